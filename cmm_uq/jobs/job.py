@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from math import inf
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, ValidationInfo, create_model, field_validator, model_validator
 
@@ -59,22 +59,15 @@ class JobFacts(Identification):
     derived_from: DerivedFrom | None = None
     """Written by the commands that make a recording out of another: of what job, by what, and hashes."""
 
-    @model_validator(mode="after")
-    def _derived(self) -> Self:
+    def problems(self) -> Iterator[str]:
+        yield from super().problems()
         if self.derived_from is not None and self.origin == MEASURED:
-            raise ValueError(
-                'derived_from says that the recording was made from another: origin must be "simulated" or "compensated"'
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _adjusted_before(self) -> Self:
+            yield 'derived_from says that the recording was made from another: origin must be "simulated" or "compensated"'
         if self.adjusted_since is not None and self.adjusted_since > self.date:
-            raise ValueError(
+            yield (
                 f"adjusted_since = {self.adjusted_since} is after the measurement of {self.date}: give the last day of an "
                 "adjustment before it"
             )
-        return self
 
 
 class SetAside(JobTable):
@@ -134,14 +127,10 @@ class ModelFacts(JobTable):
     tolerances: Annotated[dict[str, Tolerance], Field(max_length=EFFECTS.most)] = {}
     """Largest permissible size of an effect's first parameter, by the effect's name and in its unit."""
 
-    @model_validator(mode="after")
-    def _tolerances_of_effects(self) -> Self:
+    def problems(self) -> Iterator[str]:
         for name in self.tolerances:
             if name not in self.effects:
-                raise ValueError(
-                    f"tolerances names {name!r}, which is not among the effects: {suggestion(name, self.effects)}"
-                )
-        return self
+                yield f"tolerances names {name!r}, which is not among the effects: {suggestion(name, self.effects)}"
 
 
 class JobFile(JobTable):

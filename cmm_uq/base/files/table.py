@@ -9,10 +9,10 @@ The string below a field is the sentence of its key: in schemas, reference pages
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from typing import Annotated
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from cmm_uq.base.files.csv_table import column_problem
 from cmm_uq.base.files.limits import EFFECTS, LISTED
@@ -25,6 +25,16 @@ class JobTable(BaseModel):
     model_config = ConfigDict(
         strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True, use_attribute_docstrings=True
     )
+
+    @model_validator(mode="after")
+    def _without_problems(self) -> Self:
+        for problem in self.problems():
+            raise ValueError(problem)
+        return self
+
+    def problems(self) -> Iterable[str]:
+        """What keys say that do not go together; the first is told."""
+        return ()
 
 
 LONGEST_MM = 1e7

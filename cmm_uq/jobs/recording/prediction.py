@@ -9,13 +9,13 @@ passed over.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.content import text_of
@@ -32,7 +32,6 @@ KEY = "[simulation]"
 
 UNIT_MM = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "um": 1e-3, "inch": 25.4}  # of predicted coordinates and lengths
 
-_OF_A_FILE = ("length_mm", "unit", "columns")  # keys that say how a file is to be read
 NOMINAL_C = 20.0  # °C of a map that is named without its temperature
 
 
@@ -67,15 +66,14 @@ class SimulationFacts(JobTable):
             given = {"file": given, "temperature_c": NOMINAL_C}
         return [given] if isinstance(given, dict) else given
 
-    @model_validator(mode="after")
-    def _one_prediction(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if (self.file is None) == (not self.map):
-            raise ValueError('give either file = "predicted.csv", or map = "error_map.csv"')
+            yield 'give either file = "predicted.csv", or map = "error_map.csv"'
         if self.refit and not self.effects:
-            raise ValueError("refit = true says nothing of what: name the effects that the simulation contains")
-        if self.map and (given := [key for key in _OF_A_FILE if key in self.model_fields_set]):
-            raise ValueError(f"{given[0]} belongs to a file of predictions, not to a map: leave it out")
-        return self
+            yield "refit = true says nothing of what: name the effects that the simulation contains"
+        for key in ("length_mm", "unit", "columns"):
+            if self.map and key in self.model_fields_set:
+                yield f"{key} belongs to a file of predictions, not to a map: leave it out"
 
 
 LENGTH, UNCERTAINTY = "length_mm", "u_um"

@@ -1,16 +1,13 @@
 """``[artefact]``: what every kind of measurement says of its artefact, and of the certificates that results rest on.
 
-What a job says of a certificate that its results rest on: number, issuer and by what right it calibrates, and dates.
-
-The certificates of the artefact and of the short gauge are tables of theirs; thermometers stand in ``[[thermometer]]``.
-What follows from them is said in :mod:`cmm_uq.jobs.chain`.
+What follows from certificates is said in :mod:`cmm_uq.jobs.chain`.
 """
 
 from __future__ import annotations
 
 import datetime as dt
 from calendar import monthrange
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -98,20 +95,14 @@ class Traceability(JobTable):
     evidence: str = ""
     """Evidence of the issuer's competence that the laboratory holds, where no arrangement covers the calibration."""
 
-    @model_validator(mode="after")
-    def _one_end(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if self.due is not None and self.interval_months is not None:
-            raise ValueError("due and interval_months both say until when the calibration holds: give one of them")
-        return self
-
-    @model_validator(mode="after")
-    def _arranged(self) -> Self:
+            yield "due and interval_months both say until when the calibration holds: give one of them"
         if self.arrangement is not None and (self.arrangement == CIPM) != (self.issuer == NATIONAL):
-            raise ValueError(
+            yield (
                 f'arrangement = "{self.arrangement}" does not fit issuer = "{self.issuer or ""}": the CIPM MRA covers '
                 "national institutes, the others accredited laboratories"
             )
-        return self
 
     @property
     def until(self) -> dt.date | None:
@@ -187,19 +178,13 @@ class ArtefactFacts(JobTable):
     def _expanded(cls, data: Any) -> Any:
         return with_standard_uncertainty(data, columns=cls.with_references)
 
-    @model_validator(mode="after")
-    def _uncertainty_of_something(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if self.degrees_of_freedom is not None and self.u_um is None and not self.with_references:
-            raise ValueError(
-                "degrees_of_freedom is given without an uncertainty: give U_um or u_um too, or leave it out"
-            )
+            yield "degrees_of_freedom is given without an uncertainty: give U_um or u_um too, or leave it out"
         if self.u_um is not None and self.length_mm is None and not self.with_references:
-            raise ValueError("u_um is given without length_mm: give both, or neither for an uncalibrated artefact")
+            yield "u_um is given without length_mm: give both, or neither for an uncalibrated artefact"
         if abs(self.cte_per_k) > 1e-3:
-            raise ValueError(
-                f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin"
-            )
-        return self
+            yield f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin"
 
     def u_of(self, lengths_mm: Floats | float) -> Floats:
         """Standard uncertainty of certified lengths, µm, as stated for them; 0 where nothing is."""
@@ -239,9 +224,9 @@ class ReferencedFacts(ArtefactFacts):
 
     def with_largest(self, u_um: float) -> Self:
         """The same, of whose points by themselves at most this is stated: it holds for points of which nothing is."""
-        found = self.model_copy()
-        found._largest_um = u_um
-        return found
+        copy = self.model_copy()
+        copy._largest_um = u_um
+        return copy
 
     @property
     def of_other_points(self) -> Self:
@@ -251,9 +236,9 @@ class ReferencedFacts(ArtefactFacts):
 
     def with_covariances(self, numbers: Sequence[int], covariances: Sequence[Floats]) -> Self:
         """The same with covariances (f, f) µm² of its points, for the distances, or for each coordinate."""
-        found = self.model_copy()
-        found._covariances = tuple(numbers), tuple(covariances)
-        return found
+        copy = self.model_copy()
+        copy._covariances = tuple(numbers), tuple(covariances)
+        return copy
 
     def covariances_at(self, numbers: Ints) -> tuple[Ints, tuple[Floats, ...]]:
         """Which certified points those of some numbers (n,) are, and covariances (f, f) µm²; none where one is another."""
@@ -263,13 +248,10 @@ class ReferencedFacts(ArtefactFacts):
         index = np.array([places[number] for number in numbers.tolist()], dtype=np.int64)
         return index, self._covariances[1]
 
-    @model_validator(mode="after")
-    def _nominal_or_certified(self) -> Self:
+    def problems(self) -> Iterator[str]:
+        yield from super().problems()
         if self.nominal and (self.u_um is not None or self.length_mm is not None):
-            raise ValueError(
-                "nominal = true says that the recording's references are not certified: leave out length_mm and u_um"
-            )
-        return self
+            yield "nominal = true says that the recording's references are not certified: leave out length_mm and u_um"
 
     @property
     def certified(self) -> bool:

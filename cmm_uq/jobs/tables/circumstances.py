@@ -6,12 +6,12 @@ A standard's clauses as a laboratory holds them against its own copy are among t
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import JobTable, Temperature, Uncertainty
@@ -43,13 +43,11 @@ class HeldClause(JobTable):
     edition: RequiredText | None = None
     """Of which edition, where another than the form's."""
 
-    @model_validator(mode="after")
-    def _one_answer(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if (self.agrees is False) != bool(self.differs.strip()):
-            raise ValueError("give agrees = true, or agrees = false with differs = how it does")
+            yield "give agrees = true, or agrees = false with differs = how it does"
         if self.stricter and self.agrees is not False:
-            raise ValueError("stricter belongs to agrees = false")
-        return self
+            yield "stricter belongs to agrees = false"
 
 
 class ClausesForm(JobTable):
@@ -142,18 +140,16 @@ class TestUncertainty(JobTable):
     machine: MachineLines = MachineLines()
     """Lines that are declared the machine's own, by whom and why."""
 
-    @model_validator(mode="after")
-    def _stated_or_declared(self) -> Self:
+    def problems(self) -> Iterator[str]:
         for line, key in LINE_KEYS.items():
-            where = [table for table in ("negligible", "machine") if getattr(getattr(self, table), line, None)]
-            if len(where) > 1 or (where and getattr(self, key)):
-                raise ValueError(f"{line} is stated more than once: give {key}, or declare it in one table")
-        return self
+            declared = sum(bool(getattr(table, line, None)) for table in (self.negligible, self.machine))
+            if declared > 1 or (declared and getattr(self, key)):
+                yield f"{line} is stated more than once: give {key}, or declare it in one table"
 
     def declared(self, line: str) -> Declared | None:
         """By whom and why a line is declared negligible or the machine's own."""
-        found: Declared | None = getattr(self.negligible, line, None) or getattr(self.machine, line, None)
-        return found
+        declaration: Declared | None = getattr(self.negligible, line, None) or getattr(self.machine, line, None)
+        return declaration
 
     @property
     def of_artefact(self) -> bool:
@@ -188,11 +184,9 @@ class RatedConditions(JobTable):
     declared: Declared | None = None
     """By whom and why the test counts as one under rated conditions, where no rated temperature is stated."""
 
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if self.temperature_c is not None and not self.temperature_c[0] < self.temperature_c[1]:
-            raise ValueError(f"temperature_c = {self.temperature_c}: the first number must be the lower one")
-        return self
+            yield f"temperature_c = {self.temperature_c}: the first number must be the lower one"
 
 
 class ProbeFacts(JobTable):
@@ -208,15 +202,9 @@ class ProbeFacts(JobTable):
 
 @dataclass(frozen=True)
 class Circumstances:
-    """What a test must know of the job beside its recording.
+    """What a test must know of the job beside its recording; ``cte_per_k``: of the artefact, 1/K, where it is stated.
 
-    uncertainty, rated, probe : as the job states them.
-    cte_per_k : coefficient of expansion of the artefact, 1/K; ``None`` where it is not stated.
-    short_gauge : recorded beside lengths that are not bidirectional by themselves.
-    cmc : of the laboratory, below which no test value is said to be known.
-    clauses : forms of standards' clauses that the laboratory filled in, by their file.
-    set_aside : measurements that the laboratory leaves out of the estimates, each with its reason.
-    calibration_dof : degrees of freedom that the artefact's certificate states.
+    ``clauses``: forms of standards' clauses, by their file; ``set_aside``: reason by measurement that estimates leave out.
     """
 
     uncertainty: TestUncertainty = field(default_factory=TestUncertainty)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, Self
@@ -27,13 +27,11 @@ class MaximumPermissibleError(JobTable):
     b_um: Limit | None = None
     """Limit that does not grow with the length, or at which A + L/K stops growing."""
 
-    @model_validator(mode="after")
-    def _one_of_three_forms(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if (self.a_um is None) != (self.k is None):
-            raise ValueError("mpe = A + L/K needs both a_um and k")
+            yield "mpe = A + L/K needs both a_um and k"
         if self.a_um is None and self.b_um is None:
-            raise ValueError("give mpe = { a_um = …, k = … }, the same with b_um = …, or { b_um = … }")
-        return self
+            yield "give mpe = { a_um = …, k = … }, the same with b_um = …, or { b_um = … }"
 
 
 def _as_table(given: Any) -> Any:
@@ -92,11 +90,9 @@ class Prior(JobTable):
     mean_um: Annotated[float, Field(ge=-LARGEST_UM, le=LARGEST_UM)] = 0.0
     """Mean of the errors of such machines."""
 
-    @model_validator(mode="after")
-    def _one_width(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if (self.sd_um is None) == (self.share_of_limit is None):
-            raise ValueError("give either sd_um or share_of_limit: how far errors of such machines scatter")
-        return self
+            yield "give either sd_um or share_of_limit: how far errors of such machines scatter"
 
 
 RuleName = Literal[
@@ -158,20 +154,14 @@ class ConformityFacts(JobTable):
                 )
         return data
 
-    @model_validator(mode="after")
-    def _one_limit(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if (self.limit_um is None) == (self.mpe is None):
-            raise ValueError('give either limit_um, or mpe = "3 + L/300" with L in mm and the error in µm')
-        return self
-
-    @model_validator(mode="after")
-    def _prior_where_needed(self) -> Self:
+            yield 'give either limit_um, or mpe = "3 + L/300" with L in mm and the error in µm'
         if needs_prior(self.rule) and self.prior is None:
-            raise ValueError(
+            yield (
                 f"the rule {_key_of(self.rule)} goes by what is known of such machines beforehand: "
                 "give prior = { sd_um = … } or { share_of_limit = … }"
             )
-        return self
 
     @model_validator(mode="after")
     def _decided_here(self, info: ValidationInfo) -> Self:
@@ -188,12 +178,12 @@ def forms_of(
     wishes: list[ConformityFacts], inputs: Mapping[str, bytes], folder: Path, standards: Standards
 ) -> dict[str, ClausesForm]:
     """The forms that a job names, by their file."""
-    found: dict[str, ClausesForm] = {}
+    forms: dict[str, ClausesForm] = {}
     for i, wish in enumerate(wishes, 1):
         if wish.clauses is None:
             continue
         path = folder / wish.clauses
-        form = found[wish.clauses] = checked(inputs[wish.clauses], path, ClausesForm)
+        form = forms[wish.clauses] = checked(inputs[wish.clauses], path, ClausesForm)
         if form.standard != wish.standard:
             raise CmmUqError(
                 f"is the form of {form.standard}, and [[conformity]] {i} states {wish.standard}", where=str(path),
@@ -205,7 +195,7 @@ def forms_of(
             if name not in known:
                 raise CmmUqError(f"{wish.standard} has no clause {name!r} here", where=f"{path}: [clauses.{name}]",
                                  fix=suggestion(name, known))  # fmt: skip
-    return found
+    return forms
 
 
 class StandardFacts(Protocol):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import datetime as dt
 import re
-from typing import Annotated, Self
+from collections.abc import Iterator
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from cmm_uq.base.files.table import JobTable, Limit, at_least
 from cmm_uq.base.languages.translation import ENGLISH, Code
@@ -53,13 +54,9 @@ class ReplacedCertificate(JobTable):
     results: str | None = None
     """`results.json` of the certificate that is replaced, or the folder with it inside the job's, where no records have it."""
 
-    @model_validator(mode="after")
-    def _one_answer(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if self.figures_changed and self.denies_in_words:
-            raise ValueError(
-                f"figures_changed = true, and changed = {self.changed!r} says that none is: say in changed which are"
-            )
-        return self
+            yield f"figures_changed = true, and changed = {self.changed!r} says that none is: say in changed which are"
 
     @property
     def denies_in_words(self) -> bool:
@@ -117,22 +114,16 @@ class Identification(JobTable):
     language: Code = ENGLISH
     """Language of the documents: `en`, `de`, `fr` or `ja`; files for programs stay English."""
 
-    @model_validator(mode="after")
-    def _numbered_anew(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if self.replaces is not None and self.replaces.number == (self.number or self.id):
-            raise ValueError(
+            yield (
                 f"replaces.number = {self.replaces.number!r} is the number of this certificate itself: give the new one "
                 "a number of its own"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _names_a_folder(self) -> Self:
         if set(self.id) == {"."}:
-            raise ValueError("must name a folder of its own, so it cannot consist of dots")
+            yield "must name a folder of its own, so it cannot consist of dots"
         if device_name(self.id):
-            raise ValueError("must name a folder of its own, and Windows takes this name for a device")
-        return self
+            yield "must name a folder of its own, and Windows takes this name for a device"
 
 
 _LENGTHS = {"mm": 1e-3, "µm": 1.0}  # units of lengths, and how many of each a micrometre is

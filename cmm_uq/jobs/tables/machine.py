@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import datetime as dt
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED, MAPS
 from cmm_uq.base.files.table import Column, JobTable, Number, Range, Temperature, Triple, at_least
@@ -28,17 +29,15 @@ class Recalibration(JobTable):
     longest_months: Months | None = None
     """Longest interval that a method, or with a fixed one interim checks in control, may come to."""
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def problems(self) -> Iterator[str]:
         longest = self.longest_months
         if longest is not None and not self.shortest_months <= self.every_months <= longest:
-            raise ValueError(
+            yield (
                 f"every_months = {self.every_months} lies outside {self.shortest_months} to {longest} months: "
                 "give shortest_months ≤ every_months ≤ longest_months"
             )
         if self.method == "fixed" and self.reliability is not None:
-            raise ValueError("a fixed interval knows no reliability: leave it out, or name another method")
-        return self
+            yield "a fixed interval knows no reliability: leave it out, or name another method"
 
 
 HOTTEST_C = 100.0  # °C at which a machine may be mapped: far beyond any, and far below any temperature in kelvin
@@ -61,15 +60,13 @@ class Travel(JobTable):
     z: Range | None = None
     """Lowest and highest scale reading of z."""
 
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
+    def problems(self) -> Iterator[str]:
         for axis in "xyz":
-            given = getattr(self, axis)
-            if given and not given[0] < given[1]:
-                raise ValueError(f"{axis} = {given}: the first number must be the lower one")
-            if given and given[1] - given[0] < SHORTEST_TRAVEL_MM:
-                raise ValueError(f"{axis} = {given}: a travel of less than {SHORTEST_TRAVEL_MM:g} mm is none")
-        return self
+            travel = getattr(self, axis)
+            if travel and not travel[0] < travel[1]:
+                yield f"{axis} = {travel}: the first number must be the lower one"
+            if travel and travel[1] - travel[0] < SHORTEST_TRAVEL_MM:
+                yield f"{axis} = {travel}: a travel of less than {SHORTEST_TRAVEL_MM:g} mm is none"
 
 
 class SquarenessFacts(JobTable):
@@ -158,21 +155,15 @@ class DigitizerFacts(JobTable):
     calibration: Annotated[str, Field(min_length=1)] | None = None
     """In place of both: `results.json` of the digitizer's calibration, or the folder with it, inside the job's."""
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if (self.offset_mm is None) == (self.calibration is None):
-            raise ValueError('give either offset_mm = [U1, V1, W1] with poses, or calibration = "FOLDER"')
+            yield 'give either offset_mm = [U1, V1, W1] with poses, or calibration = "FOLDER"'
         if self.offset_mm is not None and not self.poses:
-            raise ValueError("offset_mm is given without poses: give the Euler angles of each")
-        return self
-
-    @model_validator(mode="after")
-    def _poses_once(self) -> Self:
-        numbers = [given.pose for given in self.poses]
-        twice = next((number for number in numbers if numbers.count(number) > 1), None)
-        if twice is not None:
-            raise ValueError(f"pose {twice} is there twice: number each pose as the cloud does")
-        return self
+            yield "offset_mm is given without poses: give the Euler angles of each"
+        numbers = [pose.pose for pose in self.poses]
+        for number in numbers:
+            if numbers.count(number) > 1:
+                yield f"pose {number} is there twice: number each pose as the cloud does"
 
 
 def check_carriages(chain: str) -> None:
@@ -213,16 +204,7 @@ class MachineFacts(JobTable):
     calibrate: Recalibration | None = None
     """When the machine is to be calibrated again, for `cmm-uq due`."""
 
-    @model_validator(mode="after")
-    def _squareness_once(self) -> Self:
-        twice = [given.file for given in self.error_map if given.squareness_arcsec is not None]
-        if self.squareness_arcsec is not None and twice:
-            raise ValueError(
-                f"squareness_arcsec is given for the machine and for the map {twice[0]!r}: leave out one of the two"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _three_carriages(self) -> Self:
+    def problems(self) -> Iterator[str]:
+        for file in [each.file for each in self.error_map if each.squareness_arcsec and self.squareness_arcsec]:
+            yield f"squareness_arcsec is given for the machine and for the map {file!r}: leave out one of the two"
         check_carriages(self.chain)
-        return self

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import hypot
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED
 from cmm_uq.base.files.table import AnyFloat, Column, Duration, JobTable, Length, Names, Range, Uncertainty, at_least
@@ -28,15 +29,13 @@ class FixtureFacts(JobTable):
     heights_mm: Range | None = None
     """Lowest and highest z reading of the artefact's middle."""
 
-    @model_validator(mode="after")
-    def _possible(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if any(not any(direction) for direction in self.directions):
-            raise ValueError("directions: [0, 0, 0] points nowhere")
+            yield "directions: [0, 0, 0] points nowhere"
         if any(hypot(*direction) < _SHORTEST for direction in self.directions):
-            raise ValueError(f"directions: one is shorter than {_SHORTEST:g}")
+            yield f"directions: one is shorter than {_SHORTEST:g}"
         if self.heights_mm is not None and not self.heights_mm[0] <= self.heights_mm[1]:
-            raise ValueError(f"heights_mm = {self.heights_mm}: the first number must be the lower one")
-        return self
+            yield f"heights_mm = {self.heights_mm}: the first number must be the lower one"
 
 
 class PlanFacts(JobTable):
@@ -95,20 +94,16 @@ class PlanFacts(JobTable):
     budget_min: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
     """Time that there is, min; unlimited by default."""
 
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    def problems(self) -> Iterator[str]:
         for axis, (low, high) in self.volume_mm.items():
             if not low < high:
-                raise ValueError(f"volume_mm: {axis} = [{low:g}, {high:g}]: the first number must be the lower one")
+                yield f"volume_mm: {axis} = [{low:g}, {high:g}]: the first number must be the lower one"
         if self.number is not None and self.more is not None:
-            raise ValueError("number and more are both given: a plan of so many, or so many beside what there is")
+            yield "number and more are both given: a plan of so many, or so many beside what there is"
         if self.noise_from is not None and (self.placing_um is not None or self.growth_um is not None):
-            raise ValueError(
-                "noise_from and placing_um or growth_um are both given: name the recording, or state the sizes"
-            )
+            yield "noise_from and placing_um or growth_um are both given: name the recording, or state the sizes"
         if self.criterion is None and (self.number is not None or self.more is not None):
-            raise ValueError('number and more need a criterion: criterion = "separation", "D", "A" or "worst"')
-        return self
+            yield 'number and more need a criterion: criterion = "separation", "D", "A" or "worst"'
 
 
 class DeclaredSource(JobTable):
@@ -174,9 +169,7 @@ class ProveFacts(JobTable):
     found_pct: Percent | None = None
     """Least percentage of hidden effects that are found, of all strengths that are drawn."""
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def problems(self) -> Iterator[str]:
         low, high = self.coverage_pct
         if not low < high:
-            raise ValueError(f"coverage_pct = [{low:g}, {high:g}]: the first number must be the lower one")
-        return self
+            yield f"coverage_pct = [{low:g}, {high:g}]: the first number must be the lower one"
