@@ -49,7 +49,11 @@ def restore(file: Path, place: str | Path) -> tuple[int, str]:
     """Make records of a backup; records that are there are kept beside them; number and hash of the last entry."""
     head = _checked(file)
     if is_url(place):
-        _to_server(file, str(place))
+        with open_records(place, create=True) as server, open_records(file, read_only=True) as source:
+            if server.head()[0]:
+                raise CmmUqError("holds entries already", where=shown(place), fix="Restore into an empty database")
+            with server.writing() as writing:
+                writing.copy(source.entries())
         return head
     target = Path(place)
     if target.is_dir():
@@ -102,14 +106,6 @@ def _copied(records: Records, path: Path) -> None:
         writing.copy(Entry(*row) for row in rows)
     with _raw(path) as raw:
         raw.execute("PRAGMA journal_mode = DELETE")
-
-
-def _to_server(file: Path, url: str) -> None:
-    with open_records(url, create=True) as target, open_records(file, read_only=True) as source:
-        if target.head()[0]:
-            raise CmmUqError("holds entries already", where=shown(url), fix="Restore into an empty database")
-        with target.writing() as writing:
-            writing.copy(source.entries())
 
 
 @contextlib.contextmanager

@@ -41,6 +41,8 @@ def certificate_content(
     """Content of the entry of a report or a diagnosis; ``facts`` is ``None`` where only results.json is left."""
     try:
         job, verdicts = data["job"], Verdicts.of_results(data)
+        # keys of what ISO/IEC 17025:2017, 7.8 asks for and the certificate does not state
+        missing = [str(one["key"]) for one in data.get("iso17025") or () if one["status"] == "missing"]
         return {
             "command": command, "job": str(job["id"]), "origin": str(job["origin"]), "day": str(job["date"]),
             **(_of_job(facts) if facts else _of_results(job)),
@@ -48,7 +50,7 @@ def certificate_content(
             "diagnosis": str((data.get("diagnosis") or {}).get("verdict") or ""),
             "version": str((data.get("software") or {}).get("version") or ""), "folder": folder,
             "results_sha256": results_sha256, "files": dict(files), "inputs": dict(job.get("inputs_sha256") or {}),
-            "values": values(data, named), "covariance": covariance(data), **_unstated(data),
+            "values": values(data, named), "covariance": covariance(data), **({"missing": missing} if missing else {}),
         }  # fmt: skip
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise CmmUqError(f"is no results.json of a job: {error!r}", where=folder) from error
@@ -64,13 +66,12 @@ def values(data: Mapping[str, Any], named: Named) -> list[list[Any]]:
     common = _of_the_artefact(data)
     units = dict(zip(*((data.get("covariance") or {}).get(key) or () for key in ("parameters", "units")), strict=False))
     tolerances = data.get("tolerances") or {}
-    found = []
+    found: list[list[Any]] = []
     for name, quantity in _quantities(data):
         owner, _, own = name.partition(".")
-        unit = units.get(name) or unit_of(own)
         limit = (tolerances.get(owner) or {}).get(own)
-        found.append(_row(name, named(name), unit, quantity, common.get(name, 0.0), limit))
-    return [*(row for row in found if row is not None), *_performances(data)]
+        found += _row(name, named(name), units.get(name) or unit_of(own), quantity, common.get(name, 0.0), limit)
+    return [*found, *_performances(data)]
 
 
 def covariance(data: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -81,12 +82,6 @@ def covariance(data: Mapping[str, Any]) -> dict[str, Any] | None:
     if not lower or not all(_finite(element) for element in lower):
         return None
     return {"names": list(given["parameters"]), "lower": lower}
-
-
-def _unstated(data: Mapping[str, Any]) -> dict[str, list[str]]:
-    """Keys of what ISO/IEC 17025:2017, 7.8 asks for and the certificate does not state, where there are any."""
-    missing = [str(one["key"]) for one in data.get("iso17025") or () if one["status"] == "missing"]
-    return {"missing": missing} if missing else {}
 
 
 def unit_of(name: str) -> str:
@@ -115,16 +110,10 @@ def _of_job(facts: JobFile) -> dict[str, Any]:
 
 
 def _of_results(job: Mapping[str, Any]) -> dict[str, Any]:
-    machine = {
-        "serial": str(job.get("serial") or ""),
-        "name": str(job["machine"]),
-        "manufacturer": "",
-        "model": "",
-        "place": "",
-    }
+    machine = {"serial": str(job.get("serial") or ""), "name": str(job["machine"])}
     return {
-        "number": str(job["id"]), "machine": machine, "artefact": {}, "kind": "", "adjusted_since": None, "interim": False,
-        "operator": "", "four_eyes": False,
+        "number": str(job["id"]), "machine": {**machine, "manufacturer": "", "model": "", "place": ""},
+        "artefact": {}, "kind": "", "adjusted_since": None, "interim": False, "operator": "", "four_eyes": False,
     }  # fmt: skip
 
 
@@ -141,25 +130,16 @@ def _quantities(data: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any
 
 def _row(
     name: str, quantity: str, unit: str, stated: Mapping[str, Any], common: float, limit: float | None
-) -> list[Any] | None:
-    """``None`` where there is no estimate: what the recording does not determine has no value."""
+) -> list[list[Any]]:
+    """None where there is no estimate: what the recording does not determine has no value."""
     if not all(_finite(stated.get(key)) for key in ("value", "u")):
-        return None
+        return []
     value, u = float(stated["value"]), float(stated["u"])
     interval = stated.get("interval95")
     ends = interval if isinstance(interval, Sequence) and len(interval) == 2 and all(map(_finite, interval)) else None
     lower, upper = ends or (value - 2 * u, value + 2 * u)
-    return [
-        name,
-        quantity,
-        unit,
-        value,
-        u,
-        float(lower),
-        float(upper),
-        min(common, u),
-        None if limit is None else float(limit),
-    ]
+    at_most = None if limit is None else float(limit)
+    return [[name, quantity, unit, value, u, float(lower), float(upper), min(common, u), at_most]]
 
 
 def _performances(data: Mapping[str, Any]) -> Iterator[list[Any]]:
@@ -175,16 +155,10 @@ def _performances(data: Mapping[str, Any]) -> Iterator[list[Any]]:
         taken.add(name)
         worst = {"value": value, "u": u, "interval95": (value - 2 * u, value + 2 * u)}
         said = f"{title}: {statement.get('quantity') or ''}".rstrip(": ")
-        row = _row(name, said, "µm", worst, _certified_part(statement), limit if _finite(limit) else None)
-        if row is not None:
-            yield row
-
-
-def _certified_part(statement: Mapping[str, Any]) -> float:
-    """What the artefact's certificate contributes to the u of a test value, by its budget."""
-    rows = (statement.get("test_uncertainty") or {}).get("budget") or ()
-    parts = [row.get("contribution") for row in rows if row.get("source") == "certificate"]
-    return math.hypot(*(float(part) for part in parts if _finite(part)))
+        budget = (statement.get("test_uncertainty") or {}).get("budget") or ()
+        parts = [row.get("contribution") for row in budget if row.get("source") == "certificate"]
+        certified = math.hypot(*(float(part) for part in parts if _finite(part)))
+        yield from _row(name, said, "µm", worst, certified, limit if _finite(limit) else None)
 
 
 def _of_the_artefact(data: Mapping[str, Any]) -> dict[str, float]:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from sqlalchemy import Connection, Table, func, insert, select, update
+from sqlalchemy import ColumnElement, Connection, Table, func, insert, select, update
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.records.entries import CERTIFIED, Entry
@@ -33,8 +33,7 @@ class Indexer:
     def __init__(self, connection: Connection) -> None:
         self.connection = connection
         self._rows: dict[Table, list[Row]] = {table: [] for table in INDEX}
-        self._machines: dict[str, Row] = {}
-        self._artefacts: dict[str, Row] = {}
+        self._recognised: dict[Table, dict[str, Row]] = {machines: {}, artefacts: {}}
         self._quantities: dict[tuple[str, str, str], int] = {}
         self._certificates: dict[int, Row] = {}
         self._counts: dict[Table, int] = {}
@@ -99,7 +98,7 @@ class Indexer:
 
     def _machine(self, facts: Mapping[str, Any], day: str, entry: int) -> Row:
         key = machine_key(facts)
-        row = self._known(machines, self._machines, key)
+        row = self._known(machines, key)
         said = {name: called(facts, name) for name in ("name", "manufacturer", "model", "place")}
         said["named"] = spelled(said["name"])
         rule = json.dumps(facts["calibrate"], sort_keys=True) if facts.get("calibrate") else None
@@ -109,25 +108,22 @@ class Indexer:
                 "spelled": spelled(called(facts, "serial", "name")), **said, "calibrate": rule, "day": day,
                 "entry": entry,
             }  # fmt: skip
-            self._machines[key] = row
-            self._rows[machines].append(row)
+            self._add(machines, key, row)
         elif day >= row["day"]:
             changed: Row = {name: value for name, value in said.items() if value and value != row[name]}
             if "calibrate" in facts and rule != row["calibrate"]:
                 changed["calibrate"] = rule
-            self._change(machines, row, {**changed, "day": day, "entry": entry} if changed else {})
+            self._change(machines, row, changed, day, entry)
         return row
 
     def _name_of(self, facts: Mapping[str, Any]) -> str:
         """As it is asked for: its serial, and where another has the same, what tells them apart behind it."""
         name = called(facts, "serial", "name") or "unnamed"
-        others = {row["called"] for row in self._machines.values()}
-        taken = select(machines.c.called)
-        candidates = [name, f"{name} ({called(facts, 'manufacturer', 'name') or 'other'})"]
-        candidates += [f"{name} ({i})" for i in range(2, 100)]
-        for candidate in candidates:
-            there = candidate in others
-            if not there and not self.connection.execute(taken.where(machines.c.called == candidate)).first():
+        others = {row["called"] for row in self._recognised[machines].values()}
+        further = (called(facts, "manufacturer", "name") or "other", *range(2, 100))
+        for candidate in (name, *(f"{name} ({end})" for end in further)):
+            there = select(machines.c.called).where(machines.c.called == candidate)
+            if candidate not in others and not self.connection.execute(there).first():
                 return candidate
         raise ValueError(name)
 
@@ -135,18 +131,17 @@ class Indexer:
         key = artefact_key(facts)
         if not key:
             return None
-        row = self._known(artefacts, self._artefacts, key)
+        row = self._known(artefacts, key)
         said: Row = {name: called(facts, name) for name in ("certificate", "laboratory")}
         said |= {name: facts.get(name) or None for name in ("calibrated", "due")}
         said["kind"] = kind
         if row is None:
             name = called(facts, "serial", "certificate", "name")
             row = {"id": self._next(artefacts), "recognised": key, "called": name, **said, "day": day, "entry": entry}
-            self._artefacts[key] = row
-            self._rows[artefacts].append(row)
+            self._add(artefacts, key, row)
         elif day >= row["day"]:
             changed = {name: value for name, value in said.items() if value != row[name]}
-            self._change(artefacts, row, {**changed, "day": day, "entry": entry} if changed else {})
+            self._change(artefacts, row, changed, day, entry)
         return int(row["id"])
 
     def _adjustment(self, machine: int, day: str, entry: int) -> None:
@@ -158,17 +153,15 @@ class Indexer:
 
     def _signature(self, entry: Entry, data: Mapping[str, Any]) -> None:
         number = int(data["certificate"])
-        row = self._certificates.get(number)
+        row = self._certificates.get(number) or self._stored(certificates, certificates.c.entry == number)
         if row is None:
-            found = (
-                self.connection.execute(select(certificates).where(certificates.c.entry == number)).mappings().first()
-            )
-            if found is None:
-                raise ValueError(f"certificate {number}")
-            row = dict(found)
+            raise ValueError(f"certificate {number}")
+        # why, and what was said of a certificate that states no pass
+        despite = f"{data['outcome']}: {data['despite']}" if data.get("despite") else ""
         self._rows[signatures].append({
             "entry": entry.number, "certificate": number, "what": entry.kind, "by": data["by"],
-            "reason": _reason(data), "at": entry.at, "replaced_by": data.get("replaced_by"),
+            "reason": "; ".join(filter(None, (data.get("reason"), despite))), "at": entry.at,
+            "replaced_by": data.get("replaced_by"),
         })  # fmt: skip
         state = STATE_AFTER.get(entry.kind, "released" if data.get("complete", True) else row["state"])
         if state == "released" and row["state"] not in STANDING:
@@ -185,32 +178,33 @@ class Indexer:
             number = self.connection.execute(there).scalar()
             if number is None:
                 number = self._next(quantities)
-                self._rows[quantities].append(
-                    dict(zip(("id", "name", "quantity", "unit"), (number, *key), strict=True))
-                )
+                self._rows[quantities].append(dict(zip(quantities.c.keys(), (number, *key), strict=True)))
             self._quantities[key] = number
         return self._quantities[key]
 
-    def _known(self, table: Table, cache: dict[str, Row], key: str) -> Row | None:
-        if key not in cache:
-            found = self.connection.execute(select(table).where(table.c.recognised == key)).mappings().first()
-            if found is None:
-                return None
-            cache[key] = dict(found)
-        return cache[key]
+    def _stored(self, table: Table, where: ColumnElement[bool]) -> Row | None:
+        found = self.connection.execute(select(table).where(where)).mappings().first()
+        return None if found is None else dict(found)
 
-    def _change(self, table: Table, row: Row, changed: Row) -> None:
-        """Change a row, be it written already or not."""
-        if not changed:
-            return
-        row.update(changed)
-        if not self._waits(table, row):
-            self.connection.execute(update(table).where(table.c.id == row["id"]).values(**changed))
+    def _known(self, table: Table, key: str) -> Row | None:
+        """The row that is recognised by a key, the very object where it is still to be written."""
+        cache = self._recognised[table]
+        if key not in cache and (row := self._stored(table, table.c.recognised == key)) is not None:
+            cache[key] = row
+        return cache.get(key)
 
-    def _waits(self, table: Table, row: Row) -> bool:
-        """Whether a row, the very object, is still to be written: rows are numbered as they come."""
-        first = self._rows[table][0]["id"] if self._rows[table] else None
-        return first is not None and row["id"] >= first
+    def _add(self, table: Table, key: str, row: Row) -> None:
+        self._recognised[table][key] = row
+        self._rows[table].append(row)
+
+    def _change(self, table: Table, row: Row, changed: Row, day: str, entry: int) -> None:
+        """Change a row, be it written already or not: rows are numbered as they come."""
+        if changed:
+            changed = {**changed, "day": day, "entry": entry}
+            row.update(changed)
+            waiting = self._rows[table]
+            if not waiting or row["id"] < waiting[0]["id"]:
+                self.connection.execute(update(table).where(table.c.id == row["id"]).values(**changed))
 
     def _next(self, table: Table) -> int:
         if table not in self._counts:
@@ -225,9 +219,3 @@ def index(connection: Connection, entries: Iterable[Entry]) -> None:
     for entry in entries:
         indexer.add(entry)
     indexer.flush()
-
-
-def _reason(data: Mapping[str, Any]) -> str:
-    """Why something was signed, and what was said of a certificate that states no pass."""
-    despite = f"{data['outcome']}: {data['despite']}" if data.get("despite") else ""
-    return "; ".join(filter(None, (data.get("reason"), despite)))

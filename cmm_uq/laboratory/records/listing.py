@@ -119,24 +119,9 @@ def chosen(
 
 
 def _listed(row: Any) -> ListedCertificate:
-    entry, job, number, machine, name, artefact, kind, origin, day, state, decision, verdict, interim, command = row
+    *facts, day, state, decision, verdict, interim, command = row
     date = dt.date.fromisoformat(day)
-    return ListedCertificate(
-        entry,
-        job,
-        number,
-        machine,
-        name,
-        artefact,
-        kind,
-        origin,
-        date,
-        state,
-        decision,
-        verdict,
-        bool(interim),
-        command,
-    )
+    return ListedCertificate._make((*facts, date, state, decision, verdict, bool(interim), command))
 
 
 def _conditions(connection: Connection, choice: CertificateFilter) -> list[ColumnElement[bool]]:
@@ -155,19 +140,17 @@ def _conditions(connection: Connection, choice: CertificateFilter) -> list[Colum
         found.append(_C.day >= choice.since.isoformat())
     if choice.until is not None:
         found.append(_C.day <= choice.until.isoformat())
-    return [*found, *_with_text(connection, choice.text)]
+    return [*found, _with_text(connection, choice.text)] if choice.text else found
 
 
-def _with_text(connection: Connection, text: str) -> list[ColumnElement[bool]]:
+def _with_text(connection: Connection, text: str) -> ColumnElement[bool]:
     """A text in the job's id or the certificate's number, or in the machine's serial or name however they are spelled."""
-    if not text:
-        return []
     key = spelled(text)
     of_machine = or_(*(column.contains(key, autoescape=True) for column in (machines.c.spelled, machines.c.named)))
     escaped = "".join(f"/{c}" if c in "%_/" else c for c in text)
     sqlite = connection.dialect.name == "sqlite"  # whose LIKE takes capitals for small letters, and its lower() is slow
     named = ((column.like if sqlite else column.ilike)(f"%{escaped}%", escape="/") for column in (_C.job, _C.number))
-    return [or_(*named, _C.machine.in_(select(machines.c.id).where(of_machine)))]
+    return or_(*named, _C.machine.in_(select(machines.c.id).where(of_machine)))
 
 
 class CourseValue(NamedTuple):
@@ -213,36 +196,29 @@ def courses(records: Records, machine: RecordedMachine, most: int) -> list[Cours
         rows = connection.execute(query).all()
     for row in rows:
         course = found.setdefault((row.name, row.unit), Course(row.name, row.quantity, row.unit, []))
-        course.stated.append(
-            CourseValue(
-                row.entry, dt.date.fromisoformat(row.day), row.value, row.lower, row.upper, row.at_most, bool(row.interim),
-                adjusted_before(row.adjusted_since, row.day, adjusted),
-            )
-        )  # fmt: skip
-    for course in found.values():
-        course.stated.reverse()
+        since = adjusted_before(row.adjusted_since, row.day, adjusted)
+        day, interim = dt.date.fromisoformat(row.day), bool(row.interim)
+        stated = CourseValue(row.entry, day, row.value, row.lower, row.upper, row.at_most, interim, since)
+        course.stated.insert(0, stated)
     return list(found.values())
 
 
-def _outcomes(verdicts: Verdicts) -> dict[str, str]:
-    """What is stated of each value, by the name that the records gives it; the gravest, where several are."""
-    found: dict[str, str] = {}
-    for one in verdicts:
-        name = PERFORMANCE + (one.name or one.by) if one.by else one.name
-        if one.by and name in found:
-            name = f"{name} ({one.by})"
-        found[name] = gravest((one.outcome, found.get(name, one.outcome)))
-    return found
-
-
 def outcomes_of(records: Records, numbers: Collection[int]) -> dict[int, dict[str, str]]:
-    """What certificates state of each of their values, by entry; nothing of entries of versions that did not keep it."""
-    found = {}
+    """What certificates state of each of their values, by entry; nothing of entries of versions that did not keep it.
+
+    Values have the names that the records give them; where several statements are of one, the gravest counts.
+    """
+    found: dict[int, dict[str, str]] = {}
     with records.reading() as connection:
         for block in blocks(sorted(numbers)):
             query = select(entries.c.number, entries.c.content).where(entries.c.number.in_(block))
             for number, content in connection.execute(query):
-                found[int(number)] = _outcomes(Verdicts.of_results(json.loads(content)))
+                outcomes = found[int(number)] = {}
+                for one in Verdicts.of_results(json.loads(content)):
+                    name = PERFORMANCE + (one.name or one.by) if one.by else one.name
+                    if one.by and name in outcomes:
+                        name = f"{name} ({one.by})"
+                    outcomes[name] = gravest((one.outcome, outcomes.get(name, one.outcome)))
     return found
 
 

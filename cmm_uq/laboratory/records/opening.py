@@ -76,18 +76,20 @@ def _file(path: Path, create: bool, read_only: bool) -> Engine:
     _check_file(path, create)
     mode = "ro" if read_only else "rwc" if create else "rw"
     if read_only and not os.access(path.parent, os.W_OK):
-        mode = (
-            "ro&immutable=1"  # without its -shm file a database in WAL mode can only be read as one that nobody writes
-        )
+        # without its -shm file a database in WAL mode can only be read as one that nobody writes
+        mode = "ro&immutable=1"
     uri = f"{path.absolute().as_uri()}?mode={mode}"
 
     def connect() -> sqlite3.Connection:
         made = sqlite3.connect(uri, uri=True, timeout=PATIENCE_S, isolation_level=None, check_same_thread=False)
         with contextlib.suppress(sqlite3.Error):  # what is wrong with the file is told when it is first read
-            made.execute("PRAGMA foreign_keys = ON")
-            made.execute("PRAGMA synchronous = FULL")
-            made.execute("PRAGMA recursive_triggers = ON")
-            made.execute("PRAGMA cache_size = -65536")  # KiB: pages of the indexes of 10⁵ certificates
+            for setting in (
+                "foreign_keys = ON",
+                "synchronous = FULL",
+                "recursive_triggers = ON",
+                "cache_size = -65536",
+            ):
+                made.execute(f"PRAGMA {setting}")  # the cache in KiB: pages of the indexes of 10⁵ certificates
         return made
 
     engine = create_engine("sqlite://", creator=connect, poolclass=QueuePool)

@@ -60,31 +60,23 @@ def told(place: str | Path) -> Iterator[None]:
         raise _in_words(str(error), shown(place)) from error
 
 
+_MEND, _RESTORE = "Mend the permissions of the file and its folder", "Restore a backup: cmm-uq records restore FILE"
+_NO_SERVER = "the server of the records cannot be reached"
 _WORDS: tuple[tuple[str, str, str, type[CmmUqError]], ...] = (
     ("database is locked", "another program keeps the records locked", "Wait until it is done, or end it", OutputError),
-    ("readonly", "the records cannot be written to", "Mend the permissions of the file and its folder", OutputError),
+    ("readonly", "the records cannot be written to", _MEND, OutputError),
     ("read-only transaction", "the records were opened to be read only", "Name others with --records", OutputError),
     ("disk is full", "the disk of the records is full", "Free it; nothing was recorded", OutputError),
     ("disk I/O error", "the disk of the records fails", "Free or mend it; nothing was recorded", OutputError),
-    ("unable to open", "cannot be opened", "Mend the permissions of the file and its folder", OutputError),
-    (
-        "connection failed",
-        "the server of the records cannot be reached",
-        "Start it, or mend host and port",
-        OutputError,
-    ),
-    ("connection to server", "the server of the records cannot be reached", "Start it, or mend the URL", OutputError),
+    ("unable to open", "cannot be opened", _MEND, OutputError),
+    ("connection failed", _NO_SERVER, "Start it, or mend host and port", OutputError),
+    ("connection to server", _NO_SERVER, "Start it, or mend the URL", OutputError),
     ("password", "the server of the records refuses the login", "Mend user and password", OutputError),
     ("not a database", "is no database", "Name the file of the records, or restore a backup", CmmUqError),
-    (
-        "decode to UTF-8",
-        "a text in the records is none any more",
-        "Restore a backup: cmm-uq records restore FILE",
-        CmmUqError,
-    ),
-    ("malformed", "the file of the records is damaged", "Restore a backup: cmm-uq records restore FILE", CmmUqError),
+    ("decode to UTF-8", "a text in the records is none any more", _RESTORE, CmmUqError),
+    ("malformed", "the file of the records is damaged", _RESTORE, CmmUqError),
     ("never changed", "entries are never changed", "Record what is right as a new entry", CmmUqError),
-    ("no such table", "tables of the records are missing", "Restore a backup: cmm-uq records restore FILE", CmmUqError),
+    ("no such table", "tables of the records are missing", _RESTORE, CmmUqError),
 )
 
 

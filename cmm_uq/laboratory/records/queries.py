@@ -8,11 +8,11 @@ import json
 import os
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sqlalchemy import Connection, Engine, Select, and_, func, or_, select
+from sqlalchemy import ColumnElement, Connection, Engine, Select, func, or_, select
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.laboratory.records.facts import (
@@ -47,7 +47,11 @@ _CALLED = func.coalesce(artefacts.c.called, "")
 _CERTIFICATES = select(
     certificates, machines.c.called.label("machine_called"), _CALLED.label("artefact_called")
 ).select_from(certificates.join(machines).outerjoin(artefacts, artefacts.c.id == _C.artefact))
-_MEASURED = (_C.command == "report", _C.origin == "measured", _C.state.in_(STANDING))
+
+
+def _measured(c: Any, origin: str = "measured") -> tuple[ColumnElement[bool], ...]:
+    """Reports of an origin that stand."""
+    return c.command == "report", c.origin == origin, c.state.in_(STANDING)
 
 
 class RecordQueries:
@@ -100,16 +104,17 @@ class RecordQueries:
 
         ``since``: first day; ``limit, offset``: at most so many, the newest, and newest that are left out, for pages.
         """
-        where = [
-            column == v for column, v in ((_C.command, command), (_C.origin, origin), (_C.job, job)) if v is not None
-        ]
+        wanted = ((_C.command, command), (_C.origin, origin), (_C.job, job))
+        where = [column == value for column, value in wanted if value is not None]
         with self.reading() as connection:
             if machine is not None:
                 where.append(_C.machine == _machine_id(connection, machine))
             if states is not None:
                 where.append(_C.state.in_(tuple(states)))
             if artefact is not None:
-                where.append(_C.artefact.in_(_artefact_ids(connection, artefact)))
+                key, a = spelled(artefact), artefacts.c
+                way = or_(a.called == artefact, a.recognised.in_((key, f"certificate:{key}")))
+                where.append(_C.artefact.in_(tuple(connection.execute(select(a.id).where(way)).scalars())))
             if since is not None:
                 where.append(_C.day >= since.isoformat())
             query = _CERTIFICATES.where(*where).order_by(_C.day.desc(), _C.entry.desc())
@@ -148,7 +153,7 @@ class RecordQueries:
     def checks(self) -> list[RecordedCertificate]:
         """Measured interim checks of all machines, neither withdrawn nor replaced, by day, then entry."""
         with self.reading() as connection:
-            query = _CERTIFICATES.where(*_MEASURED, _C.interim.is_(True)).order_by(_C.day, _C.entry)
+            query = _CERTIFICATES.where(*_measured(_C), _C.interim.is_(True)).order_by(_C.day, _C.entry)
             return self._certificates(connection, query)
 
     def limited(self, entries: Sequence[int]) -> set[int]:
@@ -163,7 +168,7 @@ class RecordQueries:
     def dated_after(self, day: dt.date) -> dict[str, dt.date]:
         """Machines with measured certificates or interim checks dated after a day, and the last such date of each."""
         query = select(machines.c.called, func.max(_C.day)).select_from(certificates.join(machines))
-        query = query.where(*_MEASURED, _C.day > day.isoformat()).group_by(machines.c.called)
+        query = query.where(*_measured(_C), _C.day > day.isoformat()).group_by(machines.c.called)
         with self.reading() as connection:
             return {row[0]: dt.date.fromisoformat(row[1]) for row in connection.execute(query)}
 
@@ -173,10 +178,8 @@ class RecordQueries:
         with self.reading() as connection:
             rows = connection.execute(query).all()
         moment = dt.datetime.fromisoformat
-        return [
-            ReleaseSignature(row.entry, row.certificate, row.what, row.by, row.reason, moment(row.at), row.replaced_by)
-            for row in rows
-        ]
+        return [ReleaseSignature(entry, of, what, by, reason, moment(at), replaced_by)
+                for entry, of, what, by, reason, at, replaced_by in rows]  # fmt: skip
 
     def has_results(self, results_sha256: str) -> int | None:
         """Number of the entry that recorded these very results; ``None`` where none did."""
@@ -216,16 +219,14 @@ class RecordQueries:
             adjusted = _adjusted(connection, set(known))
         ordinal = {day: dt.date.fromisoformat(day).toordinal() for day in {row.day for row in rows}}
         since = [adjusted_before(row.adjusted_since, row.day, adjusted[row.machine]) for row in rows]
-        columns = {
-            "machine": [known[row.machine].called for row in rows],
-            "model": [known[row.machine].model for row in rows],
-            "place": [known[row.machine].place for row in rows],
-            "day": [ordinal[row.day] for row in rows],
-        }
-        for name in ("name", "value", "u", "u_artefact", "artefact", "limit", "entry"):
-            columns[name] = [getattr(row, name) for row in rows]
-        columns["adjusted_since"] = [day.toordinal() if day else 0 for day in since]
-        frame = pd.DataFrame({**columns, "interim": [bool(row.interim) for row in rows]})
+        stated = ("name", "value", "u", "u_artefact", "artefact", "limit", "entry")
+        frame = pd.DataFrame({
+            "machine": [known[row.machine].called for row in rows], "model": [known[row.machine].model for row in rows],
+            "place": [known[row.machine].place for row in rows], "day": [ordinal[row.day] for row in rows],
+            **{name: [getattr(row, name) for row in rows] for name in stated},
+            "adjusted_since": [day.toordinal() if day else 0 for day in since],
+            "interim": [bool(row.interim) for row in rows],
+        })  # fmt: skip
         frame["limit"] = frame["limit"].astype(float)
         return frame.sort_values(["machine", "name", "day", "entry"], kind="stable", ignore_index=True)
 
@@ -237,12 +238,14 @@ class RecordQueries:
         stated = _values(connection, entries) if values else {}
         together = _covariances(connection, entries) if values else {}
         adjusted = _adjusted(connection, {row.machine for row in rows})
-        base, day_of, moment_of = _folder(self.home), dt.date.fromisoformat, dt.datetime.fromisoformat
+        before = "" if self.home is None else f"{self.home}{os.sep}"
+        day_of, moment_of = dt.date.fromisoformat, dt.datetime.fromisoformat
         return [
             RecordedCertificate(
                 entry, job, machine_called, artefact_called, kind, origin, day_of(day), moment_of(at),
-                adjusted_before(since, day, adjusted[machine]), state, decision, diagnosis, bool(interim), base(folder),
-                version, results, number, command, _day(due), tuple(stated.get(entry, ())), together.get(entry),
+                adjusted_before(since, day, adjusted[machine]), state, decision, diagnosis, bool(interim),
+                _opened(before, folder), version, results, number, command, _day(due), tuple(stated.get(entry, ())),
+                together.get(entry),
             )
             for (entry, machine, _, command, job, number, kind, origin, day, at, since, state, decision, diagnosis, interim,
                  folder, version, results, due, machine_called, artefact_called) in rows
@@ -252,13 +255,7 @@ class RecordQueries:
 def newest_of_machine(until: dt.date | None = None) -> Any:
     """Entry of each machine's newest measured certificate that stands, as a subquery of ``machines``."""
     c = certificates.alias().c
-    query = select(c.entry).where(
-        c.machine == machines.c.id,
-        c.command == "report",
-        c.origin == "measured",
-        c.state.in_(STANDING),
-        c.interim.is_(False),
-    )
+    query = select(c.entry).where(c.machine == machines.c.id, *_measured(c), c.interim.is_(False))
     if until:
         query = query.where(c.day <= until.isoformat())
     return query.order_by(c.day.desc(), c.entry.desc()).limit(1).correlate(machines).scalar_subquery()
@@ -309,12 +306,6 @@ def _machine_id(connection: Connection, serial: str) -> int:
     raise CmmUqError(f"no machine {serial!r} is recorded", where="records", fix=fix)
 
 
-def _artefact_ids(connection: Connection, artefact: str) -> tuple[int, ...]:
-    key = spelled(artefact)
-    way = or_(artefacts.c.called == artefact, artefacts.c.recognised.in_((key, f"certificate:{key}")))
-    return tuple(connection.execute(select(artefacts.c.id).where(way)).scalars())
-
-
 def _values(connection: Connection, entries: Sequence[int]) -> dict[int, list[RecordedValue]]:
     f, q = figures.c, quantities.c
     names = {row[0]: row[1:] for row in connection.execute(select(q.id, q.name, q.quantity, q.unit)).all()}
@@ -356,21 +347,16 @@ def _stated(names: Collection[str] | None, origin: str) -> Select[Any]:
             f.at_most.label("limit"), _C.entry, _C.adjusted_since, _C.interim,
         )
         .select_from(joined.outerjoin(artefacts, artefacts.c.id == _C.artefact))
-        .where(and_(_C.command == "report", _C.origin == origin, _C.state.in_(STANDING)))
+        .where(*_measured(_C, origin))
         .order_by(_C.day, _C.entry, f.place)
     )  # fmt: skip
     return query if names is None else query.where(q.name.in_(tuple(names)))
 
 
-def _folder(home: Path | None) -> Callable[[str], str]:
+def _opened(before: str, folder: str) -> str:
     """A recorded folder as a path that can be opened."""
-    before = "" if home is None else f"{home}{os.sep}"
-
-    def opened(folder: str) -> str:
-        absolute = folder[:1] in "/\\" or folder[1:2] == ":"
-        return f"{before}{folder}" if folder and before and not absolute else folder
-
-    return opened
+    absolute = folder[:1] in "/\\" or folder[1:2] == ":"
+    return f"{before}{folder}" if folder and before and not absolute else folder
 
 
 def _day(text: str | None) -> dt.date | None:

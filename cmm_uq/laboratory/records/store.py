@@ -14,7 +14,6 @@ import json
 import socket
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from sqlalchemy import Connection, Engine, delete, insert, select, text
@@ -48,9 +47,7 @@ class Records(RecordQueries):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
@@ -87,8 +84,7 @@ class Records(RecordQueries):
                 wanted = wanted.where(entries.c.kind == kind)
             with self.reading() as connection:
                 rows = connection.execute(wanted).all()
-            for row in rows:
-                yield Entry(*row)
+            yield from (Entry(*row) for row in rows)
             if len(rows) < _BLOCK:
                 return
             number = rows[-1].number + 1
@@ -129,10 +125,9 @@ class Records(RecordQueries):
         for row in rows:
             folder = Path(row.folder)
             if is_pending(folder, row.token):
-                with contextlib.suppress(
-                    CmmUqError
-                ):  # a folder that cannot be written to keeps nobody from the records
-                    finish_interrupted(folder)  # of a process that is no more; otherwise nothing happens
+                # of a process that is no more; a folder that cannot be written to keeps nobody from the records
+                with contextlib.suppress(CmmUqError):
+                    finish_interrupted(folder)
             if is_pending(folder, row.token) or not folder.parent.is_dir():
                 continue  # somebody is at it; a disk that is away for now may hold it
             with self.writing() as writing:

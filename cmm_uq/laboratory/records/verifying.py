@@ -15,7 +15,6 @@ from cmm_uq.base.output import read_manifest, sha256_of
 from cmm_uq.laboratory.records.entries import BEGINNING, Entry
 from cmm_uq.laboratory.records.facts import ChainFinding
 from cmm_uq.laboratory.records.indexing import Indexer
-from cmm_uq.laboratory.records.place import told
 from cmm_uq.laboratory.records.tables import INDEX, META, certificates, entries
 
 if TYPE_CHECKING:
@@ -27,10 +26,7 @@ _BLOCK = 2000
 
 def verified(records: Records, head: str | None, *, files: bool) -> list[ChainFinding]:
     """What is wrong; see :meth:`cmm_uq.laboratory.records.store.Records.verify`."""
-    with (
-        told(records.place),
-        records.engine.connect() as connection,
-    ):  # one transaction: one state, whoever writes meanwhile
+    with records.reading() as connection:  # one transaction: one state, whoever writes meanwhile
         found = chain(connection, head)
         if not found:
             found += _tables(connection)
@@ -45,11 +41,8 @@ def chain(connection: Connection, head: str | None = None) -> list[ChainFinding]
     number, previous, met = 0, BEGINNING, head is None
     for entry in _entries(connection):
         if entry.number != number + 1:
-            gap = (
-                f"entry {number + 1} is"
-                if entry.number == number + 2
-                else f"entries {number + 1} to {entry.number - 1} are"
-            )
+            one = entry.number == number + 2
+            gap = f"entry {number + 1} is" if one else f"entries {number + 1} to {entry.number - 1} are"
             found.append(ChainFinding("chain", f"{gap} missing", number + 1))
         elif entry.previous != previous:
             found.append(ChainFinding("chain", "does not follow the entry before it", entry.number))
@@ -59,9 +52,8 @@ def chain(connection: Connection, head: str | None = None) -> list[ChainFinding]
         if len(found) >= MOST:
             return found
     if not met:
-        found.append(
-            ChainFinding("chain", f"no entry has the hash {head}: the last are missing, or all were written anew")
-        )
+        problem = f"no entry has the hash {head}: the last are missing, or all were written anew"
+        found.append(ChainFinding("chain", problem))
     return found
 
 
@@ -126,14 +118,13 @@ def _rows(table: Table, connection: Connection) -> Iterator[tuple[Any, ...]]:
 
 def _files(connection: Connection, home: Path | None) -> list[ChainFinding]:
     """Files of the newest set in each folder that were altered, and what is not there any more."""
-    c, kept = certificates.c, _removed(connection)
-    newest: dict[str, tuple[int, str]] = {}
-    for row in connection.execute(select(c.folder, c.entry, c.results_sha256).order_by(c.entry)):
-        if row.folder:
-            newest[row.folder] = (row.entry, row.results_sha256)
+    c, retained = certificates.c, select(entries).where(entries.c.kind == "retained")
+    removed = {int(one) for row in connection.execute(retained) for one in Entry(*row).data.get("certificates", ())}
+    rows = connection.execute(select(c.folder, c.entry, c.results_sha256).order_by(c.entry))
+    newest = {folder: (entry, results) for folder, entry, results in rows if folder}
     found: list[ChainFinding] = []
     for folder, (entry, results) in newest.items():
-        if entry not in kept and len(found) < MOST:
+        if entry not in removed and len(found) < MOST:
             found += _of_folder(home / folder if home else Path(folder), entry, results)
     return found
 
@@ -149,8 +140,3 @@ def _of_folder(folder: Path, entry: int, results: str) -> Iterator[ChainFinding]
     for name, wanted in (manifest.files if manifest else {}).items():
         if name != "results.json" and sha256_of(folder / name) != wanted:
             yield ChainFinding("file", f"{folder / name} was altered or removed", entry)
-
-
-def _removed(connection: Connection) -> set[int]:
-    query = select(entries).where(entries.c.kind == "retained")
-    return {int(number) for row in connection.execute(query) for number in Entry(*row).data.get("certificates", ())}
