@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import special
@@ -158,13 +158,27 @@ def crossing(
     return many.one(0)
 
 
+class _States(NamedTuple):
+    """Level and rate of N machines in each of C nodes and tales."""
+
+    mean: Floats  # (2, N, C)
+    variance: Floats  # (2, N, C)
+    covariance: Floats  # (N, C)
+    weight: Floats  # (N, C)
+    node: Ints  # (C,)
+    prior: DriftPrior
+
+
 def crossings(
     machines: Histories, prior: DriftPrior, state: DriftState, limit: Floats | float, *, one_sided: bool = False,
     paths: int = PATHS, until: float = HORIZON * YEAR, days: Floats = DAYS,
 ) -> Crossings:  # fmt: skip
     """When the errors of many machines will be; later than ``until`` days, probabilities are those of that day."""
-    N = len(machines)
-    flat = _States.of(state, prior)
+    N, M = len(machines), state.log_weight.shape[2]
+    flat = _States(
+        state.mean[:2].reshape(2, N, -1), state.covariance[[0, 1], [0, 1]].reshape(2, N, -1),
+        state.covariance[0, 1].reshape(N, -1), state.weights(prior).reshape(N, -1), np.repeat(np.arange(len(prior)), M), prior,
+    )  # fmt: skip
     limits = np.broadcast_to(np.asarray(limit, dtype=np.float64), N)
     chunk = max(1, _AT_ONCE // (paths * 8))
     numbers, ahead = _numbers(paths, len(days) - 1), days[: 1 + int(np.searchsorted(days, until))]
@@ -175,29 +189,6 @@ def crossings(
     probability = np.concatenate(found)
     probability = np.pad(probability, [(0, 0), (0, len(days) - probability.shape[1])], mode="edge")
     return Crossings(machines.last, days, probability, mean[0], u[0], mean[1], u[1])
-
-
-@dataclass(frozen=True, eq=False)
-class _States:
-    """Level and rate of N machines in each of C nodes and tales: mean and variance (2, N, C), covariance and weight (N, C)."""
-
-    mean: Floats
-    variance: Floats
-    covariance: Floats
-    weight: Floats
-    node: Ints
-    prior: DriftPrior
-
-    @staticmethod
-    def of(state: DriftState, prior: DriftPrior) -> _States:
-        """From what the filter left."""
-        N, K, M = state.log_weight.shape
-        C = K * M
-        matrix = state.covariance
-        return _States(
-            state.mean[:2].reshape(2, N, C), np.stack([matrix[0, 0], matrix[1, 1]]).reshape(2, N, C),
-            matrix[0, 1].reshape(N, C), state.weights(prior).reshape(N, C), np.repeat(np.arange(K), M), prior,
-        )  # fmt: skip
 
 
 @lru_cache(maxsize=3)
@@ -213,12 +204,8 @@ def _numbers(paths: int, gaps: int) -> tuple[Floats, Floats, Floats, Floats]:
     random = np.random.default_rng(_SEED)
     half = random.standard_normal((paths // 2 + 1, gaps))
     walk = np.concatenate([half, -half])[:paths][random.permutation(paths)]
-    return (
-        (n + 0.5) / paths,
-        state,
-        walk,
-        np.stack([random.random((paths, gaps)), random.standard_normal((paths, gaps))]),
-    )
+    steps = np.stack([random.random((paths, gaps)), random.standard_normal((paths, gaps))])
+    return (n + 0.5) / paths, state, walk, steps
 
 
 def _probabilities(
@@ -236,30 +223,23 @@ def _probabilities(
     node, prior = states.node[chosen], states.prior
     walking, often, size = prior.walk[node], prior.steps_per_year[node], prior.step_sd[node]
     high = limits[which][:, None]
-    inside = _inside(level, high, one_sided).astype(np.float64)
+    low = np.full_like(high, -np.inf) if one_sided else -high
+    inside = ((low <= level) & (level <= high)).astype(np.float64)
     survival = np.empty((len(which), len(days)))
     survival[:, 0] = inside.mean(axis=1)
     for g, years in enumerate(np.diff(days) / YEAR):
         spread = walking**2 * years
         after = level + rate * years + walking * np.sqrt(years) * walk[:, g]
-        inside *= _kept_inside(level, after, spread, high, one_sided)
+        # probability that a bridge from one level to the other stays within the limits, given that its ends do
+        stays = -np.expm1(-2 * np.maximum((high - level) * (high - after), 0.0) / spread)
+        if not one_sided:
+            stays *= -np.expm1(-2 * np.maximum((high + level) * (high + after), 0.0) / spread)
+        inside *= stays
         step = stepping[0, :, g] < -np.expm1(-often * years)
         level = after + step * size * stepping[1, :, g]
-        inside *= _inside(level, high, one_sided)
+        inside *= (low <= level) & (level <= high)
         survival[:, g + 1] = inside.mean(axis=1)
     return 1.0 - survival
-
-
-def _inside(level: Floats, high: Floats, one_sided: bool) -> Floats:
-    return np.asarray(level <= high if one_sided else np.abs(level) <= high)
-
-
-def _kept_inside(before: Floats, after: Floats, spread: Floats, high: Floats, one_sided: bool) -> Floats:
-    """Probability that a bridge from one level to another stays within the limits, given that its ends do."""
-    kept = -np.expm1(-2 * np.maximum((high - before) * (high - after), 0.0) / spread)
-    if not one_sided:
-        kept *= -np.expm1(-2 * np.maximum((high + before) * (high + after), 0.0) / spread)
-    return np.asarray(kept, dtype=np.float64)
 
 
 def _log_survival(probability: Floats) -> Floats:

@@ -10,7 +10,7 @@ import calendar
 import datetime as dt
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Literal
 
 from cmm_uq.base.errors import CmmUqError
@@ -51,11 +51,9 @@ def interval_by(
     try:
         days, why = METHODS[rule.method](rule, certificates, pool, priors or {})
     except CmmUqError as error:
-        return RecalibrationInterval(
-            None, rule.every_months,
-            say("{months}, as method {method} cannot say: {why}", months=months_of(rule), method=METHOD_WORDS[rule.method],
-                why=foreign(error.problem)),
-        )  # fmt: skip
+        why = say("{months}, as method {method} cannot say: {why}", months=months_of(rule),
+                  method=METHOD_WORDS[rule.method], why=foreign(error.problem))  # fmt: skip
+        return RecalibrationInterval(None, rule.every_months, why)
     return RecalibrationInterval(days, None, why)
 
 
@@ -119,62 +117,53 @@ class CalibrationRecord:
 def machine_due(of: CalibrationRecord, artefacts: Mapping[str, ArtefactRow], on: dt.date, pool: Pool) -> DueItem:
     """When a machine is to be calibrated again; artefacts by serial."""
     machine, known = of.machine, of.certificates
-    remarks: list[Text] = []
-    if machine.by_name:
-        remarks.append(say("It has no serial number and is recognised by its name alone."))
+    by_name = say("It has no serial number and is recognised by its name alone.")
+    remarks: list[Text] = [by_name] if machine.by_name else []
     if of.late is not None:
         remarks.append(say("A recording of {day} is dated after {on} and does not count: a clock or a date is wrong.",
                            day=day(of.late), on=day(on)))  # fmt: skip
     done = calibrations(known)
+    item = partial(DueItem, "machine", machine.serial, machine.name, machine.model, machine.place)
     if not done:
-        why = say("never calibrated up to {on}", on=day(on))
-        return DueItem(
-            "machine", machine.serial, machine.name, machine.model, machine.place, None, None, why, tuple(remarks)
-        )
+        return item(None, None, say("never calibrated up to {on}", on=day(on)), tuple(remarks))
     last = done[-1]
     if last.state == "draft":
         remarks.append(say("Its certificate of {day} is a draft that nobody has released.", day=day(last.day)))
     if not of.limited:
         remarks.append(say("Its certificate has no limits, so that only time can say when it is due."))
     elif last.decision not in (*BEYOND, NONE, "pass"):
-        remarks.append(
-            say("Its last certificate does not state that it conforms: {decision}.", decision=Verbatim(last.decision))
-        )
-    calibrated_again, reason = _machine_date(of, done, on, pool)
-    used = artefacts.get(last.artefact)
-    blocked = _blocked(used, on)
-    if used is not None and used.due is not None and blocked is None and used.due < calibrated_again:
-        remarks.append(say("Its artefact {artefact} is itself due on {due}, before that.",
-                           artefact=Verbatim(used.serial), due=day(used.due)))  # fmt: skip
-    return DueItem("machine", machine.serial, machine.name, machine.model, machine.place, last.day, calibrated_again, reason,
-               tuple(remarks), last.artefact, blocked, _is_beyond(of, last, on))  # fmt: skip
+        decision = Verbatim(last.decision)
+        remarks.append(say("Its last certificate does not state that it conforms: {decision}.", decision=decision))
+    adjusted = [one for one in (*machine.adjusted, *(one.adjusted_since for one in known))
+                if one is not None and last.day < one <= on]  # fmt: skip
+    due, reason = _due_date(of, last, adjusted, pool)
+    blocked: Text | None = None
+    if (used := artefacts.get(last.artefact)) is not None and used.due is not None and used.due < max(on, due):
+        named = {"artefact": Verbatim(used.serial), "due": day(used.due)}
+        if used.due < on:
+            blocked = say(
+                "its artefact {artefact} is out of date since {due}: no certificate can be made with it", **named
+            )
+        else:
+            remarks.append(say("Its artefact {artefact} is itself due on {due}, before that.", **named))
+    return item(last.day, due, reason, tuple(remarks), last.artefact, blocked, last.decision in BEYOND and not adjusted)
 
 
-def _machine_date(
-    of: CalibrationRecord, done: Sequence[RecordedCertificate], on: dt.date, pool: Pool
+def _due_date(
+    of: CalibrationRecord, last: RecordedCertificate, adjusted: Sequence[dt.date], pool: Pool
 ) -> tuple[dt.date, Text]:
     """By the first of: an adjustment since, a certificate that does not conform, an interim check, the rule."""
-    last, known, rule = done[-1], of.certificates, of.rule
-    if adjusted := _adjusted_after(of, last, on):
+    if adjusted:
         return min(adjusted), say("adjusted on {day}, and not calibrated since", day=day(min(adjusted)))
-    if _is_beyond(of, last, on):
+    if last.decision in BEYOND:
         return last.day, say("its last certificate finds it beyond its limits")
+    known, rule = of.certificates, of.rule
     # the drift model takes checks after the calibration too; other methods count what calibrations found
     seen = known if rule.method == "drift" else known[: known.index(last) + 1]
     interval = interval_by(rule, seen, pool, of.priors)
     planned = _ends(last.day, interval)
     checks = check_standings(last, [one for one in known[known.index(last) + 1 :] if one.interim])
     return _checked(rule, last, planned, interval.why, checks)
-
-
-def _adjusted_after(of: CalibrationRecord, last: RecordedCertificate, on: dt.date) -> list[dt.date]:
-    since = (*of.machine.adjusted, *(one.adjusted_since for one in of.certificates))
-    return [one for one in since if one is not None and last.day < one <= on]
-
-
-def _is_beyond(of: CalibrationRecord, last: RecordedCertificate, on: dt.date) -> bool:
-    """Whether its last certificate finds it beyond its limits, and nobody has adjusted it since."""
-    return last.decision in BEYOND and not _adjusted_after(of, last, on)
 
 
 def _ends(start: dt.date, interval: RecalibrationInterval) -> dt.date:
@@ -187,30 +176,28 @@ def _checked(
     rule: Rule, last: RecordedCertificate, planned: dt.date, why: Text, checks: Sequence[InterimCheck]
 ) -> tuple[dt.date, Text]:
     """What interim checks make of the date: an action ends the interval, a check in control may lengthen a fixed one."""
-    for one in checks:
-        if one.standing == "action":
-            return one.certificate.day, say(
-                "the interim check of {day} is out of control ({what})",
-                day=day(one.certificate.day),
-                what=_furthest(one),
-            )
     if not checks:
         return planned, why
-    newest = checks[-1]
-    if newest.standing == "warning":
-        return planned, say("{why}; the interim check of {day} warns ({what}): repeat it", why=why,
-                            day=day(newest.certificate.day), what=_furthest(newest))  # fmt: skip
-    if newest.standing == "nothing compared":
-        return planned, say("{why}; the interim check of {day} has no value in common with the calibration", why=why,
-                            day=day(newest.certificate.day))  # fmt: skip
-    if rule.method != "fixed" or rule.longest_months is None:
-        return planned, say("{why}; interim checks up to {day} in control", why=why, day=day(newest.certificate.day))
-    carried = RecalibrationInterval((planned - last.day).days, None, why)
-    extended = min(_ends(newest.certificate.day, carried), after_months(last.day, rule.longest_months))
+    one = next((one for one in checks if one.standing == "action"), checks[-1])
+    at = day(one.certificate.day)
+    if one.standing == "action":
+        reason = say("the interim check of {day} is out of control ({what})", day=at, what=_furthest(one))
+        return one.certificate.day, reason
+    if one.standing == "warning":
+        return planned, say(
+            "{why}; the interim check of {day} warns ({what}): repeat it", why=why, day=at, what=_furthest(one)
+        )
+    if one.standing == "nothing compared":
+        return planned, say(
+            "{why}; the interim check of {day} has no value in common with the calibration", why=why, day=at
+        )
+    extended = planned
+    if rule.method == "fixed" and rule.longest_months is not None:
+        carried = RecalibrationInterval((planned - last.day).days, None, why)
+        extended = min(_ends(one.certificate.day, carried), after_months(last.day, rule.longest_months))
     if extended <= planned:
-        return planned, say("{why}; interim checks up to {day} in control", why=why, day=day(newest.certificate.day))
-    return extended, say("{why}; lengthened by the interim check of {day}, in control", why=why,
-                         day=day(newest.certificate.day))  # fmt: skip
+        return planned, say("{why}; interim checks up to {day} in control", why=why, day=at)
+    return extended, say("{why}; lengthened by the interim check of {day}, in control", why=why, day=at)
 
 
 def _furthest(one: InterimCheck) -> Text:
@@ -218,13 +205,6 @@ def _furthest(one: InterimCheck) -> Text:
         return say("nothing in it can be compared")
     return say("{name}: {ratio} standard uncertainties from the calibration, limit {limit}", name=foreign(one.worst),
                ratio=number(abs(one.ratio), ".1f"), limit=number(one.action, ".1f"))  # fmt: skip
-
-
-def _blocked(artefact: ArtefactRow | None, on: dt.date) -> Text | None:
-    if artefact is None or artefact.due is None or artefact.due >= on:
-        return None
-    return say("its artefact {artefact} is out of date since {due}: no certificate can be made with it",
-               artefact=Verbatim(artefact.serial), due=day(artefact.due))  # fmt: skip
 
 
 def artefact_due(artefact: ArtefactRow) -> DueItem:
