@@ -6,6 +6,7 @@ ISO 1101, ISO 5459 and ISO 14405-1 that this room knows. What is proved of an an
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -23,14 +24,19 @@ ASSOCIATIONS: tuple[Association, ...] = get_args(Association)
 ALONG = 0.05  # cosine of the angle between a normal and ``outward`` below which the latter names no side
 _WITH_SIZE = (CIRCLE, SPHERE, CYLINDER)
 _STRAIGHT = (PLANE, LINE_IN_PLANE)
+_CRITERIA: Mapping[Association, Callable[[Placed, Floats], Extreme]] = {
+    "minimum_zone": least_zone,
+    "maximum_inscribed": inscribed,
+    "minimum_circumscribed": circumscribed,
+}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Associated:
     """A feature associated with n points."""
 
-    feature: FeatureKind  # its kind
-    association: Association  # the criterion
+    feature: FeatureKind
+    association: Association
     # (d,) centre; or where the axis pierces the plane across the least-squares axis through the least-squares point; of a
     # plane, and of a line in a plane, the point of it above the centroid. mm.
     position: Floats
@@ -86,17 +92,11 @@ def associate(
     if association in ("maximum_inscribed", "minimum_circumscribed") and of.shape not in _WITH_SIZE:
         raise CmmUqError(f"{feature}: it has no size to be inscribed or circumscribed",
                          fix="Ask for circles, spheres and cylinders")  # fmt: skip
-    return _answer(feature, association, of, local, _found(of, local, association), outward)
-
-
-def _found(of: Placed, local: Floats, association: Association) -> Extreme:
-    if association == "minimum_zone":
-        return least_zone(of, local)
-    if association == "maximum_inscribed":
-        return inscribed(of, local)
-    if association == "minimum_circumscribed":
-        return circumscribed(of, local)
-    return Extreme(of.state, np.zeros(0, dtype=np.int64), np.zeros(0), np.nan)
+    if association == "least_squares":
+        extreme = Extreme(of.state, np.zeros(0, dtype=np.int64), np.zeros(0), np.nan)
+    else:
+        extreme = _CRITERIA[association](of, local)
+    return _answer(feature, association, of, local, extreme, outward)
 
 
 def _answer(
@@ -130,9 +130,8 @@ def _tangent(feature: FeatureKind, of: Placed, local: Floats, outward: ArrayLike
         raise CmmUqError(f"{feature}: a tangent feature is a plane, or a line in a plane",
                          fix="Ask for maximum_inscribed or minimum_circumscribed")  # fmt: skip
     if outward is None:
-        raise CmmUqError(
-            f"{feature}: a tangent needs the side of the material", fix="Give the direction out of it (outward)"
-        )
+        problem = f"{feature}: a tangent needs the side of the material"
+        raise CmmUqError(problem, fix="Give the direction out of it (outward)")
     found = least_zone(of, local)
     slopes = np.append(-found.state[1:], 1.0)
     normal = slopes @ of.frame

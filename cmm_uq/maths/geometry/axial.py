@@ -1,7 +1,5 @@
 """Least-squares cones and cylinders.
 
-Least-squares cone, and the fit of an axis that it shares with the cylinder.
-
 Distances and derivatives follow Shakarji, J. Res. NIST 103 (1998) 633: with f the distance from the axis and g the
 height along it, d = f·cos ψ − g·sin ψ − s, s being the distance of the surface from a point of the axis and ψ the
 half angle; ψ = 0 is the cylinder.
@@ -9,6 +7,7 @@ half angle; ψ = 0 is the cylinder.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,17 +16,7 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.geometry.feature import (
-    Feature,
-    centred,
-    checked_points,
-    determined_radius,
-    fit_figures,
-    frame_about,
-    no_plane,
-    tilted,
-    upward,
-)
+from cmm_uq.maths.geometry.feature import Feature, frame_about, prepared, tilted, upward, with_known_radius
 from cmm_uq.maths.geometry.orthogonal_distance import Minimum, axis_candidates, minimise, minimum_at, section
 
 SAMPLE = 1500  # points on which the candidates for the axis are tried; the fit itself takes all
@@ -59,27 +48,21 @@ def fit_cone(points: ArrayLike, *, u_point: float | None = None) -> Cone:
     ``points``: (n, 3) in mm. ``u_point``: standard uncertainty of a point along the normal, mm; estimated from the residuals
     when left out.
     """
-    array = checked_points(points, "cone", 6)
-    about, centroid, extent = centred(array)
-    no_plane(about, "cone")
+    about, centroid, extent = prepared(points, "cone", 6, extended=3)
     found = axis_minimum(about, "cone", tapered=True)
     if found.state.half_angle < 0:
-        turned = found.state._replace(frame=_reversed(found.state.frame), half_angle=-found.state.half_angle)
+        reverse = found.state.frame * np.array([1.0, -1.0, -1.0])[:, None]
+        turned = found.state._replace(frame=reverse, half_angle=-found.state.half_angle)
         found = minimum_at(turned, linearised(about, turned, tapered=True), "cone", found.iterations)
     state = found.state
     cos, sin = np.cos(state.half_angle), np.sin(state.half_angle)
     natural = axis_derivatives(state, extent, 8)
     natural[6, 4:] = extent / cos, extent * state.distance * sin / cos**2
     natural[7, 5] = 1.0
-    names = ("x", "y", "z", "dx", "dy", "dz", "r", "psi")
-    cone = Cone(
-        point=centroid + extent * state.point,
-        direction=state.frame[2],
-        radius=float(extent * state.distance / cos),
-        half_angle=float(state.half_angle),
-        **fit_figures(found, extent, names, natural, u_point, "cone"),
-    )
-    determined_radius(cone, cone.radius, "cone")
+    figures = found, extent, "x y z dx dy dz r psi", natural, u_point
+    point, radius, half_angle = centroid + extent * state.point, float(extent * state.distance / cos), state.half_angle
+    cone = Cone.of_minimum(*figures, point=point, direction=state.frame[2], radius=radius, half_angle=float(half_angle))
+    with_known_radius(cone, radius)
     if not cone.u("psi") < cone.half_angle:
         raise CmmUqError("cone: within their scatter the points lie on a cylinder", fix="Fit a cylinder")
     return cone
@@ -100,10 +83,12 @@ def axis_minimum(about: Floats, what: str, *, tapered: bool) -> Minimum[Axis]:
     sample = about[:, :: -(-n // SAMPLE)]
     tried = []
     for w in axis_candidates(about, tapered=tapered):
-        try:
-            tried.append(_descend(sample, _start(sample, w, tapered), what, tapered))
-        except CmmUqError:
-            continue  # this direction leads nowhere; another one may
+        with suppress(CmmUqError):  # this direction leads nowhere; another one may
+            frame = frame_about(upward(w))
+            centre, radius, tangent = section(sample, frame, tapered=tapered)
+            half_angle = float(np.arctan(tangent))
+            start = Axis(frame, centre @ frame[:2], radius * np.cos(half_angle), half_angle)
+            tried.append(_descend(sample, start, what, tapered))
     if not tried:
         raise CmmUqError(f"{what}: no {what} fits these points", fix=f"Cover more of the {what}")
     best = min(tried, key=lambda m: m.cost)
@@ -143,20 +128,8 @@ def _moved(state: Axis, step: Floats) -> Axis:
     half_angle = state.half_angle + (step[5] if len(step) == 6 else 0.0)
     # back to the plane across the axis through the centroid, which changes the distance of a cone
     along = -frame[2] @ point
-    return Axis(
-        frame, point + along * frame[2], float(state.distance + step[4] + along * np.sin(half_angle)), half_angle
-    )
-
-
-def _start(about: Floats, w: Floats, tapered: bool) -> Axis:
-    frame = frame_about(upward(w))
-    centre, radius, tangent = section(about, frame, tapered=tapered)
-    half_angle = float(np.arctan(tangent))
-    return Axis(frame, centre @ frame[:2], radius * np.cos(half_angle), half_angle)
-
-
-def _reversed(frame: Floats) -> Floats:
-    return np.asarray(frame * np.array([1.0, -1.0, -1.0])[:, None])
+    distance = float(state.distance + step[4] + along * np.sin(half_angle))
+    return Axis(frame, point + along * frame[2], distance, half_angle)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -179,21 +152,13 @@ def fit_cylinder(points: ArrayLike, *, u_point: float | None = None) -> Cylinder
     ``points``: (n, 3) in mm. ``u_point``: standard uncertainty of a point along the normal, mm; estimated from the residuals
     when left out.
     """
-    array = checked_points(points, "cylinder", 5)
-    about, centroid, extent = centred(array)
-    no_plane(about, "cylinder")
+    about, centroid, extent = prepared(points, "cylinder", 5, extended=3)
     found = axis_minimum(about, "cylinder", tapered=False)
     natural = axis_derivatives(found.state, extent, 7)
     natural[6, 4] = extent
     direction = upward(found.state.frame[2])
     # the covariance of a direction is that of its opposite but for the sign of its correlations
     natural[3:6] *= np.sign(direction @ found.state.frame[2])
-    names = ("x", "y", "z", "dx", "dy", "dz", "r")
-    cylinder = Cylinder(
-        point=centroid + extent * found.state.point,
-        direction=direction,
-        radius=float(extent * found.state.distance),
-        **fit_figures(found, extent, names, natural, u_point, "cylinder"),
-    )
-    determined_radius(cylinder, cylinder.radius, "cylinder")
-    return cylinder
+    figures = found, extent, "x y z dx dy dz r", natural, u_point
+    point, radius = centroid + extent * found.state.point, float(extent * found.state.distance)
+    return with_known_radius(Cylinder.of_minimum(*figures, point=point, direction=direction, radius=radius), radius)

@@ -41,57 +41,33 @@ class _Basis:
 def least_zones(shape: FeatureShape, start: Floats, local: Floats, units: Floats) -> tuple[Floats, Floats, Ints]:
     """States (N, k) and widths (N,) of the minimum zones of points (d, N, n), and the draws that did not settle.
 
-    A draw does not settle where fewer contact points than k + 1 hold the zone by its curvature.
+    A draw does not settle where fewer contact points than k + 1 hold the zone by its curvature. Of many points exchanges are
+    among those that stand out, which all others then join that lie outside: the highest and the lowest of all are among them.
+    Where these no longer move the zone, no point lies outside, and the proof is that of all points.
 
     ``start``: (N, k) the least-squares features. ``units``: (k,) see :meth:`Placed.units`.
     """
-    if local.shape[2] >= SCREENED:
-        return _screened(shape, start, local, units)
-    state, width = start.copy(), np.empty(len(start))
-    floor = ROUNDING * float(np.abs(local).max())
-    pending, stuck = np.arange(len(start)), np.zeros(len(start), dtype=np.bool_)
-    basis: _Basis | None = None
-    for _ in range(MOST_STEPS):
-        d, J = shape.distances(state[pending], local[:, pending])
-        A = np.ascontiguousarray((J / units[:, None, None]).transpose(1, 2, 0))
-        try:
-            basis = _first(A) if basis is None else basis
-            step, half = _exchange(A, d, basis, floor)
-        except np.linalg.LinAlgError:  # contact points of one draw that determine nothing
-            break
-        state[pending] += step / units
-        width[pending] = 2 * half
-        stuck[pending] = ~np.isfinite(half)
-        left = (np.abs(step).max(axis=1) > SETTLED) & ~stuck[pending]
-        pending, basis = pending[left], basis.rows(np.flatnonzero(left))
-        if not len(pending):
-            break
-    stuck[pending] = True
-    return state, width, np.flatnonzero(stuck)
-
-
-def _screened(shape: FeatureShape, start: Floats, local: Floats, units: Floats) -> tuple[Floats, Floats, Ints]:
-    """The same of many points: exchanges among those that stand out, which all others then join that lie outside.
-
-    The highest and the lowest of all are among those that stand out. Where these no longer move the zone, no point lies
-    outside, and the proof is that of all points.
-    """
-    k, N = start.shape[1], local.shape[1]
+    k, N, many = start.shape[1], local.shape[1], local.shape[2] >= SCREENED
     state, width = start.copy(), np.empty(N)
     floor = ROUNDING * float(np.abs(local).max())
     pending, stuck = np.arange(N), np.zeros(N, dtype=np.bool_)
     held = np.zeros((N, 0), dtype=np.int64)
-    for _ in range(MOST_ROUNDS):
-        own = local if len(pending) == N else local[:, pending]
-        d = shape.distances(state[pending], own)[0]
-        if not held.shape[1]:
-            J = shape.distances(state[:1], local[:, :1])[1]
-            held = np.tile(_independent((J[:, 0] / units[:, None]).T), (N, 1))
-        index = np.concatenate([_standing_out(d), held], axis=1)
-        d, J = shape.distances(state[pending], np.take_along_axis(own, index[None], axis=2))
+    for _ in range(MOST_ROUNDS if many else MOST_STEPS):
+        seen = local if many and len(pending) == N else local[:, pending]
+        if many:
+            d = shape.distances(state[pending], seen)[0]
+            if not held.shape[1]:
+                J = shape.distances(state[:1], local[:, :1])[1]
+                held = np.tile(_independent((J[:, 0] / units[:, None]).T), (N, 1))
+            index = np.concatenate([_standing_out(d), held], axis=1)
+            seen = np.take_along_axis(seen, index[None], axis=2)
+            contacts = np.tile(np.arange(index.shape[1] - k - 1, index.shape[1]), (len(pending), 1))
+        d, J = shape.distances(state[pending], seen)
         A = np.ascontiguousarray((J / units[:, None, None]).transpose(1, 2, 0))
         try:
-            basis = _signed(A, np.tile(np.arange(index.shape[1] - k - 1, index.shape[1]), (len(pending), 1)))
+            if many or not held.shape[1]:
+                held = contacts if many else np.tile(_independent(A[0]), (N, 1))
+                basis = _signed(A, held)
             step, half = _exchange(A, d, basis, floor)
         except np.linalg.LinAlgError:  # contact points of one draw that determine nothing
             break
@@ -99,8 +75,9 @@ def _screened(shape: FeatureShape, start: Floats, local: Floats, units: Floats) 
         width[pending] = 2 * half
         stuck[pending] = ~np.isfinite(half)
         left = (np.abs(step).max(axis=1) > SETTLED) & ~stuck[pending]
-        held = np.take_along_axis(index, basis.index, axis=1)[left]
-        pending = pending[left]
+        if many:
+            held = np.take_along_axis(index, basis.index, axis=1)[left]
+        basis, pending = basis.rows(np.flatnonzero(left)), pending[left]
         if not len(pending):
             break
     stuck[pending] = True
@@ -118,11 +95,6 @@ def _standing_out(d: Floats) -> Ints:
         last = d[:, -rest:]
         found += [n - rest + last.argmax(axis=1)[:, None], n - rest + last.argmin(axis=1)[:, None]]
     return np.concatenate(found, axis=1)
-
-
-def _first(A: Floats) -> _Basis:
-    """Contact points to begin with, the same for all draws: as independent as those of the first draw allow."""
-    return _signed(A, np.tile(_independent(A[0]), (len(A), 1)))
 
 
 def _independent(A: Floats) -> Ints:

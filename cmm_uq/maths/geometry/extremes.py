@@ -8,7 +8,7 @@ for rings and shells, the Voronoi diagram for inscribed, and convexity for circu
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
@@ -21,23 +21,21 @@ from cmm_uq.maths.geometry.round import largest_empty, narrower, safe_radius
 from cmm_uq.maths.geometry.straight import narrowest
 
 ROUNDING = 4 * float(np.finfo(np.float64).eps)  # of distances, as a share of the coordinates
-# form, as a share of the coordinates, below which contact points cannot be told from their neighbours
-PERFECT = 1e4 * ROUNDING
+PERFECT = 1e4 * ROUNDING  # share of the coordinates below which contact points cannot be told from their neighbours
 SAME = 1e-9  # mm: two ways to the same optimum agree within this
-# cosine between the least-squares normal and that of the narrowest zone below which they are across each other
-LEANING = 1e-6
+LEANING = (
+    1e-6  # cosine between the normals of least squares and of the narrowest zone below which they are across each other
+)
 _BALLS = (CIRCLE, SPHERE)
 _NONE = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
 class Extreme:
-    """State (k,) of the feature, its contact points and multipliers, and the gap (see :class:`Associated`)."""
-
-    state: Floats
+    state: Floats  # (k,) of the feature
     contacts: Ints
     multipliers: Floats
-    gap: float
+    gap: float  # see :class:`Associated`
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,29 +64,27 @@ class _Problem:
         value = np.concatenate([side * d[0] for side in self.sides]) / self.scale
         return value, np.concatenate([side * rows.T for side in self.sides])
 
-    def points(self, rows: Ints) -> Ints:
-        """The points that rows belong to."""
-        return np.asarray(rows % self.local.shape[-1])
+    def extreme(self, found: Extremum, gap: float) -> Extreme:
+        return Extreme(self.state(found.state), found.contacts % self.local.shape[-1], found.multipliers, gap)
+
+    def solve(self, starts: Iterator[Floats]) -> Extremum:
+        """The first minimum that is proved."""
+        rounding = ROUNDING * float(np.abs(self.local).max()) / self.scale
+        for start in starts:
+            found = least_largest(self.rows, start, rounding)
+            if found.proved:
+                return found
+        fix = f"Cover more of the {self.of.shape.name}, or associate by least squares"
+        raise CmmUqError(f"{self.of.shape.name}: no contact points hold it", fix=fix)
 
 
-def _problem(of: Placed, local: Floats, sides: tuple[float, ...], *, sized: bool) -> _Problem | None:
-    """None where the points lie on the least-squares feature to rounding."""
+def _problem(of: Placed, local: Floats, sides: tuple[float, ...], *, sized: bool) -> _Problem | Extreme:
+    """The problem; where the points lie on the feature to rounding, nothing fits better by more than they lie off."""
     d = of.shape.distances(of.state[None], local[:, None])[0][0]
     scale = float(d.max() if of.shape is LINE else np.ptp(d))
-    return None if scale <= PERFECT * float(np.abs(local).max()) else _Problem(of, local, np.array(sides), sized, scale)
-
-
-def _solved(problem: _Problem, starts: Iterator[Floats]) -> Extremum:
-    """The first that is proved."""
-    rounding = ROUNDING * float(np.abs(problem.local).max()) / problem.scale
-    for start in starts:
-        found = least_largest(problem.rows, start, rounding)
-        if found.proved:
-            return found
-    name = problem.of.shape.name
-    raise CmmUqError(
-        f"{name}: no contact points hold it", fix=f"Cover more of the {name}, or associate by least squares"
-    )
+    if scale > PERFECT * float(np.abs(local).max()):
+        return _Problem(of, local, np.array(sides), sized, scale)
+    return Extreme(of.state, _NONE, np.zeros(0), float(2 * d.max() if of.shape is LINE else np.ptp(d)))
 
 
 def _starts(k: int) -> Iterator[Floats]:
@@ -108,21 +104,14 @@ def least_zone(of: Placed, local: Floats, near: Floats | None = None) -> Extreme
         return _least_slab(of, local)
     sides = (1.0,) if of.shape is LINE else (1.0, -1.0)
     problem = _problem(of, local, sides, sized=True)
-    if problem is None:
-        return _perfect(of, local)
+    if isinstance(problem, Extreme):
+        return problem
     k = len(of.state)
     if of.shape in _BALLS:
         return _least_ring(problem, k)
     first = [] if near is None else [(near - of.state) * of.units() / problem.scale]
-    found = _solved(problem, chain(first, _starts(k)))
-    gap = _line_gap(problem, found) if of.shape is LINE else np.inf
-    return Extreme(problem.state(found.state), problem.points(found.contacts), found.multipliers, gap)
-
-
-def _perfect(of: Placed, local: Floats) -> Extreme:
-    """Points that lie on the feature to rounding: nothing fits better by more than they lie off."""
-    d = of.shape.distances(of.state[None], local[:, None])[0][0]
-    return Extreme(of.state, _NONE, np.zeros(0), float(2 * d.max() if of.shape is LINE else np.ptp(d)))
+    found = problem.solve(chain(first, _starts(k)))
+    return problem.extreme(found, _line_gap(problem, found) if of.shape is LINE else np.inf)
 
 
 def _least_slab(of: Placed, local: Floats) -> Extreme:
@@ -130,19 +119,16 @@ def _least_slab(of: Placed, local: Floats) -> Extreme:
     points = local.reshape(len(local), -1).T
     normal, width = narrowest(points)
     if abs(normal[-1]) < LEANING:
-        raise CmmUqError(
-            f"{of.shape.name}: the points are as wide as they are long",
-            fix=f"Measure points that spread along the {of.shape.name}",
-        )
+        fix = f"Measure points that spread along the {of.shape.name}"
+        raise CmmUqError(f"{of.shape.name}: the points are as wide as they are long", fix=fix)
     problem = _problem(of, local, (1.0, -1.0), sized=True)
-    if problem is None:
-        return _perfect(of, local)
+    if isinstance(problem, Extreme):
+        return problem
     heights = points @ normal
     state = np.append(0.5 * (heights.max() + heights.min()), -normal[:-1]) / normal[-1]
-    found = _solved(problem, iter([(state - of.state) * of.units() / problem.scale, *_starts(len(state))]))
+    found = problem.solve(iter([(state - of.state) * of.units() / problem.scale, *_starts(len(state))]))
     # by either way the same width: the contact points are those of the narrowest
-    gap = 0.0 if abs(2 * found.value * problem.scale - width) <= SAME else np.inf
-    return Extreme(problem.state(found.state), problem.points(found.contacts), found.multipliers, gap)
+    return problem.extreme(found, 0.0 if abs(2 * found.value * problem.scale - width) <= SAME else np.inf)
 
 
 def _least_ring(problem: _Problem, k: int) -> Extreme:
@@ -150,22 +136,18 @@ def _least_ring(problem: _Problem, k: int) -> Extreme:
     points = problem.local.reshape(k - 1, -1).T
     starts = _starts(k)
     for _ in range(8):
-        found = _solved(problem, starts)
-        state = problem.state(found.state)
-        centre, width = state[:-1], 2 * found.value * problem.scale
+        found = problem.solve(starts)
+        ring = problem.extreme(found, np.inf)
+        centre, width = ring.state[:-1], 2 * found.value * problem.scale
         A = problem.rows(found.state)[1][found.contacts]
         nearest = float(np.linalg.norm(points - centre, axis=1).min())
-        safe = safe_radius(A, nearest)
-        ended, better = narrower(points, width, centre, safe, problem.points(found.contacts))
+        ended, better = narrower(points, width, centre, safe_radius(A, nearest), ring.contacts)
         if better is None:
-            gap = 0.0 if ended else np.inf
-            break
+            return replace(ring, gap=0.0 if ended else np.inf)
         radii = np.linalg.norm(points - better, axis=1)
         start = np.append(better, 0.5 * (radii.max() + radii.min()))
         starts = iter([(start - problem.of.state) / problem.scale])
-    else:
-        gap = np.inf
-    return Extreme(state, problem.points(found.contacts), found.multipliers, gap)
+    return ring
 
 
 def _line_gap(problem: _Problem, found: Extremum) -> float:
@@ -196,20 +178,17 @@ def inscribed(of: Placed, local: Floats) -> Extreme:
         name = of.shape.name
         raise CmmUqError(f"{name}: the points surround no inscribed one", fix=f"Measure all round the {name}")
     centre, radius = found
-    one = _one_sided(of, local, -1.0, 0.0, centre)
-    better = radius - one.state[-1]
-    return Extreme(one.state, one.contacts, one.multipliers, 0.0 if better <= SAME else np.inf)
+    largest = _one_sided(of, local, -1.0, 0.0, centre)
+    return replace(largest, gap=0.0 if radius - largest.state[-1] <= SAME else np.inf)
 
 
 def _one_sided(of: Placed, local: Floats, side: float, gap: float, centre: Floats | None = None) -> Extreme:
     problem = _problem(of, local, (side,), sized=False)
-    if problem is None:
-        return _perfect(of, local)
+    if isinstance(problem, Extreme):
+        return problem
     k = len(of.state) - 1
-    starts = _starts(k)
-    if centre is not None:
-        starts = iter([(centre - of.state[:k]) / problem.scale, *_starts(k)])
-    found = _solved(problem, starts)
-    state = problem.state(found.state)
-    state[k] = side * found.value * problem.scale
-    return Extreme(state, problem.points(found.contacts), found.multipliers, gap)
+    first = [] if centre is None else [(centre - of.state[:k]) / problem.scale]
+    found = problem.solve(chain(first, _starts(k)))
+    extreme = problem.extreme(found, gap)
+    extreme.state[k] = side * found.value * problem.scale
+    return extreme

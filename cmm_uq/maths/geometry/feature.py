@@ -1,16 +1,14 @@
 """What every fitted feature tells: its covariance, residuals and form; frames, rotations, and the form of a ball.
 
-What the form error of a ball does to its fitted centre: a systematic line of the budget.
-
 A ball that is slightly oblate or prolate does not show its centre to a sensor that sees only one side of it (Harris
 2004 appendix A), and more points do not help. The deviation of the surface is radial, so to first order the centre
-and the radius move by its least-squares projection on n·δc + δr.
+and the radius move by its least-squares projection on n·δc + δr: a systematic line of the budget.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypedDict, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +17,6 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.orthogonal_distance import Minimum, extents
 
-State = TypeVar("State")
 DEGENERATE = 1e-9  # ratio of extents below which points count as lying on one line or in one plane
 
 
@@ -65,25 +62,73 @@ class Feature:
         i = self.names.index(name)
         return float(np.sqrt(self.covariance[i, i]))
 
+    @classmethod
+    def of_minimum(
+        cls,
+        found: Minimum[Any],
+        extent: float,
+        names: str,
+        natural: Floats,
+        u_point: float | None,
+        components: int = 1,
+        **own: Any,
+    ) -> Self:
+        """From a minimum in data whose unit is ``extent``, mm, and what only this feature has.
+
+        ``natural``: (k, j) derivatives of the parameters ``names`` in mm and rad with respect to the step's j parameters.
+        ``components``: of each point's distance.
+        """
+        what, distances = cls.__name__.lower(), extent * found.distances
+        freedom = len(distances) - natural.shape[1]
+        if u_point is not None and not (np.isfinite(u_point) and u_point > 0):
+            problem = f"{what}: u_point = {u_point} is no standard uncertainty"
+            raise CmmUqError(problem, fix="Give a positive number, mm")
+        if u_point is None and freedom < 1:
+            raise CmmUqError(
+                f"{what}: so few points leave nothing to estimate their uncertainty from",
+                fix="Measure more points, or give the standard uncertainty of a point (u_point)",
+            )
+        u = float(np.sqrt(np.sum(distances**2) / freedom)) if u_point is None else float(u_point)
+        return cls(
+            names=tuple(names.split()),
+            covariance=(u / extent) ** 2 * natural @ found.covariance() @ natural.T,
+            residuals=distances if components == 1 else distances.reshape(components, -1).T,
+            u_point=u,
+            u_point_given=u_point is not None,
+            degrees_of_freedom=freedom,
+            condition=found.condition,
+            iterations=found.iterations,
+            **own,
+        )
+
     def correlation(self, one: str, other: str) -> float:
         """Correlation coefficient of two parameters."""
         return float(self.covariance[self.names.index(one), self.names.index(other)] / (self.u(one) * self.u(other)))
 
 
-def checked_points(points: ArrayLike, what: str, least: int, dimensions: tuple[int, ...] = (3,)) -> Floats:
-    """Points as an (n, d) array of finite numbers, n ≥ ``least``."""
+def prepared(
+    points: ArrayLike, what: str, least: int, dimensions: tuple[int, ...] = (3,), extended: int = 2
+) -> tuple[Floats, Floats, float]:
+    """Points (n, d) as :func:`centred` gives them: finite numbers, n ≥ ``least``, that extend in 2 or 3 directions, or any."""
     array = np.asarray(points, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] not in dimensions:
-        wanted = " or ".join(f"(n, {d})" for d in dimensions)
-        raise CmmUqError(f"{what}: points have the shape {array.shape}", fix=f"Give them as {wanted} in mm")
+        shapes = " or ".join(f"(n, {d})" for d in dimensions)
+        raise CmmUqError(f"{what}: points have the shape {array.shape}", fix=f"Give them as {shapes} in mm")
     if len(array) < least:
         raise CmmUqError(f"{what}: {len(array)} points are too few", fix=f"Measure at least {least}")
     if not np.isfinite(array).all():
         bad = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise CmmUqError(
-            f"{what}: point {bad + 1} has a coordinate that is no finite number", fix="Correct or remove it"
-        )
-    return array
+        problem = f"{what}: point {bad + 1} has a coordinate that is no finite number"
+        raise CmmUqError(problem, fix="Correct or remove it")
+    about, centroid, extent = centred(array)
+    if extended > 1:
+        s = extents(about)
+        if s[1] <= DEGENERATE * s[0]:
+            spread = "across it too" if extended == 2 else "in all directions"
+            raise CmmUqError(f"{what}: the points lie on one line", fix=f"Measure points that spread {spread}")
+        if extended > 2 and s[2] <= DEGENERATE * s[0]:
+            raise CmmUqError(f"{what}: the points lie in one plane", fix="Measure points out of that plane too")
+    return about, centroid, extent
 
 
 def centred(points: Floats) -> tuple[Floats, Floats, float]:
@@ -96,87 +141,18 @@ def centred(points: Floats) -> tuple[Floats, Floats, float]:
     return about / (extent or 1.0), centroid, extent
 
 
-def no_line(about: Floats, what: str) -> None:
-    """Refuse centred points (d, n) that coincide or lie on one line."""
-    s = extents(about)
-    if s[1] <= DEGENERATE * s[0]:
-        raise CmmUqError(f"{what}: the points lie on one line", fix="Measure points that spread across it too")
+Round = TypeVar("Round", bound=Feature)
 
 
-def no_plane(about: Floats, what: str) -> None:
-    """Refuse centred points (3, n) that lie in one plane."""
-    s = extents(about)
-    if s[1] <= DEGENERATE * s[0]:
-        raise CmmUqError(f"{what}: the points lie on one line", fix="Measure points that spread in all directions")
-    if s[2] <= DEGENERATE * s[0]:
-        raise CmmUqError(f"{what}: the points lie in one plane", fix="Measure points out of that plane too")
-
-
-class FitFigures(TypedDict):
-    """The fields of :class:`Feature` that every fit gives alike."""
-
-    names: tuple[str, ...]
-    covariance: Floats
-    residuals: Floats
-    u_point: float
-    u_point_given: bool
-    degrees_of_freedom: int
-    condition: float
-    iterations: int
-
-
-def fit_figures(
-    found: Minimum[State],
-    extent: float,
-    names: tuple[str, ...],
-    natural: Floats,
-    u_point: float | None,
-    what: str,
-    components: int = 1,
-) -> FitFigures:
-    """Fields of a feature from the minimum found in data of unit extent.
-
-    ``extent``: unit of its data, mm. ``natural``: (len(names), k) derivatives of the parameters in mm and rad with respect
-    to the step's k parameters.
-    """
-    distances = extent * found.distances
-    freedom = len(distances) - natural.shape[1]
-    u = point_uncertainty(distances, freedom, u_point, what)
-    return FitFigures(
-        names=names,
-        covariance=(u / extent) ** 2 * natural @ found.covariance() @ natural.T,
-        residuals=distances if components == 1 else distances.reshape(components, -1).T,
-        u_point=u,
-        u_point_given=u_point is not None,
-        degrees_of_freedom=freedom,
-        condition=found.condition,
-        iterations=found.iterations,
-    )
-
-
-def determined_radius(feature: Feature, radius: float, what: str) -> None:
+def with_known_radius(feature: Round, radius: float) -> Round:
     """Refuse a radius known to less than a quarter of itself: within their scatter the points are as good as flat."""
+    what = type(feature).__name__.lower()
     if not feature.u("r") < radius / 4:
         raise CmmUqError(
             f"{what}: the points do not determine its radius (r = {radius:.6g} mm, u = {feature.u('r'):.2g} mm)",
             fix=f"Cover more of the {what}",
         )
-
-
-def point_uncertainty(residuals: Floats, degrees_of_freedom: int, u_point: float | None, what: str) -> float:
-    """Standard uncertainty of a point, mm: given, or from the residuals and their degrees of freedom."""
-    if u_point is not None:
-        if not (np.isfinite(u_point) and u_point > 0):
-            raise CmmUqError(
-                f"{what}: u_point = {u_point} is no standard uncertainty", fix="Give a positive number, mm"
-            )
-        return float(u_point)
-    if degrees_of_freedom < 1:
-        raise CmmUqError(
-            f"{what}: so few points leave nothing to estimate their uncertainty from",
-            fix="Measure more points, or give the standard uncertainty of a point (u_point)",
-        )
-    return float(np.sqrt(np.sum(residuals**2) / degrees_of_freedom))
+    return feature
 
 
 def frame_about(axis: Floats) -> Floats:
@@ -215,29 +191,19 @@ def nearest_rotations(moments: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class BallForm:
-    """A ball whose largest and smallest diameters differ, as an ellipsoid of revolution does.
-
-    Parameters
-    ----------
-    sphericity : largest less smallest diameter, mm (200 µin, that is 5.08e-3 mm, for a ball of grade 200).
-    """
+    """A ball whose largest and smallest diameters differ, as an ellipsoid of revolution does."""
 
     sphericity: float  # largest less smallest diameter, mm (200 µin, that is 5.08e-3 mm, for a ball of grade 200).
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.sphericity) and self.sphericity >= 0):
-            raise CmmUqError(
-                f"a sphericity of {self.sphericity} mm", fix="Give the difference of two diameters, mm, ≥ 0"
-            )
+            fix = "Give the difference of two diameters, mm, ≥ 0"
+            raise CmmUqError(f"a sphericity of {self.sphericity} mm", fix=fix)
 
     def shift(self, directions: Floats, axis: Floats) -> Floats:
         """(4,) shift of the fitted x, y, z and r, mm, for a ball prolate by the sphericity along ``axis`` (3,).
 
-        The oblate ball gives the opposite.
-
-        Parameters
-        ----------
-        directions : (n, 3) unit vectors from the centre to the points measured.
+        The oblate ball gives the opposite. ``directions``: (n, 3) unit vectors from the centre to the points measured.
         """
         k = axis / np.linalg.norm(axis)
         return np.asarray(_projection(directions) @ (0.5 * self.sphericity * (directions @ k) ** 2))
@@ -261,6 +227,7 @@ class BallForm:
 
 def _projection(directions: Floats) -> Floats:
     """(4, n) of the least-squares fit of n·δc + δr to radial deviations."""
-    if len(directions) < 4 or np.linalg.matrix_rank(np.column_stack([directions, np.ones(len(directions))])) < 4:
+    design = np.column_stack([directions, np.ones(len(directions))])
+    if len(directions) < 4 or np.linalg.matrix_rank(design) < 4:
         raise CmmUqError("the directions do not determine a sphere", fix="Give at least four, not all in one plane")
-    return np.asarray(np.linalg.pinv(np.column_stack([directions, np.ones(len(directions))])))
+    return np.asarray(np.linalg.pinv(design))

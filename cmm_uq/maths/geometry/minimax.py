@@ -1,13 +1,9 @@
 """The least of the largest of many smooth functions; distances of points from a feature with their derivatives.
 
-The least of the largest of many smooth functions, with the contact points and multipliers that prove it.
-
 Every zone and every inscribed, circumscribed or tangent feature of one measurement is such a problem: the state s with the
 least of the largest c_i(s). A descent by sequential quadratic programming comes near; Newton's method on the conditions of
 Karush, Kuhn and Tucker then holds the contact points exactly: Σ λ_i ∇c_i = 0, Σ λ_i = 1, λ_i ≥ 0, and all other c_i below
 those of the contacts.
-
-Distances of points from a feature, and their derivatives, for many measurements of it at once.
 
 A feature stands near the origin of its own frame, its axis or normal along z. Its state says how far it has moved from
 there: shifts across the axis, slopes of the axis, then sizes. Distances and derivatives are exact at any state, so that
@@ -27,8 +23,9 @@ from cmm_uq.base.points import Floats, Ints
 
 # from a state (k,): values (m,) and derivatives (m, k), in units in which states and values are about one
 Rows = Callable[[Floats], tuple[Floats, Floats]]
-# of values, stationarity and step: where the conditions are met, unless the rounding of the coordinates is coarser
-EXACT = 1e-11
+EXACT = (
+    1e-11  # of values, stationarity and step: where conditions are met, unless the rounding of coordinates is coarser
+)
 WORKING = 16  # rows a parameter that the descent looks at together; others join when they come out above
 
 
@@ -40,14 +37,12 @@ class Extremum:
     value: float  # the largest c_i
     contacts: Ints  # (p,) rows that hold it
     multipliers: Floats  # (p,) of sum 1, none negative but for rounding
-    # contacts, multipliers and, where the contacts alone do not hold the state, curvature prove a local minimum
-    proved: bool
+    proved: bool  # by contacts, multipliers and, where the contacts alone do not hold the state, curvature
 
 
 def least_largest(rows: Rows, start: Floats, rounding: float = 0.0) -> Extremum:
     """The local minimum of the largest row below a start (k,), and whether it is proved."""
-    exact = max(EXACT, 100 * rounding)
-    state = start
+    exact, state = max(EXACT, 100 * rounding), start
     found = _polished(rows, state, exact)
     for _ in range(4):
         if found is not None and found.proved:
@@ -84,9 +79,6 @@ def _programmed(rows: Rows, start: Floats, of: Ints) -> Floats:
     def height(z: Floats) -> float:
         return float(z[-1])
 
-    def uphill(z: Floats) -> Floats:
-        return np.asarray(np.eye(len(z))[-1])
-
     def below(z: Floats) -> Floats:
         return np.asarray(z[-1] - rows(z[:-1])[0][of])
 
@@ -95,8 +87,9 @@ def _programmed(rows: Rows, start: Floats, of: Ints) -> Floats:
 
     bounded: Any = {"type": "ineq", "fun": below, "jac": slopes}
     first = np.append(start, rows(start)[0][of].max())
+    uphill = np.eye(len(first))[-1]
     options: Any = {"maxiter": 200, "ftol": 1e-14}
-    found = minimize(height, first, jac=uphill, method="SLSQP", constraints=bounded, options=options)
+    found = minimize(height, first, jac=lambda _: uphill, method="SLSQP", constraints=bounded, options=options)
     return np.asarray(found.x[:-1]) if np.isfinite(found.x).all() else start
 
 
@@ -126,9 +119,8 @@ def _newton(rows: Rows, start: Floats, near: float, exact: float, redundant: boo
     # steps are small against the feature, so that the curvature does not change on the way
     H = _curvature(rows, state, contacts, multipliers)
     for _ in range(20):
-        residual = np.concatenate(
-            [multipliers @ A[contacts], c[contacts] - c[contacts].mean(), [multipliers.sum() - 1]]
-        )
+        off = c[contacts] - c[contacts].mean()
+        residual = np.concatenate([multipliers @ A[contacts], off, [multipliers.sum() - 1]])
         system = np.zeros((k + p + 1, k + p + 1))
         system[:k, :k], system[:k, k + 1 :] = H, A[contacts].T
         system[k : k + p, :k], system[k : k + p, k] = A[contacts], -1.0
@@ -208,10 +200,10 @@ class FeatureShape:
 
     name: str  # as messages call it
     least: int  # points that determine it
-    # places in the state of slopes of axis or normal, which belong to a length; the others are mm
-    slopes: tuple[int, ...]
-    # place in the state of the radius (of a cone the distance of its surface), None where there is no size
-    size: int | None
+    slopes: tuple[
+        int, ...
+    ]  # places in the state of slopes of axis or normal, which belong to a length; the others are mm
+    size: int | None  # place of the radius (of a cone the distance of its surface), None where there is no size
     distances: Distances  # of a state (N, k) and local points (d, N, n): distances (N, n) and derivatives (k, N, n)
 
     def normal_matrix(self, state: Floats, local: Floats) -> Floats:
@@ -288,9 +280,7 @@ def _from_axis(state: Floats, local: Floats) -> tuple[Floats, Floats, Floats, Fl
 
 
 def _axis(state: Floats, local: Floats) -> tuple[Floats, Floats]:
-    """Line in space: distance from it."""
-    f, _, of_f, _ = _from_axis(state, local)
-    return f, of_f
+    return _from_axis(state, local)[::2]
 
 
 def _cylinder(state: Floats, local: Floats) -> tuple[Floats, Floats]:

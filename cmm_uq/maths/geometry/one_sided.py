@@ -17,8 +17,7 @@ from cmm_uq.maths.geometry.exchange import MOST_EXCHANGES, ROUNDING
 from cmm_uq.maths.geometry.minimax import FeatureShape
 
 # mm: what may be left to be gained in a step; and after the most of them, where they wind along a curved valley
-SETTLED, ENOUGH = 1e-10, 1e-7
-MOST_STEPS = 50
+SETTLED, ENOUGH, MOST_STEPS = 1e-10, 1e-7, 50
 _WIDE = 10.0  # times the form: the half width of the first box
 # parts of the gain foretold below which the box shrinks and above which it grows, and by how much
 _POOR, _GOOD, _WIDER, _NARROWER = 0.25, 0.75, 2.0, 0.25

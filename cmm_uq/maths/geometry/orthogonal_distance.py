@@ -1,11 +1,8 @@
 """Least squares of orthogonal distances, and where to begin for a cylinder or a cone.
 
-Least squares of orthogonal distances: Gauss–Newton steps by QR, damped where a step would not descend.
-
+Gauss–Newton steps by QR, damped where a step would not descend.
 The features are given in centred data of unit extent. Each says how to linearise its distances at a state and how to
 move the state by a small step; frames that follow the axis keep every step free of singularities.
-
-Where to begin for a cylinder or a cone: directions of the axis that could explain the points.
 
 For a given axis the surface is linear in what remains: |p⊥|² = 2c·p⊥ + k of a cylinder, with b·h + t²·h² more of a cone
 (h along the axis, t the tangent of the half angle). Its least-squares misfit depends on the points only through their
@@ -131,10 +128,7 @@ def minimum_at(state: State, rows: Floats, what: str, iterations: int = 0) -> Mi
 
 
 def cap_directions(polar_angle: float, n: int = 20_000) -> Floats:
-    """Unit directions (n, 3) spread evenly over the cap of a sphere about +z, as a digitizer sees it from above.
-
-    ``polar_angle``: of the cap's edge from +z, rad: π/2 for a hemisphere.
-    """
+    """Unit directions (n, 3) spread evenly over the cap of a sphere about +z, whose edge is ``polar_angle`` from it, rad."""
     i = np.arange(n)
     z = 1 - (1 - np.cos(polar_angle)) * (i + 0.5) / n
     turn = np.pi * (3 - np.sqrt(5)) * i
@@ -142,8 +136,7 @@ def cap_directions(polar_angle: float, n: int = 20_000) -> Floats:
     return np.column_stack([r * np.cos(turn), r * np.sin(turn), z])
 
 
-DIRECTIONS = 600
-CANDIDATES = 6
+DIRECTIONS, CANDIDATES = 600, 6
 APART = np.cos(np.radians(12))  # candidates nearer to each other than this descend to the same minimum
 
 

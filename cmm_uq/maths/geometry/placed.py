@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.axial import fit_cone, fit_cylinder
-from cmm_uq.maths.geometry.feature import centred, frame_about
+from cmm_uq.maths.geometry.feature import Feature, centred, frame_about
 from cmm_uq.maths.geometry.minimax import CIRCLE, CONE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE, FeatureShape
 from cmm_uq.maths.geometry.round import fit_circle, fit_sphere
 from cmm_uq.maths.geometry.straight import fit_line, fit_plane
@@ -24,14 +25,13 @@ KINDS: tuple[FeatureKind, ...] = get_args(FeatureKind)
 class Placed:
     """A shape in a frame near which the points lie."""
 
-    shape: FeatureShape  # the kind of feature
+    shape: FeatureShape
     origin: Floats  # (d,) of the frame, mm
     # (m, d) orthonormal rows; the last is the axis or normal, of a line in a plane the direction across it. Of a circle in
     # space there are two, so that its points are projected along the normal.
     frame: Floats
     state: Floats  # (k,) of the least-squares feature
-    # root mean square distance of the points from their centroid, mm: the length that slopes are multiplied by
-    extent: float
+    extent: float  # root mean square distance of the points from their centroid, mm: slopes are multiplied by it
     condition: float  # of the least-squares problem with columns of unit length
 
     def local(self, points: Floats) -> Floats:
@@ -75,58 +75,45 @@ class Placed:
 
 def placed(kind: FeatureKind, points: ArrayLike) -> Placed:
     """The least-squares feature of points (n, d), and its frame."""
-    if kind not in KINDS:
-        raise CmmUqError(f"{kind!r} is no feature", fix=f"Features are {', '.join(KINDS)}")
-    return _PLACING[kind](np.asarray(points, dtype=np.float64))
-
-
-def _line(points: Floats) -> Placed:
-    fit = fit_line(points, u_point=1.0)
-    if points.shape[1] == 2:
-        frame = np.array([fit.direction, [-fit.direction[1], fit.direction[0]]])
-        return _about(LINE_IN_PLANE, points, fit.point, frame, np.zeros(2), fit.condition)
-    return _about(LINE, points, fit.point, frame_about(fit.direction), np.zeros(4), fit.condition)
-
-
-def _plane(points: Floats) -> Placed:
-    fit = fit_plane(points, u_point=1.0)
-    return _about(PLANE, points, fit.point, frame_about(fit.normal), np.zeros(3), fit.condition)
-
-
-def _circle(points: Floats) -> Placed:
-    fit = fit_circle(points, u_point=_scatter(points, CIRCLE))
-    frame = np.eye(2) if fit.normal is None else frame_about(fit.normal)[:2]
-    return _about(CIRCLE, points, fit.centre, frame, np.array([0.0, 0, fit.radius]), fit.condition)
-
-
-def _sphere(points: Floats) -> Placed:
-    fit = fit_sphere(points, u_point=_scatter(points, SPHERE))
-    return _about(SPHERE, points, fit.centre, np.eye(3), np.array([0.0, 0, 0, fit.radius]), fit.condition)
-
-
-def _cylinder(points: Floats) -> Placed:
-    fit = fit_cylinder(points, u_point=_scatter(points, CYLINDER))
-    state = np.array([0.0, 0, 0, 0, fit.radius])
-    return _about(CYLINDER, points, fit.point, frame_about(fit.direction), state, fit.condition)
-
-
-def _cone(points: Floats) -> Placed:
-    fit = fit_cone(points, u_point=_scatter(points, CONE))
-    state = np.array([0.0, 0, 0, 0, fit.radius * np.cos(fit.half_angle), fit.half_angle])
-    return _about(CONE, points, fit.point, frame_about(fit.direction), state, fit.condition)
-
-
-_PLACING = {"line": _line, "plane": _plane, "circle": _circle, "sphere": _sphere, "cylinder": _cylinder, "cone": _cone}
+    array = np.asarray(points, dtype=np.float64)
+    match kind:
+        case "line":
+            line = fit_line(array, u_point=1.0)
+            if array.shape[1] == 2:
+                frame = np.array([line.direction, [-line.direction[1], line.direction[0]]])
+                return _about(LINE_IN_PLANE, array, line, line.point, frame, [0, 0])
+            return _about(LINE, array, line, line.point, frame_about(line.direction), [0, 0, 0, 0])
+        case "plane":
+            plane = fit_plane(array, u_point=1.0)
+            return _about(PLANE, array, plane, plane.point, frame_about(plane.normal), [0, 0, 0])
+        case "circle":
+            circle = fit_circle(array, u_point=_scatter(array, CIRCLE))
+            frame = np.eye(2) if circle.normal is None else frame_about(circle.normal)[:2]
+            return _about(CIRCLE, array, circle, circle.centre, frame, [0, 0, circle.radius])
+        case "sphere":
+            sphere = fit_sphere(array, u_point=_scatter(array, SPHERE))
+            return _about(SPHERE, array, sphere, sphere.centre, np.eye(3), [0, 0, 0, sphere.radius])
+        case "cylinder":
+            cylinder = fit_cylinder(array, u_point=_scatter(array, CYLINDER))
+            frame, state = frame_about(cylinder.direction), [0, 0, 0, 0, cylinder.radius]
+            return _about(CYLINDER, array, cylinder, cylinder.point, frame, state)
+        case "cone":
+            cone = fit_cone(array, u_point=_scatter(array, CONE))
+            state = [0, 0, 0, 0, cone.radius * np.cos(cone.half_angle), cone.half_angle]
+            return _about(CONE, array, cone, cone.point, frame_about(cone.direction), state)
+    raise CmmUqError(f"{kind!r} is no feature", fix=f"Features are {', '.join(KINDS)}")
 
 
 def _scatter(points: Floats, shape: FeatureShape) -> float | None:
-    """Uncertainty of a point to be told to the fit: a millionth where no more points than needed leave it to be told."""
+    """Uncertainty of a point to be given to the fit: a millionth where no more points than needed leave it to be given."""
     if points.ndim != 2 or len(points) != shape.least or not np.isfinite(points).all():
         return None
     return 1e-6 * (centred(points)[2] or 1.0)
 
 
 def _about(
-    shape: FeatureShape, points: Floats, origin: Floats, frame: Floats, state: Floats, condition: float
+    shape: FeatureShape, points: Floats, fit: Feature, origin: Floats, frame: Floats, state: Sequence[float]
 ) -> Placed:
-    return Placed(shape, np.asarray(origin), frame, state, centred(points)[2], condition)
+    return Placed(
+        shape, np.asarray(origin), frame, np.array(state, dtype=np.float64), centred(points)[2], fit.condition
+    )

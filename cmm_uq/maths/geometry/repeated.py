@@ -16,35 +16,21 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.maths.geometry import extremes
 from cmm_uq.maths.geometry.exchange import SCREENED, least_zones
-from cmm_uq.maths.geometry.extremes import (
-    circumscribed as alone_circumscribed,
-    inscribed as alone_inscribed,
-    least_zone,
-)
+from cmm_uq.maths.geometry.extremes import least_zone
 from cmm_uq.maths.geometry.minimax import CIRCLE, CYLINDER, LINE, SPHERE
 from cmm_uq.maths.geometry.one_sided import held
 from cmm_uq.maths.geometry.placed import FeatureKind, Placed, placed
 
-SETTLED = 1e-9
-"""Steps, mm, below which a draw is at its minimum: what is left is smaller by the ratio of error to feature."""
-
-SHARED_STEPS = 20
-"""Steps with the normal equations of the nominal points. They settle slowly, or not at all, where points are off by a large
-part of the feature: a bore's along its axis by a third of the probed length."""
-
-MOST_STEPS = 60
-BLOCK = 12_000
-"""Points worked on together: a dozen arrays of them stay in the cache of a core."""
-
-TOGETHER = 9_000_000
-"""Coordinates of unit displacements held at once, 72 MB: all of a feature of a thousand points."""
-
-MANY = 500
-"""Points from which on each is not moved alone, with all the others in their places: that takes the square of their number."""
-
-CONDITION = 1e7
-"""Condition of nominal points from which they do not determine the feature with errors of micrometres."""
+SETTLED = 1e-9  # steps, mm, below which a draw is at its minimum; what is left is far smaller
+# the first steps are with the normal equations of the nominal points. They settle slowly, or not at all, where points are off
+# by a large part of the feature: a bore's along its axis by a third of the probed length
+SHARED_STEPS, MOST_STEPS = 20, 60
+BLOCK = 12_000  # points worked on together: a dozen arrays of them stay in the cache of a core
+TOGETHER = 9_000_000  # coordinates of unit displacements held at once, 72 MB: all of a feature of a thousand points
+MANY = 500  # points from which on each is not moved alone, which takes the square of their number
+CONDITION = 1e7  # of nominal points from which they do not determine the feature with errors of micrometres
 
 
 def one_by_one(n: int, d: int) -> Iterator[Floats]:
@@ -62,13 +48,10 @@ def one_by_one(n: int, d: int) -> Iterator[Floats]:
 class Drawn:
     """A feature of N measurements.
 
-    Parameters
-    ----------
-    position : (N, d) centre, or point of axis, line or plane over the centroid of the nominal points, mm.
-    direction : (N, d) unit direction of the axis, of a plane its normal; None where there is none.
-    size : (N,) diameter, mm, of a cone at its position; None where there is none.
-    half_angle : (N,) of a cone, rad; else None.
-    form : (N,) form deviation, mm: range of the distances, of a line in space the diameter of the cylinder that holds all.
+    ``position``: (N, d) centre, or point of axis, line or plane over the centroid of the nominal points, mm. ``direction``:
+    (N, d) unit direction of the axis, of a plane its normal; None where there is none. ``size``: (N,) diameter, mm, of a cone
+    at its position; None where there is none. ``half_angle``: (N,) of a cone, rad; else None. ``form``: (N,) form deviation,
+    mm: range of the distances, of a line in space the diameter of the cylinder that holds all.
     """
 
     position: Floats
@@ -80,18 +63,11 @@ class Drawn:
 
 @dataclass(frozen=True, eq=False)
 class Raised:
-    """Errors of points along one direction of each.
+    """Errors of points along one direction of each."""
 
-    Parameters
-    ----------
-    heights : (N, n) mm.
-    directions : (n, d) of the points.
-    offset : (n, d) errors that all draws have besides, mm.
-    """
-
-    heights: Floats
-    directions: Floats
-    offset: Floats
+    heights: Floats  # (N, n) mm
+    directions: Floats  # (n, d) of the points
+    offset: Floats  # (n, d) errors that all draws have besides, mm
 
     def __len__(self) -> int:
         return len(self.heights)
@@ -103,43 +79,37 @@ class Raised:
 class Repeated:
     """A feature and its nominal points, to be measured many times.
 
-    Parameters
-    ----------
-    kind : ``"line"``, ``"plane"``, ``"circle"``, ``"sphere"``, ``"cylinder"`` or ``"cone"``.
-    points : (n, 3) nominal points on the feature, mm; (n, 2) of a line or circle in a plane. A circle of points in space
-        is the circle of their projections along the nominal normal.
+    ``kind``: ``"line"``, ``"plane"``, ``"circle"``, ``"sphere"``, ``"cylinder"`` or ``"cone"``. ``points``: (n, 3)
+    nominal points on it, mm; (n, 2) of a line or circle in a plane. A circle of points in space is the circle of their
+    projections along the nominal normal. Errors of the points, ``displacements``, are (N, n, d) mm, small against the feature.
 
     Raises
     ------
-    CmmUqError : points that do not determine the feature.
+    CmmUqError : points that do not determine the feature; displacements of the wrong shape, that are not finite, or so large
+        that a draw does not settle.
     """
 
     def __init__(self, kind: FeatureKind, points: ArrayLike) -> None:
         self.points = np.asarray(points, dtype=np.float64)
         self.placed: Placed = placed(kind, self.points)
         if self.placed.condition > CONDITION:
-            raise CmmUqError(
-                f"{kind}: the nominal points hardly determine it (condition {self.placed.condition:.1e})",
-                fix=f"Cover more of the {kind}",
-            )
+            problem = f"{kind}: the nominal points hardly determine it (condition {self.placed.condition:.1e})"
+            raise CmmUqError(problem, fix=f"Cover more of the {kind}")
         self.nominal = self.placed.local(self.points)
-        units = self.placed.units()
+        self._units = units = self.placed.units()
         matrix = self.placed.shape.normal_matrix(self.placed.state, self.nominal) / np.outer(units, units)
         self._inverse = np.linalg.inv(matrix) / np.outer(units, units)
-        self._units = units
-        self._response = self._first_order()
+        # (n·d, k) by which the state follows each coordinate, by a step of a millionth of the extent: where to begin
+        small = 1e-6 * self.placed.extent
+        if len(self.points) > MANY:
+            self._response = -self._pulls(self.placed.state, self.points, small) @ self._inverse / small
+        else:
+            steps = np.concatenate(list(one_by_one(*self.points.shape)))
+            local = self._local(small * steps, 0)
+            self._response = -self._step(np.tile(self.placed.state, (len(steps), 1)), local)[0] / small
 
     def least_squares(self, displacements: ArrayLike | Raised) -> Drawn:
-        """The least-squares feature of each draw, to 1e-9 mm.
-
-        Parameters
-        ----------
-        displacements : (N, n, d) errors of the points, mm, small against the feature.
-
-        Raises
-        ------
-        CmmUqError : the wrong shape, a number missing, or errors so large that a draw does not settle.
-        """
+        """The least-squares feature of each draw, to 1e-9 mm."""
         errors = self._checked(displacements)
         state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
         for rows in self._blocks(len(errors)):
@@ -151,20 +121,10 @@ class Repeated:
         """How the least-squares feature of one measurement follows its points: by the implicit function theorem, Jᵀd = 0.
 
         Each point adds a term of its own to Jᵀd, so that all points are moved at once and not one after the other.
+        ``displacements`` are (n, d); ``step``, mm, is that of central differences.
 
-        Parameters
-        ----------
-        displacements : (n, d) errors of the points, mm.
-        step : mm, of central differences.
-
-        Returns
-        -------
-        states : (2k, k) where one component after the other is larger by a step, then those where it is smaller.
-        derivative : (n·d, k) of the state by the coordinates of each point, in steps of each component.
-
-        Raises
-        ------
-        CmmUqError : as for least squares.
+        Returns states (2k, k) where one component after the other is larger by a step, then those where it is smaller; and
+        the derivative (n·d, k) of the state by the coordinates of each point, in steps of each component.
         """
         errors, steps = self._checked(displacements[None]), np.diag(step / self._units)
         points = self.points + displacements
@@ -183,14 +143,6 @@ class Repeated:
 
         Each ends where contact points prove a local minimum. Position and size are those of the middle of the zone. Of a line
         in space it is the narrowest cylinder, found draw by draw, some hundredths of a second each.
-
-        Parameters
-        ----------
-        displacements : (N, n, d) errors of the points, mm.
-
-        Raises
-        ------
-        CmmUqError : as for least squares.
         """
         if len(self.points) <= len(self.placed.state) and self.placed.shape is not LINE:
             # the feature goes through as many points as it has parameters
@@ -205,29 +157,22 @@ class Repeated:
             if self.placed.shape is not LINE:
                 state[rows], form[rows], left = least_zones(self.placed.shape, state[rows], local, self._units)
             for i in left:
-                state[rows.start + i] = least_zone(self.placed, local[:, i], state[rows.start + i]).state
-                form[rows.start + i] = self._range(state[rows.start + i], local[:, i])
+                state[rows.start + i] = zone = least_zone(self.placed, local[:, i], state[rows.start + i]).state
+                d = self.placed.shape.distances(zone[None], local[:, i, None])[0]
+                form[rows.start + i] = 2 * d.max() if self.placed.shape is LINE else np.ptp(d)
         return self._drawn(state, form)
 
     def one_sided(self, displacements: ArrayLike | Raised, *, inscribed: bool) -> Drawn:
         """The largest circle, sphere or cylinder inside the points of each draw, or the smallest about them.
 
         Each is held by contact points near the least-squares feature: of several inscribed ones that points hold, as they do
-        where errors leave a feature of few points nearly perfect, one may be larger by less than a nanometre.
-
-        Parameters
-        ----------
-        displacements : (N, n, d) errors of the points, mm.
-        inscribed : whether it is the inscribed one.
-
-        Raises
-        ------
-        CmmUqError : as for least squares; a feature without a size, or points that hold no such one.
+        where errors leave a feature of few points nearly perfect, one may be larger by less than a nanometre. Raises
+        :class:`CmmUqError` for a feature without a size too, or points that hold no such one.
         """
         if self.placed.shape not in (CIRCLE, SPHERE, CYLINDER):
             raise CmmUqError(f"{self.placed.shape.name}: it has no size to be inscribed or circumscribed",
                              fix="Ask for circles, spheres and cylinders")  # fmt: skip
-        errors, alone = self._checked(displacements), alone_inscribed if inscribed else alone_circumscribed
+        errors, alone = self._checked(displacements), extremes.inscribed if inscribed else extremes.circumscribed
         state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
         for rows in self._blocks(len(errors), 20 * BLOCK):
             local = self._local(errors[rows], rows.start)
@@ -237,10 +182,6 @@ class Repeated:
                 state[rows.start + i] = alone(self.placed, local[:, i]).state
             form[rows] = np.ptp(self.placed.shape.distances(state[rows], local)[0], axis=1)
         return self._drawn(state, form)
-
-    def _range(self, state: Floats, local: Floats) -> float:
-        d = self.placed.shape.distances(state[None], local[:, None])[0]
-        return float(2 * d.max() if self.placed.shape is LINE else np.ptp(d))
 
     def _checked(self, displacements: ArrayLike | Raised) -> Floats | Raised:
         if isinstance(displacements, Raised):
@@ -282,15 +223,6 @@ class Repeated:
             inverse = np.linalg.pinv(scaled @ scaled.transpose(0, 2, 1), hermitian=True)
             return np.einsum("bkl,bl->bk", inverse, gradient / self._units) / self._units, d, J
         return gradient @ self._inverse, d, J
-
-    def _first_order(self) -> Floats:
-        """(n·d, k) by which the state follows each coordinate, by a step of a millionth of the extent: where to begin."""
-        small = 1e-6 * self.placed.extent
-        if len(self.points) > MANY:
-            return -self._pulls(self.placed.state, self.points, small) @ self._inverse / small
-        steps = np.concatenate(list(one_by_one(*self.points.shape)))
-        local = self._local(small * steps, 0)
-        return -self._step(np.tile(self.placed.state, (len(steps), 1)), local)[0] / small
 
     def _pulls(self, state: Floats, points: Floats, step: float) -> Floats:
         """(n·d, k) by how much Jᵀd, at a state (k,), changes with one coordinate of one point (n, d) moved by a step."""

@@ -1,6 +1,4 @@
-"""Least-squares circles and spheres, and whether another centre has a narrower ring or shell.
-
-Whether another centre has a narrower ring or shell: a search that leaves out no place where one could be.
+"""Least-squares circles and spheres; a search for narrower rings or shells that leaves out no place where one could be.
 
 With the centre c moved by δ, distances change by at most |δ|, so a box of half width h about c holds no ring narrower than
 that about c less 2·h·√d. Far away a ring is nearly a strip, and no narrower than the points are wide. Next to a ring that is
@@ -19,18 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.maths.geometry.feature import (
-    Feature,
-    centred,
-    checked_points,
-    determined_radius,
-    fit_figures,
-    frame_about,
-    no_line,
-    no_plane,
-    tilted,
-    upward,
-)
+from cmm_uq.maths.geometry.feature import Feature, frame_about, prepared, tilted, upward, with_known_radius
 from cmm_uq.maths.geometry.orthogonal_distance import Minimum, minimise, principal
 from cmm_uq.maths.geometry.straight import narrowest
 
@@ -46,26 +33,14 @@ class Sphere(Feature):
 def fit_sphere(points: ArrayLike, *, u_point: float | None = None) -> Sphere:
     """Sphere through at least four points, not all in one plane.
 
-    Parameters
-    ----------
-    points : (n, 3) in mm.
-    u_point : standard uncertainty of a point along the normal, mm; estimated from the residuals when left out.
-
-    Raises
-    ------
-    CmmUqError : too few points, points in one plane, or a cap so small that the radius is not determined.
+    ``points``: (n, 3) in mm. ``u_point``: standard uncertainty of a point along the normal, mm; estimated from the residuals
+    when left out. Raises :class:`CmmUqError` where a cap is so small that the radius is not determined.
     """
-    array = checked_points(points, "sphere", 4)
-    about, centroid, extent = centred(array)
-    no_plane(about, "sphere")
+    about, centroid, extent = prepared(points, "sphere", 4, extended=3)
     found = radial_minimum(about, "sphere")
-    sphere = Sphere(
-        centre=centroid + extent * found.state[:3],
-        radius=float(extent * found.state[3]),
-        **fit_figures(found, extent, ("x", "y", "z", "r"), extent * np.eye(4), u_point, "sphere"),
-    )
-    determined_radius(sphere, sphere.radius, "sphere")
-    return sphere
+    centre, radius = centroid + extent * found.state[:3], float(extent * found.state[3])
+    figures = found, extent, "x y z r", extent * np.eye(4), u_point
+    return with_known_radius(Sphere.of_minimum(*figures, centre=centre, radius=radius), radius)
 
 
 def radial_minimum(about: Floats, what: str) -> Minimum[Floats]:
@@ -81,14 +56,10 @@ def radial_minimum(about: Floats, what: str) -> Minimum[Floats]:
         np.subtract(distance, state[-1], out=rows[-1])
         return rows
 
-    return minimise(_algebraic(about), linearise, np.add, what)
-
-
-def _algebraic(about: Floats) -> Floats:
-    """Start (d + 1,) from |p|² = 2c·p + r² − |c|², linear in c."""
+    # start from |p|² = 2c·p + r² − |c|², linear in c
     squares = np.einsum("ij,ij->j", about, about)
     centre = 0.5 * np.linalg.lstsq(about @ about.T, about @ squares, rcond=None)[0]
-    return np.append(centre, np.sqrt(squares.mean() + centre @ centre))
+    return minimise(np.append(centre, np.sqrt(squares.mean() + centre @ centre)), linearise, np.add, what)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -117,22 +88,15 @@ def fit_circle(points: ArrayLike, *, u_point: float | None = None) -> Circle:
     ``points``: (n, 2), or (n, 3) for a circle in space, mm. ``u_point``: standard uncertainty of a point radially, and in
     space along the normal, mm; estimated when left out.
     """
-    array = checked_points(points, "circle", 3, (2, 3))
-    about, centroid, extent = centred(array)
-    no_line(about, "circle")
-    circle = (_in_plane if len(about) == 2 else _in_space)(about, centroid, extent, u_point)
-    determined_radius(circle, circle.radius, "circle")
-    return circle
-
-
-def _in_plane(about: Floats, centroid: Floats, extent: float, u_point: float | None) -> Circle:
-    found = radial_minimum(about, "circle")
-    return Circle(
-        centre=centroid + extent * found.state[:2],
-        radius=float(extent * found.state[2]),
-        normal=None,
-        **fit_figures(found, extent, ("x", "y", "r"), extent * np.eye(3), u_point, "circle"),
-    )
+    about, centroid, extent = prepared(points, "circle", 3, (2, 3))
+    if len(about) == 3:
+        circle = _in_space(about, centroid, extent, u_point)
+    else:
+        found = radial_minimum(about, "circle")
+        centre, radius = centroid + extent * found.state[:2], float(extent * found.state[2])
+        figures = found, extent, "x y r", extent * np.eye(3), u_point
+        circle = Circle.of_minimum(*figures, centre=centre, radius=radius, normal=None)
+    return with_known_radius(circle, circle.radius)
 
 
 class _Placed(NamedTuple):
@@ -169,16 +133,12 @@ def _in_space(about: Floats, centroid: Floats, extent: float, u_point: float | N
     natural[:3, :3] = extent * placed.frame.T
     natural[3:6, 3:5] = placed.frame[:2].T
     natural[6, 5] = extent
-    return Circle(
-        centre=centroid + extent * placed.centre,
-        radius=float(extent * placed.radius),
-        normal=placed.frame[2],
-        **fit_figures(found, extent, ("x", "y", "z", "nx", "ny", "nz", "r"), natural, u_point, "circle", 2),
-    )
+    centre, radius = centroid + extent * placed.centre, float(extent * placed.radius)
+    figures = found, extent, "x y z nx ny nz r", natural, u_point, 2
+    return Circle.of_minimum(*figures, centre=centre, radius=radius, normal=placed.frame[2])
 
 
-MOST_BOXES = 200_000
-SAMPLE = 100
+MOST_BOXES, SAMPLE = 200_000, 100
 
 
 def safe_radius(gradients: Floats, nearest: float) -> float:

@@ -1,6 +1,4 @@
-"""Least-squares lines and planes, and the least width of two parallels that hold all points.
-
-The least distance of two parallel lines or planes that hold all points: exact, from their convex hull.
+"""Least-squares lines and planes, and the least distance of two parallels that hold all points, from their convex hull.
 
 In a plane one of the lines runs along an edge of the hull; in space the planes touch a face and a corner, or two edges
 that face each other (M. E. Houle & G. T. Toussaint, IEEE Trans. PAMI 10 (1988) 761). All of these are looked at, so
@@ -10,13 +8,14 @@ that the narrowest is the narrowest of all.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.points import Floats, Ints
-from cmm_uq.maths.geometry.feature import Feature, centred, checked_points, fit_figures, frame_about, no_line, upward
+from cmm_uq.base.points import Floats
+from cmm_uq.maths.geometry.feature import Feature, frame_about, prepared, upward
 from cmm_uq.maths.geometry.orthogonal_distance import minimum_at, principal
 
 
@@ -45,30 +44,22 @@ def fit_line(points: ArrayLike, *, u_point: float | None = None) -> Line:
     ``points``: (n, 3) or (n, 2) in mm. ``u_point``: standard uncertainty of a point across the line in each direction, mm;
     estimated when left out.
     """
-    array = checked_points(points, "line", 2, (2, 3))
-    about, centroid, extent = centred(array)
+    about, centroid, extent = prepared(points, "line", 2, (2, 3), extended=1)
     if extent == 0:
         raise CmmUqError("line: all points are in one place", fix="Measure points that spread along the line")
     direction = upward(principal(about)[0])
-    across = _across(direction)
+    # (d − 1, d) unit vectors across it
+    across = np.array([[-direction[1], direction[0]]]) if len(direction) == 2 else frame_about(direction)[:2]
     along, offsets = direction @ about, across @ about
     k = len(across)
-    rows = np.zeros((2 * k + 1, k, len(array)))
+    rows = np.zeros((2 * k + 1, k, about.shape[1]))
     for i in range(k):
         rows[i, i], rows[k + i, i] = -1.0, -along
     rows[-1] = offsets
     found = minimum_at(direction, rows.reshape(2 * k + 1, -1), "line")
     natural = np.asarray(np.kron(np.diag([extent, 1.0]), across.T), dtype=np.float64)
-    letters = "xyz"[: k + 1]
-    names = (*letters, *(f"d{a}" for a in letters))
-    return Line(point=centroid, direction=direction, **fit_figures(found, extent, names, natural, u_point, "line", k))
-
-
-def _across(direction: Floats) -> Floats:
-    """Unit vectors (d − 1, d) across a direction (d,)."""
-    if len(direction) == 2:
-        return np.array([[-direction[1], direction[0]]])
-    return frame_about(direction)[:2]
+    names = "x y dx dy" if k == 1 else "x y z dx dy dz"
+    return Line.of_minimum(found, extent, names, natural, u_point, k, point=centroid, direction=direction)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -89,20 +80,14 @@ def fit_plane(points: ArrayLike, *, u_point: float | None = None) -> Plane:
     ``points``: (n, 3) in mm. ``u_point``: standard uncertainty of a point along the normal, mm; estimated from the residuals
     when left out.
     """
-    array = checked_points(points, "plane", 3)
-    about, centroid, extent = centred(array)
-    no_line(about, "plane")
+    about, centroid, extent = prepared(points, "plane", 3)
     frame = frame_about(upward(principal(about)[2]))
     x, y, z = frame @ about
-    found = minimum_at(frame, np.array([x, y, np.full(len(array), -1.0), z]), "plane")
+    found = minimum_at(frame, np.array([x, y, np.full(len(x), -1.0), z]), "plane")
     natural = np.zeros((6, 3))
     natural[3:, :2] = frame[:2].T
     natural[:3, 2] = extent * frame[2]
-    return Plane(
-        point=centroid,
-        normal=frame[2],
-        **fit_figures(found, extent, ("x", "y", "z", "nx", "ny", "nz"), natural, u_point, "plane"),
-    )
+    return Plane.of_minimum(found, extent, "x y z nx ny nz", natural, u_point, point=centroid, normal=frame[2])
 
 
 # edges count as facing each other within this: a pair too many is looked at in vain, a pair too few would be missed
@@ -114,6 +99,8 @@ MOST_EDGES = 5000  # of a hull: points about a plane have a few hundred
 
 def narrowest(points: Floats) -> tuple[Floats, float]:
     """Unit normal (d,) and distance, mm, of the narrowest pair of parallel lines (d = 2) or planes (3) about points (n, d)."""
+    from scipy.spatial import ConvexHull
+
     about = (points - points.mean(axis=0)).T
     frame = principal(about)
     local = frame @ about
@@ -122,30 +109,24 @@ def narrowest(points: Floats) -> tuple[Floats, float]:
         return np.asarray(frame[-1]), float(spread[-1])
     # stretching keeps faces, edges and which of them face each other, and lets the hull be found without merging
     stretched = (local / spread[:, None]).T
-    normals = _in_plane(stretched) if len(local) == 2 else _in_space(stretched)
-    normals = normals / spread
+    hull = ConvexHull(stretched)
+    normals = (np.asarray(hull.equations[:, :2]) if len(local) == 2 else _in_space(stretched, hull)) / spread
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    widths = np.concatenate(
-        [np.ptp(part @ local, axis=1) for part in np.array_split(normals, len(normals) // 4096 + 1)]
-    )
+    parts = np.array_split(normals, len(normals) // 4096 + 1)
+    widths = np.concatenate([np.ptp(part @ local, axis=1) for part in parts])
     best = int(np.argmin(widths))
     return np.asarray(normals[best] @ frame), float(widths[best])
 
 
-def _in_plane(points: Floats) -> Floats:
-    """(m, 2) normals of the hull's edges."""
-    from scipy.spatial import ConvexHull
-
-    return np.asarray(ConvexHull(points).equations[:, :2])
-
-
-def _in_space(points: Floats) -> Floats:
+def _in_space(points: Floats, hull: Any) -> Floats:
     """(m, 3) normals of the hull's faces and of pairs of edges that face each other."""
-    from scipy.spatial import ConvexHull
-
-    hull = ConvexHull(points)
-    faces = np.asarray(hull.equations[:, :3])
-    ends, beside = _edges(np.asarray(hull.simplices, dtype=np.int64), np.asarray(hull.neighbors, dtype=np.int64))
+    faces, corners = np.asarray(hull.equations[:, :3]), np.asarray(hull.simplices, dtype=np.int64)
+    # corners (e, 2) of the edges of the triangles, and the faces (e, 2) at each
+    ends = np.concatenate([np.delete(corners, j, axis=1) for j in range(3)])
+    neighbours = np.asarray(hull.neighbors, dtype=np.int64).T.ravel()
+    beside = np.column_stack([np.tile(np.arange(len(corners)), 3), neighbours])
+    once = beside[:, 0] < beside[:, 1]
+    ends, beside = ends[once], beside[once]
     if len(ends) > MOST_EDGES:
         raise CmmUqError("plane: the points lie about no plane", fix="Measure one flat surface at a time")
     edges, one, other = points[ends[:, 1]] - points[ends[:, 0]], faces[beside[:, 0]], faces[beside[:, 1]]
@@ -171,15 +152,3 @@ def _between(n: Floats, one: Floats, other: Floats, edge: Floats, sense: Floats)
     toward = np.einsum("...i,...i->...", n, one + other)
     inside = ((a >= -length) & (b >= -length)) | ((a <= length) & (b <= length))
     return np.asarray(np.where(inside, np.sign(toward), 0.0))
-
-
-def _edges(faces: Ints, neighbours: Ints) -> tuple[Ints, Ints]:
-    """Corners (e, 2) of the edges of triangles, and the faces (e, 2) at each."""
-    ends, beside = [], []
-    for j in range(3):
-        two = np.delete(faces, j, axis=1)
-        ends.append(two)
-        beside.append(np.column_stack([np.arange(len(faces)), neighbours[:, j]]))
-    all_ends, all_beside = np.concatenate(ends), np.concatenate(beside)
-    once = all_beside[:, 0] < all_beside[:, 1]
-    return all_ends[once], all_beside[once]
