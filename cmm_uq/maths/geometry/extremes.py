@@ -23,9 +23,7 @@ from cmm_uq.maths.geometry.straight import narrowest
 ROUNDING = 4 * float(np.finfo(np.float64).eps)  # of distances, as a share of the coordinates
 PERFECT = 1e4 * ROUNDING  # share of the coordinates below which contact points cannot be told from their neighbours
 SAME = 1e-9  # mm: two ways to the same optimum agree within this
-LEANING = (
-    1e-6  # cosine between the normals of least squares and of the narrowest zone below which they are across each other
-)
+LEANING = 1e-6  # cosine between the normals of least squares and of the narrowest zone: they are across each other
 _BALLS = (CIRCLE, SPHERE)
 _NONE = np.zeros(0, dtype=np.int64)
 

@@ -23,9 +23,7 @@ from cmm_uq.base.points import Floats, Ints
 
 # from a state (k,): values (m,) and derivatives (m, k), in units in which states and values are about one
 Rows = Callable[[Floats], tuple[Floats, Floats]]
-EXACT = (
-    1e-11  # of values, stationarity and step: where conditions are met, unless the rounding of coordinates is coarser
-)
+EXACT = 1e-11  # of values, stationarity and step, unless the rounding of the coordinates is coarser
 WORKING = 16  # rows a parameter that the descent looks at together; others join when they come out above
 
 
@@ -79,6 +77,9 @@ def _programmed(rows: Rows, start: Floats, of: Ints) -> Floats:
     def height(z: Floats) -> float:
         return float(z[-1])
 
+    def uphill(z: Floats) -> Floats:
+        return np.asarray(np.eye(len(z))[-1])
+
     def below(z: Floats) -> Floats:
         return np.asarray(z[-1] - rows(z[:-1])[0][of])
 
@@ -87,9 +88,8 @@ def _programmed(rows: Rows, start: Floats, of: Ints) -> Floats:
 
     bounded: Any = {"type": "ineq", "fun": below, "jac": slopes}
     first = np.append(start, rows(start)[0][of].max())
-    uphill = np.eye(len(first))[-1]
     options: Any = {"maxiter": 200, "ftol": 1e-14}
-    found = minimize(height, first, jac=lambda _: uphill, method="SLSQP", constraints=bounded, options=options)
+    found = minimize(height, first, jac=uphill, method="SLSQP", constraints=bounded, options=options)
     return np.asarray(found.x[:-1]) if np.isfinite(found.x).all() else start
 
 

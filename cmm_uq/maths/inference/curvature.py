@@ -1,7 +1,5 @@
 """Posteriors where the model bends within its width, or where a nonlinear parameter shapes its columns.
 
-Draws of a posterior where the model bends within its width: from those of the linear model about the estimate.
-
     observed = explained(parameters) + noise,   explained = linear part + r,   r ≈ ½ H(δ, δ)
 
 r is what the linear model about a point leaves out, δ the distance from there. It is measured, by differences over a few
@@ -11,9 +9,8 @@ explains as much, δ + K·r(δ) = φ with K the linear gain, and the bent draws 
 (Tierney 1994, Annals of Statistics 22(4), independence chains) whose stationary distribution is the posterior of the
 second-order model.
 
-The posterior of a linear model some of whose columns are shaped by a nonlinear parameter, such as a period.
-
-The parameters that enter linearly are integrated exactly, and drawn exactly in the end. What emcee samples is the noise and
+Where a nonlinear parameter, such as a period, shapes some columns of a linear model, the parameters that enter linearly are
+integrated exactly, and drawn exactly in the end. What emcee samples is the noise and
 the shapes. A shape may have several modes: it is sampled through its own marginal distribution, which a fine grid gives, so
 that the walkers step from mode to mode as easily as within one.
 """
@@ -21,7 +18,7 @@ that the walkers step from mode to mode as easily as within one.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -35,8 +32,7 @@ from cmm_uq.maths.inference.proposals import Proposal
 
 NEGLIGIBLE = 0.02  # of a standard uncertainty
 FARTHEST = 4.0  # posterior standard deviations
-# posterior standard deviations over which the second derivatives are taken: the middle of the range that counts
-_STEP = 2.0
+_STEP = 2.0  # posterior standard deviations over which the second derivatives are taken: the middle of the range that counts
 _ROUNDS = 4  # fixed-point rounds of bending; each gains the factor by which the model bends within a standard deviation
 _BLOCK = 2_000_000  # numbers at a time
 # what parameters (k,) explain of the observations, (m,) mm, beyond the linear model
@@ -47,17 +43,14 @@ Remainder = Callable[[Floats], Floats]
 class Bend:
     """The second-order model in units of posterior standard deviations z, whitened by the noise."""
 
-    # centre, axes: z = 0 and (k, k) columns: parameters = centre + axes · z; the linear posterior is N(z₀, 1)
-    centre: Floats
-    axes: Floats
+    centre: Floats  # (k,) parameters = centre + axes · z; the linear posterior is N(z₀, 1)
+    axes: Floats  # (k, k)
     design: Floats  # (m, k) of z
-    # first, second: (m, k) and (m, k, k) derivatives of what the linear model leaves out: a design need not be exact
-    first: Floats
-    second: Floats
+    first: Floats  # (m, k) derivatives of what the linear model leaves out: a design need not be exact
+    second: Floats  # (m, k, k)
     left: Floats  # (m,) what z = 0 leaves unexplained
-    # prior, prior_at: (p, k) and (p,): priors as observations, ``prior``·z − ``prior_at``
-    prior: Floats
-    prior_at: Floats
+    prior: Floats  # (p, k) priors as observations, ``prior``·z − ``prior_at``
+    prior_at: Floats  # (p,)
 
     @property
     def largest(self) -> float:
@@ -112,7 +105,7 @@ def bend(model: LinearModel, about: Floats, sigma: float, remainder: Remainder) 
     """
     reduced = model.reduced
     design, left = reduced.design / sigma, (reduced.observed - reduced.design @ about) / sigma
-    scale = np.array([u.scale for u in model.unknowns])
+    scale = model.scale
     prior, given = model.priors
     _, s, Vt = np.linalg.svd(np.vstack([design, prior]) * scale, full_matrices=False)
     axes = scale[:, None] * Vt.T / s
@@ -141,15 +134,11 @@ def bent(posterior: NoisyPosterior, found: Bend) -> NoisyPosterior:
     z, weight = found.bent(flat)
     kept = _metropolis(weight, posterior.steps // posterior.every, posterior.seed)
     draws = (found.centre + z @ found.axes.T)[kept]
-    given = {field.name: getattr(posterior, field.name) for field in fields(posterior)}
-    held = {"draws": draws, "sigma": posterior.sigma[kept], "sizes": posterior.sizes.at(kept)}
-    return NoisyPosterior(**given | held | {"ess_min": posterior.ess_min * _evenness(weight)})
-
-
-def _evenness(log_weight: Floats) -> float:
-    """Part of draws that are worth as much as equally weighted ones (Kish): 1 where all weigh the same."""
-    weight = np.exp(log_weight - log_weight.max())
-    return float(weight.sum() ** 2 / (len(weight) * np.sum(weight**2)))
+    even = np.exp(weight - weight.max())
+    # part of draws that are worth as much as equally weighted ones (Kish)
+    ess_min = posterior.ess_min * float(even.sum() ** 2 / (len(even) * np.sum(even**2)))
+    sizes = posterior.sizes.at(kept)
+    return replace(posterior, draws=draws, sigma=posterior.sigma[kept], sizes=sizes, ess_min=ess_min)
 
 
 def _metropolis(log_weight: Floats, steps: int, seed: int) -> Ints:
@@ -160,9 +149,8 @@ def _metropolis(log_weight: Floats, steps: int, seed: int) -> Ints:
     held = walks.copy()
     for step in range(1, steps):
         before, now = held[:, step - 1], walks[:, step]
-        better = np.where(np.isfinite(log_weight[now]), log_weight[now], -np.inf) - np.maximum(
-            log_weight[before], -1e300
-        )
+        weight = np.where(np.isfinite(log_weight[now]), log_weight[now], -np.inf)
+        better = weight - np.maximum(log_weight[before], -1e300)
         held[:, step] = np.where(chance[:, step] < better, now, before)
     return np.asarray(held.ravel(), dtype=np.int64)
 
@@ -186,10 +174,7 @@ class Shaped:
 def sample_shaped(
     model: LinearModel, shaped: Sequence[Shaped], seed: int, progress: Progress | None = None
 ) -> Posterior:
-    """Sample the posterior; its ``shapes`` (N, q) belong to ``shaped`` in order.
-
-    ``progress``: told the part done, from 0 to 1.
-    """
+    """Sample the posterior, whose ``shapes`` (N, q) belong to ``shaped``; ``progress`` gets the part done, from 0 to 1."""
     density = _Density(model, shaped)
     centre, factor = density.start
     chains = run_ensembles(density, Proposal.single(centre, factor), seed, progress)
@@ -197,28 +182,21 @@ def sample_shaped(
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(5,)))
     parts = [slice(i, i + _BATCH) for i in range(0, len(sigma), _BATCH)]
     draws = np.vstack([density.draw(shapes[part], sigma[part], random) for part in parts])
-    return Posterior(
-        model.unknowns, draws, sigma, seed, chains.sampler, chains.ess_min, chains.rhat_max, chains.steps,
-        chains.autocorrelation_time, shapes,
-    )  # fmt: skip
-
-
-def _reduced(model: LinearModel, columns: Floats) -> Floats:
-    """Columns (m, r) as :meth:`LinearModel.reduce` gives them, which is each by itself."""
-    parts = np.array_split(columns, columns.shape[1] // _COLUMNS + 1, axis=1)
-    return np.hstack([model.reduce(part) for part in parts])
+    return Posterior(model.unknowns, draws, sigma, seed, **chains.quality, shapes=shapes)
 
 
 class _Density:
     """Log density of (u₁ … u_q, ln σ): each u is normal where its shape follows the marginal of the grid."""
 
     def __init__(self, model: LinearModel, shaped: Sequence[Shaped]) -> None:
-        self.model = model
-        self.shaped = shaped
-        reduced = model.reduced
+        self.model, self.shaped, reduced = model, shaped, model.reduced
         # deviations from the prior means: lengths of half a metre would leave no digits for nanometres
         observed = reduced.observed - reduced.design @ model.prior_mean
-        flat = [_reduced(model, np.hstack(list(some.table))) for some in shaped]
+        flat = []
+        for some in shaped:
+            columns = np.hstack(list(some.table))
+            parts = np.array_split(columns, columns.shape[1] // _COLUMNS + 1, axis=1)
+            flat.append(np.hstack([model.reduce(part) for part in parts]))
         # the walkers need no more rows than the columns have dimensions
         every = np.hstack([reduced.design, *flat])
         every = every / np.maximum(np.linalg.norm(every, axis=0), 1e-300)
@@ -232,11 +210,6 @@ class _Density:
             (Q.T @ columns).reshape(Q.shape[1], len(some.nodes), -1).transpose(1, 0, 2)
             for some, columns in zip(shaped, flat, strict=True)
         ]
-
-    @cached_property
-    def _weight(self) -> Floats:
-        scale = np.array([u.scale for u in self.model.unknowns])
-        return np.asarray(1 / np.maximum(self.model.prior_sd, 1e-6 * scale) ** 2, dtype=np.float64)
 
     def designs(self, shapes: Floats) -> Floats:
         """Reduced designs (w, m', k) for shapes (w, q), linear between the nodes."""
@@ -252,7 +225,9 @@ class _Density:
         """Means (w, k) less the prior ones, lower factors of the precisions, and ln p(observations | shapes, σ)."""
         design = self.designs(shapes)
         right = (design.transpose(0, 2, 1) @ self.observed) / sigma[:, None] ** 2
-        precision = design.transpose(0, 2, 1) @ design / sigma[:, None, None] ** 2 + np.diag(self._weight)
+        precision = design.transpose(0, 2, 1) @ design / sigma[:, None, None] ** 2 + np.diag(
+            1 / self.model.effective_sd**2
+        )
         scale = 1 / np.sqrt(np.einsum("wii->wi", precision))
         factor = np.linalg.cholesky(precision * scale[:, :, None] * scale[:, None, :])
         half = np.linalg.solve(factor, (right * scale)[:, :, None])[:, :, 0]
@@ -273,6 +248,13 @@ class _Density:
         z = random.standard_normal(mean.shape)
         return self.model.prior_mean + mean + np.linalg.solve(factor.transpose(0, 2, 1), z[:, :, None])[:, :, 0]
 
+    def _log_over_nodes(self, j: int, shapes: Floats, sigma: float) -> Floats:
+        """:meth:`log_marginal` at all nodes of one shape, the others as they are."""
+        nodes = self.shaped[j].nodes
+        trial = np.repeat(shapes[None], len(nodes), axis=0)
+        trial[:, j] = nodes
+        return self.log_marginal(trial, np.full(len(trial), sigma))
+
     @cached_property
     def _best(self) -> tuple[Floats, float]:
         """Shapes (q,) and σ near the mode: one shape after the other over its grid, twice."""
@@ -281,10 +263,7 @@ class _Density:
         sigma = self.model.sigma or 0.0
         for _ in range(2):
             for j, some in enumerate(self.shaped):
-                trial = np.repeat(shapes[None], len(some.nodes), axis=0)
-                trial[:, j] = some.nodes
-                size = sigma or typical
-                shapes[j] = some.nodes[int(np.argmax(self.log_marginal(trial, np.full(len(trial), size))))]
+                shapes[j] = some.nodes[int(np.argmax(self._log_over_nodes(j, shapes, sigma or typical)))]
             if self.model.sigma is None:
                 grid = np.geomspace(1e-3, 2, 120) * typical
                 log = self.log_marginal(np.repeat(shapes[None], len(grid), axis=0), grid)
@@ -297,9 +276,7 @@ class _Density:
         best, sigma = self._best
         found = []
         for j, some in enumerate(self.shaped):
-            trial = np.repeat(best[None], len(some.nodes), axis=0)
-            trial[:, j] = some.nodes
-            log = self.log_marginal(trial, np.full(len(trial), sigma))
+            log = self._log_over_nodes(j, best, sigma)
             t, p = np.log(some.nodes), np.exp(log - log.max())
             width = np.diff(t)
             mass = 0.5 * (p[1:] + p[:-1]) * width
@@ -308,7 +285,6 @@ class _Density:
         return found
 
     def unpacked(self, theta: Floats) -> tuple[Floats, Floats]:
-        """Shapes (w, q) and σ (w,)."""
         shapes = np.empty((len(theta), len(self.shaped)))
         for j, (t, distribution, _) in enumerate(self._quantiles):
             shapes[:, j] = np.exp(np.interp(special.ndtr(theta[:, j]), distribution, t))
@@ -316,7 +292,6 @@ class _Density:
         return shapes, sigma
 
     def __call__(self, theta: Floats) -> Floats:
-        """Log density (w,), up to a constant."""
         shapes, sigma = self.unpacked(theta)
         inside = (sigma > SIGMA_BOUNDS[0]) & (sigma < SIGMA_BOUNDS[1])
         value = self.log_marginal(shapes, np.where(inside, sigma, 1.0))
@@ -327,7 +302,6 @@ class _Density:
 
     @property
     def start(self) -> tuple[Floats, Floats]:
-        """Centre and factor for the ensembles."""
         q = len(self.shaped)
         if self.model.sigma is not None:
             return np.zeros(q), np.eye(q)

@@ -28,8 +28,7 @@ class Cause:
 
     name: Text  # in words
     common: Floats  # (m, r) change of each observation, mm, for one standard uncertainty of each of r independent parts
-    # the same where each block of observations errs by itself; ``None`` where all are known to err together
-    apart: Freedoms | None = None
+    apart: Freedoms | None = None  # where each block errs by itself; ``None`` where all are known to err together
     # (m,) change for one standard uncertainty of what is in the draws already, as that of a certified size is: it stands for
     # ``common``, which is then zero, and of ``apart`` only what is more counts
     included: Floats | None = None
@@ -42,11 +41,9 @@ class Cause:
         return cls(name, columns, Freedoms(columns, index.ravel(), int(index.max(initial=-1)) + 1))
 
     def at(self, rows: NDArray[np.bool_]) -> Cause:
-        """Of some of the observations."""
-        return Cause(
-            self.name, self.common[rows], None if self.apart is None else self.apart.at(rows),
-            None if self.included is None else self.included[rows],
-        )  # fmt: skip
+        apart = None if self.apart is None else self.apart.at(rows)
+        included = None if self.included is None else self.included[rows]
+        return Cause(self.name, self.common[rows], apart, included)
 
     def drawn(self, shape: tuple[int, ...], random: np.random.Generator, *, apart: bool) -> Floats:
         """Errors (*shape, m), mm, of the observations."""

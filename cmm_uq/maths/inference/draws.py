@@ -1,6 +1,4 @@
-"""The draws of a posterior by name and by chain, and what noise leaves uncertain of a weighted sum.
-
-The draws of a posterior by name and by chain, as other programs read them.
+"""The draws of a posterior by name and by chain, as other programs read them; what noise leaves uncertain of a sum.
 
 A chain is the path of one walker of one ensemble, as the sampler ran it. Draws of several walkers strung together would look
 independent to a program that estimates autocorrelation along a chain, and be counted several times over. Where only some draws
@@ -28,8 +26,8 @@ from cmm_uq.maths.inference.slow import root
 if TYPE_CHECKING:
     import pandas as pd
 
-# date of the members of an archive, the first that the format knows: the clock is never read
-EPOCH = (1980, 1, 1, 0, 0, 0)
+EPOCH = (1980, 1, 1, 0, 0, 0)  # of the members of an archive, the first that the format knows: the clock is never read
+_COVERAGE = 0.975
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,7 +55,6 @@ class Draws(Mapping[str, Floats]):
 
     @property
     def names(self) -> list[str]:
-        """Of the quantities, in order."""
         return list(self.units)
 
     @cached_property
@@ -135,12 +132,7 @@ class Draws(Mapping[str, Floats]):
         return {name: np.ascontiguousarray(self.array[:, :, i]).ravel() for i, name in enumerate(self.names)}
 
     def to_arviz(self) -> Any:
-        """The draws as ``arviz.InferenceData``, group ``posterior``.
-
-        Raises
-        ------
-        CmmUqError : ArviZ is not installed.
-        """
+        """The draws as ``arviz.InferenceData``, group ``posterior``."""
         try:
             import arviz
         except ImportError as error:
@@ -150,11 +142,9 @@ class Draws(Mapping[str, Floats]):
 
 def by_chain(values: Floats, steps: int) -> Floats:
     """Draws (N, …), ensembles, steps and walkers in this order, as chains (chain, draw, …), each the path of a walker."""
-    rest = values.shape[1:]
-    walkers = len(values) // (ENSEMBLES * steps)
-    return np.asarray(
-        values.reshape(ENSEMBLES, steps, walkers, *rest).swapaxes(1, 2).reshape(ENSEMBLES * walkers, steps, *rest)
-    )
+    walkers, rest = len(values) // (ENSEMBLES * steps), values.shape[1:]
+    by_step = values.reshape(ENSEMBLES, steps, walkers, *rest)
+    return np.asarray(by_step.swapaxes(1, 2).reshape(ENSEMBLES * walkers, steps, *rest))
 
 
 def evenly(count: int, most: int) -> Ints:
@@ -179,18 +169,13 @@ def _texts(words: Any) -> Any:
     return np.array(listed, dtype=f"<U{max([1, *map(len, listed)])}")
 
 
-_COVERAGE = 0.975
-
-
 def uncertainty_of_sum(
     components: Components, sizes: Sizes, weights: Floats, beside: float = 0.0
 ) -> tuple[float, float]:
-    """Standard uncertainty, and half the 95 % interval, of a sum of observations.
+    """Standard uncertainty, and half the 95 % interval, of a sum of observations with weights (m,).
 
-    Given the sizes the sum is normal; over their draws it is a mixture of normal distributions about one value.
-
-    ``weights``: (m,) of the observations. ``beside``: standard uncertainty of a normal contribution that is no noise, in the
-    unit of the sum.
+    Given the sizes the sum is normal; over their draws it is a mixture of normal distributions about one value. ``beside``:
+    standard uncertainty of a normal contribution that is no noise, in the unit of the sum.
     """
     variances, _ = components.variances(sizes)
     squares = components.shares.T @ np.asarray(components.turn @ weights) ** 2

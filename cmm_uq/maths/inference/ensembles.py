@@ -1,21 +1,13 @@
-"""Several ensembles of emcee on one density, until the autocorrelation time says enough.
+"""Several ensembles of emcee on one density, side by side in one sampler, until the autocorrelation time says enough.
 
-The step of several ensembles side by side in one sampler of emcee, each with random numbers of its own, as if alone.
+The walkers move in coordinates whitened by an approximation of the density. Walkers of one ensemble are not independent, so
+the ensembles, each with random numbers of its own, are compared with each other. Most steps are independence proposals from
+the approximation; differential-evolution steps repair what it misses. (emcee's snooker move is not used: its normalisation is
+wrong in release 3.1.6.) Independence proposals do not depend on where the walkers are, so those of all ensembles are drawn
+ahead, up to each one's next differential-evolution step, and the density is asked for all of them at once.
 
-Most steps are independence proposals from an approximation of the density; differential-evolution steps repair what the
-approximation misses. (emcee's snooker move is not used: its normalisation is wrong in release 3.1.6.) Independence proposals
-do not depend on where the walkers are, so those of all ensembles are drawn ahead, up to each one's next differential-evolution
-step, and the density is asked for all of them at once, which costs little more than for those of one step.
-
-Several ensembles of emcee on one density, until the autocorrelation time says enough.
-
-The walkers move in coordinates whitened by an approximation of the density (``side_by_side``). Walkers
-of one ensemble are not independent, so the ensembles are compared with each other.
-
-How many independent draws chains are worth.
-
-The bulk effective sample size of Vehtari, Gelman, Simpson, Carpenter and Bürkner (2021), "Rank-normalization, folding, and
-localization: an improved R-hat", Bayesian Analysis 16(2), sections 3.2 and 4.3.
+Chains are worth as many independent draws as the bulk effective sample size of Vehtari, Gelman, Simpson, Carpenter and Bürkner
+(2021) says: "Rank-normalization, folding, and localization: an improved R-hat", Bayesian Analysis 16(2), sections 3.2 and 4.3.
 """
 
 from __future__ import annotations
@@ -52,20 +44,14 @@ class _Independent:
 
     @classmethod
     def together(cls, steps: Sequence[_Independent], log_before: Floats) -> _Independent:
-        """Those of several ensembles as those of one.
-
-        ``log_before``: (w,) of what is proposed, where the walkers are.
-        """
+        """Those of several ensembles as those of one; ``log_before``: (w,) of the proposal, where the walkers are."""
         each = ((step.proposed, step.log_proposal, step.log_density, step.uniform) for step in steps)
         proposed, log_proposal, log_density, uniform = (np.concatenate(of) for of in zip(*each, strict=True))
         return cls(proposed, log_proposal, log_density, uniform, log_before)
 
 
 class SideBySide:
-    """A move of emcee's.
-
-    ``proposal``: roughly the density. ``randoms``: random numbers of each ensemble, of which the walkers follow one another.
-    """
+    """A move of emcee's, with a proposal that is roughly the density, and random numbers of each ensemble."""
 
     def __init__(self, proposal: Proposes, randoms: Sequence[Any]) -> None:
         from emcee.moves import DEMove, MHMove
@@ -133,15 +119,10 @@ class SideBySide:
         return drawn.proposed, drawn.log_before - drawn.log_proposal
 
 
-ENSEMBLES = 4
-STEPS_AT_ONCE = 300
-MOST_STEPS = 6000
-BURN_IN = 60
-WALKERS = 32
-# asked of every parameter: the interval's ends are then stable to about 3 % of u, below the last digit printed
-EFFECTIVE_SAMPLES = 4000
-LEAST_EFFECTIVE_SAMPLES = 1000
-LARGEST_RHAT = 1.01
+ENSEMBLES, WALKERS = 4, 32
+STEPS_AT_ONCE, MOST_STEPS, BURN_IN = 300, 6000, 60
+EFFECTIVE_SAMPLES = 4000  # of every parameter: intervals' ends are then stable to about 3 % of u
+LEAST_EFFECTIVE_SAMPLES, LARGEST_RHAT = 1000, 1.01
 _WINDOW = 5.0  # autocorrelation times that are summed over
 Progress = Callable[[float], None]
 
@@ -152,16 +133,19 @@ class Chains:
 
     draws: Floats  # (N, d) in the density's own parameters: ensembles, steps and walkers in this order
     sampler: str  # program and version
-    # ess_min, rhat_max: effective samples and rank-normalised R-hat, worst over all parameters
-    ess_min: float
-    rhat_max: float
-    # steps, autocorrelation_time: length of each chain, and the longest time
-    steps: int
-    autocorrelation_time: float
+    ess_min: float  # effective samples, fewest of all parameters
+    rhat_max: float  # rank-normalised R-hat, worst of all parameters
+    steps: int  # of each chain
+    autocorrelation_time: float  # the longest
 
     @property
     def converged(self) -> bool:
         return converged(self.ess_min, self.rhat_max, self.steps, self.autocorrelation_time)
+
+    @property
+    def quality(self) -> dict[str, Any]:
+        """All but the draws."""
+        return {name: value for name, value in vars(self).items() if name != "draws"}
 
     def thinning(self, most: int) -> int:
         """Of how many steps one is to be kept for at most ``most`` draws (or for those of two steps of each chain)."""
@@ -189,10 +173,7 @@ def run_ensembles(
     walkers: int | None = None,
     burn_in: int = BURN_IN,
 ) -> Chains:
-    """Sample a density with emcee.
-
-    ``progress``: told the part done, from 0 to 1. ``walkers``: in each ensemble; by default 32, or four for each dimension.
-    """
+    """Sample a density with emcee; ``progress`` gets the part done, ``walkers`` are 32 an ensemble, or four a dimension."""
     import emcee
 
     d = len(proposal.centre)
@@ -258,10 +239,7 @@ def autocorrelation_time(chains: Floats) -> float:
 
 
 def rhat(chains: Floats, scores: Floats | None = None) -> float:
-    """Largest rank-normalised split R-hat of the parameters, bulk or tail (Vehtari et al. 2021, section 4).
-
-    ``chains``: (c, n, d) independent chains.
-    """
+    """Largest rank-normalised split R-hat of the parameters of chains (c, n, d), bulk or tail (section 4)."""
     halves = split(chains)
     folded = np.abs(halves - np.median(halves, axis=(0, 1)))
     bulk = normal_scores(halves) if scores is None else scores
@@ -289,17 +267,13 @@ def _split_rhat(values: Floats) -> Floats:
     n = values.shape[1]
     within = values.var(axis=1, ddof=1).mean(axis=0)
     between = values.mean(axis=1).var(axis=0, ddof=1)
-    with np.errstate(
-        divide="ignore", invalid="ignore"
-    ):  # chains that never moved: infinite or not a number, not converged
+    # of chains that never moved it is infinite or not a number: not converged
+    with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.sqrt((n - 1) / n + between / within), dtype=np.float64)
 
 
 def bulk_ess(chains: Floats, scores: Floats | None = None) -> float:
-    """Smallest bulk effective sample size of the parameters.
-
-    ``chains``: (c, n, d) draws, n at least 8.
-    """
+    """Smallest bulk effective sample size of the parameters of chains (c, n, d), n at least 8."""
     scores = normal_scores(split(chains)) if scores is None else scores
     return min(_effective(scores[:, :, i]) for i in range(scores.shape[2]))
 
@@ -309,7 +283,12 @@ def _effective(values: Floats) -> float:
     c, n = values.shape
     if np.ptp(values) == 0:
         return float(c * n)  # what does not vary is known from any draw
-    correlation = _autocorrelation(values)
+    # autocorrelation (n,) at every lag, from the variances within the chains and between them (equation 10)
+    spectrum = np.fft.rfft(values - values.mean(axis=1, keepdims=True), n=2 * n, axis=1)
+    covariance = np.fft.irfft(np.abs(spectrum) ** 2, n=2 * n, axis=1)[:, :n].mean(axis=0) / n
+    within = covariance[0] * n / (n - 1)
+    correlation = 1.0 - (within - covariance) / (covariance[0] + values.mean(axis=1).var(ddof=1))
+    correlation[0] = 1.0
     pairs = correlation[: (n - 1) // 2 * 2].reshape(-1, 2).sum(axis=1)
     ends = np.flatnonzero(pairs <= 0)  # Geyer's initial positive sequence: its sums of pairs are all positive
     last = int(ends[0]) if len(ends) else len(pairs) - 1
@@ -317,16 +296,3 @@ def _effective(values: Floats) -> float:
     time = -1.0 + 2.0 * float(monotone.sum()) + max(float(correlation[2 * last]), 0.0)
     draws = c * n
     return float(draws / max(time, 1.0 / np.log10(draws)))
-
-
-def _autocorrelation(values: Floats) -> Floats:
-    """(n,) at every lag, of (c, n), from the variances within the chains and between them (equation 10)."""
-    n = values.shape[1]
-    about = values - values.mean(axis=1, keepdims=True)
-    spectrum = np.fft.rfft(about, n=2 * n, axis=1)
-    covariance = np.fft.irfft(np.abs(spectrum) ** 2, n=2 * n, axis=1)[:, :n].mean(axis=0) / n
-    within = covariance[0] * n / (n - 1)
-    whole = covariance[0] + values.mean(axis=1).var(ddof=1)
-    found = 1.0 - (within - covariance) / whole
-    found[0] = 1.0
-    return np.asarray(found, dtype=np.float64)

@@ -9,17 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import linalg
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.points import Floats
+from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
 
-# singular values below this part of the largest are zero: rounding leaves about 1e-13, fitted placings of spheres 1e-8
-RANK_TOLERANCE = 1e-7
+RANK_TOLERANCE = 1e-7  # part of the largest singular value; fitted placings of spheres leave 1e-8
 _NOTHING = 1e-8  # part of a parameter in a free combination, over its typical size, that is rounding
-# up to how many times its singular value over the largest noise turns a combination that only noise shows
-_ROUGHLY = 100.0
+_ROUGHLY = 100.0  # times its singular value over the largest: so far noise turns a combination that only it shows
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,17 +26,12 @@ class LeastSquares:
     """A least-squares estimate."""
 
     unknowns: tuple[Unknown, ...]  # k parameters; certified ones keep their certified value
-    # (k,) estimates; for an undetermined parameter the one nearest to its prior mean of many that fit equally well
-    value: Floats
-    # (k, k), with the certificates' uncertainty propagated (JCGM 100, 5.1.2); infinite variance where undetermined.
-    covariance: Floats
-    # (k,) whether the observations (or a certificate) determine the parameter by itself
-    determined: np.ndarray[tuple[int], np.dtype[np.bool_]]
-    # (k, f) combinations, one a column and in the parameters' units, that leave every observation as it is
-    null_space: Floats
-    # rank, condition: of the design in units of the parameters' typical sizes; condition of its determined part
-    rank: int
-    condition: float
+    value: Floats  # (k,) of an undetermined parameter the one nearest to its prior mean that fits equally well
+    covariance: Floats  # (k, k), certificates' u propagated (JCGM 100, 5.1.2); infinite variance where undetermined
+    determined: NDArray[np.bool_]  # (k,) whether the observations (or a certificate) determine the parameter by itself
+    null_space: Floats  # (k, f) combinations, in the parameters' units, that leave all observations as they are
+    rank: int  # of the design in units of the parameters' typical sizes
+    condition: float  # of its determined part
     residuals: Floats  # (m,) mm, observed minus explained
     degrees_of_freedom: int  # observations minus what was fitted to them
     residual_sd: float | None  # mm, √(sum of squares / degrees of freedom); ``None`` without degrees of freedom
@@ -55,9 +49,17 @@ def solve(model: LinearModel, most: int | None = None) -> LeastSquares:
     unknowns, reduced = model.unknowns, model.reduced
     held = np.array([u.known for u in unknowns], dtype=bool)
     free = np.flatnonzero(~held)
-    _enough(reduced.count, len(free), stated=model.sigma is not None)
+    if reduced.count < len(free) or (reduced.count == len(free) and model.sigma is None):
+        problem = f"{reduced.count} observations cannot determine {len(free)} parameters"
+        fix = "name fewer effects in job.toml [model] effects"
+        if reduced.count == len(free):
+            problem = (
+                f"{reduced.count} observations for {len(free)} parameters leave nothing to estimate the noise from"
+            )
+            fix = "state u_coordinate_um in job.toml [recording]"
+        raise CmmUqError(problem, where="recording", fix=f"Record more placings, or {fix}")
     value = model.prior_mean.copy()
-    scale = np.array([unknowns[i].scale for i in free])
+    scale = model.scale[free]
     target = reduced.observed - reduced.design @ value
     U, s, Vt = linalg.svd(reduced.design[:, free] * scale, full_matrices=False)
     rank = int(np.sum(s > RANK_TOLERANCE * s[0])) if s.size and s[0] > 0 else 0
@@ -78,73 +80,37 @@ def solve(model: LinearModel, most: int | None = None) -> LeastSquares:
         column /= column[np.flatnonzero(column)[0]]
     determined = np.ones(len(unknowns), dtype=bool)
     determined[free] = np.all(null_space[free] == 0, axis=1)
-    return LeastSquares(
-        unknowns, value, _covariance(model, forward, free, held, sigma, determined), determined, null_space,
-        rank, float(s[0] / s[rank - 1]) if rank else float("inf"), whitened * model.noise_scale, dof,
-        _residual_sd(whitened * model.noise_scale, dof), sigma, from_residuals,
-        _spread(forward, free, sigma, len(unknowns)),
-    )  # fmt: skip
+    residuals, spread = whitened * model.noise_scale, np.zeros(len(unknowns))
+    residual_sd = float(np.sqrt(residuals @ residuals / dof)) if dof > 0 else None
+    spread[free] = sigma * np.sqrt(np.sum(forward**2, axis=1))
+    covariance = _covariance(model, forward, free, held, sigma)
+    covariance[np.diag(~determined)] = np.inf
+    condition = float(s[0] / s[rank - 1]) if rank else float("inf")
+    figures = rank, condition, residuals, dof, residual_sd, sigma, from_residuals, spread
+    return LeastSquares(unknowns, value, covariance, determined, null_space, *figures)
 
 
 def likeliest(model: LinearModel, sigma: float) -> Floats:
     """The parameters (k,) that observations with noise ``sigma``, mm, and all priors together make likeliest."""
     rows, given = model.priors
-    scale = np.array([u.scale for u in model.unknowns])
+    scale = model.scale
     whole = np.vstack([model.reduced.design / sigma, rows]) * scale
     return np.asarray(scale * np.linalg.lstsq(whole, np.append(model.reduced.observed / sigma, given), rcond=None)[0])
 
 
-def _enough(observations: int, parameters: int, *, stated: bool) -> None:
-    if observations < parameters:
-        raise CmmUqError(
-            f"{observations} observations cannot determine {parameters} parameters",
-            where="recording",
-            fix="Record more placings, or name fewer effects in job.toml [model] effects",
-        )
-    if observations == parameters and not stated:
-        raise CmmUqError(
-            f"{observations} observations for {parameters} parameters leave nothing to estimate the noise from",
-            where="recording",
-            fix="Record more placings, or state u_coordinate_um in job.toml [recording]",
-        )
-
-
-def _residual_sd(residuals: Floats, dof: int) -> float | None:
-    return float(np.sqrt(residuals @ residuals / dof)) if dof > 0 else None
-
-
-def _spread(forward: Floats, free: np.ndarray[tuple[int], np.dtype[np.int64]], sigma: float, count: int) -> Floats:
-    spread = np.zeros(count)
-    spread[free] = sigma * np.sqrt(np.sum(forward**2, axis=1))
-    return spread
-
-
-def _covariance(
-    model: LinearModel,
-    forward: Floats,
-    free: np.ndarray[tuple[int], np.dtype[np.int64]],
-    held: np.ndarray[tuple[int], np.dtype[np.bool_]],
-    sigma: float,
-    determined: np.ndarray[tuple[int], np.dtype[np.bool_]],
-) -> Floats:
+def _covariance(model: LinearModel, forward: Floats, free: Ints, held: NDArray[np.bool_], sigma: float) -> Floats:
     """σ² from the noise, plus what the certificates' uncertainty does to the estimates."""
-    k = len(model.unknowns)
-    covariance = np.zeros((k, k))
-    sensitivity = np.zeros((k, int(held.sum())))
+    k = len(held)
+    covariance, sensitivity = np.zeros((k, k)), np.zeros((k, int(held.sum())))
     sensitivity[free] = -forward @ model.reduced.design[:, held]
     sensitivity[held] = np.eye(int(held.sum()))
     covariance[np.ix_(free, free)] = sigma**2 * forward @ forward.T
     covariance += (sensitivity * model.prior_sd[held] ** 2) @ sensitivity.T
-    for i in np.flatnonzero(~determined):
-        covariance[i, i] = np.inf
     return covariance
 
 
 def _simplest(null_space: Floats, nothing: float) -> Floats:
-    """The same space, each column with a one where no other has anything: reads as few parameters as possible.
-
-    Parts up to ``nothing`` are zero.
-    """
+    """The same space, each column with a one where no other has anything; parts up to ``nothing`` are zero."""
     if null_space.shape[1] == 0:
         return null_space
     _, _, order = linalg.qr(null_space.T, mode="economic", pivoting=True)

@@ -1,7 +1,5 @@
 """A linear measurement model: observations, what explains them, what is known beforehand and what each set-up leaves free.
 
-A linear measurement model: observations, what explains them, and what is known beforehand.
-
     observed = design · parameters + placing · (anything) + noise,   noise_i ~ N(0, (σ · noise_scale_i)²)
 
 Observed values are mm. Columns of ``placing`` have no prior and are of no interest (where the artefact stood); they are
@@ -41,7 +39,6 @@ class Freedoms:
 
     @property
     def count(self) -> int:
-        """Of all columns."""
         return self.blocks * int(self.columns.shape[1])
 
     def dense(self) -> Floats:
@@ -52,7 +49,6 @@ class Freedoms:
         return whole.reshape(len(self.index), -1)
 
     def at(self, rows: NDArray[np.bool_] | Ints) -> Freedoms:
-        """Of some of the observations."""
         return Freedoms(self.columns[rows], self.index[rows], self.blocks)
 
     def over(self, scale: Floats) -> Freedoms:
@@ -81,9 +77,9 @@ class Freedoms:
         return Freedoms(found, self.index, self.blocks)
 
     def apart(self, group: Ints) -> Freedoms:
-        """The same span by orthogonal columns of the same length, as many as can be zero outside one group (m,) each.
+        """The same span by orthogonal columns of one length, as many as can be zero outside one group (m,) each.
 
-        Columns are orthogonal and of one length, or zero; those that are zero stay where they are.
+        Columns that are zero stay where they are.
         """
         found = np.zeros_like(self.columns)
         for rows in self.rows:
@@ -131,26 +127,20 @@ def reached(columns: Floats) -> Floats:
     return np.asarray(Q[:, diagonal > _DEPENDENT * diagonal[0]], dtype=np.float64)
 
 
-Whiten = Callable[[Floats], Floats]
-
-
 @dataclass(frozen=True)
 class Unknown:
     """A parameter of a linear model."""
 
     key: tuple[str, str]  # effect (or ``artefact``) and parameter name, as in results.json.
     unit: Unit  # as printed
-    # prior_mean, prior_sd: what is known beforehand; an infinite standard deviation means nothing
     prior_mean: float
-    prior_sd: float
+    prior_sd: float  # infinite where nothing is known beforehand
     scale: float  # a typical size, for columns of comparable length
     known: bool = False  # whether the prior comes from a certificate, so that least squares may use it too
 
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """See the module's docstring."""
-
     observed: Floats  # (m,) mm
     design: Floats  # (m, k) mm per unit of each parameter
     unknowns: tuple[Unknown, ...]  # k of them
@@ -160,7 +150,7 @@ class LinearModel:
 
     @cached_property
     def reduced(self) -> Reduced:
-        """Whitened by the noise scale, the placing projected out by QR: (observed, design, degrees of freedom)."""
+        """Whitened by the noise scale, the placing projected out by QR."""
         y = self.reduce(self.observed[:, None])[:, 0]
         return Reduced(y, self.reduce(self.design), len(y) - self._whitened.rank)
 
@@ -175,52 +165,47 @@ class LinearModel:
 
     @cached_property
     def _whitened(self) -> Freedoms:
-        """The same in units of the noise scale."""
         return self.freedoms.over(self.noise_scale)
 
     def at(self, rows: NDArray[np.bool_]) -> LinearModel:
         """The model of some of its observations."""
-        return replace(
-            self, observed=self.observed[rows], design=self.design[rows], placing=self.freedoms.at(rows),
-            noise_scale=self.noise_scale[rows],
-        )  # fmt: skip
+        of_rows = {name: getattr(self, name)[rows] for name in ("observed", "design", "noise_scale")}
+        return replace(self, **of_rows, placing=self.freedoms.at(rows))
 
     def only(self, parameters: Sequence[int]) -> LinearModel:
         """The model with some of its parameters, the others zero."""
         chosen = list(parameters)
         return replace(self, design=self.design[:, chosen], unknowns=tuple(self.unknowns[i] for i in chosen))
 
-    def uncorrelated(self, whiten: Whiten) -> LinearModel:
-        """The same model in observations without correlation.
-
-        ``whiten``: what turns columns (m, r) of noise, mm, into white noise of one coordinate's standard deviation.
-        """
-        observed = whiten(self.observed[:, None])[:, 0]
-        return replace(
-            self, observed=observed, design=whiten(self.design), placing=whiten(self.freedoms.dense()),
-            noise_scale=np.ones(len(observed)),
-        )  # fmt: skip
+    def uncorrelated(self, whiten: Callable[[Floats], Floats]) -> LinearModel:
+        """The same model in observations whose noise ``whiten`` has made white, of one coordinate's standard deviation."""
+        design, placing = whiten(self.design), whiten(self.freedoms.dense())
+        observed, scale = whiten(self.observed[:, None])[:, 0], np.ones(len(self.observed))
+        return replace(self, observed=observed, design=design, placing=placing, noise_scale=scale)
 
     @property
     def priors(self) -> tuple[Floats, Floats]:
-        """What is known beforehand as p observations of unit variance: rows (p, k), and what they give, (p,).
-
-        A certificate without uncertainty is taken as good to a millionth of a typical size.
-        """
+        """What is known beforehand as p observations of unit variance: rows (p, k), and what they give, (p,)."""
         known = np.isfinite(self.prior_sd)
-        scale = np.array([u.scale for u in self.unknowns])
-        sd = np.maximum(self.prior_sd, 1e-6 * scale)[known]
+        sd = self.effective_sd[known]
         return np.eye(len(known))[known] / sd[:, None], self.prior_mean[known] / sd
 
     @property
+    def scale(self) -> Floats:
+        return np.array([u.scale for u in self.unknowns])
+
+    @property
     def prior_mean(self) -> Floats:
-        """(k,)."""
         return np.array([u.prior_mean for u in self.unknowns])
 
     @property
     def prior_sd(self) -> Floats:
-        """(k,); infinite where nothing is known."""
         return np.array([u.prior_sd for u in self.unknowns])
+
+    @property
+    def effective_sd(self) -> Floats:
+        """(k,) prior ones; a certificate without uncertainty is taken as good to a millionth of a typical size."""
+        return np.maximum(self.prior_sd, 1e-6 * self.scale)
 
 
 @dataclass(frozen=True, eq=False)

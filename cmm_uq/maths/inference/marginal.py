@@ -22,8 +22,7 @@ from cmm_uq.maths.inference.slow import SlowFirst, groups, products
 SIGMA_BOUNDS = (1e-6, 10.0)
 _JITTER = 1e-11  # relative; a recording that a model explains to the last digit leaves nothing to factorise
 _NUMBERS = 500_000  # in one batch of matrices; the random numbers of draws follow batch by batch
-# numbers in the matrices that are reckoned with at once: as many as a processor's cache holds beside what makes them
-_CACHED = 220_000
+_CACHED = 220_000  # in the matrices that are reckoned with at once: as many as a processor's cache holds
 _MOST_FREE = 150  # columns of placings up to which slow noise is eliminated before them
 _NUMBERS_DRAWN = 100_000_000  # in the matrices that all draws of the parameters take
 
@@ -34,12 +33,10 @@ class Marginal:
 
     model: LinearModel  # linear about its estimate
     noise: Components  # its components; observations as in the model
-    # least squares of the model: deviations from it leave digits that lengths of half a metre would not
-    estimate: LeastSquares
+    estimate: LeastSquares  # of the model: deviations from it leave digits that lengths of half a metre would not
 
     @cached_property
     def _scale(self) -> float:
-        """Mm."""
         return float(max(self.estimate.sigma_of_residuals, SIGMA_BOUNDS[0]))
 
     @cached_property
@@ -52,15 +49,10 @@ class Marginal:
     def _length(self) -> Floats:
         """(P,) by which columns [slow, parameters, observations] are divided."""
         design = self.model.design
-        priors = np.array([0.0 if np.isinf(u.prior_sd) else 1 / self._sd(i) for i, u in enumerate(self.model.unknowns)])
+        priors = np.where(np.isinf(self.model.prior_sd), 0.0, 1 / self.model.effective_sd)
         parameters = np.sqrt(np.sum(design**2, axis=0) / self._scale**2 + priors**2)
         others = np.full(self.noise.slow.shape[1], 1 / self._scale)
         return np.concatenate([others, np.where(parameters > 0, parameters, 1.0), [1.0]])
-
-    def _sd(self, i: int) -> float:
-        """Prior standard deviation; a certificate without uncertainty is taken as good to a millionth of a typical size."""
-        unknown = self.model.unknowns[i]
-        return float(max(unknown.prior_sd, 1e-6 * unknown.scale))
 
     @cached_property
     def _turned(self) -> Floats:
@@ -79,12 +71,10 @@ class Marginal:
     def _prior(self) -> Floats:
         """(P, P) precision of the columns beforehand, which is data too; of slow noise it is not known yet."""
         model, value, size = self.model, self.estimate.value, len(self._length)
-        first = size - 1 - len(value)
-        prior = np.zeros((len(value), size))
-        for i, unknown in enumerate(model.unknowns):
-            if np.isfinite(unknown.prior_sd):
-                prior[i, first + i] = 1 / self._sd(i)
-                prior[i, -1] = (unknown.prior_mean - value[i]) / self._sd(i)
+        prior, sd = np.zeros((len(value), size)), model.effective_sd
+        known = np.flatnonzero(np.isfinite(model.prior_sd))
+        prior[known, size - 1 - len(value) + known] = 1 / sd[known]
+        prior[known, -1] = (model.prior_mean - value)[known] / sd[known]
         prior = prior / self._length
         return np.asarray(prior.T @ prior)
 
@@ -125,17 +115,12 @@ class Marginal:
         return self._eliminating(*self.noise.classes)
 
     @cached_property
-    def _slow_first_even(self) -> SlowFirst:
-        """The same where no noise grows, so that there are fewer classes."""
-        return self._eliminating(*self._even)
-
-    @cached_property
-    def _even(self) -> tuple[Ints, Floats]:
-        """Classes of observations where no noise grows, and their shares."""
+    def _slow_first_even(self) -> tuple[SlowFirst, Floats]:
+        """The same where no noise grows, so that there are fewer classes of observations, and their shares."""
         index, shares = self.noise.classes
         others = np.round(np.delete(shares, GROWING, axis=1), 9)
         _, first, which = np.unique(others, axis=0, return_index=True, return_inverse=True)
-        return which.ravel()[index], shares[first]
+        return self._eliminating(which.ravel()[index], shares[first]), shares[first]
 
     def _eliminating(self, index: Ints, shares: Floats) -> SlowFirst:
         c = self.noise.slow.shape[1]
@@ -149,7 +134,7 @@ class Marginal:
         """As :meth:`_factors`, slow noise eliminated ahead of the placings."""
         shares = self.noise.classes[1]
         if not np.any(sizes.growth):
-            slow, shares = self._slow_first_even, self._even[1]
+            slow, shares = self._slow_first_even
         v = self.noise.variances(sizes)[0] @ shares.T
         precision, walks, log = self._of_slow(sizes)
         c, free = precision.shape[1], self._freedoms.count
@@ -166,8 +151,8 @@ class Marginal:
     def _of_slow(self, sizes: Sizes) -> tuple[Floats, Floats, Floats]:
         """What is known beforehand of slow noise' coefficients.
 
-        Returns Precision (w, c) of all but walks; by what that of a walk is multiplied (w,), zero of what is none; half the
-        logarithm of the determinant (w,).
+        Precision (w, c) of all but walks; by what that of a walk is multiplied (w,), zero of what is none; half the logarithm
+        of the determinant (w,).
         """
         variances = np.maximum(self.noise.variances(sizes)[1], (1e-6 * self._scale) ** 2)
         walks, constant = sizes.rate == 0, variances[:, 0]

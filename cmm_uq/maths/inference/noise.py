@@ -34,14 +34,15 @@ ABSENT = {AXES: 0.5, PLACING: 0.5, GROWTH: 0.8, SLOW: 0.6}  # probability, befor
 # with that spread, are then exponentially distributed as far as their distance from zero goes (∫ 2·φ(s)·exp(−r²/2s²) ds =
 # exp(−r)), and that distance and a direction are sampled: what is known well of two numbers is no curved ridge in three.
 AXES_SPREAD = 0.7
-# scale (half-Cauchy) of a component's standard deviation over that of a reading
-RATIO = {PLACING: 1.0, GROWTH: 1.0, SLOW: 1.0}
+RATIO = {
+    PLACING: 1.0,
+    GROWTH: 1.0,
+    SLOW: 1.0,
+}  # scale (half-Cauchy) of a component's standard deviation over that of a reading
 LARGEST_RATIO = 300.0
-# cosines of slow noise that one observation may see, of all axes together: as many as are used where it is quick, and where
-# it is not; what is faster counts as independent
+# cosines of slow noise that one observation may see, of all axes together, where it is quick and where it is not
 FREQUENCIES, FEWER = 72, 24
-# variance of what is faster than the cosines, over that of a reading, up to which it may count as independent
-NEGLIGIBLE = 0.05
+NEGLIGIBLE = 0.05  # variance of what is faster than the cosines, over that of a reading, that counts as independent
 FASTEST = 200.0  # largest rate of slow noise, over the duration of the recording
 # probability, beforehand, that slow noise is a random walk; its rate is then zero. A process that returns to its mean within
 # the recording, of which a walk of few readings cannot be told, leaves a constant behind that is up to four times too small.
@@ -50,8 +51,7 @@ _CONTRASTS = np.array([[2.0, -1.0, -1.0], [0.0, 1.0, -1.0]]).T / np.sqrt([6.0, 2
 _FARTHEST = 5.0  # largest logarithm of an axis' noise over the mean of all
 _MOST_CLASSES, _STEPS = 48, 20
 # columns of ``shares``: reading noise along x, y, z; what repeats share; growing noise; what each observation has alone
-_VARIANCES = 6
-GROWING = 4  # the column of growing noise
+_VARIANCES, GROWING = 6, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +62,7 @@ class Sizes:
     placing: Floats  # (w,) of a set-up offset
     growth: Floats  # (w,) of the growing part, at the longest length
     slow: Floats  # (w,) of slow noise, root mean square over the recording
-    # (w,) at which it returns to its mean, in units of one over the duration of the recording; 0 of a random walk
-    rate: Floats
+    rate: Floats  # (w,) at which it returns to its mean, over one by the recording's duration; 0 of a random walk
 
     @property
     def coordinate(self) -> Floats:
@@ -73,21 +72,17 @@ class Sizes:
     @property
     def typical(self) -> Sizes:
         """A single draw of median sizes; what is more probably absent than not is absent."""
-        others = (self.placing, self.growth, self.slow, self.rate)
-        return Sizes(
-            np.median(self.reading, axis=0, keepdims=True), *(np.median(part, keepdims=True) for part in others)
-        )
+        return Sizes(*(np.median(part, axis=0, keepdims=True) for part in vars(self).values()))
 
     @property
     def different(self) -> tuple[Ints, Ints]:
         """The first (u,) of each of the different draws, and which of those each draw (w,) is."""
-        table = np.column_stack([self.reading, self.placing, self.growth, self.slow, self.rate])
+        table = np.column_stack(list(vars(self).values()))
         _, first, index = np.unique(table, axis=0, return_index=True, return_inverse=True)
         return np.asarray(first), np.asarray(index.ravel())
 
     def at(self, chosen: Ints | slice) -> Sizes:
-        """Some of the draws."""
-        return Sizes(*(part[chosen] for part in (self.reading, self.placing, self.growth, self.slow, self.rate)))
+        return Sizes(*(part[chosen] for part in vars(self).values()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +97,9 @@ class Components:
     stated: float | None = None  # standard uncertainty of a coordinate, mm, as the job states it
     gap: float = 0.0  # typical time between neighbouring readings, over the duration of the recording
     display: float = 0.0  # step in which coordinates are displayed, mm; 0 where it is too fine to matter
-    # (m,) of the unturned observations, from 0 to 1; (0,) where none is recorded
-    time: Floats = field(default_factory=lambda: np.zeros(0))
+    time: Floats = field(
+        default_factory=lambda: np.zeros(0)
+    )  # (m,) of the unturned observations, 0 to 1; (0,) where unknown
     known: float = 0.0  # what is not known of a coordinate in any case, mm: the reading noise is not taken for less
     names: tuple[str, ...] = field(init=False)
 
@@ -124,7 +120,6 @@ class Components:
 
     @property
     def dimension(self) -> int:
-        """Of the numbers that say the sizes."""
         return len(self.names)
 
     def sizes(self, latent: Floats) -> Sizes:
@@ -145,12 +140,12 @@ class Components:
             each = np.exp(apart * np.minimum(1.0, _FARTHEST / np.maximum(most, 1e-9)))
             reading = reading * each / np.sqrt(np.mean(each**2, axis=1, keepdims=True))
         apparent = np.hypot(sigma, self._rounding)
-        ratios = {
-            name: apparent * _half_cauchy(column[name], ABSENT[name], RATIO[name]) if name in self.possible else nothing
+        placing, growth, slow = (
+            apparent * _half_cauchy(column[name], name) if name in self.possible else nothing
             for name in (PLACING, GROWTH, SLOW)
-        }
+        )
         rate = _rate(column["rate"]) if SLOW in self.possible else 1 + nothing
-        return Sizes(reading, ratios[PLACING], ratios[GROWTH], ratios[SLOW], rate)
+        return Sizes(reading, placing, growth, slow, rate)
 
     def log_scatter(self, latent: Floats) -> Floats:
         """Logarithm (w,) of the standard deviation of neighbouring readings about each other, over √2 of that of a reading."""
@@ -159,15 +154,12 @@ class Components:
         if SLOW in self.possible:
             rate = _rate(column["rate"])
             changed = np.where(rate > 0, -np.expm1(-self.gap * rate), self.gap)
-            square += changed * _half_cauchy(column[SLOW], ABSENT[SLOW], RATIO[SLOW]) ** 2
+            square += changed * _half_cauchy(column[SLOW], SLOW) ** 2
         if GROWTH in self.possible:
-            square += self._growth * _half_cauchy(column[GROWTH], ABSENT[GROWTH], RATIO[GROWTH]) ** 2
+            # typical variance of the growing part over that at the longest length
+            typical = float(np.mean(self.shares[:, GROWING] / self.shares[:, :3].sum(axis=1)))
+            square += typical * _half_cauchy(column[GROWTH], GROWTH) ** 2
         return np.asarray(0.5 * np.log(square))
-
-    @cached_property
-    def _growth(self) -> float:
-        """Typical variance of the growing part over that at the longest length."""
-        return float(np.mean(self.shares[:, GROWING] / self.shares[:, :3].sum(axis=1)))
 
     def variances(self, sizes: Sizes) -> tuple[Floats, Floats]:
         """Six variances (w, 6), mm², that ``shares`` refers to, and those of the slow columns (w, c)."""
@@ -183,7 +175,6 @@ class Components:
         return int(self.frequency.max(initial=0.0))
 
     def slowest(self, most: int) -> Components:
-        """With the cosines up to ``most`` half turns."""
         kept = self.frequency <= most
         return replace(self, slow=self.slow[:, kept], frequency=self.frequency[kept])
 
@@ -230,12 +221,7 @@ class Components:
         return np.asarray(fast / (fast + sizes.coordinate**2 + self._rounding**2))
 
     def exact(self, sizes: Sizes) -> Floats:
-        """Columns (m, c) with standard normal coefficients, mm, whose covariance is all of that of slow noise.
-
-        Parameters
-        ----------
-        sizes : of a single draw.
-        """
+        """Columns (m, c) with standard normal coefficients, mm, whose covariance is all of that of slow noise of one draw."""
         times, index = np.unique(self.time, return_inverse=True)
         rate = sizes.rate[0]
         covariance = np.exp(-rate * np.abs(times[:, None] - times)) if rate else 2 * np.minimum(times[:, None], times)
@@ -263,7 +249,8 @@ class Components:
         scale = np.sqrt(variances @ self.shares.T)
         found = random.standard_normal((w, repetitions, m))
         found *= scale[:, None, :]
-        if not self._unturned:
+        # T may leave all as it is: every quantity read once, seen along one axis or by several points
+        if self.turn.nnz != m or np.any(self.turn.data != 1) or np.any(self.turn.indices != np.arange(m)):
             found = np.asarray((self.turn.T @ found.reshape(-1, m).T).T, dtype=np.float64).reshape(found.shape)
         if self.slow.shape[1] and np.any(slow):
             waves = np.sqrt(slow)[:, None, :] * random.standard_normal((w, repetitions, slow.shape[1]))
@@ -272,12 +259,6 @@ class Components:
                 if np.any(chosen):
                     found[chosen] += waves[chosen] @ columns.T
         return found
-
-    @cached_property
-    def _unturned(self) -> bool:
-        """Whether T leaves all as it is: every quantity read once, seen along one axis or by several points."""
-        m = len(self.shares)
-        return self.turn.nnz == m and bool(np.all(self.turn.data == 1) and np.all(self.turn.indices == np.arange(m)))
 
     def white(self, sizes: Sizes) -> Callable[[Floats], Floats]:
         """What turns columns (m, r), mm, of such noise into white noise with the standard deviation of a reading."""
@@ -362,5 +343,6 @@ def _present(latent: Floats, absent: float) -> Floats:
     return np.asarray(np.clip((special.ndtr(latent) - absent) / (1 - absent), 0.0, 1 - 1e-9))
 
 
-def _half_cauchy(latent: Floats, absent: float, scale: float) -> Floats:
-    return np.asarray(np.minimum(scale * np.tan(0.5 * np.pi * _present(latent, absent)), LARGEST_RATIO))
+def _half_cauchy(latent: Floats, name: str) -> Floats:
+    ratio = RATIO[name] * np.tan(0.5 * np.pi * _present(latent, ABSENT[name]))
+    return np.asarray(np.minimum(ratio, LARGEST_RATIO))

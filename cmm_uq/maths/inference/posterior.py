@@ -22,6 +22,8 @@ __all__ = ["SIGMA_BOUNDS", "Density", "Posterior", "Progress", "sample"]
 SIGMA_BOUNDS = (1e-6, 10.0)
 # of ln σ: how near to the end of the range searched is at its end, and the step through the whole range
 _EDGE, _STEP = 0.01, 0.5
+_LOOKED_AT = 2000  # draws by which it is judged whether slow noise is quicker than a few cosines
+_BURN_IN = 30  # steps left out where what is proposed knows which components are present
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +35,10 @@ class Posterior:
     sigma: Floats  # (N,) standard uncertainty of one coordinate, mm; constant when it was stated
     seed: int  # of the random numbers
     sampler: str  # program and version
-    # ess_min, rhat_max: worst over all parameters and the noise
-    ess_min: float
-    rhat_max: float
-    # steps, autocorrelation_time: length of each chain, and the longest time
-    steps: int
-    autocorrelation_time: float
+    ess_min: float  # worst over all parameters and the noise
+    rhat_max: float  # the same
+    steps: int  # of each chain
+    autocorrelation_time: float  # the longest
     shapes: Floats = field(default_factory=lambda: np.zeros((0, 0)))  # (N, q) of what shapes columns, if anything does
     every: int = 1  # of how many steps one was kept as a draw
 
@@ -84,13 +84,10 @@ class Density:
 
     @cached_property
     def _weight(self) -> Floats:
-        """Inverse prior variances, (k,); a certificate without uncertainty is taken as good to a nanometre."""
-        sd = self.model.prior_sd
-        scale = np.array([u.scale for u in self.model.unknowns])
-        return np.asarray(1 / np.maximum(sd, 1e-6 * scale) ** 2, dtype=np.float64)
+        """(k,) inverse prior variances."""
+        return np.asarray(1 / self.model.effective_sd**2, dtype=np.float64)
 
     def __call__(self, theta: Floats) -> Floats:
-        """Log density, up to a constant, of (w, dimension) → (w,)."""
         R, explained, rest, count = self._factor
         k = len(self.model.unknowns)
         misfit = theta[:, :k] @ R.T - explained
@@ -116,11 +113,9 @@ class Density:
         covariance = np.outer(scale, scale) * linalg.cho_solve((factor, True), np.eye(len(scale)))
         misfit = explained - R @ mean
         deviation = mean - self.model.prior_mean
-        log_evidence = (
-            -0.5 * ((misfit @ misfit + rest) / sigma2 + deviation @ (self._weight * deviation))
-            - count * log_sigma + float(np.log(scale).sum() - np.log(np.diag(factor)).sum())
-        )  # fmt: skip
-        return mean, covariance, float(log_evidence)
+        squares = (misfit @ misfit + rest) / sigma2 + deviation @ (self._weight * deviation)
+        volume = float(np.log(scale).sum() - np.log(np.diag(factor)).sum())
+        return mean, covariance, float(-0.5 * squares - count * log_sigma + volume)
 
     def laplace(self) -> tuple[Floats, Floats]:
         """Centre (dimension,) and lower triangular factor of the covariance about it."""
@@ -166,33 +161,19 @@ def _lower(covariance: Floats) -> Floats:
 
 
 def sample(model: LinearModel, seed: int, progress: Progress | None = None) -> Posterior:
-    """Sample the posterior of a linear model with emcee.
-
-    ``progress``: told the part done, from 0 to 1.
-    """
+    """Sample the posterior of a linear model with emcee; ``progress`` gets the part done, from 0 to 1."""
     density = Density(model)
     centre, factor = density.laplace()
     chains = run_ensembles(density, Proposal.single(centre, factor), seed, progress)
     k = len(model.unknowns)
     sigma = np.full(len(chains.draws), model.sigma) if model.sigma is not None else np.exp(chains.draws[:, k])
-    return Posterior(
-        model.unknowns, chains.draws[:, :k], sigma, seed, chains.sampler, chains.ess_min, chains.rhat_max, chains.steps,
-        chains.autocorrelation_time,
-    )  # fmt: skip
-
-
-_LOOKED_AT = 2000  # draws by which it is judged whether slow noise is quicker than a few cosines
-# steps that are left out where what is proposed knows which components are present: about every other one is taken
-_BURN_IN = 30
+    return Posterior(model.unknowns, chains.draws[:, :k], sigma, seed, **chains.quality)
 
 
 def sample_with_noise(
     model: LinearModel, noise: Components, estimate: LeastSquares, seed: int, progress: Progress | None = None
 ) -> NoisyPosterior:
-    """Sample the posterior.
-
-    ``progress``: told the part done, from 0 to 1.
-    """
+    """Sample the posterior of a linear model and of its noise; ``progress`` gets the part done, from 0 to 1."""
     marginal, proposal = sufficient(Marginal(model, noise, estimate), seed)
     noise = marginal.noise
     chains = run_ensembles(
@@ -208,11 +189,16 @@ def sample_with_noise(
     every = chains.thinning(marginal.affordable_draws)
     sizes = noise.sizes(chains.thinned(every))
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(5,)))
+    draws = marginal.draw(sizes, random)
     return NoisyPosterior(
-        unknowns=model.unknowns, draws=marginal.draw(sizes, random), sigma=sizes.coordinate, seed=seed,
-        sampler=chains.sampler, ess_min=chains.ess_min, rhat_max=chains.rhat_max, steps=chains.steps,
-        autocorrelation_time=chains.autocorrelation_time, every=every, sizes=sizes,
-    )  # fmt: skip
+        unknowns=model.unknowns,
+        draws=draws,
+        sigma=sizes.coordinate,
+        seed=seed,
+        every=every,
+        sizes=sizes,
+        **chains.quality,
+    )
 
 
 def sufficient(marginal: Marginal, seed: int) -> tuple[Marginal, Proposes]:

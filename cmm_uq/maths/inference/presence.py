@@ -22,17 +22,9 @@ from numpy.typing import NDArray
 from scipy import special
 
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.maths.inference import proposals
 from cmm_uq.maths.inference.noise import ABSENT, AXES, GROWTH, PLACING, SLOW, WALK
-from cmm_uq.maths.inference.proposals import (
-    LogDensity,
-    Numbers as RandomNumbers,
-    Proposal,
-    chosen,
-    cumulative,
-    highest_power,
-    moments,
-    weights,
-)
+from cmm_uq.maths.inference.proposals import LogDensity, Proposal, highest_power, moments, weights
 
 # numbers that say whether something is present, and the probability that it is not
 _SWITCHES = {"spread": ABSENT[AXES], PLACING: ABSENT[PLACING], GROWTH: ABSENT[GROWTH], SLOW: ABSENT[SLOW], "rate": WALK}
@@ -60,11 +52,11 @@ class Numbers:
     @cached_property
     def sets(self) -> NDArray[np.bool_]:
         """(S, switches) what is present together; slow noise that is absent has no rate."""
-        every = [
-            dict(zip(self.switches, each, strict=True)) for each in product((False, True), repeat=len(self.switches))
-        ]
-        kept = [list(each.values()) for each in every if not each.get("rate") or each[SLOW]]
-        return np.array(kept, dtype=bool).reshape(len(kept), len(self.switches))
+        every = np.array(list(product((False, True), repeat=len(self.switches))), dtype=bool)
+        if "rate" not in self.switches:
+            return every
+        slow, rate = (every[:, self.switches.index(name)] for name in (SLOW, "rate"))
+        return np.asarray(every[slow | ~rate])
 
     @cached_property
     def log_prior(self) -> Floats:
@@ -83,12 +75,11 @@ class Numbers:
     @cached_property
     def matters(self) -> NDArray[np.bool_]:
         """(S, D) which of the coordinates matter in each set."""
-        own = {name: self.sets[:, i] for i, name in enumerate(self.switches)}
-        always = np.ones(len(self.sets), dtype=bool)
-        both = {"first": "spread", "second": "spread"}
-        return np.column_stack(
-            [always if name == "log_sigma" else own[both.get(name, name)] for name in self.names if name != "spread"]
-        )
+        with_set = {name: self.sets[:, i] for i, name in enumerate(self.switches)}
+        with_set["log_sigma"] = np.ones(len(self.sets), dtype=bool)
+        if "spread" in with_set:
+            with_set["first"] = with_set["second"] = with_set["spread"]
+        return np.column_stack([with_set[name] for name in self.names if name != "spread"])
 
     @cached_property
     def has_prior(self) -> NDArray[np.bool_]:
@@ -101,22 +92,18 @@ class Numbers:
         on = np.column_stack([column[name] > special.ndtri(_SWITCHES[name]) for name in self.switches])
         if "rate" in column:
             on[:, self.switches.index("rate")] &= on[:, self.switches.index(SLOW)]
-        beyond = {  # logarithm of the probability of more, given that it is present
-            name: np.minimum(special.log_ndtr(-column[name]) - np.log1p(-_SWITCHES[name]), 0.0)
-            for name in self.switches
-        }
+        # logarithm of the probability of more, given that it is present
+        log = {name: special.log_ndtr(-column[name]) - np.log1p(-_SWITCHES[name]) for name in self.switches}
+        beyond = {name: np.minimum(each, 0.0) for name, each in log.items()}
         found = {name: np.maximum(-special.ndtri_exp(each), _LEAST) for name, each in beyond.items()}
         if "spread" in column:
             length = np.sqrt(-2 * beyond["spread"]) / np.maximum(np.hypot(column["first"], column["second"]), 1e-300)
             found |= {name: length * column[name] for name in ("first", "second")}
         coordinates = [found.get(name, column[name]) for name in self.names if name != "spread"]
-        return self._number(on), np.column_stack(coordinates)
-
-    def _number(self, on: NDArray[np.bool_]) -> Ints:
         bits = 1 << np.arange(len(self.switches))
         place = np.full(1 << len(self.switches), -1)
         place[self.sets @ bits] = np.arange(len(self.sets))
-        return np.asarray(place[on @ bits])
+        return np.asarray(place[on @ bits]), np.column_stack(coordinates)
 
     def latent(self, number: Ints, coordinates: Floats, normal: Floats, uniform: Floats) -> Floats:
         """Numbers (w, d) of sets (w,) and their coordinates (w, D).
@@ -128,16 +115,14 @@ class Numbers:
         found = dict(zip(self.names, normal.T, strict=True))
         if "log_sigma" in column:
             found["log_sigma"] = column["log_sigma"]
+        beyond = {name: special.log_ndtr(-column[name]) for name in self.switches if name != "spread"}
         if "spread" in found:
             square = column["first"] ** 2 + column["second"] ** 2
-            beyond = {"spread": -0.5 * square}
+            beyond["spread"] = -0.5 * square
             length = np.hypot(found["first"], found["second"]) / np.maximum(np.sqrt(square), 1e-300)
             present = on[:, self.switches.index("spread")]
             for name in ("first", "second"):
                 found[name] = np.where(present, length * column[name], found[name])
-        else:
-            beyond = {}
-        beyond |= {name: special.log_ndtr(-column[name]) for name in self.switches if name != "spread"}
         for i, name in enumerate(self.switches):
             absent = _SWITCHES[name]
             without = special.ndtri(absent * uniform[:, i])
@@ -166,33 +151,26 @@ class Present:
         return z
 
     def draws(self, count: int, random: Any) -> Floats:
-        """(count, d)."""
         return self.made(self.numbers_of(count, random))
 
-    def numbers_of(self, count: int, random: Any) -> RandomNumbers:
+    def numbers_of(self, count: int, random: Any) -> proposals.Numbers:
         """Set (count,), coordinates (count, D), and two arrays of what is absent, normal and uniform."""
-        number, numbers = chosen(self._cumulative, count, random), self.numbers
+        number, numbers = proposals.chosen(self._cumulative, count, random), self.numbers
         coordinates = np.zeros((count, numbers.matters.shape[1]))
         for s in np.flatnonzero(np.bincount(number)).tolist():
-            if len(self._matters[s]):
-                own = np.flatnonzero(number == s)
-                each = self.each[s]
-                coordinates[own[:, None], self._matters[s]] = each.parameters(each.draws(len(own), random))
+            matters = np.flatnonzero(numbers.matters[s])
+            if len(matters):
+                rows, each = np.flatnonzero(number == s), self.each[s]
+                coordinates[rows[:, None], matters] = each.parameters(each.draws(len(rows), random))
         absent = random.standard_normal((len(numbers.names), count)).T
         return number, coordinates, absent, random.random_sample((len(numbers.switches), count)).T
 
-    def made(self, numbers: RandomNumbers) -> Floats:
-        """(w, d) from these."""
+    def made(self, numbers: proposals.Numbers) -> Floats:
         return self.numbers.latent(*numbers)
 
     @cached_property
     def _cumulative(self) -> Floats:
-        return cumulative(self.probability)
-
-    @cached_property
-    def _matters(self) -> list[Ints]:
-        """Of each set: the coordinates that matter."""
-        return [np.flatnonzero(matters) for matters in self.numbers.matters]
+        return proposals.cumulative(self.probability)
 
     def log_density(self, z: Floats) -> Floats:
         """(w,) of numbers (w, d), with its constant."""
@@ -209,9 +187,7 @@ class Present:
                 found[own] += 0.5 * before.shape[1] * np.log(2 * np.pi)
         return np.asarray(found)
 
-    def log_probability(self, parameters: Floats) -> Floats:
-        """The same: the numbers are proposed as they are."""
-        return self.log_density(parameters)
+    log_probability = log_density  # the numbers are proposed as they are
 
 
 def beginning(names: Sequence[str], log_sigma: float = 0.0, width: float = 1.0) -> Present:
@@ -226,24 +202,24 @@ def beginning(names: Sequence[str], log_sigma: float = 0.0, width: float = 1.0) 
 def present(density: LogDensity, begin: Present, seed: int, looks: int = _LOOKS, tried: int = TRIED) -> Present:
     """An approximation of a density of the numbers that say the sizes of noise."""
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(17,))))
-    proposals: list[Present] = [begin]
+    fits: list[Present] = [begin]
     draws: list[Floats] = []
     gains: list[Floats] = []
     power, enough, left = 0.0, _ENOUGH, looks
     for _ in range(_ROUNDS):
-        z = proposals[-1].draws(tried, random)
+        z = fits[-1].draws(tried, random)
         draws = [*draws, z][-_RECALLED:]
         gains = [*gains, np.maximum(density(z) - begin.log_density(z), _NEVER)][-_RECALLED:]
         every, gain = np.vstack(draws), np.concatenate(gains)
-        from_any = np.stack([each.log_density(every) for each in proposals[-_RECALLED:]])
+        from_any = np.stack([each.log_density(every) for each in fits[-_RECALLED:]])
         known = begin.log_density(every) - special.logsumexp(from_any, axis=0)
         before, power = power, highest_power(gain, known, power, enough * len(every))
         enough = max(0.5 * enough, _LEAST_ENOUGH) if power < min(1.0, _STUCK * before) else enough
-        proposals.append(_fitted(begin, every, weights(power * gain + known)))
+        fits.append(_fitted(begin, every, weights(power * gain + known)))
         left -= power == 1.0
         if not left:
             break
-    return proposals[-1]
+    return fits[-1]
 
 
 def _fitted(begin: Present, latent: Floats, weight: Floats) -> Present:

@@ -21,8 +21,7 @@ Numbers = tuple[NDArray[Any], ...]  # random numbers, of which the first axis ar
 LogDensity = Callable[[Floats], Floats]  # of (w, d) parameters, up to a constant: (w,)
 _DOF = 6.0
 # times the curvature's width at which a skewed density is first looked at: too wide costs draws, too narrow misses a tail
-_WIDER = 2.0
-_LOOKS = 3
+_WIDER, _LOOKS = 2.0, 3
 # letting in by degrees: part of the draws that must count, rounds at most, least gain that is reckoned with
 _ENOUGH, _MOST_LOOKS, _NEVER = 0.2, 25, -1e30
 _STUCK = 1.01  # times the power from round to round below which one distribution does not do
@@ -59,26 +58,21 @@ class Proposes(Protocol):
 class Proposal:
     """Student's t distributions with six degrees of freedom in whitened coordinates z; x = centre + factor @ z."""
 
-    # centre, factor: (d,) and (d, d)
-    centre: Floats
-    factor: Floats
-    # weights, centres, factors: (K,), (K, d) and (K, d, d) in z
-    weights: Floats
-    centres: Floats
-    factors: Floats
+    centre: Floats  # (d,)
+    factor: Floats  # (d, d)
+    weights: Floats  # (K,)
+    centres: Floats  # (K, d) in z
+    factors: Floats  # (K, d, d) in z
 
     @classmethod
     def single(cls, centre: Floats, factor: Floats) -> Proposal:
-        """One distribution, about ``centre``."""
         d = len(centre)
         return cls(centre, factor, np.ones(1), np.zeros((1, d)), np.eye(d)[None])
 
     def parameters(self, z: Floats) -> Floats:
-        """(w, d) for whitened coordinates z."""
         return np.asarray(self.centre + z @ self.factor.T)
 
     def draws(self, count: int, random: Any) -> Floats:
-        """Whitened coordinates (count, d)."""
         return self.made(self.numbers_of(count, random))
 
     def numbers_of(self, count: int, random: Any) -> Numbers:
@@ -88,7 +82,6 @@ class Proposal:
         return normal, squares, chosen(self._cumulative, count, random)
 
     def made(self, numbers: Numbers) -> Floats:
-        """Whitened coordinates (w, d) from these."""
         normal, squares, part = numbers
         t = np.asarray(normal / np.sqrt(squares / _DOF))
         if len(self.weights) == 1:
@@ -96,7 +89,6 @@ class Proposal:
         return np.asarray(self.centres[part] + np.einsum("wij,wj->wi", self.factors[part], t))
 
     def log_density(self, z: Floats) -> Floats:
-        """(w,) up to a constant."""
         log, _ = self.log_each(z)
         return log[:, 0] if len(self.weights) == 1 else np.asarray(np.logaddexp.reduce(log, axis=1))
 
@@ -171,17 +163,16 @@ def refined(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> P
             width = max(1.0, width / 2**0.25)  # in many dimensions most of what is so much wider lies where nothing is
             continue
         looks += 1
-        mean, covariance = moments(theta, weight)
-        centre, factor, width = mean, _root(covariance), 1.0
+        centre, covariance = moments(theta, weight)
+        factor, width = np.asarray(np.linalg.cholesky(covariance)), 1.0
     return Proposal.single(centre, factor)
 
 
 def tempered(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> Proposal:
     """An approximation of a density that may lie far from where it was looked for: importance sampling, let in by degrees.
 
-    What is looked for goes from where the search begins to the density, in each round as far as enough draws count.
-
-    ``centre, factor``: where to begin, (d,) and (d, d), wide enough for the density to be somewhere within.
+    What is looked for goes from ``centre`` (d,) and ``factor`` (d, d), wide enough for the density to be somewhere within, to
+    the density, in each round as far as enough draws count.
     """
     random, d = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed))), len(centre)
     begin, back = centre, np.linalg.inv(factor)
@@ -243,18 +234,15 @@ def _fitted(proposal: Proposal, z: Floats, weight: Floats, random: Any) -> Propo
     covariance = covariance + 1e-9 * np.trace(covariance) * np.eye(d)
     many = 1 / np.sum(weight**2)
     narrow = np.linalg.cholesky(_NARROWER * covariance)
-    found = Proposal(
-        proposal.centre, proposal.factor, np.full(_PARTS, 1 / _PARTS), z[random.choice(len(z), _PARTS, p=weight)],
-        np.repeat(narrow[None], _PARTS, axis=0),
-    )  # fmt: skip
+    centres, factors = z[random.choice(len(z), _PARTS, p=weight)], np.repeat(narrow[None], _PARTS, axis=0)
+    found = Proposal(proposal.centre, proposal.factor, np.full(_PARTS, 1 / _PARTS), centres, factors)
     for _ in range(_REFITS):
         log, squares = found.log_each(z)
         share = weight[:, None] * np.exp(log - special.logsumexp(log, axis=1, keepdims=True))
         part = share.sum(axis=0)
         pull = share * (_DOF + d) / (_DOF + squares)
-        kept = part * many > min(
-            d / 2, 0.5 * part.max() * many
-        )  # fewer draws say nothing about a distribution of its own
+        # fewer draws say nothing about a distribution of its own
+        kept = part * many > min(d / 2, 0.5 * part.max() * many)
         share, pull, part = share[:, kept], pull[:, kept], part[kept]
         centres = (pull.T @ z) / pull.sum(axis=0)[:, None]
         about = z[:, None] - centres
@@ -262,14 +250,9 @@ def _fitted(proposal: Proposal, z: Floats, weight: Floats, random: Any) -> Propo
         prior = (2 * d / (2 * d + part * many))[:, None, None]
         factors = np.linalg.cholesky((1 - prior) * own + prior * _NARROWER * covariance)
         found = Proposal(proposal.centre, proposal.factor, part / part.sum(), centres, factors)
-    return Proposal(
-        proposal.centre, proposal.factor, np.append((1 - _WIDE) * found.weights, _WIDE),
-        np.vstack([found.centres, mean]), np.concatenate([found.factors, np.linalg.cholesky(covariance)[None]]),
-    )  # fmt: skip
-
-
-def _root(covariance: Floats) -> Floats:
-    return np.asarray(np.linalg.cholesky(covariance))
+    parts, centres = np.append((1 - _WIDE) * found.weights, _WIDE), np.vstack([found.centres, mean])
+    factors = np.concatenate([found.factors, np.linalg.cholesky(covariance)[None]])
+    return Proposal(proposal.centre, proposal.factor, parts, centres, factors)
 
 
 def moments(values: Floats, weight: Floats) -> tuple[Floats, Floats]:

@@ -1,7 +1,5 @@
 """Slow noise integrated out ahead of all else, axis by axis, and where a function of one number crosses zero.
 
-Slow noise integrated out ahead of all else, axis by axis: so its many cosines cost what one axis of them costs.
-
 Observations that see one axis of the machine each share no cosine with those of another. The precision of the cosines is then
 made of blocks, and what is left of all other columns once they are eliminated is a small matrix.
 
@@ -24,6 +22,7 @@ from cmm_uq.base.points import Floats, Ints
 _NOTHING = 1e-9  # part of the largest below which a cosine is zero for an observation
 _NONE = 1e-13  # part of the largest below which another column's value is zero
 _ALIKE = 1e-12  # relative difference up to which variances are the same
+_RELATIVE, _ROUNDS = 8.881784197001252e-16, 100  # of a root: four times the spacing of floats at one, and steps at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +37,10 @@ class SlowFirst:
 
     @property
     def count(self) -> int:
-        """Of the classes."""
         return len(self.base)
 
     @cached_property
     def groups(self) -> tuple[tuple[Ints, Ints], ...]:
-        """Columns and rows of cosines that share an observation, directly or through others."""
         return groups(self.cosines)
 
     @cached_property
@@ -54,7 +51,6 @@ class SlowFirst:
 
     @cached_property
     def _others(self) -> Floats:
-        """(classes, R²)."""
         return products(self.others, self.others, self.classes, self.count)
 
     @cached_property
@@ -81,7 +77,6 @@ class SlowFirst:
 
     @cached_property
     def _turned(self) -> list[_Turned]:
-        """Of each group."""
         found = []
         for columns, own, of_cosines, across in self._products:
             c, weights = len(columns), 1 / self.base[own]
@@ -99,9 +94,8 @@ class SlowFirst:
         w, R = len(v), self.others.shape[1]
         left = ((1 / v) @ self._others + prior).reshape(w, R, R)
         logs = np.zeros(w)
-        for (columns, own, of_cosines, across), near, turned in zip(
-            self._products, self._near, self._turned, strict=True
-        ):
+        for group, near, turned in zip(self._products, self._near, self._turned, strict=True):
+            columns, own, of_cosines, across = group
             times = v[:, own] / self.base[own]
             alike = (walks > 0) & (np.ptp(times, axis=1) <= _ALIKE * times[:, 0])
             if alike.any():
@@ -174,11 +168,6 @@ def products(first: Floats, second: Floats, classes: Ints, count: int) -> Floats
     order = np.argsort(classes, kind="stable")
     parts = np.split(order, np.cumsum(np.bincount(classes, minlength=count))[:-1])
     return np.stack([(first[rows].T @ second[rows]).ravel() for rows in parts])
-
-
-# part of the root to which it is found at best: four times the spacing of floats at one
-_RELATIVE = 8.881784197001252e-16
-_ROUNDS = 100
 
 
 def root(function: Callable[[float], float], low: float, high: float, tolerance: float) -> float:

@@ -227,9 +227,7 @@ def _quantile(distances: Floats, coverage: float) -> float:
 @dataclass(frozen=True)
 class Tail:
     shape: float  # k of the generalised Pareto distribution
-    unseen: (
-        float  # what draws beyond the largest of so many would add to the mean square about the mean; may be infinite
-    )
+    unseen: float  # what draws beyond the largest would add to the mean square about the mean; may be infinite
 
 
 def draws_in_tail(trials: int) -> int:

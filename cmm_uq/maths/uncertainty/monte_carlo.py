@@ -51,9 +51,7 @@ class Simulated:
         bool | None
     )  # all figures within their numerical tolerance, rare draws included; None when no digits are asked for
     shape: Floats  # (p,) of the heavier tail of each output (:mod:`cmm_uq.maths.uncertainty.coverage`).
-    unseen: (
-        Floats  # (p,) by how much u would be larger with draws too rare to have come; infinite where it does not exist
-    )
+    unseen: Floats  # (p,) by how much u would be larger with draws too rare to have come; may be infinite
     edges: Floats  # (p, b + 1) of the histogram of the output, for pictures
     density: Floats  # (p, b)
 

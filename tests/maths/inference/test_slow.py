@@ -102,7 +102,7 @@ def test_where_no_noise_grows_all_lengths_are_of_one_class_and_the_density_is_th
     sizes = replace(SIZES, growth=np.array([0.0, 0.8, 0.0, 1.5]))
     first = Marginal(model, noise, solve(model))
     assert first._slow_first is not None
-    assert first._slow_first_even.count == 3 < first._slow_first.count
+    assert first._slow_first_even[0].count == 3 < first._slow_first.count
     monkeypatch.setattr(module, "_MOST_FREE", -1)
     last = Marginal(model, noise, solve(model))
     assert first.log_likelihood(sizes)[0] - last.log_likelihood(sizes)[0] == pytest.approx(np.zeros(4), abs=1e-7)
