@@ -49,7 +49,9 @@ def marked_as(document: Document, origin: Origin, id: str, told: Iterable[Text])
     is_certificate = document.title == CERTIFICATE
     return replace(
         document,
-        title=TITLES[origin] if is_certificate else _of_such(document.title, origin),
+        title=TITLES[origin] if is_certificate
+        else say("{title} of a simulated recording", title=document.title) if origin == SIMULATED
+        else say("{title} of a compensated recording", title=document.title),
         number=Verbatim(id),
         banner=BANNERS[origin],
         draft=False,
@@ -57,17 +59,11 @@ def marked_as(document: Document, origin: Origin, id: str, told: Iterable[Text])
         statements=(),
         signatures=(),
         end=say("End of evaluation") if is_certificate else document.end,
-    )
+    )  # fmt: skip
 
 
 DIGITAL = "certificate.xml"  # the digital certificate
 CERTIFICATE = say("Calibration certificate")  # title of a document that certifies
-
-
-def _of_such(title: Text, origin: str) -> Text:
-    if origin == SIMULATED:
-        return say("{title} of a simulated recording", title=title)
-    return say("{title} of a compensated recording", title=title)
 
 
 def came_about(job: Job) -> Text:
@@ -80,14 +76,13 @@ def origin_warnings(job: Job) -> list[Text]:
     if job.origin == MEASURED:
         return taken
     source = job.facts.job.derived_from
-    what = _WHAT[job.origin]
-    texts: list[Text] = [what]
+    texts: list[Text] = [_WHAT[job.origin]]
     if source:
         told = say(
             "It was derived from job {job} by {program} ({by}).",
             job=Verbatim(source.job), program=Verbatim(source.program), by=Verbatim(source.by),
         )  # fmt: skip
-        texts = [after(what, told)]
+        texts = [after(texts[0], told)]
     if job.altered:
         texts.append(say("Changed after it was derived: {files}.", files=commas(names(job.altered))))
     return [*texts, *taken]

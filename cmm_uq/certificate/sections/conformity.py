@@ -31,7 +31,7 @@ def budget_table(measurand: Text, budget: Budget) -> Table:
     rows = tuple(
         (
             line.name,
-            *((_u(line), _sensitivity(line, scale)) if turned else ()),
+            *(_turned(line, scale) if turned else ()),
             significant(scale * line.contribution),
             *((say("{share} %", share=signed(100 * share, ".1f")),) if several else ()),
             line.origin,
@@ -44,25 +44,17 @@ def budget_table(measurand: Text, budget: Budget) -> Table:
     return Table(say("Contributions to {measurand}", measurand=measurand), columns, rows, tuple(notes))
 
 
-def _u(line: BudgetLine) -> Text:
-    factor, shown = _shown(line)
-    return say("{u} {unit}", u=significant((line.u or 0.0) * factor), unit=shown)
-
-
-def _sensitivity(line: BudgetLine, scale: float) -> Text:
-    """Change of the value, µm, by one unit of the quantity as it is shown."""
-    factor, shown = _shown(line)
-    per = figure(scale / factor * (line.sensitivity or 0.0))
-    return per if shown == unit("µm") else say("{per} µm per {unit}", per=per, unit=shown)
-
-
-def _shown(line: BudgetLine) -> tuple[float, Text]:
-    """By what a figure of the line is multiplied to be shown, and in which unit."""
+def _turned(line: BudgetLine, scale: float) -> tuple[Text, Text]:
+    """U of a quantity as it is shown, and the change of the value, µm, by one unit of that."""
+    factor, shown = 1.0, line.unit
     if line.unit == unit("mm"):
-        return 1 / MICROMETRE, unit("µm")
-    if line.unit == unit("1/K"):
-        return 1e6, say("10⁻⁶ /K")
-    return 1.0, line.unit
+        factor, shown = 1 / MICROMETRE, unit("µm")
+    elif line.unit == unit("1/K"):
+        factor, shown = 1e6, say("10⁻⁶ /K")
+    per: Text = figure(scale / factor * (line.sensitivity or 0.0))
+    if shown != unit("µm"):
+        per = say("{per} µm per {unit}", per=per, unit=shown)
+    return say("{u} {unit}", u=significant((line.u or 0.0) * factor), unit=shown), per
 
 
 _LISTED = 250  # rows of a table of errors; of more only those nearest to their limits are listed, results.json has all.
@@ -84,7 +76,7 @@ def decision_block(statement: Statement) -> DecisionBlock:
     """One statement: what was compared with what, by which rule, and what follows."""
     value = stated_value(statement.value_um, 2 * statement.u_um, signed=statement.signed)
     measured = say("{value} µm (k = 2)", value=value) if statement.u_um > 0 else say("{value} µm", value=value)
-    told = sentences((*_what_follows(statement), *_chances(statement), *statement.remarks))
+    told = sentences((*_what_follows(statement), *statement.remarks))
     return DecisionBlock(named(statement), statement.quantity, measured, _limit(statement), statement.decision.rule,
                          statement.outcome, told, statement.missing)  # fmt: skip
 
@@ -128,11 +120,7 @@ def _what_follows(statement: Statement) -> list[Text]:
         said.append(say("The uncertainty is too large for any value to be accepted."))
     elif band > 0:
         said.append(say("The guard band is {guard_band} µm.", guard_band=significant(band)))
-    return said
-
-
-def _chances(statement: Statement) -> list[Text]:
-    count, risks, said = len(statement.errors), statement.risks, list[Text]()
+    count, risks = len(statement.errors), statement.risks
     if (p := statement.decision.probability_conforming) is not None:
         said.append(say("Probability that the quantity is within the limit: {chance}.", chance=probability(p)))
     if statement.joint is not None and count > 1:
@@ -159,9 +147,13 @@ def picture(statement: Statement) -> Plot:
     far = len(statement.errors) - len(items)
     beyond = say("Not drawn: the values that the screening set aside, {count}, which lie far outside.", count=far)
     count, outside = len(items), sum(not _accepted(item) for item in items)
+    bands = [item.decision.guard_band for item in items]
+    accepted = [
+        None if band is None else max(0.0, item.limit_um - band) for item, band in zip(items, bands, strict=True)
+    ]
     return trumpet(
         [item.length_mm or 0.0 for item in items], [item.error_um for item in items],
-        limit_um=[item.limit_um for item in items], acceptance_um=[_acceptance(item) for item in items],
+        limit_um=[item.limit_um for item in items], acceptance_um=accepted,
         expanded_um=[2 * item.u_um for item in items], outside=[not _accepted(item) for item in items],
         quantity=say("Error / µm"),
         caption=sentences((
@@ -174,11 +166,6 @@ def picture(statement: Statement) -> Plot:
     )  # fmt: skip
 
 
-def _acceptance(item: Decided) -> float | None:
-    band = item.decision.guard_band
-    return None if band is None else max(0.0, item.limit_um - band)
-
-
 def _accepted(item: Decided) -> bool:
     return item.decision.outcome in ("pass", "conditional pass") and not item.set_aside
 
@@ -188,7 +175,11 @@ _STANDING = {"counts": NOTHING, "again": say("to be measured again"), "replaced"
 
 def _table(statement: Statement) -> Table:
     """Every error; those of one length in one measurement in one row, in the order of their repeats."""
-    rows, count = _together(statement.errors), len(statement.errors)
+    together: dict[object, list[Decided]] = {}
+    for item in statement.errors:
+        key = (item.measurement, item.length_mm, round(item.u_um, 9), item.limit_um, item.standing, item.set_aside)
+        together.setdefault(key, []).append(item)
+    rows, count = list(together.values()), len(statement.errors)
     notes: list[Text] = [
         plural(count, one=say("{count} value.", count=count), many=say("{count} values.", count=count))
     ]
@@ -211,14 +202,6 @@ def _table(statement: Statement) -> Table:
     title = say("All values decided by {standard}", standard=named(statement))
     cells = tuple(_row(row, lengths=lengths, known=known, signed_values=statement.signed) for row in rows)
     return Table(title, columns, cells, tuple(notes))
-
-
-def _together(errors: Sequence[Decided]) -> list[list[Decided]]:
-    found: dict[tuple[int | None, float | None, float, float, str, bool], list[Decided]] = {}
-    for item in errors:
-        key = (item.measurement, item.length_mm, round(item.u_um, 9), item.limit_um, item.standing, item.set_aside)
-        found.setdefault(key, []).append(item)
-    return list(found.values())
 
 
 def _row(row: Sequence[Decided], *, lengths: bool, known: bool, signed_values: bool) -> tuple[Text, ...]:

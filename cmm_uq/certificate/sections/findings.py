@@ -11,7 +11,7 @@ from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, say
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.document import Block, Column, Facts, Paragraph, Section, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import Block, Facts, Paragraph, Section, Table, figure_columns, text_columns
 from cmm_uq.certificate.effect_words import parameter_title, titles
 from cmm_uq.certificate.result import SimulatedTwin
 from cmm_uq.certificate.wording import expanded, probability, with_uncertainty
@@ -23,12 +23,12 @@ _TOLD = 8  # periods that a sentence tells; results.json has all.
 
 
 def sentences(withheld: Sequence[WithheldEffect]) -> list[Text]:
-    told: list[Text] = []
-    for item in withheld:
-        why = say("{why} ({periods})", why=item.why, periods=_listed(item.modes)) if item.modes else item.why
-        told.append(say("{title} (probability {probability}) is not asserted: {why}.",
-                        title=item.title, probability=probability(item.probability), why=why))  # fmt: skip
-    return told
+    return [
+        say("{title} (probability {probability}) is not asserted: {why}.", title=item.title,
+            probability=probability(item.probability),
+            why=say("{why} ({periods})", why=item.why, periods=_listed(item.modes)) if item.modes else item.why)
+        for item in withheld
+    ]  # fmt: skip
 
 
 def other_periods(item: OmittedEffect) -> Text:
@@ -55,14 +55,12 @@ def periods_data(modes: Sequence[Mode]) -> list[dict[str, Any]]:
 
 
 def _listed(modes: Sequence[Mode]) -> Text:
-    told: list[Text] = []
+    periods: list[Text] = []
     for mode in modes[:_TOLD]:
         value, U = rounded(mode.period.value, mode.period.expanded)
-        told.append(say("{value} ± {U} {unit}: {probability}",
-                        value=value, U=U, unit=mode.period.unit, probability=probability(mode.probability)))  # fmt: skip
-    if len(modes) > _TOLD:
-        told.append(say("and {count} more", count=len(modes) - _TOLD))
-    return commas(told)
+        periods.append(say("{value} ± {U} {unit}: {probability}", value=value, U=U, unit=mode.period.unit,
+                           probability=probability(mode.probability)))  # fmt: skip
+    return commas([*periods, *([say("and {count} more", count=len(modes) - _TOLD)] if len(modes) > _TOLD else [])])
 
 
 VERDICTS: Mapping[str, Text] = {
@@ -102,7 +100,13 @@ def simulation_section(simulated: SimulatedTwin, refitted: Mapping[str, Mapping[
         "effects are what the machine has beyond what the simulation contains. The noise is that of both together."
     )))  # fmt: skip
     if refitted:
-        blocks.append(_corrections(refitted))
+        differing = tuple(
+            (parameter_title(owner, name), with_uncertainty(quantity), quantity.unit, expanded(quantity)[2])
+            for owner, quantities in refitted.items() for name, quantity in quantities.items()
+        )  # fmt: skip
+        heads = (*text_columns(say("Parameter")), *figure_columns(say("Machine minus simulation")),
+                 *text_columns(say("Unit")), *figure_columns(say("k")))  # fmt: skip
+        blocks.append(Table(say("What the simulation contains, estimated anew"), heads, differing))
     return Section(say("Simulation"), tuple(blocks))
 
 
@@ -113,16 +117,6 @@ def _uncertainty(simulated: SimulatedTwin) -> Text:
     if not simulated.u_common_um:
         return own
     return say("{own}, and {common:.3g} µm of the artefact's size in common", own=own, common=simulated.u_common_um)
-
-
-def _corrections(refitted: Mapping[str, Mapping[str, Quantity]]) -> Table:
-    rows = tuple(
-        (parameter_title(owner, name), with_uncertainty(quantity), quantity.unit, expanded(quantity)[2])
-        for owner, quantities in refitted.items() for name, quantity in quantities.items()
-    )  # fmt: skip
-    heads = (*text_columns(say("Parameter")), Column(say("Machine minus simulation")), *text_columns(say("Unit")),
-             Column(say("k")))  # fmt: skip
-    return Table(say("What the simulation contains, estimated anew"), heads, rows)
 
 
 def contained(simulated: SimulatedTwin | None, effect: str) -> Text:

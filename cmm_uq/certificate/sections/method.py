@@ -9,7 +9,6 @@ from cmm_uq.certificate.result import RecordingNoise, Result
 from cmm_uq.certificate.wording import title_of
 from cmm_uq.machine.model.certified_places import CALIBRATION
 from cmm_uq.machine.model.measurement import ARTEFACT
-from cmm_uq.maths.inference.posterior import Posterior
 from cmm_uq.maths.uncertainty.quantity import alike
 
 _SHOWN = 0.8  # probability from which a component is said to be there; beforehand it is at most one half
@@ -27,10 +26,9 @@ def noise_found(noise: RecordingNoise, *, heavy_tails: bool) -> Text:
     if noise.wider >= _WIDER:
         found = say("{found}; standard uncertainties are up to {times:.2f} times those under white noise",
                     found=found, times=noise.wider)  # fmt: skip
-    slow = (
-        say("what had drifted before the first reading") if "slow" in noise.components else say("slow noise (no times)")
-    )
-    hidden = [*([] if "placing" in noise.components else [say("set-up offsets (no repeats)")]), slow]
+    hidden = [] if "placing" in noise.components else [say("set-up offsets (no repeats)")]
+    drifted = "slow" in noise.components
+    hidden.append(say("what had drifted before the first reading") if drifted else say("slow noise (no times)"))
     return say("{found}; not to be seen in this recording: {what}", found=found, what=listed(hidden))
 
 
@@ -99,8 +97,17 @@ def method(result: Result) -> Section:
         (say("Noise"), noise_found(noise, heavy_tails=result.diagnosed.diagnosis.noise.heavy_tails)),
         (say("Sampler"), say("{sampler}, seed {seed}, {count} draws", sampler=Verbatim(posterior.sampler),
                              seed=posterior.seed, count=len(posterior.draws))),
-        (say("Convergence"), _convergence(posterior)),
-        (say("Averaged"), _averaged(result)),
+        (say("Convergence"), say(
+            "{reached}: at least {ess:.0f} effective samples in every parameter, rank-normalised R-hat {rhat:.4f}, "
+            "autocorrelation time {time:.1f} of {steps} steps",
+            reached=say("reached") if posterior.converged else say("NOT reached"), ess=posterior.ess_min,
+            rhat=posterior.rhat_max, time=posterior.autocorrelation_time, steps=posterior.steps,
+        )),
+        (say("Averaged"), say(
+            "estimates, their covariance and draws are of the mixture of {rivals} explanations that remain, {count} draws, of "
+            "each as many as it is probable; residuals, noise, least squares and the sampler are of the named model, where "
+            "what it leaves out counts as noise", rivals=result.averaged, count=len(result.values),
+        ) if result.averaged else NOTHING),
         (say("Stated of the artefact"), _stated(result)),
         (say("Calibrated lengths together"), _calibration(result)),
     )  # fmt: skip
@@ -112,18 +119,6 @@ def method(result: Result) -> Section:
         what=say("Rigid-body error factors") if result.model.effects else say("Sizes of the artefact"),
     )
     return Section(say("Method"), (Paragraph(text), Facts(tuple((label, value) for label, value in rows if value))))
-
-
-def _averaged(result: Result) -> Text:
-    """What the estimates are averaged over, if they are, and what is not averaged."""
-    if not result.averaged:
-        return NOTHING
-    return say(
-        "estimates, their covariance and draws are of the mixture of {rivals} explanations that remain, {count} draws, of "
-        "each as many as it is probable; residuals, noise, least squares and the sampler are of the named model, where what "
-        "it leaves out counts as noise",
-        rivals=result.averaged, count=len(result.values),
-    )  # fmt: skip
 
 
 def _stated(result: Result) -> Text:
@@ -151,12 +146,3 @@ def _calibration(result: Result) -> Text:
         "errors of the calibrated lengths are taken as of one cause and as of each place by itself; in every figure the "
         "larger U stands"
     )
-
-
-def _convergence(posterior: Posterior) -> Text:
-    return say(
-        "{reached}: at least {ess:.0f} effective samples in every parameter, rank-normalised R-hat {rhat:.4f}, "
-        "autocorrelation time {time:.1f} of {steps} steps",
-        reached=say("reached") if posterior.converged else say("NOT reached"),
-        ess=posterior.ess_min, rhat=posterior.rhat_max, time=posterior.autocorrelation_time, steps=posterior.steps,
-    )  # fmt: skip

@@ -14,7 +14,6 @@ from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.sections.first_page import subject_of, tolerances_of
 from cmm_uq.certificate.wording import OUTCOME_WORDS, expanded, title_of
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.reports import EstimateWithInterval
 from cmm_uq.jobs.verdicts import Verdict
 from cmm_uq.maths.uncertainty.quantity import Quantity, rounded
 
@@ -84,12 +83,9 @@ def _free_combination(result: Result, combination: tuple[tuple[str, str], ...]) 
         titles=listed([title_of(key, result) for key in combination]),
     ))  # fmt: skip
     named = [
-        (
-            say("{second} − {first}", second=title_of(one.second, result), first=title_of(one.first, result)),
-            one.quantity,
-        )
+        (say("{second} − {first}", second=title_of(one.second, result), first=title_of(one.first, result)), one.quantity)
         for one in result.differences(combination)
-    ]
+    ]  # fmt: skip
     if not named:
         return [words]
     caption = say("Differences that are determined")
@@ -110,10 +106,10 @@ def as_found_section(job: Job, left: Iterable[Left], verdicts: Iterable[Verdict]
     )  # fmt: skip
     blocks: list[Block] = [Paragraph(told)]
     rows = tuple(
-        (title_, *expanded(_quantity(before, now))[:2], *expanded(now)[:2], now.unit)
-        for group, name, title_, now in left
-        if (before := found.figure(group, name)) is not None
-    )
+        (title_, *expanded(Quantity(before.value, before.u, (before.interval95[0], before.interval95[1]), now.unit))[:2], *expanded(now)[:2],
+         now.unit)
+        for group, name, title_, now in left if (before := found.figure(group, name)) is not None
+    )  # fmt: skip
     if rows:
         heads = (*text_columns(say("Quantity")), *figure_columns(say("As found"), say("U"), say("As left"), say("U")),
                  *text_columns(say("Unit")))  # fmt: skip
@@ -145,11 +141,6 @@ def as_found_data(job: Job) -> dict[str, Any]:
         return {}
     found = job.as_found.model_dump(mode="json", include={"job", "estimates", "accuracy_uncertainty", "conformity"})
     return {"as_found": found}
-
-
-def _quantity(figure: EstimateWithInterval, now: Quantity) -> Quantity:
-    low, high = figure.interval95
-    return Quantity(figure.value, figure.u, (low, high), now.unit)
 
 
 _WORDS = {"pass": say("in"), "fail": say("out"), "undecided": say("open")}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from cmm_uq.analysis.conformity.lengths_decided import unknown_expansion
 from cmm_uq.base.messages import Text, listed, say, sentences
 from cmm_uq.certificate.diagnosis.overview import VERDICTS
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import title_of, with_uncertainty
+from cmm_uq.maths.inference.ensembles import Chains
+from cmm_uq.maths.inference.posterior import Posterior
 from cmm_uq.maths.uncertainty.quantity import figure, nominal, significant
 
 ASSUMED = 0.25  # share of the prior in a parameter's variance from which on the reader is told
@@ -20,20 +20,7 @@ def warnings(result: Result) -> tuple[Text, ...]:
     return *not_converged(result.posterior), *(text for of in each for text in of(result))
 
 
-class Sampled(Protocol):
-    """What a sampling says of itself."""
-
-    @property
-    def converged(self) -> bool: ...
-
-    @property
-    def ess_min(self) -> float: ...
-
-    @property
-    def rhat_max(self) -> float: ...
-
-
-def not_converged(sampled: Sampled) -> list[Text]:
+def not_converged(sampled: Posterior | Chains) -> list[Text]:
     """That figures must not be used, where the sampling did not converge."""
     told = say(
         "The sampling did not converge (least effective sample size {ess_min:.0f}, R-hat "
@@ -98,14 +85,12 @@ def _implausible(result: Result) -> list[Text]:
             if unknown.prior_mean:
                 parameter = say("Correction of the {what:small}, {nominal} {unit}", what=parameter,
                                 nominal=nominal(unknown.prior_mean), unit=unknown.unit)  # fmt: skip
-            texts.append(
-                say(
-                    "{parameter}: {off} {unit} is {times:.0f} times the standard uncertainty with which it was known "
-                    "beforehand ({sd} {unit}). Before it is used, rule out a wrong certified length, unit or expansion.",
-                    parameter=parameter, off=figure(off), unit=unknown.unit, times=abs(off) / unknown.prior_sd,
-                    sd=figure(unknown.prior_sd, 3),
-                )
-            )  # fmt: skip
+            texts.append(say(
+                "{parameter}: {off} {unit} is {times:.0f} times the standard uncertainty with which it was known "
+                "beforehand ({sd} {unit}). Before it is used, rule out a wrong certified length, unit or expansion.",
+                parameter=parameter, off=figure(off), unit=unknown.unit, times=abs(off) / unknown.prior_sd,
+                sd=figure(unknown.prior_sd, 3),
+            ))  # fmt: skip
     return texts
 
 

@@ -9,9 +9,9 @@ from cmm_uq.analysis.diagnosis.location import Place, residual_field
 from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, after, alternatives, commas, number, say, signed
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
+from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table, text_columns
 from cmm_uq.certificate.effect_words import effect_of
-from cmm_uq.certificate.plots.vectors import Shade, profile_plot, residual_field_plot
+from cmm_uq.certificate.plots.vectors import profile_plot, residual_field_plot
 from cmm_uq.jobs.columns import in_words, labelled, unit_of
 from cmm_uq.maths.uncertainty.quantity import significant
 
@@ -56,13 +56,10 @@ def where_section(d: Diagnosis) -> Section:
     """Pictures and table of where the residuals lie; without a mismatch, nothing."""
     if d.verdict == "consistent":
         return Section(say("Where it is"), ())
-    blocks: list[Block] = [Paragraph(where_sentence(d))]
-    if (picture := field_picture(d)) is not None:
-        blocks.append(picture)
-    if d.where:
-        blocks.append(_profile(d.where[0]))
-        blocks.append(_table(d.where))
-    return Section(say("Where it is"), tuple(blocks))
+    picture = field_picture(d)
+    found: tuple[Block, ...] = (_profile(d.where[0]), _table(d.where)) if d.where else ()
+    pictures = () if picture is None else (picture,)
+    return Section(say("Where it is"), (Paragraph(where_sentence(d)), *pictures, *found))
 
 
 def where_sentence(d: Diagnosis) -> Text:
@@ -97,15 +94,10 @@ def field_picture(d: Diagnosis) -> Plot | None:
     count = say("{before} of {all} vectors are longer than their U before", before=beyond[0], all=len(expanded))
     if d.effects:
         count = say("{count} and {after} after", count=count, after=beyond[1])
-    return residual_field_plot(
-        field, expanded, titles=titles, shade=_shade(d.where), caption=told, alternative=say("{count}.", count=count)
-    )
-
-
-def _shade(where: tuple[Place, ...]) -> Shade | None:
-    if not where or where[0].covariate not in _READINGS:
-        return None
-    return where[0].covariate[0], *where[0].region
+    along = next((place for place in d.where[:1] if place.covariate in _READINGS), None)
+    shade = None if along is None else (along.covariate[0], *along.region)
+    alternative = say("{count}.", count=count)
+    return residual_field_plot(field, expanded, titles=titles, shade=shade, caption=told, alternative=alternative)
 
 
 def _profile(place: Place) -> Plot:
@@ -132,10 +124,7 @@ def _table(where: tuple[Place, ...]) -> Table:
          significant(place.amplitude_um), number(place.p_value, ".1g"))
         for place in where
     )  # fmt: skip
-    heads = (
-        Column(say("What it depends on"), numeric=False), Column(say("Where"), numeric=False),
-        Column(say("Up to"), unit("µm")), Column(say("p")),
-    )  # fmt: skip
+    heads = (*text_columns(say("What it depends on"), say("Where")), Column(say("Up to"), unit("µm")), Column(say("p")))
     note = say(
         "p is corrected for having looked everywhere, and of a further place holds beside those above it. A region is where "
         "the function exceeds half its largest value and its band does not hold zero, or between which values it jumps."

@@ -13,10 +13,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cmm_uq.certificate.verify.figures import QUANTITY
+from cmm_uq.certificate.verify.figures import quantities
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.given import RESULTS, Given, strict_json
-from cmm_uq.certificate.verify.views import squashed
+from cmm_uq.certificate.verify.views import differing_parts, first_difference, squashed
 from cmm_uq.maths.uncertainty.quantity import rounded
 
 _NUMBER = re.compile(r"[−-]?\d+(?:[.,]\d+)*")
@@ -66,9 +66,8 @@ def compare_again(inquiry: Inquiry, given: Given, again: Again) -> bool:
     if not (same or kernels or found):
         inquiry.wrong("again", name, "", "is written otherwise than its inputs give it, though its figures are equal")
     for kept in again.kept:
-        inquiry.left(
-            f"platform and versions of packages in {kept}", "they are others than here, and nothing else tells them"
-        )
+        why = "they are others than here, and nothing else tells them"
+        inquiry.left(f"platform and versions of packages in {kept}", why)
     alike = _compare_html(inquiry, given, again, kernels=kernels)
     _compare_attached(inquiry, given, again, kernels=kernels)
     return same and _compare_pdf(inquiry, given, again) and alike
@@ -110,19 +109,17 @@ def beyond_sampling(data: Any, new: Any, found: list[Difference]) -> Iterator[Di
     """Of some differences those that neither printed digits nor Monte Carlo error explain."""
     draws = min(filter(None, map(_draws, (data, new))), default=0.0)
     part = _ERRORS * math.sqrt(2.0 / draws) if draws > 0 else 1e-6
-    quantities = dict(_quantities(new))
+    uncertain = dict(quantities(new, inner=True))
     for path, stands, should in found:
         if not (isinstance(stands, (int, float)) and isinstance(should, (int, float))):
-            if isinstance(stands, str) and isinstance(should, str) and _words_alike(stands, should, part):
-                continue
-            yield path, stands, should
+            if not (isinstance(stands, str) and isinstance(should, str) and _words_alike(stands, should, part)):
+                yield path, stands, should
             continue
         owner = path.rpartition(".")[0] if "interval95" not in path else path.rpartition(".interval95")[0]
         scale = max(abs(stands), abs(should))
-        if owner in quantities:
-            one = quantities[owner]
-            place = _place(one)
-            room = part * (one["u"] if path.endswith((".value", "]", ".u", ".U")) else scale) + place
+        if owner in uncertain:
+            u = uncertain[owner]["u"] if path.endswith((".value", "]", ".u", ".U")) else scale
+            room = part * u + _place(uncertain[owner])
         else:
             room = part * max(scale, 1.0 if path.startswith(_OF_ONE) else 0.0)
         if abs(stands - should) > room:
@@ -136,35 +133,20 @@ def _draws(data: Mapping[str, Any]) -> float:
     return float((data.get("sampling") or {}).get("ess_min") or 0.0)
 
 
-def _quantities(data: Any, path: str = "") -> Iterator[tuple[str, Mapping[str, Any]]]:
-    if isinstance(data, Mapping):
-        if data.keys() >= QUANTITY:
-            yield path, data
-        for key, value in data.items():
-            yield from _quantities(value, f"{path}.{key}" if path else str(key))
-    elif isinstance(data, list):
-        for i, value in enumerate(data):
-            yield from _quantities(value, f"{path}[{i}]")
-
-
-def _place(one: Mapping[str, Any]) -> float:
+def _place(quantity: Mapping[str, Any]) -> float:
     """Half a unit of the last digit that is printed."""
-    if one["value"] is None or not one["U"]:
+    if quantity["value"] is None or not quantity["U"]:
         return 0.0
-    text = rounded(0.0, one["U"])[1]
-    decimals = len(text.partition(".")[2])
-    return 0.5 * 10.0**-decimals
+    return float(0.5 * 10.0 ** -len(rounded(0.0, quantity["U"])[1].partition(".")[2]))
 
 
 def _words_alike(stands: str, should: str, part: float) -> bool:
     """Whether two sentences differ in the last digits of their numbers alone."""
     if _NUMBER.sub("#", stands) != _NUMBER.sub("#", should):
         return False
-    pairs = zip(_NUMBER.findall(stands), _NUMBER.findall(should), strict=True)
-    numbers = [
-        (float(a.replace("−", "-").replace(",", ".")), float(b.replace("−", "-").replace(",", "."))) for a, b in pairs
-    ]
-    return all(abs(a - b) <= 4 * part * max(abs(a), abs(b), 1.0) for a, b in numbers)
+    numbers = ([float(figure.replace("−", "-").replace(",", ".")) for figure in _NUMBER.findall(text)]
+               for text in (stands, should))  # fmt: skip
+    return all(abs(a - b) <= 4 * part * max(abs(a), abs(b), 1.0) for a, b in zip(*numbers, strict=True))
 
 
 def _compare_html(inquiry: Inquiry, given: Given, again: Again, *, kernels: bool) -> bool:
@@ -181,7 +163,8 @@ def _compare_html(inquiry: Inquiry, given: Given, again: Again, *, kernels: bool
     if kernels:
         from cmm_uq.certificate.verify.html_page import read_html
 
-        if _masked(page.text) == _masked(read_html(should, name).text):
+        here, there = (_NUMBER.sub("#", squashed(text)) for text in (page.text, read_html(should, name).text))
+        if here == there:
             inquiry.left("pictures", "the figures differ in their last digits, and with them the pictures")
             return False
     line, stands, wanted = _first_line(content, should)
@@ -189,27 +172,21 @@ def _compare_html(inquiry: Inquiry, given: Given, again: Again, *, kernels: bool
     return False
 
 
-def _masked(text: str) -> str:
-    return _NUMBER.sub("#", squashed(text))
-
-
 def _first_line(stands: bytes, should: bytes) -> tuple[int, str, str]:
     """Number of the first line that differs, and what differs in it."""
-    a, b = stands.decode("utf-8", "replace").split("\n"), should.decode("utf-8", "replace").split("\n")
-    at = next((i for i, (one, other) in enumerate(zip(a, b, strict=False)) if one != other), min(len(a), len(b)))
-    one, other = a[at] if at < len(a) else "", b[at] if at < len(b) else ""
-    begin = next((i for i, (x, y) in enumerate(zip(one, other, strict=False)) if x != y), min(len(one), len(other)))
-    begin = max(0, begin - 20)
-    return at + 1, one[begin : begin + 60], other[begin : begin + 60]
+    a, b = (content.decode("utf-8", "replace").split("\n") for content in (stands, should))
+    at = first_difference(a, b)
+    line, other = a[at] if at < len(a) else "", b[at] if at < len(b) else ""
+    begin = max(0, first_difference(line, other) - 20)
+    return at + 1, line[begin : begin + 60], other[begin : begin + 60]
 
 
 def _compare_attached(inquiry: Inquiry, given: Given, again: Again, *, kernels: bool) -> None:
     """Files inside the PDF, or beside it, that the command writes: none missing, none more, none other."""
-    written = {
-        name: data for name, data in again.files.items() if name != RESULTS and not name.endswith((".html", ".xml"))
-    }
     inputs = given.results[1]["job"]["inputs_sha256"] if given.results else {}
-    for name, data in written.items():
+    for name, data in again.files.items():
+        if name == RESULTS or name.endswith((".html", ".xml")):
+            continue
         stands = given.files.get(name)
         inquiry.looked("again")
         if stands is None and given.pdf is not None and name not in again.beside:
@@ -218,15 +195,14 @@ def _compare_attached(inquiry: Inquiry, given: Given, again: Again, *, kernels: 
             inquiry.wrong("again", name, "", "is not what the inputs give")
     if given.pdf is None:
         return
-    known = {*inputs, *again.files}
-    for name in again.files:
-        if name.endswith(".xml") and name not in given.pdf[1].files:
-            inquiry.wrong("again", given.pdf[0], f"attachment {name}", "is missing, and the inputs give it")
-    for name in given.pdf[1].files.keys() - known:
-        inquiry.wrong("again", given.pdf[0], f"attachment {name}", "belongs to nothing that the inputs give")
-    for name in (*inputs, RESULTS):
-        if name not in given.pdf[1].files:
-            inquiry.wrong("again", given.pdf[0], f"attachment {name}", "is missing")
+    pdf, there = given.pdf[0], given.pdf[1].files
+    missing = [name for name in again.files if name.endswith(".xml") and name not in there]
+    problems = [(name, "is missing, and the inputs give it") for name in missing]
+    further = there.keys() - {*inputs, *again.files}
+    problems += [(name, "belongs to nothing that the inputs give") for name in further]
+    problems += [(name, "is missing") for name in (*inputs, RESULTS) if name not in there]
+    for name, problem in problems:
+        inquiry.wrong("again", pdf, f"attachment {name}", problem)
 
 
 def _compare_pdf(inquiry: Inquiry, given: Given, again: Again) -> bool:
@@ -240,15 +216,11 @@ def _compare_pdf(inquiry: Inquiry, given: Given, again: Again) -> bool:
     inquiry.looked("again")
     if pdf.content[: pdf.ends[0]] == again.pdf:
         return True
-    from cmm_uq.certificate.verify.views import differing_parts
-
     stands, should = pdf.content[: pdf.ends[0]], again.pdf
     parts = differing_parts(stands, should)
     for where, here, there in parts:
         inquiry.wrong("again", name, where, "is not what its inputs give", here, there)
     if not parts:
-        pairs = enumerate(zip(stands, should, strict=False))
-        at = next((i for i, (a, b) in pairs if a != b), min(len(stands), len(should)))
         problem = "was written anew, or changed where nothing is stated: it is not the file that was made"
-        inquiry.wrong("again", name, f"byte {at}", problem)
+        inquiry.wrong("again", name, f"byte {first_difference(stands, should)}", problem)
     return False

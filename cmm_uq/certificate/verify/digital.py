@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,11 +13,9 @@ from cmm_uq.certificate.verify.given import Given
 from cmm_uq.certificate.verify.html_page import read_html
 
 if TYPE_CHECKING:
-    from cmm_uq.certificate.verify.pdf_file import Attachment
     from cmm_uq.jobs.dcc.tree import Node
     from cmm_uq.jobs.job import Job
 
-_SIGNATURE = "Signature"
 _MOST = 12
 Difference = tuple[str, str, str]  # XPath, what stands there, what should
 
@@ -25,14 +24,16 @@ def open_digital(inquiry: Inquiry, given: Given) -> None:
     """Take the certificate out of the PDF where it is not given by itself, and the page out of it; keep where these differ."""
     from cmm_uq.jobs.dcc import read
 
-    attached = _attached(given)
+    # an artefact's certificate is an input
+    inputs = given.results[1]["job"]["inputs_sha256"] if given.results is not None else {}
+    files = [] if given.pdf is None else given.pdf[1].attachments
+    attached = next((file for file in files if file.name.lower().endswith(".xml") and file.name not in inputs), None)
     if attached is not None and given.pdf is not None:
         if given.xml is None:
             given.xml, given.digital_inside = (f"{attached.name} in {given.pdf[0]}", attached.content), True
         elif given.xml[1] != attached.content:
-            _compare(
-                inquiry, f"attachment {attached.name} of {given.pdf[0]}", attached.content, given.xml[1], given.xml[0]
-            )
+            name = f"attachment {attached.name} of {given.pdf[0]}"
+            _compare(inquiry, name, attached.content, given.xml[1], given.xml[0])
     if given.xml is None:
         return
     name, content = given.xml
@@ -48,13 +49,6 @@ def open_digital(inquiry: Inquiry, given: Given) -> None:
         given.html = where, read_html(document.data, where), document.data
     elif given.html[2] != document.data:
         inquiry.wrong("forms", name, place, f"is not {given.html[0]}")
-
-
-def _attached(given: Given) -> Attachment | None:
-    """The certificate inside the PDF; an artefact's certificate is an input."""
-    inputs = given.results[1]["job"]["inputs_sha256"] if given.results is not None else {}
-    files = [] if given.pdf is None else given.pdf[1].attachments
-    return next((one for one in files if one.name.lower().endswith(".xml") and one.name not in inputs), None)
 
 
 def check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
@@ -105,16 +99,12 @@ def _compare(inquiry: Inquiry, name: str, content: bytes, should: bytes, source:
     if content == should:
         return
     root, wished = parsed(content, name), parsed(should, source)
-    count = 0
-    for path, stands, wanted in differences(root, wished):
-        count += 1
-        if count > _MOST:
-            break
+    found = list(islice(differences(root, wished), _MOST))
+    for path, stands, wanted in found:
         inquiry.wrong("forms", name, path, f"is not what {source} says", stands, wanted)
-    if not count and not any(map(_is_signature, (*root.children, *wished.children))):
-        inquiry.wrong(
-            "forms", name, "", "is written otherwise, though it says the same: it is not the file that was made"
-        )
+    if not found and not any(map(_is_signature, (*root.children, *wished.children))):
+        problem = "is written otherwise, though it says the same: it is not the file that was made"
+        inquiry.wrong("forms", name, "", problem)
 
 
 def differences(one: Node, other: Node) -> Iterator[Difference]:
@@ -129,10 +119,9 @@ def differences(one: Node, other: Node) -> Iterator[Difference]:
     a, b = ([child for child in node.children if node.parent or not _is_signature(child)] for node in (one, other))
     for mine, theirs in zip(a, b, strict=False):
         yield from differences(mine, theirs)
-    for further, stands in ((a[len(b) :], True), (b[len(a) :], False)):
-        for child in further:
-            yield child.xpath, "there" if stands else "", "" if stands else "there"
+    yield from ((child.xpath, "there", "") for child in a[len(b) :])
+    yield from ((child.xpath, "", "there") for child in b[len(a) :])
 
 
 def _is_signature(node: Node) -> bool:
-    return node.tag.rpartition(":")[2].rpartition("}")[2] == _SIGNATURE
+    return node.tag.rpartition(":")[2].rpartition("}")[2] == "Signature"

@@ -43,51 +43,31 @@ def inputs_of(inquiry: Inquiry, given: Given) -> dict[str, bytes] | None:
     if given.results is None:
         return None
     name, data, _ = given.results
-    wanted = data["job"]["inputs_sha256"]
-    files, sound, found = given.files, True, dict[str, bytes]()
-    for input_, digest in wanted.items():
-        inquiry.looked("inputs")
-        if input_ not in files:
-            sound = False
+    wanted, files = data["job"]["inputs_sha256"], given.files
+
+    def is_sound(file: str, digest: str, source: str, missing: str) -> bool:
+        if file not in files:
             if given.pdf is not None:
-                inquiry.wrong(
-                    "inputs", given.pdf[0], f"attachment {input_}", f"is missing, and {name} names it as an input"
-                )
-            continue
-        found[input_] = files[input_]
-        stands = sha256(files[input_]).hexdigest()
+                inquiry.wrong("inputs", given.pdf[0], f"attachment {file}", missing)
+            return False
+        stands = sha256(files[file]).hexdigest()
         if stands != digest:
-            sound = False
-            inquiry.wrong(
-                "inputs", _file_of(given, input_), "", f"is not the file whose hash {name} has", stands, digest
-            )
+            where = f"{file} in {given.pdf[0]}" if given.pdf is not None and file in given.pdf[1].files else file
+            inquiry.wrong("inputs", where, "", f"is not the file whose hash {source} has", stands, digest)
+        return stands == digest
+
+    inquiry.looked("inputs", len(wanted))
+    missing = f"is missing, and {name} names it as an input"
+    sound = sum(is_sound(file, digest, name, missing) for file, digest in wanted.items()) == len(wanted)
     if given.pdf is None and not sound and not (wanted.keys() & files.keys()):
         inquiry.left("inputs", "neither a PDF that has them inside nor the files themselves are given")
     elif given.pdf is None and not sound:
         inquiry.left("inputs", f"not given: {', '.join(sorted(wanted.keys() - files.keys()))}")
-    _check_posterior(inquiry, given, data, files)
-    return found if sound and JOB in found else None
-
-
-def _file_of(given: Given, name: str) -> str:
-    inside = given.pdf is not None and name in given.pdf[1].files
-    return f"{name} in {given.pdf[0]}" if inside and given.pdf else name
-
-
-def _check_posterior(inquiry: Inquiry, given: Given, data: Mapping[str, Any], files: Mapping[str, bytes]) -> None:
-    entry = data.get("posterior")
-    if not entry:
-        return
-    name = str(entry["file"])
-    if name not in files:
-        if given.pdf is not None:
-            inquiry.wrong("inputs", given.pdf[0], f"attachment {name}", "is missing, and results.json names it")
-        return
-    inquiry.looked("inputs")
-    stands = sha256(files[name]).hexdigest()
-    if stands != entry["sha256"]:
-        inquiry.wrong("inputs", _file_of(given, name), "", "is not the file whose hash results.json has", stands,
-                      entry["sha256"])  # fmt: skip
+    if entry := data.get("posterior"):
+        draws = str(entry["file"])
+        inquiry.looked("inputs", draws in files)
+        is_sound(draws, entry["sha256"], RESULTS, f"is missing, and {RESULTS} names it")
+    return {file: files[file] for file in wanted} if sound and JOB in wanted else None
 
 
 def check_job(inquiry: Inquiry, job: Job, data: Mapping[str, Any], file: str) -> None:
@@ -115,10 +95,7 @@ def check_job(inquiry: Inquiry, job: Job, data: Mapping[str, Any], file: str) ->
             asked.append((f"conformity[{i}].characteristic", entry.get("characteristic"), wish.characteristic))
         if wish.limit_um is not None:
             asked.append((f"conformity[{i}].limit_um", entry.get("limit_um"), float(f"{wish.limit_um:.10g}")))
-    for place, stands, should in asked:
-        inquiry.looked("inputs")
-        if stands != should:
-            inquiry.wrong("inputs", file, place, f"is not what {JOB} says", stands, should)
+    _compare(inquiry, asked, file, f"is not what {JOB} says")
 
 
 def check_dates(inquiry: Inquiry, job: Job) -> None:
@@ -130,9 +107,8 @@ def check_dates(inquiry: Inquiry, job: Job) -> None:
     if certified_on_this_machine(job.facts):
         inquiry.notes.append("The artefact was certified on the machine that it tests; the certificate says so.")
     if chain is not None and chain.number and chain.until is None:
-        inquiry.notes.append(
-            "The artefact's certificate has no date by which it is due: that it was in date is not shown."
-        )
+        note = "The artefact's certificate has no date by which it is due: that it was in date is not shown."
+        inquiry.notes.append(note)
 
 
 def _first(stands: bytes, should: bytes) -> str:
@@ -157,7 +133,7 @@ def check_part_job(
     inquiry: Inquiry, job: PartJob, plan: Plan, measured: Floats | None, data: Mapping[str, Any], file: str
 ) -> None:
     """Keep what the job says otherwise; ``measured``: (c,) values of the measured points, mm and rad."""
-    facts, said = job.facts, data["job"]
+    facts, said, problem = job.facts, data["job"], f"is not what {JOB} says"
     part, decision = data["part"], data["decision"]
     prior = None if facts.decision.prior is None else facts.decision.prior.model_dump()
     asked: list[Asked] = [
@@ -181,17 +157,21 @@ def check_part_job(
                   (f"{where}.association", one["association"], known.association),
                   (f"{where}.unit", one["unit"], "°" if angle else "mm")]  # fmt: skip
         limits = one["limits"] or {"lower": None, "upper": None}
-        numbers: list[tuple[str, Any, float | None, float]] = [
-            (f"limits.{key}", limits[key], getattr(known, key), _SAME) for key in ("lower", "upper")
-        ]
         value = None if measured is None else float(measured[i])
-        numbers.append(("measured", one["measured"], value, _NEAR_MM))
-        for key, stands, should, room in numbers:
+        numbers: list[tuple[str, Any, float | None, float, str]] = [
+            *((f"limits.{key}", limits[key], getattr(known, key), _SAME, problem) for key in ("lower", "upper")),
+            ("measured", one["measured"], value, _NEAR_MM, "is not the value of the measured points"),
+        ]
+        for key, stands, should, room, otherwise in numbers:
             inquiry.looked("inputs")
             inside = None if should is None else degrees(should) if angle else should
-            if not _near(stands, inside, room):
-                inquiry.wrong("inputs", file, f"{where}.{key}", _otherwise(key), stands, f"{inside}")
-    _compare(inquiry, asked, file, f"is not what {JOB} says")
+            if stands is None or inside is None:
+                near = stands is inside
+            else:
+                near = abs(stands - inside) <= room * max(1.0, abs(inside))
+            if not near:
+                inquiry.wrong("inputs", file, f"{where}.{key}", otherwise, stands, f"{inside}")
+    _compare(inquiry, asked, file, problem)
 
 
 def check_standing(inquiry: Inquiry, standing: CertificateStatus, data: Mapping[str, Any], file: str) -> None:
@@ -203,16 +183,4 @@ def check_standing(inquiry: Inquiry, standing: CertificateStatus, data: Mapping[
 
 def _compare(inquiry: Inquiry, asked: Sequence[Asked], file: str, problem: str) -> None:
     for place, stands, should in asked:
-        inquiry.looked("inputs")
-        if stands != should:
-            inquiry.wrong("inputs", file, place, problem, stands, should)
-
-
-def _otherwise(key: str) -> str:
-    return "is not the value of the measured points" if key == "measured" else f"is not what {JOB} says"
-
-
-def _near(a: float | None, b: float | None, room: float) -> bool:
-    if a is None or b is None:
-        return a is b
-    return abs(a - b) <= room * max(1.0, abs(b))
+        inquiry.compare("inputs", file, place, problem, stands, should)

@@ -163,13 +163,11 @@ def _read(found: PdfFile, where: str) -> None:
 
 
 class _Walk:
-    """Every object that can be reached, once."""
-
     def __init__(self, found: PdfFile, where: str) -> None:
         self._found, self._where, self._unpacked, self._seen = found, where, 0, set[tuple[int, int]]()
 
     def all(self, trailer: Any) -> None:
-        """Follow references without recursing."""
+        """Every object that can be reached, once, without recursing."""
         from pypdf.generic import ArrayObject, DictionaryObject, IndirectObject, NameObject, StreamObject
 
         waiting: list[tuple[str, Any]] = [("trailer", trailer)]
@@ -208,10 +206,8 @@ class _Walk:
 
     def _unpack(self, place: str, one: Any) -> None:
         """A stream whole, up to the limit, with its checksum."""
-        packing = one.get("/Filter")
-        packing = (
-            [str(name) for name in packing] if isinstance(packing, list) else [] if packing is None else [str(packing)]
-        )
+        names = one.get("/Filter")
+        packing = list(map(str, names if isinstance(names, list) else [] if names is None else [names]))
         raw = one._data if isinstance(one._data, bytes) else bytes(one._data)
         if packing not in ([], ["/FlateDecode"]) or one.get("/DecodeParms") is not None:
             raise CmmUqError(f"packs a stream by {' '.join(packing)}, which no PDF of cmm-uq does",
@@ -263,10 +259,8 @@ def _attachments(found: PdfFile, root: Any) -> Iterator[Attachment]:
         told = _inner(stream, "/Params")
         if "/Size" in told and int(told["/Size"]) != len(content):
             found.problems.append((f"attachment {name}", f"has {len(content)} bytes, and {told['/Size']} are told"))
-        if (
-            "/CheckSum" in told
-            and bytes(told["/CheckSum"].original_bytes) != hashlib.md5(content, usedforsecurity=False).digest()
-        ):
+        checksum = hashlib.md5(content, usedforsecurity=False).digest()
+        if "/CheckSum" in told and bytes(told["/CheckSum"].original_bytes) != checksum:
             found.problems.append((f"attachment {name}", "has another checksum than the PDF tells"))
         yield Attachment(name, content, str(spec.get("/AFRelationship", "")).lstrip("/"))
 
@@ -275,16 +269,15 @@ def _texts(found: PdfFile) -> Iterator[str]:
     """Text of each page, as a reader copies it."""
     until, where = monotonic() + SECONDS, found.where
     for number, page in enumerate(found.reader.pages if found.reader else (), 1):
+        place = f"{where}: page {number}"
         if _drawn(page, {}, ()) > PDF_DRAWN.most:
-            raise CmmUqError(
-                f"draws more than {PDF_DRAWN.most} bytes on a page", where=f"{where}: page {number}", fix=_FIX
-            )
+            raise CmmUqError(f"draws more than {PDF_DRAWN.most} bytes on a page", where=place, fix=_FIX)
         contents = page.get_contents()
         if contents is not None and _INVISIBLE.search(contents.get_data()):
             found.problems.append((f"page {number}", "has text that is not painted as text"))
         yield page.extract_text()
         if monotonic() > until:
-            raise CmmUqError(f"takes longer than {SECONDS:.0f} s to read", where=f"{where}: page {number}", fix=_FIX)
+            raise CmmUqError(f"takes longer than {SECONDS:.0f} s to read", where=place, fix=_FIX)
 
 
 def _inner(one: Any, key: str) -> Any:

@@ -20,46 +20,33 @@ _OPENING = b"http://www.w3.org/2000/09/xmldsig#"
 
 def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> None:
     """Keep what is wrong; ``trust``: ``None`` where nobody said whom the reader trusts, and then nothing need be signed."""
-    if given.pdf is not None:
-        name, pdf = given.pdf
-        signed: Sequence[FileSignature] = ()
-        if pdf.signatures:
-            from cmm_uq.certificate.sign import Trust, signatures_of_pdf
+    from cmm_uq.certificate import sign
 
-            try:
-                signed = signatures_of_pdf(pdf.content, trust or Trust(), where=name)
-            except NotInstalledError as error:
-                inquiry.left("electronic signatures", f"{error.problem}. {error.fix}")
-                return
-        elif len(pdf.ends) > 1:
-            inquiry.wrong(
-                "signatures", name, f"byte {pdf.ends[0]}", "was changed after it was made, and nobody signed that"
-            )
-        _all(inquiry, name, signed, trust)
-    if given.xml is not None:
-        name, content = given.xml
-        signed = ()
-        if _OPENING in content:
-            from cmm_uq.certificate.sign import Trust, signatures_of_xml
-
-            try:
-                signed = signatures_of_xml(content, trust or Trust(), where=name)
-            except NotInstalledError as error:
-                inquiry.left("electronic signatures", f"{error.problem}. {error.fix}")
-                return
-        if signed or not given.digital_inside:  # what is inside a signed PDF is signed with it
-            _all(inquiry, name, signed, trust)
+    held = trust or sign.Trust()
+    try:
+        if given.pdf is not None:
+            name, pdf = given.pdf
+            if not pdf.signatures and len(pdf.ends) > 1:
+                problem = "was changed after it was made, and nobody signed that"
+                inquiry.wrong("signatures", name, f"byte {pdf.ends[0]}", problem)
+            _all(inquiry, name, sign.signatures_of_pdf(pdf.content, held, where=name) if pdf.signatures else (), trust)
+        if given.xml is not None:
+            name, content = given.xml
+            signed = sign.signatures_of_xml(content, held, where=name) if _OPENING in content else ()
+            if signed or not given.digital_inside:  # what is inside a signed PDF is signed with it
+                _all(inquiry, name, signed, trust)
+    except NotInstalledError as error:
+        inquiry.left("electronic signatures", f"{error.problem}. {error.fix}")
 
 
 def _all(inquiry: Inquiry, name: str, signed: Sequence[FileSignature], trust: Trust | None) -> None:
     inquiry.looked("signatures", len(signed))
-    if not signed:
-        if trust is not None:
-            inquiry.wrong("signatures", name, "", "carries no signature, and --trust asks for one")
-        else:
-            inquiry.notes.append(f"{name} carries no electronic signature: who issued it is not shown.")
-    for number, one in enumerate(signed, 1):
-        _one(inquiry, name, f"signature {number}", one, trust)
+    if not signed and trust is not None:
+        inquiry.wrong("signatures", name, "", "carries no signature, and --trust asks for one")
+    elif not signed:
+        inquiry.notes.append(f"{name} carries no electronic signature: who issued it is not shown.")
+    for number, signature in enumerate(signed, 1):
+        _one(inquiry, name, f"signature {number}", signature, trust)
 
 
 def _one(inquiry: Inquiry, name: str, place: str, one: FileSignature, trust: Trust | None) -> None:
@@ -76,9 +63,7 @@ def _one(inquiry: Inquiry, name: str, place: str, one: FileSignature, trust: Tru
             inquiry.wrong("signatures", name, place, str.__str__(problem))
     if not one.problems and not (one.intact and one.covers_whole_file and (one.trusted or trust is None)):
         inquiry.wrong("signatures", name, place, "does not hold")
-    if one.test_key:
-        note = str.__str__(TEST_NOTE)
-        if trust is None:
-            inquiry.left(f"who signed {name}", note)
-        else:
-            inquiry.wrong("signatures", name, place, note)
+    if one.test_key and trust is None:
+        inquiry.left(f"who signed {name}", str.__str__(TEST_NOTE))
+    elif one.test_key:
+        inquiry.wrong("signatures", name, place, str.__str__(TEST_NOTE))

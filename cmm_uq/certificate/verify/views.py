@@ -126,15 +126,15 @@ def _together(text: str, here: int, whole: str, at: int) -> tuple[int, int]:
 
 def _compare_information(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, name: str) -> None:
     """Title, language, subject and author in the file's own information, which a reader's window shows."""
-    told = pdf.information
-    asked = [("/Title", page.title), ("/Author", page.metas.get("author", ""))]
     subject = page.metas.get("description", "")
-    asked.append(("/Subject", f"{page.banner}. {subject}" if page.banner else subject))
-    for key, should in asked:
-        stands = told.get(key, "")
+    for key, should in (
+        ("/Title", page.title), ("/Author", page.metas.get("author", "")),
+        ("/Subject", f"{page.banner}. {subject}" if page.banner else subject),
+    ):  # fmt: skip
+        stands = pdf.information.get(key, "")
         if " ".join(stands.split()) != " ".join(should.split()):
             inquiry.wrong("forms", name, f"information {key}", "is not that of the document", stands, should)
-    for key, value in told.items():
+    for key, value in pdf.information.items():
         words = "".join(value.split())
         if not key.endswith("Date") and words not in "".join(html.unescape(pdf.xmp).split()):
             inquiry.wrong("forms", name, f"information {key}", "does not stand in the metadata", "", value)
@@ -159,24 +159,22 @@ def differing_parts(stands: bytes, should: bytes) -> list[Part]:
 
 
 class _Pairs:
-    """Both files walked together from their trailers, each pair of objects once."""
-
     def __init__(self) -> None:
         self.found: list[Part] = []
-        self._seen: set[tuple[object, object]] = set()
 
     def compared(self, a: Any, b: Any) -> list[Part]:
-        """Differences in the order in which they are reached."""
+        """Both files walked together from their trailers, each pair of objects once."""
         from pypdf.generic import ArrayObject, DictionaryObject, StreamObject
 
+        seen: set[tuple[object, object]] = set()
         waiting: list[tuple[str, Any, Any]] = [("", a, b)]
         while waiting and len(self.found) < MOST:
             path, one, other = waiting.pop()
-            key = _reference(one), _reference(other)
+            key = getattr(one, "idnum", None), getattr(other, "idnum", None)
             if all(key):
-                if key in self._seen:
+                if key in seen:
                     continue
-                self._seen.add(key)
+                seen.add(key)
             one, other = one.get_object(), other.get_object()
             if isinstance(one, DictionaryObject) and isinstance(other, DictionaryObject):
                 if isinstance(one, StreamObject) and isinstance(other, StreamObject):
@@ -203,7 +201,7 @@ class _Pairs:
     def _stream(self, path: str, one: Any, other: Any) -> None:
         a, b = one.get_data(), other.get_data()
         if a != b:
-            at = next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
+            at = first_difference(a, b)
             self._tell(path, *(data[max(0, at - 20) : at + 20].decode("latin-1") for data in (a, b)))
 
     def _tell(self, path: str, stands: str, should: str) -> None:
@@ -212,5 +210,6 @@ class _Pairs:
         self.found.append((where or "trailer", stands, should))
 
 
-def _reference(one: Any) -> object:
-    return getattr(one, "idnum", None)
+def first_difference(a: Sequence[object], b: Sequence[object]) -> int:
+    """Where two sequences begin to differ."""
+    return next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
