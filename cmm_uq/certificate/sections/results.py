@@ -105,16 +105,17 @@ def as_found_section(job: Job, left: Iterable[Left], verdicts: Iterable[Verdict]
         job=Verbatim(found.job.id), date=say(", measured on {date}", date=day(found.job.date)) if found.job.date else NOTHING,
     )  # fmt: skip
     blocks: list[Block] = [Paragraph(told)]
-    rows = tuple(
-        (title_, *expanded(Quantity(before.value, before.u, (before.interval95[0], before.interval95[1]), now.unit))[:2], *expanded(now)[:2],
-         now.unit)
-        for group, name, title_, now in left if (before := found.figure(group, name)) is not None
-    )  # fmt: skip
+    rows = []
+    for group, name, quantity, now in left:
+        if (before := found.figure(group, name)) is not None:
+            low, high = before.interval95
+            then = Quantity(before.value, before.u, (low, high), now.unit)
+            rows.append((quantity, *expanded(then)[:2], *expanded(now)[:2], now.unit))
     if rows:
         heads = (*text_columns(say("Quantity")), *figure_columns(say("As found"), say("U"), say("As left"), say("U")),
                  *text_columns(say("Unit")))  # fmt: skip
         note = say("U is the expanded uncertainty for a coverage probability of 95 %.")
-        blocks.append(Table(say("The machine as found and as left"), heads, rows, (note,)))
+        blocks.append(Table(say("The machine as found and as left"), heads, tuple(rows), (note,)))
     decided = tuple(
         (subject_of(now), *(OUTCOME_WORDS.get(name, Verbatim(name)) for name in (before.outcome, now.outcome)))
         for now in verdicts for before in found.stated if (before.by, before.name) == (now.by, now.name)
