@@ -19,7 +19,7 @@ from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.certificate.results.reissue import COMPARED, NOT_COMPARED
 from cmm_uq.certificate.sections.conformity import conformity_section
 from cmm_uq.certificate.sections.first_page import overview_of, summary, with_first
-from cmm_uq.certificate.sections.method import method, posterior_section
+from cmm_uq.certificate.sections.method import method, posterior_section, warnings
 from cmm_uq.certificate.sections.results import (
     as_found_data,
     as_found_section,
@@ -29,7 +29,6 @@ from cmm_uq.certificate.sections.results import (
     tolerance_sections,
 )
 from cmm_uq.certificate.sections.traceability import claimed, traceability
-from cmm_uq.certificate.sections.warnings import warnings
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.tables.identification import Identification, Laboratory

@@ -1,22 +1,24 @@
-"""How figures, outcomes and names are said in documents and on the terminal."""
+"""How figures, outcomes, effects and names are said in documents and on the terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, number, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, foreign, number, say
 from cmm_uq.base.points import Floats
+from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Standing
 from cmm_uq.machine.model.measurement import ARTEFACT
-from cmm_uq.maths.uncertainty.quantity import Quantity, limit_in_full, rounded
+from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.machine.physics.effect import Amount, Effect
+from cmm_uq.maths.uncertainty.quantity import Quantity, figure, limit_in_full, rounded
 
 if TYPE_CHECKING:
     from cmm_uq.analysis.conformity.statement import Statement
     from cmm_uq.certificate.result import Result
-    from cmm_uq.machine.physics.effect import Effect
 
 OUTCOME_WORDS: Mapping[str, Text] = {
     "pass": say("pass"), "fail": say("fail"), "undecided": say("undecided"), "incomplete": say("incomplete"),
@@ -180,3 +182,60 @@ def figure_row(name: Text, quantity: Quantity, *, known: bool = True) -> Figure:
     if quantity.one_sided:
         return name, figure, say("95 % interval")
     return name, figure, NOTHING if k == NO_FACTOR else say("k = {k}", k=k)
+
+
+def effect_of(name: str, own: Iterable[Effect] = ()) -> Effect | None:
+    """The effect of a name, first among a model's ``own``; ``None`` of what is no effect."""
+    return next((effect for effect in own if effect.name == name), every().get(name))
+
+
+def effect_title(name: str, own: Iterable[Effect] = ()) -> Text:
+    """An effect in words; what is none, as it stands."""
+    effect = effect_of(name, own)
+    if effect is not None:
+        return effect.title
+    return name if isinstance(name, Text) else Verbatim(name)
+
+
+def titles(names: Iterable[str], own: Iterable[Effect] = ()) -> list[Text]:
+    known = tuple(own)
+    return [effect_title(name, known) for name in names]
+
+
+def parameter_title(owner: str, name: str, own: Iterable[Effect] = ()) -> Text:
+    """A parameter of an effect in words: ``Periodic scale error of X, amplitude``; of what is no effect by its names."""
+    effect = effect_of(owner, own)
+    if effect is not None and len(effect.reported) == 1:
+        return effect.title
+    return say("{title}, {what}", title=effect_title(owner, own), what=_what(effect, name))
+
+
+def size_of(effect: Effect | None, parameters: Mapping[str, Quantity], *, factors: bool = True) -> Text:
+    """How large an effect is, and what that means: ``the angle between X and Y is 90° minus 36 ± 4 ″``."""
+    quantities = {
+        name: quantity.times(1e6, unit("10⁻⁶/K")) if quantity.unit == "1/K" else quantity
+        for name, quantity in parameters.items()
+    }
+    if effect is not None:
+        positive = {name: q.times(-1.0, q.unit) if q.value < 0 else q for name, q in quantities.items()}
+        amounts = {name: Amount(_figures(q, factors), quantities[name].value < 0) for name, q in positive.items()}
+        if meaning := effect.meaning(amounts):
+            return meaning
+    sizes = {name: _figures(quantity, factors) for name, quantity in quantities.items()}
+    if len(sizes) == 1:
+        return next(iter(sizes.values()))
+    return commas(say("{what} {size}", what=_what(effect, name), size=size) for name, size in sizes.items())
+
+
+def _what(effect: Effect | None, name: str) -> Text:
+    parameters = () if effect is None else (*effect.reported, *effect.coefficients)
+    return next((p.what for p in parameters if p.name == name and p.what), Verbatim(name))
+
+
+def _figures(quantity: Quantity, factors: bool) -> Text:
+    if not quantity.u > 0:
+        return say("{value}\u00a0{unit}", value=figure(quantity.value), unit=quantity.unit)
+    stated, k = with_uncertainty(quantity), expanded(quantity)[2]
+    if not factors or k == NO_FACTOR:
+        return say("{stated}\u00a0{unit}", stated=stated, unit=quantity.unit)
+    return say("{stated}\u00a0{unit} (k\u00a0=\u00a0{k})", stated=stated, unit=quantity.unit, k=k)

@@ -18,8 +18,8 @@ from cmm_uq.analysis.parts.ways import ways
 from cmm_uq.app.commands.parts.part import COVERAGE, decide_limits
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Machine
-from cmm_uq.certificate.effect_words import title_of
 from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, UnseenError, VerificationCheck
+from cmm_uq.certificate.wording import effect_title
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
@@ -91,7 +91,7 @@ def found_of(
     values = None if points is None else evaluated(plan, points)
     shares = variance_shares(virtual, 1024)
     unseen = tuple(
-        UnseenError(name, line, line.partition(": ")[2], title_of(line.partition(": ")[2]), share, why)
+        UnseenError(name, line, line.partition(": ")[2], effect_title(line.partition(": ")[2]), share, why)
         for name in shares.characteristics for line, share, why in shares.told(name, virtual.named, 0.05)
     )  # fmt: skip
     together = None if values is None else conforming(plan, errors, values)[1]

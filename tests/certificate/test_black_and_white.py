@@ -10,9 +10,8 @@ import pytest
 
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plots.conformity import tolerance_plot, trumpet
 from cmm_uq.certificate.plots.corner import corner_plot
-from cmm_uq.certificate.plots.residuals import length_plot, volume_plot
+from cmm_uq.certificate.plots.residuals import length_plot, tolerance_plot, trumpet, volume_plot
 from cmm_uq.certificate.plots.style import ACCENT, BAND, DIVERGING, INK, MUTED
 from tests.certificate.svg import Drawing, outlines
 

@@ -35,8 +35,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Standing
-from cmm_uq.certificate.effect_words import effect_of, size_of, title_of
-from cmm_uq.certificate.wording import probability
+from cmm_uq.certificate.wording import effect_of, effect_title, probability, size_of
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.content import unit_of
 from cmm_uq.laboratory.records.entries import Entry
@@ -211,7 +210,7 @@ def diagnosis_section(found: Mapping[str, Any]) -> tuple[PageSection, ...]:
         blocks.append(PageTable(say("What the model leaves out"), headings, rows))
     pairs = [one for one in _list(found.get("indistinguishable")) if isinstance(one, list)]
     for pair in pairs:
-        names = commas(title_of(str(name)) for name in pair)
+        names = commas(effect_title(str(name)) for name in pair)
         blocks.append(PageParagraph(say("This recording cannot tell apart: {names}.", names=names)))
     asked = [one.get("what") for one in _list(found.get("suggested_measurements")) if isinstance(one, Mapping)]
     blocks += [PageParagraph(say("Measure next: {what}", what=Verbatim(str(what)))) for what in asked if what]
@@ -234,7 +233,7 @@ def _effect(one: Any) -> tuple[Cell, ...] | None:
     sizes = {str(key): quantity for key, value in (given if isinstance(given, Mapping) else {}).items()
              if (quantity := _quantity(str(key), value)) is not None}  # fmt: skip
     size = size_of(effect_of(name), sizes, factors=False) if sizes else NOTHING
-    return Cell(title_of(name)), Cell(probability(float(p)) if isinstance(p, (int, float)) else DASH), Cell(size)
+    return Cell(effect_title(name)), Cell(probability(float(p)) if isinstance(p, (int, float)) else DASH), Cell(size)
 
 
 def _quantity(name: str, value: Any) -> Quantity | None:

@@ -10,8 +10,7 @@ from cmm_uq.artefacts.error_maps.words import VERDICTS, difference_words, next_w
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, lines, plural, say, semicolons, signed
 from cmm_uq.certificate.diagnosis.overview import STANDING, gained, share_of
 from cmm_uq.certificate.document import Overview
-from cmm_uq.certificate.effect_words import effect_of, size_of
-from cmm_uq.certificate.wording import probability
+from cmm_uq.certificate.wording import effect_of, probability, size_of
 
 VERDICT_TITLES: Mapping[str, Text] = {
     "consistent": say("Consistent: the maps agree"),

@@ -14,12 +14,11 @@ from cmm_uq.artefacts.error_maps.words import VERDICTS, difference_words, next_w
 from cmm_uq.base.messages import Text, Verbatim, commas, day, lines, names, number, say
 from cmm_uq.certificate.diagnosis.overview import held_out, sure
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
-from cmm_uq.certificate.effect_words import effect_of, size_of, titles
 from cmm_uq.certificate.plots.residuals import curve_with_band
 from cmm_uq.certificate.results.contents import effect_data, false_alarms, finding_data, head, improvement_data
 from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.sections.findings import improvement_table
-from cmm_uq.certificate.wording import probability
+from cmm_uq.certificate.wording import effect_of, probability, size_of, titles
 
 
 def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:

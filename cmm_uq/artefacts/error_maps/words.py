@@ -6,8 +6,7 @@ from collections.abc import Mapping
 
 from cmm_uq.artefacts.error_maps.diagnosis import Difference, MapsDiagnosis
 from cmm_uq.base.messages import Text, Verbatim, listed, number, say, semicolons, sentences, signed
-from cmm_uq.certificate.effect_words import title_of
-from cmm_uq.certificate.wording import probability
+from cmm_uq.certificate.wording import effect_title, probability
 
 VERDICTS: Mapping[str, Text] = {
     "consistent": say("The maps agree with each other within their noise."),
@@ -41,7 +40,7 @@ def difference_words(difference: Difference) -> Text:
         said.append(say("With the sign of its figures turned it would agree."))
     if difference.instead:
         said.append(
-            say("It could also be: {others}.", others=semicolons([title_of(name) for name in difference.instead]))
+            say("It could also be: {others}.", others=semicolons([effect_title(name) for name in difference.instead]))
         )
     return sentences(said)
 

@@ -31,8 +31,8 @@ from cmm_uq.certificate.plots.residuals import curve_with_band
 from cmm_uq.certificate.plots.vectors import vector_plot
 from cmm_uq.certificate.results.contents import covariance_data, head
 from cmm_uq.certificate.results.plain import quantity_data
+from cmm_uq.certificate.sections.method import not_converged
 from cmm_uq.certificate.sections.results import SIGN, Left
-from cmm_uq.certificate.sections.warnings import not_converged
 from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.verdicts import NO_VERDICTS
 from cmm_uq.maths.uncertainty.quantity import rounded

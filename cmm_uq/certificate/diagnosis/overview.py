@@ -12,16 +12,16 @@ from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, day, lines, say, semicolons
 from cmm_uq.certificate.diagnosis.sections import explanation, next_sentence, without_power
 from cmm_uq.certificate.document import Overview, Standing
-from cmm_uq.certificate.effect_words import effect_of, size_of, title_of, titles
 from cmm_uq.certificate.result import JobDiagnosis
 from cmm_uq.certificate.sections.findings import (
     VERDICTS as AGAINST,
+    by_columns,
     contained,
     other_periods,
+    place_words,
     sentences as withheld_sentences,
 )
-from cmm_uq.certificate.sections.where import by_columns, place_words
-from cmm_uq.certificate.wording import Headline, Summary, probability
+from cmm_uq.certificate.wording import Headline, Summary, effect_of, effect_title, probability, size_of, titles
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.quantity import alike
@@ -257,7 +257,7 @@ def sure(item: OmittedEffect) -> Text:
     if item.probability < ASSERTED:
         share = say(
             "{share}, {together} that it is this or one that this recording cannot tell from it: {group}",
-            share=share, together=probability(item.together), group=commas(title_of(name) for name in item.group),
+            share=share, together=probability(item.together), group=commas(effect_title(name) for name in item.group),
         )  # fmt: skip
     elif alike:
         share = say("{share} ({together} of it or one that cannot be told from it)",

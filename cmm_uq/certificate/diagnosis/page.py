@@ -25,7 +25,6 @@ from cmm_uq.certificate.diagnosis.overview import (
 )
 from cmm_uq.certificate.diagnosis.sections import costs_section, next_section, unseen_section
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
-from cmm_uq.certificate.effect_words import effect_of, parameter_title, size_of, title_of, titles
 from cmm_uq.certificate.origin import came_about, program
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.plots.residuals import length_plot, residual_plot
@@ -39,9 +38,18 @@ from cmm_uq.certificate.sections.findings import (
     other_periods,
     sentences as withheld_sentences,
     simulation_section,
+    where_section,
 )
-from cmm_uq.certificate.sections.where import where_section
-from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, with_uncertainty
+from cmm_uq.certificate.wording import (
+    OUTCOME_WORDS,
+    effect_of,
+    effect_title,
+    parameter_title,
+    probability,
+    size_of,
+    titles,
+    with_uncertainty,
+)
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.uncertainty.quantity import alike, figure
@@ -292,7 +300,7 @@ def _consequences(result: JobDiagnosis) -> tuple[Block, ...]:
 
 
 def _rivals(result: JobDiagnosis) -> Table:
-    rows = tuple((title_of(name), probability(p)) for name, p in result.diagnosis.rivals)
+    rows = tuple((effect_title(name), probability(p)) for name, p in result.diagnosis.rivals)
     heads = (Column(say("Explanation"), numeric=False), Column(say("Probability")))
     notes: list[Text] = [say("Nothing missing has the rest.")]
     some, every = result.diagnosis.compared, int(result.diagnosis.before.used.sum())

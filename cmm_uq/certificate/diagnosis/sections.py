@@ -29,11 +29,17 @@ from cmm_uq.base.messages import (
 )
 from cmm_uq.base.units import Unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
-from cmm_uq.certificate.effect_words import parameter_title, title_of, titles
 from cmm_uq.certificate.plots.plans import placing_pictures
 from cmm_uq.certificate.result import JobDiagnosis
 from cmm_uq.certificate.results.plain import quantity_data
-from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, with_uncertainty
+from cmm_uq.certificate.wording import (
+    OUTCOME_WORDS,
+    effect_title,
+    parameter_title,
+    probability,
+    titles,
+    with_uncertainty,
+)
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.catalogue import every
@@ -113,7 +119,7 @@ def _set_ups(plan: NextPlan) -> Table:
 def _partings(plan: NextPlan) -> Table:
     rows = tuple(
         (
-            together(title_of(name) for name in parting.effects),
+            together(effect_title(name) for name in parting.effects),
             odds_words(parting.before),
             say("{odds} : 1", odds=rounded(parting.after)),
         )

@@ -1,12 +1,15 @@
 """The digital calibration certificate (DCC) of a result: all that results.json states, and what the job says of it.
 
 It is made from results.json's data and the job alone, so that it can be made again and compared. docs/dcc.md explains each
-choice.
+choice. The schema knows pass, fail, conditionalPass, conditionalFail, noPass and noFail. Undecided, incomplete and remeasure
+are all three ``noPass``: conformity is not stated. Which of them it is stands in the ``refType`` and in words; a program that
+knows nothing but the schema cannot take one for a pass.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from decimal import Decimal
 from math import sqrt
 from types import MappingProxyType
 from typing import Any
@@ -15,12 +18,13 @@ from scipy import special
 
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.units import UNITS
 from cmm_uq.certificate.clauses import certifies
-from cmm_uq.certificate.digital_certificate import administration, measurement
-from cmm_uq.certificate.digital_certificate.administration import Languages, mark_of
-from cmm_uq.certificate.digital_certificate.conformity import evidence, of_tolerances, statement
-from cmm_uq.certificate.digital_certificate.figures import DigitalFigures
+from cmm_uq.certificate.digital_certificate import administration
+from cmm_uq.certificate.digital_certificate.administration import Languages, english, mark_of, one_line
+from cmm_uq.certificate.digital_certificate.figures import DigitalFigures, Part
 from cmm_uq.certificate.digital_certificate.quantities import (
+    ONE,
     P95,
     decimal,
     decimals,
@@ -28,14 +32,180 @@ from cmm_uq.certificate.digital_certificate.quantities import (
     is_quantity,
     plain_name,
     product,
+    ratio,
     without_unit,
 )
 from cmm_uq.certificate.origin import file_name
 from cmm_uq.certificate.results.plain import as_json
-from cmm_uq.jobs.dcc.certificate import Administrative, Attached, Certificate, Data, DccQuantity, DccResult, Measurement
-from cmm_uq.jobs.dcc.quantities import CovarianceColumn, CovarianceElement, EllipsoidalRegion, ExpandedList, RealList
+from cmm_uq.certificate.wording import stated_row, stated_value
+from cmm_uq.jobs.dcc.certificate import (
+    Administrative,
+    Attached,
+    Certificate,
+    Data,
+    DccQuantity,
+    DccResult,
+    Measurement,
+    QuantityList,
+    StatementMetadata,
+)
+from cmm_uq.jobs.dcc.quantities import (
+    CovarianceColumn,
+    CovarianceElement,
+    EllipsoidalRegion,
+    Expanded,
+    ExpandedList,
+    Real,
+    RealList,
+)
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.verdicts import Verdicts
+from cmm_uq.jobs.verdicts import TOLERANCE_RULE, Verdict, Verdicts
+
+IN_THE_SCHEMA: Mapping[str, str] = MappingProxyType({
+    "pass": "pass", "fail": "fail", "conditional pass": "conditionalPass", "conditional fail": "conditionalFail",
+    "undecided": "noPass", "incomplete": "noPass", "remeasure": "noPass",
+})  # fmt: skip
+"""By the word of results.json."""
+
+_WHY: Mapping[str, Text] = MappingProxyType({
+    "undecided": say("Neither conformity nor nonconformity is proved by the rule, so noPass: conformity is not stated."),
+    "incomplete": say(
+        "What was measured conforms, but the test lacks what is named as missing, so noPass: conformity is not stated."
+    ),
+    "remeasure": say(
+        "The standard asks for further readings before anything is decided, so noPass: conformity is not stated."
+    ),
+})  # fmt: skip
+
+_MICROMETRE, _MILLIMETRE = UNITS["µm"].dsi, UNITS["mm"].dsi
+_P_TWICE = Decimal("0.9545")  # probability of a normal distribution within two standard deviations
+
+
+def of_tolerances(verdicts: Verdicts, texts: Languages, *, certifies: bool) -> Mapping[str, StatementMetadata]:
+    """Statements on parameters that have a tolerance, by their names (``scale_x.ppm``): each stands with its result."""
+    return {verdict.name: _of_tolerance(verdict, texts, certifies=certifies) for verdict in verdicts if not verdict.by}
+
+
+def _of_tolerance(verdict: Verdict, texts: Languages, *, certifies: bool) -> StatementMetadata:
+    limit, unit = decimal(verdict.limit or 0.0), dsi_of(verdict.unit)
+    bounds = ((say("Smallest permissible value"), -limit), (say("Largest permissible value"), limit))
+    return StatementMetadata(
+        name=texts.words(say("Conformity with its tolerance")),
+        description=english([f"Missing: {what}" for what in verdict.missing]) if verdict.missing else None,
+        references=(TOLERANCE_RULE,),
+        declaration=texts.rich(Verbatim(verdict.outcome), *_why(verdict.outcome)),
+        conformity=IN_THE_SCHEMA[verdict.outcome] if certifies else None,
+        data=Data(parts=tuple(
+            DccQuantity(name=texts.words(name), value=Real(value=bound, unit=unit), ref_type=("cmm_toleranceLimit",))
+            for name, bound in bounds
+        )),
+        ref_type=_ref_type(verdict.outcome, certifies=certifies),
+    )  # fmt: skip
+
+
+def _why(decision: str) -> tuple[Text, ...]:
+    return (_WHY[decision],) if decision in _WHY else ()
+
+
+def _ref_type(decision: str, *, certifies: bool) -> tuple[str, ...]:
+    return ("basic_conformity", f"cmm_{decision.replace(' ', '')}") if certifies else ("cmm_notCertified",)
+
+
+def statement(i: int, entry: Mapping[str, Any], figures: DigitalFigures, *, certifies: bool) -> StatementMetadata:
+    """Of a decision of results.json, by its number there."""
+    texts, decision, path = figures.texts, entry["decision"], ("conformity", str(i))
+    standard, characteristic = Verbatim(entry["standard"]), Verbatim(entry["characteristic"])
+    named = say("{standard}, {characteristic}", standard=standard, characteristic=characteristic)
+    remarks = [*entry["remarks"], *(f"Missing: {what}" for what in entry["missing"])]
+    # as on the first page: of a size that may be zero its interval, beside which no U is stated
+    value = stated_value(entry["value_um"], 2 * entry["u_um"], signed=entry.get("signed", True))
+    quantity = say("{decision}: {quantity}", decision=Verbatim(decision), quantity=Verbatim(entry["quantity"]))
+    row = stated_row(decision, value, UNITS["µm"], entry["limit_um"])
+    return StatementMetadata(
+        id=figures.id_of(path),
+        name=texts.words(named),
+        description=english(remarks) if remarks else None,
+        norms=(one_line(entry["standard"]),),
+        references=(one_line(entry["rule"]),),
+        declaration=texts.rich(quantity, row, *_why(decision)),
+        conformity=IN_THE_SCHEMA[decision] if certifies else None,
+        data=Data(parts=tuple(_figures(path, entry, figures))),
+        ref_type=_ref_type(decision, certifies=certifies),
+    )
+
+
+def _figures(path: tuple[str, ...], entry: Mapping[str, Any], figures: DigitalFigures) -> Iterator[Part]:
+    """The value with its uncertainty, its limit, the acceptance limit of the rule, and probabilities."""
+
+    def quantity(
+        keys: str, name: Text, value: Decimal, ref_type: str, unit: str = _MICROMETRE, stated: Expanded | None = None
+    ) -> DccQuantity:
+        real, id_ = Real(value=value, unit=unit, uncertainty=stated), figures.id_of((*path, *keys.split(".")))
+        return DccQuantity(id=id_, name=figures.texts.words(name), value=real, ref_type=(ref_type,))
+
+    u, limit, guard = decimal(entry["u_um"]), decimal(entry["limit_um"]), entry["guard_band_um"]
+    stated = (
+        Expanded(uncertainty=2 * u, factor=Decimal(2), probability=_P_TWICE, distribution="normal") if u > 0 else None
+    )
+    named = say("Value that is least favourable")
+    yield quantity("value_um", named, decimal(entry["value_um"]), "basic_measuredValue", stated=stated)
+    yield quantity("limit_um", say("Limit"), limit, "cmm_toleranceLimit")
+    if guard is not None:
+        yield quantity("guard_band_um", say("Guard band"), decimal(guard), "cmm_guardBand")
+        accepted = max(limit - decimal(guard), Decimal(0))
+        yield quantity("acceptance_limit_um", say("Acceptance limit"), accepted, "basic_acceptanceLimitUpper")
+    for key, name in (
+        ("probability_conforming", say("Probability that the value is within its limit")),
+        ("probability_all_conform", say("Probability that all values are within their limits")),
+    ):
+        if entry[key] is not None:
+            yield quantity(key, name, decimal(entry[key]), "cmm_conformanceProbability", ONE.dsi)
+    units = {"a_um": _MICROMETRE, "k": ratio(_MILLIMETRE, _MICROMETRE), "b_um": _MICROMETRE}
+    for key, value in (entry["mpe"] or {}).items():
+        if value is not None:
+            letter = Verbatim(key.partition("_")[0].upper())
+            name = say("{letter} of the maximum permissible error A + L/K, at most B", letter=letter)
+            yield quantity(f"mpe.{key}", name, decimal(value), "cmm_toleranceLimit", units[key])
+    for key in ("prior", "global_risks"):
+        yield from figures.parts((*path, key), entry[key])
+
+
+def evidence(
+    decided: Sequence[Mapping[str, Any]], figures: DigitalFigures, *, certifies: bool
+) -> tuple[DccResult, ...]:
+    """Every value that was decided, and the budget of the one that is named."""
+    found = []
+    for i, entry in enumerate(decided):
+        path = ("conformity", str(i))
+        parts = [_values(path, entry["errors"], figures, certifies=certifies)] if entry["errors"] else []
+        parts += figures.parts((*path, "test_uncertainty"), entry["test_uncertainty"])
+        if parts:
+            name = figures.texts.words(say("All values decided by {standard}", standard=Verbatim(entry["standard"])))
+            found.append(DccResult(name=name, data=Data(parts=tuple(parts)), ref_type=("cmm_conformity",)))
+    return tuple(found)
+
+
+def _values(
+    path: tuple[str, ...], errors: Sequence[Mapping[str, Any]], figures: DigitalFigures, *, certifies: bool
+) -> Part:
+    below, texts = (*path, "errors"), figures.texts
+    uncertainty = ExpandedList(
+        uncertainties=decimals([error["U_um"] for error in errors]), factors=(Decimal(2),), probabilities=(_P_TWICE,),
+        distributions=("normal",),
+    )  # fmt: skip
+    known = all(error["u_um"] > 0 for error in errors)
+    values = decimals([error["error_um"] for error in errors])
+    column = DccQuantity(
+        id=figures.id_of((*below, "error_um")), name=texts.words(say("Value")), ref_type=("basic_measurementError",),
+        value=RealList(values=values, units=(_MICROMETRE,), uncertainty=uncertainty if known else None),
+    )  # fmt: skip
+    others = [{key: error[key] for key in error if key not in ("error_um", "u_um", "U_um")} for error in errors]
+    rest = [part for table in figures.parts(below, others) if isinstance(table, QuantityList) for part in table.parts]
+    words = tuple(IN_THE_SCHEMA[error["outcome"]] for error in errors)
+    outcomes = (StatementMetadata(conformity_list=words, ref_type=("basic_conformity",)),) if certifies else ()
+    name = texts.words(say("Values in the order of the recording"))
+    return QuantityList(name=name, parts=(column, *rest), metadata=outcomes, ref_type=("cmm_table",))
+
 
 _TITLES: Mapping[str, Text] = MappingProxyType({
     "accuracy_uncertainty": say("Figures of performance"), "estimates": say("Error factors of the machine"),
@@ -76,7 +246,7 @@ def digital_certificate(
     mark, title = mark_of(job), Verbatim(job.facts.machine.name)
     return Certificate(
         administrative=Administrative(
-            software=measurement.software(results, texts),
+            software=administration.software(results, texts),
             ref_types=administration.ref_types(texts),
             core=administration.core_data(job, texts),
             items=administration.items(job, texts),
@@ -91,12 +261,12 @@ def digital_certificate(
                     say("Calibration of {machine}", machine=title) if mark is None
                     else say("{banner}: {machine}", banner=mark.banner, machine=title)
                 ),
-                methods=measurement.methods(job, results, texts),
-                software=measurement.software(results, texts),
-                equipment=measurement.equipment(job, results, texts),
-                conditions=measurement.conditions(job, texts),
+                methods=administration.methods(job, results, texts),
+                software=administration.software(results, texts),
+                equipment=administration.equipment(job, results, texts),
+                conditions=administration.conditions(job, texts),
                 results=(*_results(results, figures), *evidence(decided, figures, certifies=real), everything),
-                metadata=measurement.metadata(results, texts),
+                metadata=administration.metadata(results, texts),
                 ref_id=("machine",),
                 ref_type=("cmm_calibration",) if real else (f"cmm_{job.origin}", "cmm_notACertificate"),
             ),

@@ -17,7 +17,7 @@ from cmm_uq.base.units import Unit
 from cmm_uq.certificate.digital_certificate import quantities as plain
 from cmm_uq.certificate.digital_certificate.administration import Languages, english
 from cmm_uq.certificate.digital_certificate.quantities import decimal, decimals, dsi_of, is_number, is_quantity
-from cmm_uq.certificate.effect_words import effect_of, parameter_title, title_of
+from cmm_uq.certificate.wording import effect_of, effect_title, parameter_title
 from cmm_uq.jobs.dcc.certificate import Characters, DccQuantity, QuantityList, StatementMetadata
 from cmm_uq.jobs.dcc.quantities import IntervalList, Real, RealList
 
@@ -77,7 +77,7 @@ class DigitalFigures:
             return TITLES[path[-1]]
         if len(path) > 1 and effect_of(path[-2]) is not None:
             return parameter_title(path[-2], path[-1])
-        return title_of(path[-1]) if effect_of(path[-1]) is not None else Verbatim(plain.without_unit(path[-1]))
+        return effect_title(path[-1]) if effect_of(path[-1]) is not None else Verbatim(plain.without_unit(path[-1]))
 
     def _quantity(self, path: Path, value: Any, *, name: Text | None = None) -> DccQuantity:
         label = self.texts.words(name or self.title(path))

@@ -12,10 +12,10 @@ from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, after, c
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
-from cmm_uq.certificate.effect_words import title_of
 from cmm_uq.certificate.part.figures import CharacteristicFigures, by_margin, critical, figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement, UnseenError
 from cmm_uq.certificate.part.plots import shares_plots
+from cmm_uq.certificate.wording import effect_title
 
 DETAILED = 10  # characteristics whose budgets are listed line by line: those of least margin
 # lines of a budget that are listed at most, the share from which on, and that from which on a factor of one is
@@ -27,7 +27,7 @@ _GAIN = 0.02  # of u, below which a way is no gain
 def line_words(line: str) -> Text:
     """A line of the budget in words, errors of the machine by their titles."""
     _, _, factor = line.partition(": ")
-    return line_in_words(line, {factor: title_of(factor)} if factor else {})
+    return line_in_words(line, {factor: effect_title(factor)} if factor else {})
 
 
 def budget_section(found: PartMeasurement) -> Section:

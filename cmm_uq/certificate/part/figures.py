@@ -17,9 +17,8 @@ from cmm_uq.analysis.parts.in_words import CHARACTERISTICS
 from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, commas, day, names, number, plural, say, signed
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
-from cmm_uq.certificate.effect_words import titles
 from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement
-from cmm_uq.certificate.wording import Figure, Headline, Summary, probability
+from cmm_uq.certificate.wording import Figure, Headline, Summary, probability, titles
 from cmm_uq.jobs.verdicts import standing_of
 from cmm_uq.maths.uncertainty.quantity import rounded, significant
 

@@ -7,10 +7,10 @@ from cmm_uq.analysis.parts.in_words import FAMILIES, family_of
 from cmm_uq.analysis.parts.virtual import AGREES, CHECKED
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, listed, names, number, plural, say, signed
 from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
-from cmm_uq.certificate.effect_words import titles
 from cmm_uq.certificate.origin import NAME
 from cmm_uq.certificate.part.figures import figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement
+from cmm_uq.certificate.wording import titles
 
 
 def method_section(found: PartMeasurement) -> Section:

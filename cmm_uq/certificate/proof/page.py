@@ -5,7 +5,6 @@ from __future__ import annotations
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, plural, say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
-from cmm_uq.certificate.effect_words import titles
 from cmm_uq.certificate.origin import program
 from cmm_uq.certificate.proof.sections import effects_section, said_plot, strength_plot, unseen_section
 from cmm_uq.certificate.proof.words import (
@@ -21,6 +20,7 @@ from cmm_uq.certificate.proof.words import (
     percent,
     standing,
 )
+from cmm_uq.certificate.wording import titles
 from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH
 from cmm_uq.laboratory.proving.cases import KINDS, STRONGEST, WEAKEST, micrometres
 from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, REFUSED, VERDICTS

@@ -9,7 +9,7 @@ from cmm_uq.analysis.conformity.statement import Decided, Statement, least_favou
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, in_a_row, number, plural, say, sentences, signed
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, DecisionBlock, Plot, Section, Table, figure_columns, text_columns
-from cmm_uq.certificate.plots.conformity import trumpet
+from cmm_uq.certificate.plots.residuals import trumpet
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, stated_value
 from cmm_uq.jobs.tables.conformity import ConformityFacts
 from cmm_uq.maths.uncertainty.budget import Budget, BudgetLine

@@ -9,7 +9,7 @@ from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, listed, names, number, say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Block, Paragraph, Section, Table, figure_columns, text_columns
-from cmm_uq.certificate.plots.conformity import tolerance_plot
+from cmm_uq.certificate.plots.residuals import tolerance_plot
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.sections.first_page import subject_of, tolerances_of
 from cmm_uq.certificate.wording import OUTCOME_WORDS, expanded, title_of

@@ -13,8 +13,7 @@ from pyhanko_certvalidator import CertificateValidator, ValidationContext
 from pyhanko_certvalidator.errors import PathBuildingError, PathValidationError, RevokedError
 
 from cmm_uq.base.messages import Text, Verbatim, day, say
-from cmm_uq.certificate.sign.extra import ran
-from cmm_uq.certificate.sign.found import Revocation, Trust
+from cmm_uq.certificate.sign.found import Revocation, Trust, ran
 from cmm_uq.certificate.sign.signer import is_test, unfit
 
 NO_TIME = say("the signature says no time, so that nobody knows whether its certificate was in date")

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.sign.extra import appending, installed, ran
-from cmm_uq.certificate.sign.found import NOBODY, Trust
+from cmm_uq.certificate.sign.found import NOBODY, Trust, appending, installed, ran
 from cmm_uq.certificate.sign.signer import ONE_DIGEST, Signer
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import SIGNED_BYTES
 from cmm_uq.base.messages import Text, Verbatim, commas, plural, say
-from cmm_uq.certificate.sign.extra import installed, ran
-from cmm_uq.certificate.sign.found import FileSignature, Trust
+from cmm_uq.certificate.sign.found import FileSignature, Trust, installed, ran
 
 if TYPE_CHECKING:
     from pyhanko.pdf_utils.reader import PdfFileReader

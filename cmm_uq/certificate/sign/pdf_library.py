@@ -32,8 +32,7 @@ from pyhanko_certvalidator.errors import PathBuildingError, PathValidationError
 from pyhanko_certvalidator.registry import SimpleCertificateStore
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.sign.extra import appending
-from cmm_uq.certificate.sign.found import Trust
+from cmm_uq.certificate.sign.found import Trust, appending
 from cmm_uq.certificate.sign.signer import ONE_DIGEST, Signer
 
 _ROOM = 16  # bytes by which two signatures of an ECDSA key may differ in length, as DER

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import SIGNED_BYTES
 from cmm_uq.base.messages import Text, say
-from cmm_uq.certificate.sign.extra import installed
-from cmm_uq.certificate.sign.found import FileSignature, Trust
+from cmm_uq.certificate.sign.found import FileSignature, Trust, installed
 from cmm_uq.certificate.sign.signer import Signer
 
 if TYPE_CHECKING:

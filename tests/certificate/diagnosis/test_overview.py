@@ -19,7 +19,7 @@ from cmm_uq.certificate.diagnosis.page import diagnosis_document
 from cmm_uq.certificate.document import Document, Overview, Plot, Table
 from cmm_uq.certificate.render.html import render_html
 from cmm_uq.certificate.result import JobDiagnosis
-from cmm_uq.certificate.sections.where import place_words, region_words
+from cmm_uq.certificate.sections.findings import place_words, region_words
 from cmm_uq.machine.physics.catalogue import EVERY
 from tests.artefacts.simulated import diagnosed
 from tests.certificate.saying import leaves

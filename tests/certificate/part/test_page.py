@@ -24,7 +24,6 @@ from cmm_uq.analysis.parts.budget import PointErrors
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.document import Document, Overview, Section, Table
-from cmm_uq.certificate.effect_words import title_of
 from cmm_uq.certificate.part.budget_section import by_family, unseen_section, ways_section
 from cmm_uq.certificate.part.figures import _remarks
 from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement, UnseenError
@@ -34,6 +33,7 @@ from cmm_uq.certificate.part.part_section import errors_section
 from cmm_uq.certificate.part.results_section import results_section
 from cmm_uq.certificate.render.html import render_html
 from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.certificate.wording import effect_title
 from cmm_uq.jobs.part.job import TABLES
 from tests.certificate.parts_found import ERRORS, STANDING as CERTIFICATE, found_of, measured_points
 from tests.certificate.saying import leaves, strangers
@@ -297,18 +297,23 @@ def test_what_the_calibration_did_not_see_is_named_with_its_share_and_what_to_me
             "2",
             "machine: roll",
             "rotation_x_x",
-            title_of("rotation_x_x"),
+            effect_title("rotation_x_x"),
             0.73,
             say("the calibration did not model it"),
         ),
         UnseenError(
-            "1", "machine: roll", "rotation_x_x", title_of("rotation_x_x"), 0.2, say("the calibration did not model it")
+            "1",
+            "machine: roll",
+            "rotation_x_x",
+            effect_title("rotation_x_x"),
+            0.2,
+            say("the calibration did not model it"),
         ),
     )
     further = FurtherSetUps(("rotation_x_x",), 4, say("Four set-ups of the ballbar would show it."), "cmm-uq plan roll")
     found = replace(measured, unseen=unseen, further=further)
     told = said(unseen_section(found).blocks)
-    assert f"73 % of the variance of characteristic 2 comes from {title_of('rotation_x_x')[0].lower()}" in told
+    assert f"73 % of the variance of characteristic 2 comes from {effect_title('rotation_x_x')[0].lower()}" in told
     assert "Four set-ups of the ballbar would show it." in told
     assert "cmm-uq plan roll" in told
     (table,) = in_section(unseen_section(found))

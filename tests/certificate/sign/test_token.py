@@ -13,7 +13,7 @@ from cryptography.hazmat.primitives import serialization
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.sign import Trust, sign_pdf, sign_xml, signatures_of_pdf, signatures_of_xml
-from cmm_uq.certificate.sign.token import place_of, signer_of_token
+from cmm_uq.certificate.sign.signer import place_of, signer_of_token
 from tests.certificate.sign.authority import SIGNED, Held, named
 
 MODULES = (

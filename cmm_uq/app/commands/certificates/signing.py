@@ -22,7 +22,7 @@ from cmm_uq.certificate.sign import (
     signing_time,
     trust_of,
 )
-from cmm_uq.certificate.sign.token import SCHEME, signer_of_token
+from cmm_uq.certificate.sign.signer import SCHEME, signer_of_token
 from cmm_uq.laboratory.schedule import channels as credentials
 
 PASSPHRASE, PASSPHRASE_FILE = "CMM_UQ_SIGN_PASSPHRASE", "CMM_UQ_SIGN_PASSPHRASE_FILE"

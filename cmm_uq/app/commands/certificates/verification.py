@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq import __version__
 from cmm_uq.app.commands.certificates.verify_again import Compute, again, compute_again
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.verify.digital import check_schema, open_digital
 from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Inquiry
 from cmm_uq.certificate.verify.given import PART_SCHEMA, RESULTS, RESULTS_SCHEMA, Given, check_files, language_of
 from cmm_uq.certificate.verify.signed import check_signatures
+from cmm_uq.certificate.verify.views import check_schema, open_digital
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.files import Stage
@@ -179,7 +179,7 @@ def _check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
     if (made := _version(given)) != __version__:
         inquiry.left(f"{given.xml[0]} element by element", f"made by version {made}, and this is {__version__}")
         return
-    from cmm_uq.certificate.verify.digital import check_digital
+    from cmm_uq.certificate.verify.views import check_digital
 
     check_digital(inquiry, given, job)
 

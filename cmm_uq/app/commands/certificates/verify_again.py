@@ -81,7 +81,7 @@ def recomputed(given: Given, written: Mapping[str, bytes], kept: Sequence[str], 
 def as_attached(given: Given, kept: list[str], name: str, content: bytes) -> bytes:
     """A file as it is attached where it is the same but for a signature, or for the platform, which is then kept in mind."""
     from cmm_uq.certificate.results.provenance import FILE, same_but_for_the_platform
-    from cmm_uq.certificate.verify.digital import same_unsigned
+    from cmm_uq.certificate.verify.views import same_unsigned
 
     attached = given.files.get(name)
     if attached is None or attached == content or not (name == FILE or name.endswith(".xml")):

@@ -17,7 +17,7 @@ import numpy as np
 from cmm_uq.analysis.parts.machine.state import MachineState, aged
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, commas, plural, say
-from cmm_uq.certificate.effect_words import titles
+from cmm_uq.certificate.wording import titles
 from cmm_uq.laboratory.due.drift import DriftHistory, history
 from cmm_uq.laboratory.due.drift_filter import change_since
 from cmm_uq.laboratory.due.history import MachineHistory

@@ -12,8 +12,8 @@ from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.messages import NOTHING, Text, commas, plural, say, semicolons, sentences
-from cmm_uq.certificate.effect_words import title_of, titles
 from cmm_uq.certificate.part.measurement import FurtherSetUps, UnseenError
+from cmm_uq.certificate.wording import effect_title, titles
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
@@ -132,7 +132,7 @@ def _missed(calibrated: Job, missed: Sequence[str]) -> Text:
     if not missed:
         return NOTHING
     told = [
-        say("{title} ({how})", title=title_of(name),
+        say("{title} ({how})", title=effect_title(name),
             how=_why_not(calibrated, every()[name]) or say("another artefact, or more set-ups, may show it"))
         for name in missed
     ]  # fmt: skip

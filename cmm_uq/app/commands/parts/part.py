@@ -35,8 +35,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.effect_words import title_of
 from cmm_uq.certificate.part.measurement import MATTERS, PartMeasurement, UnseenError
+from cmm_uq.certificate.wording import effect_title
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
@@ -165,7 +165,7 @@ def _unseen(virtual: Virtual, shares: VarianceShares) -> tuple[UnseenError, ...]
     for name in shares.characteristics:
         for line, share, why in shares.told(name, virtual.named, MATTERS):
             effect = line.partition(": ")[2]
-            found.append(UnseenError(name, line, effect, title_of(effect), share, why))
+            found.append(UnseenError(name, line, effect, effect_title(effect), share, why))
     return tuple(found)
 
 
