@@ -4,8 +4,6 @@ A :class:`Message` is a ``str``, its English text, and keeps the pattern and the
 sentence is a :class:`Number`, a :class:`Day`, a unit (:mod:`cmm_uq.base.units`) or :class:`Verbatim`: a name, a serial
 number, words of the user. All are :class:`Text`, which is what the blocks of a document are made of. Patterns are
 literals where they stand, so that a program can list them; texts are joined by the functions here, never by ``str.join``.
-
-What objects show of themselves in a notebook.
 """
 
 from __future__ import annotations
@@ -13,6 +11,7 @@ from __future__ import annotations
 import datetime as dt
 import string
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from html import escape
 from types import MappingProxyType
 from typing import Any, Self
@@ -75,7 +74,6 @@ class Message(Text):
     arguments: Mapping[str, Argument]
 
     def __new__(cls, pattern: str, arguments: Mapping[str, Argument]) -> Self:
-        """The pattern, filled in."""
         message = super().__new__(cls, _ENGLISH.vformat(pattern, (), arguments))
         kept = {name: value if isinstance(value, Text) else _plain(value) for name, value in arguments.items()}
         message.pattern, message.arguments = pattern, MappingProxyType(kept)
@@ -95,7 +93,6 @@ class Plural(Message):
     many: Message
 
     def __new__(cls, number: int, one: Message, many: Message) -> Self:
-        """The form of the count."""
         chosen = one if number == 1 else many
         message = super().__new__(cls, chosen.pattern, chosen.arguments)
         message.number, message.one, message.many = number, one, many
@@ -116,11 +113,10 @@ class PatternFormatter(string.Formatter):
 
     def format_field(self, value: Any, format_spec: str) -> str:
         """One argument; ``capital`` and ``small`` change the first letter of a text."""
-        if format_spec == "capital":
-            return str.__getitem__(value, slice(0, 1)).upper() + str.__getitem__(value, slice(1, None))
-        if format_spec == "small":
-            return str.__getitem__(value, slice(0, 1)).lower() + str.__getitem__(value, slice(1, None))
-        return format(value, format_spec)
+        if format_spec not in ("capital", "small"):
+            return format(value, format_spec)
+        first, rest = str.__getitem__(value, slice(0, 1)), str.__getitem__(value, slice(1, None))
+        return (first.upper() if format_spec == "capital" else first.lower()) + rest
 
 
 _ENGLISH = PatternFormatter()
@@ -174,57 +170,29 @@ def listed(words: Sequence[Text]) -> Text:
     return say("{words} and {last}", words=commas(words[:-1]), last=words[-1])
 
 
-def alternatives(words: Iterable[Text]) -> Text:
-    """Words with "or"."""
-    return _folded(list(words), lambda before, after: say("{before} or {after}", before=before, after=after))
+def _folded(join: Callable[[Text, Text], Message], texts: Iterable[Text]) -> Text:
+    """Two by two, so that long lists do not nest deeply."""
+    parts = list(texts)
+    if len(parts) < 2:
+        return parts[0] if parts else NOTHING
+    half = len(parts) // 2
+    return join(_folded(join, parts[:half]), _folded(join, parts[half:]))
 
 
-def comma_or(words: Iterable[Text]) -> Text:
-    """Longer alternatives, with a comma before each "or"."""
-    return _folded(list(words), lambda before, after: say("{before}, or {after}", before=before, after=after))
-
-
-def together(words: Iterable[Text]) -> Text:
-    """Words with "and" between all."""
-    return _folded(list(words), lambda before, after: say("{before} and {after}", before=before, after=after))
-
-
-def commas(words: Iterable[Text]) -> Text:
-    """Words with commas."""
-    return _folded(list(words), lambda before, after: say("{before}, {after}", before=before, after=after))
-
-
-def in_a_row(figures: Iterable[Text]) -> Text:
-    """Figures in a row: coordinates, the ends of an interval, values of a list."""
-    return _folded(list(figures), lambda left, right: say("{left}, {right}", left=left, right=right))
-
-
-def semicolons(words: Iterable[Text]) -> Text:
-    """Words with semicolons."""
-    return _folded(list(words), lambda before, after: say("{before}; {after}", before=before, after=after))
-
-
-def sentences(texts: Iterable[Text]) -> Text:
-    """Sentences one after the other."""
-    return _folded(list(texts), lambda before, after: say("{before} {after}", before=before, after=after))
+# Texts one after the other: figures of ``in_a_row`` are coordinates, the ends of an interval, values of a list.
+alternatives = partial(_folded, lambda before, after: say("{before} or {after}", before=before, after=after))
+comma_or = partial(_folded, lambda before, after: say("{before}, or {after}", before=before, after=after))
+together = partial(_folded, lambda before, after: say("{before} and {after}", before=before, after=after))
+commas = partial(_folded, lambda before, after: say("{before}, {after}", before=before, after=after))
+in_a_row = partial(_folded, lambda left, right: say("{left}, {right}", left=left, right=right))
+semicolons = partial(_folded, lambda before, after: say("{before}; {after}", before=before, after=after))
+sentences = partial(_folded, lambda before, after: say("{before} {after}", before=before, after=after))
+lines = partial(_folded, lambda before, after: say("{before}\n{after}", before=before, after=after))
 
 
 def after(text: Text, further: Text) -> Text:
     """A text and what follows it, where anything does."""
     return sentences(part for part in (text, further) if part)
-
-
-def lines(texts: Iterable[Text]) -> Text:
-    """Texts, each on a line of its own."""
-    return _folded(list(texts), lambda before, after: say("{before}\n{after}", before=before, after=after))
-
-
-def _folded(texts: Sequence[Text], join: Callable[[Text, Text], Message]) -> Text:
-    """Two by two, so that long lists do not nest deeply."""
-    if len(texts) < 2:
-        return texts[0] if texts else NOTHING
-    half = len(texts) // 2
-    return join(_folded(texts[:half], join), _folded(texts[half:], join))
 
 
 def at_key(name: str) -> Key:

@@ -1,12 +1,6 @@
-"""What each column of a recording is: in a sentence, and in a few words for a text or the axis of a picture.
+"""What each column of a recording is: in a sentence, and in a few words for the middle of a text or the axis of a picture.
 
-What each column of a recording is, in a sentence: those of every kind of measurement, and those that effects go by.
-
-Columns of one kind alone stand with the kind.
-
-A column of a recording in a few words, for the middle of a sentence and for the axis of a picture.
-
-What a column means is told in whole sentences in :mod:`cmm_uq.jobs.columns`; a column that only the user knows keeps its name.
+Columns of one kind alone stand with the kind; a column that only the user knows keeps its name.
 """
 
 from __future__ import annotations
@@ -111,6 +105,5 @@ def unit_of(column: str) -> Text:
 
 def labelled(column: str) -> Text:
     """The same for the axis of a picture: ``Temperature of scale X / °C``."""
-    own = unit_of(column)
-    what = in_words(column)
-    return say("{what:capital} / {unit}", what=what, unit=own) if own else say("{what:capital}", what=what)
+    what, printed = in_words(column), unit_of(column)
+    return say("{what:capital} / {unit}", what=what, unit=printed) if printed else say("{what:capital}", what=what)

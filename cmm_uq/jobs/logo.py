@@ -6,9 +6,9 @@ import base64
 import re
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NoReturn, Protocol
+from typing import TYPE_CHECKING, Literal, NoReturn
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LOGO_BYTES, LOGO_ELEMENTS, LOGO_PIXELS
@@ -36,13 +36,7 @@ _EMBEDDED = "data:image/png;base64,"
 _CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # of a PNG, by its type of colour
 
 
-class _Refuse(Protocol):
-    """Refuses in words."""
-
-    def __call__(self, why: str) -> NoReturn:
-        """Raise :class:`CmmUqError`."""
-
-
+_Refuse = Callable[[str], NoReturn]
 _FIX = "Export it as plain SVG with its texts as paths, or as PNG"
 
 
@@ -56,8 +50,8 @@ class Logo:
     @property
     def uri(self) -> str:
         """As a page carries it inside."""
-        kind = "image/svg+xml" if self.format == "svg" else "image/png"
-        return f"data:{kind};base64,{base64.b64encode(self.content).decode('ascii')}"
+        kind = {"svg": "svg+xml", "png": "png"}[self.format]
+        return f"data:image/{kind};base64,{base64.b64encode(self.content).decode('ascii')}"
 
 
 def logo_of(laboratory: Laboratory, inputs: Mapping[str, bytes]) -> Logo | None:

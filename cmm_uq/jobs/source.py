@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 import re
 import unicodedata
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Protocol
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
@@ -65,21 +64,18 @@ def check_distinct(names: Iterable[str], where: str) -> None:
                              fix="Rename one of them")  # fmt: skip
 
 
-def _taken_along(parts: Sequence[str]) -> bool:
-    """Whether a file that a command wrote belongs to a job: with its recording, or as the results of another in a folder."""
-    return parts[-1] in DERIVED or (len(parts) > 1 and _REPORTED.fullmatch(parts[-1]) is not None)
-
-
 def device_name(name: str) -> bool:
     """Whether Windows takes the name for a device."""
     return _DEVICE.fullmatch(name) is not None
 
 
 def _name_problem(name: str, written: bool) -> tuple[str, str] | None:
-    rename = "Rename the file"
+    rename, outside = (
+        "Rename the file",
+        "Copy the file into the folder and name it there: a job must be complete by itself",
+    )
     if PurePosixPath(name).is_absolute() or PureWindowsPath(name).drive or name.startswith("\\"):
         return f"file {name!r} is an absolute name", "Name it relative to job.toml, and keep it beside it"
-    outside = "Copy the file into the folder and name it there: a job must be complete by itself"
     if not name or name.startswith("../"):
         return f"file {name!r} is not inside the job folder", outside
     if "\\" in name:
@@ -93,31 +89,16 @@ def _name_problem(name: str, written: bool) -> tuple[str, str] | None:
         return f"file {name!r} is no plain name", "Name it relative to job.toml, without . and .."
     if any(device_name(part) or part != part.rstrip(". ") or part != part.lstrip() for part in parts):
         return f"file {name!r} is a name that Windows does not take", rename
-    if _WRITTEN.fullmatch(parts[-1]) and not (written and _taken_along(parts)):
+    # what a command wrote belongs to a job with its recording, or as the results of another in a folder
+    along = parts[-1] in DERIVED or (len(parts) > 1 and _REPORTED.fullmatch(parts[-1]))
+    if _WRITTEN.fullmatch(parts[-1]) and not (written and along):
         return f"file {name!r} has a name that cmm-uq writes itself", rename
     return None
 
 
-class JobFiles(Protocol):
-    """Files by name, as job.toml names them."""
-
-    @property
-    def toml(self) -> Path:
-        """Of job.toml; for messages where it lies in no folder."""
-
-    def has(self, name: str, *, written: bool = False) -> bool:
-        """Whether the file is there; see :meth:`content`."""
-
-    def job_file(self, limit: Limit, fix: str) -> bytes:
-        """Bytes of job.toml."""
-
-    def content(self, name: str, limit: Limit, fix: str, *, written: bool = False) -> bytes:
-        """Bytes of a file that it names."""
-
-
 @dataclass(frozen=True)
 class FilesInFolder:
-    """Files beside a job.toml."""
+    """Files beside a job.toml, by the names that it has for them."""
 
     toml: Path
 
@@ -133,13 +114,10 @@ class FilesInFolder:
 
 @dataclass(frozen=True)
 class FilesInMemory:
-    """Files by name."""
+    """Files of a job that lies in no folder, by name."""
 
     files: Mapping[str, bytes]
-
-    @property
-    def toml(self) -> Path:
-        return Path("job.toml")
+    toml: Path = Path("job.toml")
 
     def has(self, name: str, *, written: bool = False) -> bool:
         return name in self.files
@@ -159,3 +137,6 @@ class FilesInMemory:
             raise CmmUqError(f"is larger than the {limit.most} {limit.unit} that are read of such a file", where=name,
                              fix="Give less of it")  # fmt: skip
         return content
+
+
+JobFiles = FilesInFolder | FilesInMemory

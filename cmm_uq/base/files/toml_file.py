@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 import unicodedata
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, cast, get_origin
 
@@ -135,11 +135,17 @@ def checked(
         raise CmmUqError(f"is not valid TOML: {error}", where=str(path),
                          fix="Text stands in quotes, dates as 2026-01-31, decimals with a point") from None  # fmt: skip
     data = data if beside is None else beside(data)
-    wanted = cast("type[Facts]", model if isinstance(model, type) else model(data))
+    table = cast("type[Facts]", model if isinstance(model, type) else model(data))
     try:
-        return wanted.model_validate(data, context=context)
+        return table.model_validate(data, context=context)
     except ValidationError as error:
-        first, *others = _all_located(error, text, path, wanted)
+        # of a key that may be several things, what is wrong as the first of them
+        problems: dict[tuple[str, ...], CmmUqError] = {}
+        for details in error.errors(include_url=False):
+            named = _named(details)
+            if tuple(named) not in problems:
+                problems[tuple(named)] = _located(details, named, text, path, table)
+        first, *others = list(problems.values())[:MOST_GATHERED]
         first.also = tuple(others)
         raise first from None
 
@@ -162,16 +168,6 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
-def _all_located(error: ValidationError, text: str, path: Path, model: type[BaseModel]) -> list[CmmUqError]:
-    """Every validation error, with line and key; of a key that may be several things, what is wrong as the first of them."""
-    found: dict[tuple[str, ...], CmmUqError] = {}
-    for one in error.errors(include_url=False):
-        named = _named(one)
-        if tuple(named) not in found:
-            found[tuple(named)] = _located(one, named, text, path, model)
-    return list(found.values())[:MOST_GATHERED]
-
-
 def _named(error: ErrorDetails) -> list[str]:
     """Keys that the user wrote, of the location of an error."""
     keys = [str(part) for part in error["loc"] if not (isinstance(part, str) and ("[" in part or "(" in part))]
@@ -179,11 +175,12 @@ def _named(error: ErrorDetails) -> list[str]:
 
 
 def _located(error: ErrorDetails, named: list[str], text: str, path: Path, model: type[BaseModel]) -> CmmUqError:
-    """A validation error, with line and key."""
+    """A validation error, with line and key, as ``[artefact] u_um`` or ``[[conformity]] 1 rule`` of the first of several."""
     line = line_of(named, text)
-    table, word = _table_of(named[:-1], model), named[-1]
-    named = [shortened(key, _SHOWN) for key in named]
-    where = f"{path}{f' line {line}' if line else ''}: {_place(named)}"
+    table, word, value = _table_of(named[:-1], model), named[-1], error["input"]
+    top, *keys = [shortened(key, _SHOWN) for key in named]
+    head = f"[[{top}]] {int(keys.pop(0)) + 1}" if keys and keys[0].isdigit() else f"[{top}]"
+    where = f"{path}{f' line {line}' if line else ''}: {' '.join(filter(None, (head, '.'.join(keys))))}"
     if error["type"] == "missing":
         return CmmUqError("is missing", where=where, fix=f"Add it to {path.name}.{_explained(word, table)}".rstrip("."))
     if error["type"] == "extra_forbidden":
@@ -191,19 +188,9 @@ def _located(error: ErrorDetails, named: list[str], text: str, path: Path, model
     message = error["msg"].removeprefix("Value error, ")
     if error["type"] == "model_type":
         message = "must be a table of keys"
-    tables = isinstance(error["input"], dict) or (
-        isinstance(error["input"], list) and any(isinstance(item, dict) for item in error["input"])
-    )
-    given = "" if tables else f" (it says {shortened(repr(error['input']), _SHOWN)})"
-    return CmmUqError(f"{message[0].lower()}{message[1:]}{given}", where=where, fix=_near(error))
-
-
-def _place(named: Sequence[str]) -> str:
-    """A key as its table is headed: ``[artefact] u_um``, or ``[[conformity]] 1 rule`` of the first of several."""
-    top, *keys = named
-    if keys and keys[0].isdigit():
-        return " ".join(filter(None, (f"[[{top}]] {int(keys[0]) + 1}", ".".join(keys[1:]))))
-    return " ".join(filter(None, (f"[{top}]", ".".join(keys))))
+    tables = isinstance(value, dict) or (isinstance(value, list) and any(isinstance(item, dict) for item in value))
+    shown = "" if tables else f" (it says {shortened(repr(value), _SHOWN)})"
+    return CmmUqError(f"{message[0].lower()}{message[1:]}{shown}", where=where, fix=_near(error))
 
 
 _WRITTEN: Mapping[str, str] = {
@@ -222,18 +209,18 @@ _WRITTEN: Mapping[str, str] = {
 
 def _meant(word: str, table: type[BaseModel] | None) -> str:
     """The key that an unknown one may stand for, with its sentence."""
-    known = _known_keys(table)
+    known = [] if table is None else [field.alias or name for name, field in table.model_fields.items()]
     if converted := conversion(word, known):
         return converted
     meant = suggestion(word, known)
-    found = _ONE_MEANT.fullmatch(meant)
-    return f"{meant}{_explained(found[1], table)}" if found else meant
+    match = _ONE_MEANT.fullmatch(meant)
+    return f"{meant}{_explained(match[1], table)}" if match else meant
 
 
 def _explained(key: str, table: type[BaseModel] | None) -> str:
     """The sentence of a key, to follow another; nothing where there is none."""
-    told = sentences(table).get(key, "") if table is not None else ""
-    return f" {told.rstrip('.')}" if told else ""
+    sentence = sentences(table).get(key, "") if table is not None else ""
+    return f" {sentence.rstrip('.')}" if sentence else ""
 
 
 def _near(error: ErrorDetails) -> str | None:
@@ -249,7 +236,7 @@ def _near(error: ErrorDetails) -> str | None:
 
 
 def _table_of(parents: list[str], top: type[BaseModel]) -> type[BaseModel] | None:
-    """The class of the table that these keys lead to."""
+    """The class of the table that these keys lead to: ``Table`` itself, ``Table | None`` or ``list[Table]``."""
     model: object = top
     by_name = False
     for parent in parents:
@@ -259,20 +246,11 @@ def _table_of(parents: list[str], top: type[BaseModel]) -> type[BaseModel] | Non
         fields = getattr(model, "model_fields", {})
         if parent not in fields:
             return None
-        model, by_name = _model_inside(fields[parent].annotation), get_origin(fields[parent].annotation) is dict
+        annotation = fields[parent].annotation
+        candidates = (annotation, *getattr(annotation, "__args__", ()))
+        model = next((candidate for candidate in candidates if hasattr(candidate, "model_fields")), annotation)
+        by_name = get_origin(annotation) is dict
     return model if isinstance(model, type) and issubclass(model, BaseModel) else None
-
-
-def _known_keys(table: type[BaseModel] | None) -> list[str]:
-    return [] if table is None else [field.alias or name for name, field in table.model_fields.items()]
-
-
-def _model_inside(annotation: object) -> object:
-    """The table class in ``Table``, ``Table | None`` or ``list[Table]``."""
-    for candidate in (annotation, *getattr(annotation, "__args__", ())):
-        if hasattr(candidate, "model_fields"):
-            return candidate
-    return annotation
 
 
 def line_of(keys: list[str], text: str) -> int | None:

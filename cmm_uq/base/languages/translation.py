@@ -1,20 +1,10 @@
-"""A document's texts in other languages: a catalogue of patterns a language, numbers and dates as the language writes them.
-
-The languages that documents can be said in, and how each writes numbers, dates and plurals.
+"""A document's texts in other languages: patterns by a catalogue, numbers and dates as the language writes them.
 
 A decimal comma in German and French, a point in Japanese (both are right by the SI Brochure, 5.4.4); figures are grouped
-nowhere, as in English. Dates by DIN 5008, by French usage, and by JIS X 0301.
-
-Catalogues: what each sentence of the program is in another language, from the ``.po`` files beside this module.
-
-An entry's ``msgid`` is a pattern as :func:`cmm_uq.base.messages.say` has it, placeholders included; those of a
-``Plural`` are ``msgid`` and ``msgid_plural``. ``python -m tests.catalogues`` keeps the files in step
-with the sentences.
-
-A text said in another language: its pattern by the catalogue, its numbers and dates as the language writes them.
-
-What a catalogue lacks, as it does the sentences of another package, stays English. Units and verbatim texts are the same in
-every language.
+nowhere, as in English. Dates by DIN 5008, by French usage, and by JIS X 0301. Catalogues are the ``.po`` files beside this
+module: an entry's ``msgid`` is a pattern as :func:`cmm_uq.base.messages.say` has it, those of a ``Plural`` are ``msgid`` and
+``msgid_plural``. What a catalogue lacks, as it does the sentences of another package, stays English. Units and verbatim texts
+are the same in every language.
 """
 
 from __future__ import annotations
@@ -53,12 +43,7 @@ class Language:
         """A number as English prints it, or a text of several: ``−3.2``, ``1.5e-3``, ``[0.1, 0.4]``."""
         if self.decimal == ".":
             return text
-        return "".join(
-            self.decimal
-            if sign == "." and text[place - 1 : place].isdigit() and text[place + 1 : place + 2].isdigit()
-            else sign
-            for place, sign in enumerate(text)
-        )
+        return re.sub(r"(?<=\d)\.(?=\d)", self.decimal, text)
 
     def date(self, text: str) -> str:
         """A date by ISO 8601."""
@@ -97,13 +82,10 @@ class Catalogue:
         forms = self.plural.get((one, many))
         if forms is None:
             return None
-        if singular and (exactly_one or fields_of(many) <= fields_of(forms[0])):
-            return forms[0]
-        return forms[-1]
+        return forms[0 if singular and (exactly_one or fields_of(many) <= fields_of(forms[0])) else -1]
 
 
 def file_of(code: Code) -> Path:
-    """The file of a language's catalogue."""
     return Path(__file__).with_name(f"{code}.po")
 
 
@@ -154,9 +136,9 @@ class Translation(Text):
     source: Text
 
     def __new__(cls, text: str, source: Text) -> Self:
-        said = super().__new__(cls, text)
-        said.source = source
-        return said
+        translation = super().__new__(cls, text)
+        translation.source = source
+        return translation
 
     def __reduce__(self) -> tuple[type[Translation], tuple[str, Text]]:
         return Translation, (str.__str__(self), self.source)
@@ -202,14 +184,12 @@ _DECIMAL = re.compile(r"\d,\d")
 
 def _pattern(message: Message, language: Language) -> str:
     """In the language, else in English."""
-    found = catalogue(language.code)
+    patterns, form = catalogue(language.code), None
     if isinstance(message, Plural):
-        count = message.number
+        count, one, many = message.number, message.one.pattern, message.many.pattern
         singular = language.singular is not None and language.singular(count)
-        form = found.of_count(message.one.pattern, message.many.pattern, singular=singular, exactly_one=count == 1)
-        if form is not None:
-            return form
-    return found.single.get(message.pattern, message.pattern)
+        form = patterns.of_count(one, many, singular=singular, exactly_one=count == 1)
+    return patterns.single.get(message.pattern, message.pattern) if form is None else form
 
 
 def _arguments(message: Message) -> Mapping[str, Argument]:
