@@ -32,13 +32,13 @@ from cmm_uq.jobs.tables.origin import DERIVING, MEASURED, SIMULATED
 
 PROGRAM = f"cmm-uq {__version__}"
 LONGEST_ID = 100
+# keys of [job] that belong to the certificate of the measured recording alone
 OF_THE_CERTIFICATE = ("number", "replaces", "received", "issued", "recalibration_agreed", "as_found", "interim")
-"""Keys of ``[job]`` that belong to the certificate of the measured recording alone."""
-OF_THE_RECORDED_MACHINE = ("short_gauge", "simulation")
-"""Tables that speak of the machine as it was recorded, not of one simulated or compensated."""
+OF_THE_RECORDED_MACHINE = ("short_gauge", "simulation")  # tables of it as it was, not of one simulated or compensated
 DERIVED_RECORDING = "recording.csv"  # name of a recording that was made from one in another format
-IN_THE_RECORDING = ("temperature_log",)
-"""Keys of ``[machine]`` whose figures stand in every recording that a command writes."""
+IN_THE_RECORDING = (
+    "temperature_log",
+)  # keys of [machine] whose figures stand in every recording that a command writes
 
 
 def recording_name(job: Job) -> str:
@@ -53,10 +53,9 @@ def recording_name(job: Job) -> str:
 
 
 def kept_inputs(job: Job) -> dict[str, bytes]:
-    """Inputs of a job that one derived from it has too.
+    """Inputs of a job that one derived from it has too: not job.toml, nor how its recording was taken.
 
-    Not its job.toml, nor how its recording was taken, nor a recording that was imported, nor a file of certified values, which
-    stand in the new recording.
+    Nor what stands in the new recording: one that was imported, and certified values of a file.
     """
     left = {"job.toml", provenance_name(job.facts.recording.file), *reference_file(job.facts.artefact)}
     left |= {job.facts.recording.file} if _was_imported(job) else set()
@@ -64,14 +63,12 @@ def kept_inputs(job: Job) -> dict[str, bytes]:
 
 
 def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tuple[str, ...] = ()) -> bytes:
-    """job.toml for a recording that a command made from a job.
-
-    A simulated recording stays simulated whatever is made from it.
-    """
-    text = job.inputs["job.toml"].decode("utf-8-sig")
-    written = _hashes(files)
+    """job.toml for a recording that a command made from a job; a simulated one stays simulated whatever is made from it."""
+    text, written = job.inputs["job.toml"].decode("utf-8-sig"), _hashes(files)
+    # an id that no other recording has: that of the job, what was done, and the beginning of a hash of what came out
+    end = f"-{DERIVING[by]}-{hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()[:8]}"
     changes = {
-        "id": _own_id(job, by, written),
+        "id": job.facts.job.id[: LONGEST_ID - len(end)] + end,
         "origin": SIMULATED if job.origin == SIMULATED else DERIVING[by],
         "derived_from": {
             "job": job.facts.job.id, "by": by, "program": PROGRAM, "inputs": _hashes(job.inputs), "files": written,
@@ -104,9 +101,8 @@ def _changed(
         table[key] = _inline(value) if isinstance(document, tomlkit.TOMLDocument) else deepcopy(value)
     _drop(document, OF_THE_RECORDED_MACHINE)
     _drop(document["machine"], without)
-    if "file" in document["artefact"].get(
-        "certificate", {}
-    ):  # certified values stand in every recording that is written
+    # certified values stand in every recording that is written
+    if "file" in document["artefact"].get("certificate", {}):
         _drop(document["artefact"]["certificate"], ("file", *FileKeys.model_fields))
     _state(document["artefact"], certified)
     if file is not None:  # the recording in the project's own format, without the keys by which it was imported
@@ -143,13 +139,6 @@ def _hashes(files: Mapping[str, bytes]) -> dict[str, str]:
     return {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
 
 
-def _own_id(job: Job, by: str, written: Mapping[str, str]) -> str:
-    """An id that no other recording has: that of the job, what was done, and the beginning of a hash of what came out."""
-    mark = hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()[:8]
-    end = f"-{DERIVING[by]}-{mark}"
-    return job.facts.job.id[: LONGEST_ID - len(end)] + end
-
-
 def is_compensated(job: Job) -> bool:
     """Whether the coordinates of a job were corrected by error maps already."""
     derived = job.facts.job.derived_from
@@ -158,30 +147,19 @@ def is_compensated(job: Job) -> bool:
 
 def against(job: Job, content: bytes, name: str, path: Path | None = None) -> Job:
     """A job that is compared with what a simulation predicts, whatever its ``[simulation]`` says."""
-    where, is_map = str(path or name), is_error_map(content, str(path or name))
-    predicted = {"file": name, "temperature_c": NOMINAL_C}
+    where = str(path or name)
+    is_map, predicted = is_error_map(content, where), {"file": name, "temperature_c": NOMINAL_C}
     simulation = SimulationFacts.model_validate({"map": predicted} if is_map else {"file": name})
-    facts = job.facts.model_copy(update={"simulation": simulation})
+    facts, before = job.facts.model_copy(update={"simulation": simulation}), job.facts.simulation
     _refuse_beside_a_simulation(facts, where)
-    inputs = _without_the_simulation(job)
+    left = set() if before is None else {before.file, *(each.file for each in before.map)}
+    left -= {each.file for each in facts.machine.error_map}
+    inputs = {of: each for of, each in job.inputs.items() if of not in left}
     if inputs.get(name, content) != content:
         raise CmmUqError(f"the job has another file {name!r}", where=where, fix="Rename the prediction")
     prediction = None if is_map else read_prediction(content, where, simulation)
-    beside = () if path is None else (path,)
-    return replace(
-        job, facts=facts, inputs={**inputs, name: content}, prediction=prediction, beside=(*job.beside, *beside)
-    )
-
-
-def _without_the_simulation(job: Job) -> dict[str, bytes]:
-    """Inputs of a job but those that only its ``[simulation]`` names."""
-    simulation = job.facts.simulation
-    if simulation is None:
-        return dict(job.inputs)
-    own = {simulation.file, *(given.file for given in simulation.map)} - {
-        given.file for given in job.facts.machine.error_map
-    }
-    return {name: content for name, content in job.inputs.items() if name not in own}
+    beside = job.beside if path is None else (*job.beside, path)
+    return replace(job, facts=facts, inputs={**inputs, name: content}, prediction=prediction, beside=beside)
 
 
 def prediction_of(facts: SimulationFacts | None, inputs: Mapping[str, bytes], folder: Path) -> Prediction | None:

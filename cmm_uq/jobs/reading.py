@@ -25,15 +25,9 @@ from cmm_uq.jobs.importing.imported import read_recording_file
 from cmm_uq.jobs.importing.sheet import Recognition
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logo import checked_logo
+from cmm_uq.jobs.recording import references
 from cmm_uq.jobs.recording.digitizer import calibration_file
-from cmm_uq.jobs.recording.references import (
-    EXPANDED,
-    OF_POINTS,
-    against_earlier,
-    reference_file,
-    with_references,
-    with_uncertainties,
-)
+from cmm_uq.jobs.recording.references import EXPANDED, OF_POINTS, reference_file
 from cmm_uq.jobs.recording.short_gauge import KEY as SHORT_GAUGE, ShortGauge, short_gauge_of
 from cmm_uq.jobs.recording.temperature_log import KEY, log_of, with_logged
 from cmm_uq.jobs.reports import as_found_of, results_named
@@ -83,7 +77,7 @@ def _read(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     maps, logs, calibrations = _of_the_machine(facts.machine)
     predicted, predicting_maps = files_of(facts, path)
     certificate = reference_file(facts.artefact)
-    logo = [*filter(None, [facts.laboratory.logo])]
+    logo = [facts.laboratory.logo] if facts.laboratory.logo else []
     recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
     recordings += [facts.short_gauge.file] if facts.short_gauge else []
     forms = clause_files(facts.conformity)
@@ -97,7 +91,9 @@ def _read(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     clauses = forms_of(facts.conformity, inputs, folder, nameable.standards)
     if says is not None:
         inputs |= _contents(source, certificate, TABLE_BYTES)
-    inputs |= _pictures(source, logo)
+    inputs |= (pictures := _contents(source, logo, LOGO_BYTES))
+    for name, picture in pictures.items():
+        checked_logo(picture, str(folder / name))
     if not facts.artefact.with_recording:
         _refuse_what_needs_a_recording(facts, path)
         check_examples(content, facts.job.origin, str(path))
@@ -130,21 +126,13 @@ def _read(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     if earlier is not None:
         then, recognised = read_recording_file(inputs[earlier], str(folder / earlier), machine, facts.recording)
         told.append(recognised)
-        points = against_earlier(points, then, facts.artefact.cte_per_k, where)
+        points = references.against_earlier(points, then, facts.artefact.cte_per_k, where)
     found = as_found_of(before, inputs, folder, facts.job.origin, facts.machine.name, facts.machine.serial)
     gauge = _short_gauge(facts, inputs, folder, machine)
     prediction = prediction_of(facts.simulation, inputs, folder)
     how = tuple(filter(None, told))
     return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge, prediction, imported=how,
                acquired=acquired, certified={} if says is None else says.table, clauses=clauses)  # fmt: skip
-
-
-def _pictures(source: JobFiles, names: Sequence[str]) -> dict[str, bytes]:
-    """Logos, checked."""
-    found = _contents(source, names, LOGO_BYTES)
-    for name, content in found.items():
-        checked_logo(content, str(source.toml.parent / name))
-    return found
 
 
 def _certified_points(
@@ -160,7 +148,7 @@ def _certified_points(
                              where=where, fix="Give U_um and k in [artefact], and leave the column out")  # fmt: skip
         return facts, points, None
     if reference_file(artefact):
-        points, recognised = with_references(points, artefact, inputs, folder, where)
+        points, recognised = references.with_references(points, artefact, inputs, folder, where)
     if says is not None and says.places is not None:
         points, artefact = says.places.beside(points, artefact)
         facts = facts.model_copy(update={"artefact": artefact})
@@ -168,7 +156,7 @@ def _certified_points(
         where = str(folder / recognised.file)
     read = (recognised,) if recognised is not None else told
     unread = [heading for one in read if one is not None for heading in one.unused]
-    points = with_uncertainties(points, artefact, where, unread)
+    points = references.with_uncertainties(points, artefact, where, unread)
     stated = [float(points.columns[name].max()) for name in OF_POINTS if name in points.columns]
     if stated and isinstance(artefact, ReferencedFacts):
         facts = facts.model_copy(update={"artefact": artefact.with_largest(max(stated))})
@@ -177,14 +165,11 @@ def _certified_points(
 
 def _refuse_unstated(facts: JobFile, points: Points, standards: Standards, path: Path) -> None:
     """That a rule needs an uncertainty which neither the job nor its certified values state."""
-    if (
-        not facts.artefact.with_references
-        or facts.artefact.u_um is not None
-        or any(name in points.columns for name in OF_POINTS)
-    ):
+    artefact = facts.artefact
+    if not artefact.with_references or artefact.u_um is not None or not points.columns.keys().isdisjoint(OF_POINTS):
         return
     for wish in facts.conformity:
-        key = uncertainty_missing(wish, facts.artefact, facts.test_uncertainty, standards)
+        key = uncertainty_missing(wish, artefact, facts.test_uncertainty, standards)
         if key is not None:
             problem, fix = needed(key, wish)
             raise CmmUqError(problem, where=f"{path}: [[conformity]]", fix=fix)
@@ -220,13 +205,13 @@ def _short_gauge(facts: JobFile, inputs: Mapping[str, bytes], folder: Path, mach
 def _refuse_what_needs_a_recording(facts: JobFile, path: Path) -> None:
     """That a job of a kind without a recording has none, nor anything to be joined to one."""
     none = f"a job of kind {facts.artefact.kind!r} has no recording of points"
-    if facts.recording.file:
-        raise CmmUqError(none, where=f"{path}: [recording] file",
-                         fix="Leave [recording] out, and name what is measured under [machine]")  # fmt: skip
-    if facts.machine.temperature_log is not None:
-        raise CmmUqError(none, where=f"{path}: {KEY}", fix="Leave the log out")
-    if facts.short_gauge is not None:
-        raise CmmUqError(none, where=f"{path}: {SHORT_GAUGE}", fix="Leave the short gauge out")
+    for given, key, fix in (
+        (facts.recording.file, "[recording] file", "Leave [recording] out, and name what is measured under [machine]"),
+        (facts.machine.temperature_log, KEY, "Leave the log out"),
+        (facts.short_gauge, SHORT_GAUGE, "Leave the short gauge out"),
+    ):
+        if given:
+            raise CmmUqError(none, where=f"{path}: {key}", fix=fix)
 
 
 def read_machine(folder: Path, nameable: Nameable) -> Job:
@@ -280,11 +265,9 @@ def _certified(data: dict[str, Any], source: JobFiles, nameable: Nameable) -> Ce
         return certified(content, str(source.toml.parent / name), artefact, table)
     if table.with_references:
         return None
-    raise CmmUqError(
-        f"a recording of kind {kind!r} has no certified values of single points",
-        where=f"{source.toml}: [artefact] certificate.file",
-        fix="Name a digital certificate (DCC), or leave file out and give the keys of [artefact]",
-    )
+    problem = f"a recording of kind {kind!r} has no certified values of single points"
+    fix = "Name a digital certificate (DCC), or leave file out and give the keys of [artefact]"
+    raise CmmUqError(problem, where=f"{source.toml}: [artefact] certificate.file", fix=fix)
 
 
 def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str], list[str]]:

@@ -25,18 +25,9 @@ from cmm_uq.jobs.dcc import Certificate, read
 from cmm_uq.jobs.dcc.figures import QuantityFigures, figures
 from cmm_uq.jobs.importing.dcc import Dcc, heading
 from cmm_uq.jobs.importing.imported import imported_references
-from cmm_uq.jobs.importing.keys import FileKeys
 from cmm_uq.jobs.importing.sheet import Fact, Recognition
-from cmm_uq.jobs.tables.artefact import (
-    ACCREDITED,
-    CIPM,
-    NATIONAL,
-    Arrangement,
-    ArtefactFacts,
-    CertificateFile,
-    CertifiedValue,
-    ReferencedFacts,
-)
+from cmm_uq.jobs.tables import artefact as artefacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertificateFile, CertifiedValue, ReferencedFacts
 from cmm_uq.jobs.tables.length_formula import Growing, growing_of, with_standard_uncertainty
 
 _METRES = {unit.dsi: Decimal(str(unit.si)) for unit in UNITS.values() if unit.dsi.endswith(r"\metre")}
@@ -95,22 +86,18 @@ def certified(content: bytes, where: str, given: Mapping[str, Any], facts: type[
     if facts.with_references:
         further, places = _longest(certificate, content, where, given)
         return CertifiedValues(table | further, places=places)
-    found = [
-        (wanted, one)
-        for wanted in facts.certified_values
-        if (one := _found(wanted, certificate, given, where)) is not None
-    ]
-    if not found:
+    chosen = [(value, _chosen(value, certificate, given, where)) for value in facts.certified_values]
+    values = [(value, quantity) for value, quantity in chosen if quantity is not None]
+    if not values:
         raise CmmUqError(f"no certified value of a recording of kind {given.get('kind')!r} is read from a certificate",
                          where=where, fix="Leave file out, and give the keys of [artefact]")  # fmt: skip
-    for wanted, one in found:
-        _merge(table, _valued(wanted, one, given, where))
-    sources = {wanted.key: heading(one) for wanted, one in found}
-    facts_told = (Fact("certificate", say("Certificate"), Verbatim(certificate.administrative.core.identifier)),)
+    for value, quantity in values:
+        for key, item in _valued(value, quantity, given, where).items():
+            table[key] = {**table.get(key, {}), **item} if isinstance(item, Mapping) else item
+    sources, count = {value.key: heading(one) for value, one in values}, sum(len(one.values) for _, one in values)
+    number = Fact("certificate", say("Certificate"), Verbatim(certificate.administrative.core.identifier))
     name = where.replace("\\", "/").rpartition("/")[2]
-    return CertifiedValues(
-        table, Recognition(name, Dcc.name, Dcc.title, facts_told, sources, sum(len(one.values) for _, one in found))
-    )
+    return CertifiedValues(table, Recognition(name, Dcc.name, Dcc.title, (number,), sources, count))
 
 
 def _chain(certificate: Certificate, given: Mapping[str, Any], where: str) -> dict[str, Any]:
@@ -125,7 +112,9 @@ def _chain(certificate: Certificate, given: Mapping[str, Any], where: str) -> di
         "accreditation": certificate.administrative.laboratory.code,
     }  # fmt: skip
     if "arrangement" not in given:
-        fitting = {NATIONAL: {CIPM}, ACCREDITED: {*get_args(Arrangement)} - {CIPM}}.get(str(given.get("issuer")), set())
+        national, others = {artefacts.CIPM}, {*get_args(artefacts.Arrangement)} - {artefacts.CIPM}
+        arrangements = {artefacts.NATIONAL: national, artefacts.ACCREDITED: others}
+        fitting = arrangements.get(str(given.get("issuer")), set())
         says["arrangement"] = next((one.convention for one in statements if one.convention in fitting), None)
     for key, value in says.items():
         if value and key in given and given[key] != value:
@@ -145,61 +134,64 @@ def _identity(certificate: Certificate, given: Mapping[str, Any], where: str) ->
     return {key: value for key, value in says.items() if value and not given.get(key)}
 
 
-def _found(
-    wanted: CertifiedValue, certificate: Certificate, given: Mapping[str, Any], where: str
+def _chosen(
+    value: CertifiedValue, certificate: Certificate, given: Mapping[str, Any], where: str
 ) -> QuantityFigures | None:
     """The quantity of a key: the one that job.toml names, else the only one that is called so."""
-    outer = wanted.key.rpartition(".")[0]
+    outer = value.key.rpartition(".")[0]
     if outer and not isinstance(given.get(outer), Mapping):
         return None
     every = [one for one in figures(certificate) if one.values and all(unit in _METRES for unit in one.units)]
-    named = _table(_table(given, "certificate"), "columns").get(wanted.key)
+    named = _table(_table(given, "certificate"), "columns").get(value.key)
     if isinstance(named, str):
         chosen = [one for one in every if named in (one.name, heading(one), one.id, one.shown)]
     else:
-        chosen = [one for one in every if len(one.values) == wanted.count and _called(one, wanted)]
-    if len(chosen) == 1 and len(chosen[0].values) == wanted.count:
+        chosen = [one for one in every if len(one.values) == value.count and _called(one, value)]
+    if len(chosen) == 1 and len(chosen[0].values) == value.count:
         return chosen[0]
-    if not chosen and not wanted.needed:
+    if not chosen and not value.needed:
         return None
     listed = ", ".join(repr(one.shown) for one in (chosen or every)) or "no quantity that is a length"
     many = f"{len(chosen)} quantities" if len(chosen) > 1 else "no one quantity"
     raise CmmUqError(
-        f"has {many} for [artefact] {wanted.key} ({wanted.count} {'value' if wanted.count == 1 else 'values'}): {listed}",
-        where=where, fix=f'Say which: certificate.columns = {{ "{wanted.key}" = "name of the quantity" }}',
+        f"has {many} for [artefact] {value.key} ({value.count} {'value' if value.count == 1 else 'values'}): {listed}",
+        where=where, fix=f'Say which: certificate.columns = {{ "{value.key}" = "name of the quantity" }}',
     )  # fmt: skip
 
 
-def _called(one: QuantityFigures, wanted: CertifiedValue) -> bool:
-    """Whether it goes by a name of what is wanted; a deviation is a certified value of a form only."""
-    name = " ".join((*one.place[2:], one.name, *one.ref_types)).casefold()
-    other = () if wanted.micrometres else _NO_RESULT
-    return any(word in name for word in wanted.words) and not any(word in name for word in other)
+def _called(quantity: QuantityFigures, value: CertifiedValue) -> bool:
+    """Whether it goes by a name of the value; a deviation is a certified value of a form only."""
+    name = " ".join((*quantity.place[2:], quantity.name, *quantity.ref_types)).casefold()
+    other = () if value.micrometres else _NO_RESULT
+    return any(word in name for word in value.words) and not any(word in name for word in other)
 
 
-def _valued(wanted: CertifiedValue, one: QuantityFigures, given: Mapping[str, Any], where: str) -> dict[str, Any]:
+def _valued(value: CertifiedValue, quantity: QuantityFigures, given: Mapping[str, Any], where: str) -> dict[str, Any]:
     """Key and uncertainty, where the job does not have them."""
-    outer, _, key = wanted.key.rpartition(".")
-    own = _table(given, outer) if outer else given
-    scale = Decimal(1_000_000 if wanted.micrometres else 1000)
-    values = [float(value * _METRES[unit] * scale) for value, unit in zip(one.values, one.units, strict=True)]
-    value = values if wanted.count > 1 else values[0]
-    table = {} if key in own else {key: value}
-    if key in own and not _same(own[key], value):
-        raise _contradicted(f"[artefact] {wanted.key}", own[key], value, where)
-    if wanted.u_key:
-        u_key = wanted.u_key.rpartition(".")[2]
-        longest = max(values) if not wanted.micrometres else 0.0
-        table |= _uncertain(u_key, _u_um(one), own, where, f"[artefact] {wanted.u_key}", one.shown, longest)
+    outer, _, key = value.key.rpartition(".")
+    stated = _table(given, outer) if outer else given
+    scale = Decimal(1_000_000 if value.micrometres else 1000)
+    numbers = [
+        float(number * _METRES[unit] * scale) for number, unit in zip(quantity.values, quantity.units, strict=True)
+    ]
+    table: dict[str, Any] = {key: numbers if value.count > 1 else numbers[0]}
+    if key in stated:
+        listed = list(stated[key]) if isinstance(stated[key], (list, tuple)) else [stated[key]]
+        same = (
+            isinstance(a, (int, float)) and math.isclose(a, b, rel_tol=SAME)
+            for a, b in zip(listed, numbers, strict=False)
+        )
+        if not all(same) or len(listed) != len(numbers):
+            raise _contradicted(f"[artefact] {value.key}", stated[key], table[key], where)
+        table = {}
+    if value.u_key:
+        us = [each.u for each in quantity.uncertainties]  # none where one value has none
+        largest = [u * _METRES[unit] for u, unit in zip(us, quantity.units, strict=True) if u is not None]
+        u_um = float(max(largest) * 1_000_000) if len(largest) == len(us) else None
+        longest = max(numbers) if not value.micrometres else 0.0
+        u_key, shown = value.u_key.rpartition(".")[2], f"[artefact] {value.u_key}"
+        table |= _uncertain(u_key, u_um, stated, where, shown, quantity.shown, longest)
     return {outer: table} if outer else table
-
-
-def _u_um(one: QuantityFigures) -> float | None:
-    """Largest standard uncertainty of a quantity, µm; none where one value has none."""
-    found = [stated.u for stated in one.uncertainties]
-    if any(u is None for u in found):
-        return None
-    return float(max(u * _METRES[unit] for u, unit in zip(found, one.units, strict=True) if u is not None) * 1_000_000)
 
 
 def _uncertain(
@@ -230,9 +222,7 @@ def _longest(
         keys = CertificateFile.model_validate(dict(_table(given, "certificate")))
     except ValidationError:
         return {}, None  # what is wrong with it is said where the table is checked
-    found = imported_references(
-        content, where, FileKeys.model_validate({name: getattr(keys, name) for name in FileKeys.model_fields})
-    )
+    found = imported_references(content, where, keys)
     sources = found.recognised.columns
     wanted = [name for name in ("reference_mm", *(f"reference_{axis}_mm" for axis in AXES)) if name in found.columns]
     headings = [sources.get(name) or sources.get(name.removeprefix("reference_")) for name in wanted]
@@ -252,9 +242,8 @@ def _longest(
     if "length_mm" in given:
         return {}, places  # what is stated of another length cannot be compared
     if all(len(set(one.values)) == 1 for one in held):
-        raise CmmUqError(
-            "certifies no distance: all its points are in one place", where=where, fix="Is it the right file?"
-        )
+        problem = "certifies no distance: all its points are in one place"
+        raise CmmUqError(problem, where=where, fix="Is it the right file?")
     length, u_um = _farthest(held)
     _uncertain("u_um", u_um, given, where, "[artefact] u_um", "its longest distance", length)
     return {"length_mm": length}, places
@@ -309,22 +298,6 @@ def _variance_of_difference(one: QuantityFigures, last: int) -> float:
 def _table(given: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     found = given.get(key)
     return found if isinstance(found, Mapping) else {}
-
-
-def _merge(table: dict[str, Any], further: Mapping[str, Any]) -> None:
-    for key, value in further.items():
-        table[key] = {**table.get(key, {}), **value} if isinstance(value, Mapping) else value
-
-
-def _same(one: object, other: object) -> bool:
-    return all(
-        isinstance(a, (int, float)) and math.isclose(a, b, rel_tol=SAME)
-        for a, b in zip(_listed(one), _listed(other), strict=False)
-    ) and len(_listed(one)) == len(_listed(other))
-
-
-def _listed(value: Any) -> list[Any]:
-    return list(value) if isinstance(value, (list, tuple)) else [value]
 
 
 def _contradicted(key: str, given: object, says: object, where: str) -> CmmUqError:

@@ -1,10 +1,8 @@
 """Reference values joined to a recording: from the file of the artefact's certificate, or from an earlier recording.
 
-Two recordings of one plate at two dates, made into one: where each ball is now against where it was then.
-
-What the earlier recording found takes the place of a certificate. Errors of the plate and of the machine that were there on
-both dates cancel, as long as the plate stands in the same place; what remains is what changed between, and its noise is that
-of both recordings.
+What an earlier recording found of the same plate takes the place of a certificate. Errors of the plate and of the machine
+that were there on both dates cancel, as long as the plate stands in the same place; what remains is what changed between, and
+its noise is that of both recordings.
 """
 
 from __future__ import annotations
@@ -55,9 +53,8 @@ def with_references(
     if chain is None or chain.file is None:
         raise CmmUqError("the certificate names no file", where=where)
     place = str(folder / chain.file)
-    twice = next((name for name in REFERENCES if name in points.columns), None)
-    if twice is not None:
-        raise CmmUqError(f"has {twice}, and so has {chain.file}", where=where, fix="Leave one of them out")
+    if twice := [name for name in REFERENCES if name in points.columns]:
+        raise CmmUqError(f"has {twice[0]}, and so has {chain.file}", where=where, fix="Leave one of them out")
     found = imported_references(inputs[chain.file], place, chain)
     if "point" not in found.columns:
         raise CmmUqError("does not number its values", where=place,
@@ -105,9 +102,8 @@ def with_uncertainties(points: Points, artefact: ArtefactFacts, where: str, unre
     for name in here:
         if np.any(columns[name] < 0):
             line = points.lines[int(np.argmin(columns[name]))] if len(points.lines) else 0
-            raise CmmUqError(
-                f"{name} is below 0", where=f"{where} line {line}", fix="Give uncertainties in µm, 0 or more"
-            )
+            fix = "Give uncertainties in µm, 0 or more"
+            raise CmmUqError(f"{name} is below 0", where=f"{where} line {line}", fix=fix)
     if here and artefact.nominal_only:
         raise CmmUqError(f"has {here[0]}, and nominal = true says that nothing is certified", where=where,
                          fix="Leave nominal or the column out")  # fmt: skip
@@ -130,11 +126,9 @@ NOISE_RATIO = "noise_ratio"  # column: standard uncertainty of a difference over
 
 
 def against_earlier(later: Points, earlier: Points, cte_per_k: float, where: str) -> Points:
-    """The later recording, means over repeats, with the earlier one as its reference positions.
+    """The later recording, means over repeats, with the earlier one as its reference positions, and :data:`NOISE_RATIO`.
 
     ``cte_per_k``: of the plate, which brings the earlier positions to 20 °C when their temperature was recorded.
-
-    Returns points with ``reference_x_mm``, ``reference_y_mm``, ``reference_z_mm`` and :data:`NOISE_RATIO`.
     """
     now, then = _Balls(later), _Balls(earlier)
     known = {key: i for i, key in enumerate(map(tuple, then.keys.tolist()))}

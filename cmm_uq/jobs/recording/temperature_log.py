@@ -1,7 +1,5 @@
 """Temperatures of a machine's scales at any moment, from a log of several thermocouples a scale, joined to a recording.
 
-Temperatures of a machine's scales at any moment, from a log of several thermocouples a scale.
-
 A log is a CSV with ``time_s`` (seconds) or ``time`` (ISO 8601) and a column for each thermocouple. Which of them sit on
 which scale is told, or read off their names: ``x1_c``, ``temp_x_2_c`` … An empty cell is a thermocouple that fell out for a
 moment; the others of its scale stand in for it.
@@ -45,11 +43,11 @@ class TemperatureLog:
 
     def at(self, times: ArrayLike, place: Callable[[int], str] | None = None) -> Floats:
         """Temperatures (n, 3) of the scales at times (n,), linear between the entries of the log, °C."""
-        return self._between(times, self.scales, place)
+        return self._between(self._inside(times, place), self.scales)
 
     def spread_at(self, times: ArrayLike) -> Floats:
         """Spread (n, 3) of the thermocouples of each scale at times (n,), K."""
-        return self._between(times, self.spread)
+        return self._between(self._inside(times), self.spread)
 
     def u_at(self, times: ArrayLike) -> Floats:
         """Standard uncertainty (n, 3) of :meth:`at` for what a scale did between two entries, K; 0 at an entry.
@@ -57,41 +55,33 @@ class TemperatureLog:
         Between them the temperature is taken to lie anywhere between theirs (GUM 4.3.7: their difference over √12). What the
         thermocouples do not see, their own calibration and the temperature between them along the scale, is not in it.
         """
-        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
-        self._check(wanted, None)
-        after = np.searchsorted(self.times, wanted)
+        moments = self._inside(times)
+        after = np.searchsorted(self.times, moments)
         steps = np.abs(self.scales[after] - self.scales[np.maximum(after - 1, 0)]) / np.sqrt(12)
-        return np.where((self.times[after] == wanted)[:, None], 0.0, steps)
+        return np.where((self.times[after] == moments)[:, None], 0.0, steps)
 
-    def _between(self, times: ArrayLike, values: Floats, place: Callable[[int], str] | None = None) -> Floats:
-        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
-        self._check(wanted, place)
-        return np.column_stack([np.interp(wanted, self.times, column) for column in values.T])
+    def _between(self, moments: Floats, values: Floats) -> Floats:
+        return np.column_stack([np.interp(moments, self.times, column) for column in values.T])
 
-    def _check(self, wanted: Floats, place: Callable[[int], str] | None) -> None:
-        def where(row: int) -> str | None:
-            return place(row) if place is not None else self.source or None
-
-        inside = (wanted >= self.times[0]) & (wanted <= self.times[-1])
-        if not inside.all():
-            row = int(np.flatnonzero(~inside)[0])
-            raise CmmUqError(
-                f"no temperature at {wanted[row]:.10g} s: the log reaches from {self.times[0]:.10g} to "
-                f"{self.times[-1]:.10g} s",
-                where=where(row),
-                fix="Log temperatures from before the first point until after the last, by the same clock",
-            )
-        after = np.searchsorted(self.times, wanted)
-        before = np.where(self.times[after] == wanted, after, after - 1)
-        wide = np.flatnonzero(self.times[after] - self.times[before] > self.max_gap)
-        if len(wide):
-            row = int(wide[0])
-            low, high = self.times[before[row]], self.times[after[row]]
-            raise CmmUqError(
-                f"no temperature at {wanted[row]:.10g} s: the log has a gap from {low:.10g} to {high:.10g} s",
-                where=where(row),
-                fix=f"Gaps of up to {self.max_gap:.10g} s are interpolated over; longer ones where max_gap_s allows it",
-            )
+    def _inside(self, times: ArrayLike, place: Callable[[int], str] | None = None) -> Floats:
+        """Times (n,), none of them outside the log or in a gap of it; ``place`` of one by its index, for messages."""
+        moments = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        after = np.searchsorted(self.times, moments)
+        outside = (moments < self.times[0]) | (moments > self.times[-1]) | np.isnan(moments)
+        if outside.any():
+            problem = f"the log reaches from {self.times[0]:.10g} to {self.times[-1]:.10g} s"
+            fix = "Log temperatures from before the first point until after the last, by the same clock"
+        else:
+            before = np.where(self.times[after] == moments, after, after - 1)
+            outside = self.times[after] - self.times[before] > self.max_gap
+            if not outside.any():
+                return moments
+            i = int(np.argmax(outside))
+            problem = f"the log has a gap from {self.times[before[i]]:.10g} to {self.times[after[i]]:.10g} s"
+            fix = f"Gaps of up to {self.max_gap:.10g} s are interpolated over; longer ones where max_gap_s allows it"
+        i = int(np.argmax(outside))
+        where = place(i) if place is not None else self.source or None
+        raise CmmUqError(f"no temperature at {moments[i]:.10g} s: {problem}", where=where, fix=fix)
 
 
 def parse_temperature_log(
@@ -107,9 +97,8 @@ def parse_temperature_log(
     times = _seconds(table, start)
     early = np.flatnonzero(np.diff(times) <= 0)
     if len(early):
-        raise CmmUqError(
-            "is not later than the line before", where=table.at(early[0] + 1), fix="Sort by time, each once"
-        )
+        place = table.at(early[0] + 1)
+        raise CmmUqError("is not later than the line before", where=place, fix="Sort by time, each once")
     on_scale = [_columns(table, axis, sensors) for axis in AXES]
     readings = [[_readings(table, row, columns) for columns in on_scale] for row in range(len(times))]
     scales = np.array([[np.mean(scale) for scale in row] for row in readings])
@@ -120,53 +109,39 @@ def parse_temperature_log(
 
 
 def _columns(table: CsvTable, axis: str, sensors: Mapping[str, Sequence[str]] | None) -> tuple[str, ...]:
-    if sensors is None:
-        matches = [(_SENSOR.fullmatch(name), name) for name in table.header]
-        found = tuple(name for match, name in matches if match and match[1] == axis)
-    else:
-        found = tuple(sensors.get(axis, ()))
-    if not found:
-        raise CmmUqError(
-            f"no thermocouple of scale {axis}",
-            where=table.where,
-            fix=f'Name its columns {axis}1_c, {axis}2_c …, or say which: columns = {{ {axis} = ["…"], … }}',
-        )
-    for name in found:
+    named = [name for name in table.header if (match := _SENSOR.fullmatch(name)) and match[1] == axis]
+    columns = tuple(named if sensors is None else sensors.get(axis, ()))
+    if not columns:
+        fix = f'Name its columns {axis}1_c, {axis}2_c …, or say which: columns = {{ {axis} = ["…"], … }}'
+        raise CmmUqError(f"no thermocouple of scale {axis}", where=table.where, fix=fix)
+    for name in columns:
         if name not in table.header:
             raise CmmUqError(f"no column {name!r}", where=table.where, fix=suggestion(name, table.header))
-    return found
+    return columns
 
 
 def _readings(table: CsvTable, row: int, columns: Sequence[str]) -> list[float]:
     """Temperatures of one scale that are there."""
-    given = [name for name in columns if table.rows[row][table.header.index(name)]]
-    if not given:
+    values = {name: table.number(row, name) for name in columns if table.rows[row][table.header.index(name)]}
+    if not values:
         raise CmmUqError(f"no temperature of {', '.join(columns)}", where=table.at(row), fix="Remove the line")
-    values = [table.number(row, name) for name in given]
-    for name, value in zip(given, values, strict=True):
+    for name, value in values.items():
         if not -50 < value < 100:
-            raise CmmUqError(
-                f"{name} = {value:g} °C",
-                where=table.at(row),
-                fix="Give °C; leave the cell empty where the thermocouple failed",
-            )
-    return values
+            fix = "Give °C; leave the cell empty where the thermocouple failed"
+            raise CmmUqError(f"{name} = {value:g} °C", where=table.at(row), fix=fix)
+    return [values[name] for name in columns if name in values]
 
 
 def _seconds(table: CsvTable, start: datetime | None) -> Floats:
     """Times (m,) of the rows."""
     if "time_s" in table.header:
         if start is not None:
-            raise CmmUqError(
-                "gives time_s, seconds that need no start",
-                where=table.where,
-                fix="Leave out start, or give dates (time)",
-            )
+            fix = "Leave out start, or give dates (time)"
+            raise CmmUqError("gives time_s, seconds that need no start", where=table.where, fix=fix)
         return np.array([table.number(row, "time_s") for row in range(len(table.rows))])
     if "time" not in table.header:
-        raise CmmUqError(
-            "no column time_s or time", where=table.where, fix="Give seconds (time_s) or dates in ISO 8601 (time)"
-        )
+        fix = "Give seconds (time_s) or dates in ISO 8601 (time)"
+        raise CmmUqError("no column time_s or time", where=table.where, fix=fix)
     moments = [_moment(table, row) for row in range(len(table.rows))]
     first = start or moments[0]
     for row, moment in enumerate(moments):
@@ -186,9 +161,8 @@ def _moment(table: CsvTable, row: int) -> datetime:
     try:
         return datetime.fromisoformat(text)
     except ValueError:
-        raise CmmUqError(
-            f"time = {text!r} is no date", where=table.at(row), fix="Write it as 2004-06-01T14:30:00"
-        ) from None
+        fix = "Write it as 2004-06-01T14:30:00"
+        raise CmmUqError(f"time = {text!r} is no date", where=table.at(row), fix=fix) from None
 
 
 COLUMNS = tuple(f"temp_{axis}_c" for axis in AXES)  # what a log gives the recording
@@ -197,13 +171,12 @@ KEY = "[machine] temperature_log"
 
 def log_of(machine: MachineFacts, inputs: Mapping[str, bytes], folder: Path) -> TemperatureLog | None:
     """The log that a job names, ``None`` where it names none."""
-    given = machine.temperature_log
-    if given is None:
+    facts = machine.temperature_log
+    if facts is None:
         return None
-    sensors = given.columns.model_dump() if given.columns is not None else None
-    where = str(folder / given.file)
-    log = parse_temperature_log(inputs[given.file], where, sensors, start=given.start, max_gap=given.max_gap_s)
-    if log.dated and given.start is None:
+    sensors, where = facts.columns.model_dump() if facts.columns is not None else None, str(folder / facts.file)
+    log = parse_temperature_log(inputs[facts.file], where, sensors, start=facts.start, max_gap=facts.max_gap_s)
+    if log.dated and facts.start is None:
         raise CmmUqError("gives dates, and the recording's time_s counts seconds", where=where,
                          fix=f"Say in {KEY} when time_s was 0: start = 2004-06-01T14:30:00")  # fmt: skip
     return log
@@ -213,12 +186,12 @@ def with_logged(points: Points, log: TemperatureLog | None, toml: Path, recordin
     """The points of a recording with the temperatures of their scales."""
     if log is None:
         return points
-    own = next((name for name in COLUMNS if name in points.columns), None)
-    if own is not None:
-        raise CmmUqError(f"the recording has {own}, and the log gives it as well", where=f"{toml}: {KEY}",
+    recorded = [name for name in COLUMNS if name in points.columns]
+    if recorded:
+        raise CmmUqError(f"the recording has {recorded[0]}, and the log gives it as well", where=f"{toml}: {KEY}",
                          fix=f"Leave out the log, or {', '.join(COLUMNS)} in {recording}")  # fmt: skip
     if "time_s" not in points.columns:
         raise CmmUqError("the recording has no times to be joined by", where=f"{toml}: {KEY}",
                          fix=f"Record time_s in {recording}, by the clock of the log")  # fmt: skip
-    found = log.at(points.columns["time_s"], lambda row: f"{recording} line {points.lines[row]}, column time_s")
-    return replace(points, columns={**points.columns, **dict(zip(COLUMNS, found.T, strict=True))})
+    scales = log.at(points.columns["time_s"], lambda row: f"{recording} line {points.lines[row]}, column time_s")
+    return replace(points, columns={**points.columns, **dict(zip(COLUMNS, scales.T, strict=True))})
