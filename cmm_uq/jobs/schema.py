@@ -1,9 +1,8 @@
 """JSON Schema of the TOML files that are read, from the very tables that check them, for editors that complete and explain.
 
 References are written out and ``null``, which TOML has not, is left out: the editors' libraries know draft 7 at most, and some
-show nothing of a key whose schema is a reference. What a check of several keys together asks for is not in it.
-
-A TOML file as a person would write it: what is given, and all else commented out with its default and its sentence.
+show nothing of a key whose schema is a reference. What a check of several keys together asks for is not in it. From a schema
+follows a file as a person would write it: what is given, and all else commented out with its default and its sentence.
 """
 
 from __future__ import annotations
@@ -152,24 +151,16 @@ def _written_out(part: Any, inside: Mapping[str, Any]) -> Any:
 
 def _key(name: str, key: Schema) -> Schema:
     """With its unit at the end of its sentence."""
-    unit, told = unit_of(name), key.get("description", "")
-    if unit and unit not in told:
+    unit, sentence = unit_of(name), key.get("description", "")
+    if unit:
         key["x-unit"] = unit
-        key["description"] = f"{told} Unit: {unit}."
-    elif unit:
-        key["x-unit"] = unit
+        key["description"] = sentence if unit in sentence else f"{sentence} Unit: {unit}."
     return key
 
 
 AnySchema = Mapping[str, Any]
-
-_WHERE = re.compile(r" (?:Unit|Kinds|Methods): [^.]*\.")
-"""Of a description, what the name of the key and the file itself say."""
-
-_EXAMPLES: Mapping[str, Any] = {
-    "string": "", "number": 0.0, "integer": 0, "boolean": False, "array": [], "object": {},
-}  # fmt: skip
-"""What stands where a key has no default; uncommented as it is, most of it is refused by name."""
+# what stands where a key has no default; uncommented as it is, most of it is refused by name
+_EXAMPLES: AnySchema = {"string": "", "number": 0.0, "integer": 0, "boolean": False, "array": [], "object": {}}
 
 
 def commented(
@@ -186,13 +177,14 @@ def commented(
             continue
         several = table.get("type") == "array"
         keys = (table["items"] if several else table).get("properties", {})
-        shown = {key: item for key, item in keys.items() if f"{name}.{key}" not in out and _has(item, asked_by)}
-        header = f"[[{name}]]" if several else f"[{name}]"
-        for said in _said(given.get(name), several) or ([None] if comment else []):
-            lines = [f"{'# ' if said is None else ''}{header}  # {table.get('description', '')}"]
-            marked = {key for key in shown if f"{name}.{key}" in examples}
-            lines += _lines(shown, said or {}, comment, marked)
-            parts.append("\n".join(lines))
+        shown = {key: item for key, item in keys.items()
+                 if f"{name}.{key}" not in out and asked_by in item.get("x-for", [asked_by])}  # fmt: skip
+        header, stated = f"[[{name}]]" if several else f"[{name}]", given.get(name) or []
+        marked = {key for key in shown if f"{name}.{key}" in examples}
+        tables: list[Any] = list(stated) if several or not stated else [stated]
+        for values in tables or ([None] if comment else []):
+            lines = [f"{'# ' if values is None else ''}{header}  # {table.get('description', '')}"]
+            parts.append("\n".join([*lines, *_lines(shown, values or {}, comment, marked)]))
     return "\n\n".join(parts) + "\n"
 
 
@@ -215,32 +207,23 @@ def written(value: Any) -> str:
 
 def without_place(description: str) -> str:
     """The sentence of a key without what the schema puts behind it: unit, and kinds or methods that have the key."""
-    return _WHERE.sub("", description)
-
-
-def _said(given: Any, several: bool) -> list[Any]:
-    if not given:
-        return []
-    return list(given) if several else [given]
-
-
-def _has(key: AnySchema, asked_by: str) -> bool:
-    return asked_by in key.get("x-for", [asked_by])
+    return re.sub(r" (?:Unit|Kinds|Methods): [^.]*\.", "", description)
 
 
 def _lines(
     keys: Mapping[str, AnySchema], given: Mapping[str, Any], comment: bool, marked: Collection[str]
 ) -> list[str]:
-    told = {key: without_place(item["description"]) for key, item in keys.items()}
     mark = {key: f"{EXAMPLE}, put in your own: " if key in marked else "" for key in keys}
-    first = [f"{key} = {written(given[key])}  # {mark[key]}{told[key]}" for key in keys if key in given]
-    first += [f"{key} = {written(value)}" for key, value in given.items() if key not in keys]
-    rest = [
-        f"# {key} = {written(_example(item))}  # {item['description']}"
-        for key, item in keys.items()
-        if key not in given
+    left = [key for key in keys if key not in given and comment]
+    return [
+        *(
+            f"{key} = {written(given[key])}  # {mark[key]}{without_place(keys[key]['description'])}"
+            for key in keys
+            if key in given
+        ),
+        *(f"{key} = {written(value)}" for key, value in given.items() if key not in keys),
+        *(f"# {key} = {written(_example(keys[key]))}  # {keys[key]['description']}" for key in left),
     ]
-    return [*first, *(rest if comment else ())]
 
 
 def _example(key: AnySchema) -> Any:

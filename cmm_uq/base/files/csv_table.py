@@ -64,24 +64,18 @@ def column_problem(name: str) -> str | None:
 
 
 def _check_row(cells: list[str], count: int, rows: int, most_rows: Limit, file: str, line: int) -> None:
-    if (
-        len(cells) <= COLUMNS.most
-        and rows <= most_rows.most
-        and count <= CELLS.most
-        and max(map(len, cells)) <= CELL.most
-    ):
-        return
-    where = f"{file} line {line}"
+    longest = max(map(len, cells))
     if len(cells) > COLUMNS.most:
-        raise CmmUqError(f"has {len(cells)} cells, {COLUMNS.most} are the most", where=where,
-                         fix="Keep the columns that the job needs")  # fmt: skip
-    if rows > most_rows.most or count > CELLS.most:
-        raise CmmUqError(
-            f"the table goes on after {rows - 1} rows and {count - len(cells)} cells: more are not read",
-            where=where, fix=f"{most_rows.most} rows and {CELLS.most} cells are the most: split or thin out the table",
-        )  # fmt: skip
-    raise CmmUqError(f"a cell has {max(map(len, cells))} characters, {CELL.most} are the most", where=where,
-                     fix="Shorten it; if it swallowed other rows, a quotation mark is not closed")  # fmt: skip
+        problem, fix = f"has {len(cells)} cells, {COLUMNS.most} are the most", "Keep the columns that the job needs"
+    elif rows > most_rows.most or count > CELLS.most:
+        problem = f"the table goes on after {rows - 1} rows and {count - len(cells)} cells: more are not read"
+        fix = f"{most_rows.most} rows and {CELLS.most} cells are the most: split or thin out the table"
+    elif longest > CELL.most:
+        problem = f"a cell has {longest} characters, {CELL.most} are the most"
+        fix = "Shorten it; if it swallowed other rows, a quotation mark is not closed"
+    else:
+        return
+    raise CmmUqError(problem, where=f"{file} line {line}", fix=fix)
 
 
 def lines_within(text: str, where: str) -> Iterator[str]:
@@ -125,23 +119,19 @@ def csv_table(content: bytes, where: str, required: Iterable[str], *, most_rows:
     cells = cells_of(content, where, "Save it as CSV in UTF-8", most_rows=most_rows)
     header = tuple(cells.header)
     if not cells.rows:
-        raise CmmUqError(
-            "has no rows", where=where, fix=f"Give a header ({', '.join(required)}) and a row for each position"
-        )
+        fix = f"Give a header ({', '.join(required)}) and a row for each position"
+        raise CmmUqError("has no rows", where=where, fix=fix)
     at = f"{where} line {cells.header_line}"
     for column in required:
         if column not in header:
             raise CmmUqError(f"column {column} is missing", where=at, fix="Add it to the header")
-    twice = next((name for name in header if header.count(name) > 1), None)
-    if twice is not None:
-        raise CmmUqError(f"column {twice} is there twice", where=at, fix="Remove one of them")
+    for name in header:
+        if header.count(name) > 1:
+            raise CmmUqError(f"column {name} is there twice", where=at, fix="Remove one of them")
     if problem := next(filter(None, map(column_problem, header)), None):
         raise CmmUqError(problem, where=at, fix="Name it with letters, digits and _")
     for line, row in zip(cells.lines, cells.rows, strict=True):
         if len(row) != len(header):
-            raise CmmUqError(
-                f"has {len(row)} cells, the header has {len(header)}",
-                where=f"{where} line {line}",
-                fix="Complete the row",
-            )
+            problem = f"has {len(row)} cells, the header has {len(header)}"
+            raise CmmUqError(problem, where=f"{where} line {line}", fix="Complete the row")
     return CsvTable(where, header, tuple(map(tuple, cells.rows)), tuple(cells.lines))

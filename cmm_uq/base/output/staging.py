@@ -37,8 +37,9 @@ def locked(path: Path, *, create: bool) -> int | None:
         if create:
             raise
         return None
-    if _lock(descriptor) and _still(path, descriptor):
-        return descriptor
+    with contextlib.suppress(OSError):  # another process may have removed it in between
+        if _lock(descriptor) and os.path.samestat(path.stat(), os.fstat(descriptor)):
+            return descriptor
     os.close(descriptor)
     return None
 
@@ -56,14 +57,6 @@ def _lock(descriptor: int) -> bool:
     except OSError:
         return False
     return True
-
-
-def _still(path: Path, descriptor: int) -> bool:
-    """Whether the path names the file that was locked: another process may have removed it in between."""
-    try:
-        return os.path.samestat(path.stat(), os.fstat(descriptor))
-    except OSError:
-        return False
 
 
 STAGE, LOCK, PLACING = ".unfinished-", ".lock", ".placing"
@@ -156,9 +149,10 @@ class Stage:
                 ledger.intend(self.token, self.folder.absolute(), sha256(whole[MANIFEST]).hexdigest())
             try:
                 with interruption.placing(self.folder, self):
-                    self._commit(tuple(hashes), hashes, ledger)
+                    self._commit(hashes, ledger)
             except BaseException:
-                if ledger is not None and not self._in_doubt():
+                # a set that could neither be put in place nor be taken back is left to the next command in the folder
+                if ledger is not None and _token(self.folder / PLACING) != self.token:
                     ledger.forget(self.token)
                 raise
         self.made.clear()
@@ -168,17 +162,12 @@ class Stage:
         if not plain_name(name):
             raise CmmUqError(f"{name!r} cannot be the name of an output", where=str(self.folder))
 
-    def _in_doubt(self) -> bool:
-        """Whether the set could neither be put in place nor be taken back: the next command in the folder will."""
-        return _token(self.folder / PLACING) == self.token
-
-    def _commit(self, names: tuple[str, ...], hashes: Mapping[str, str], ledger: Ledger | None) -> None:
+    def _commit(self, hashes: Mapping[str, str], ledger: Ledger | None) -> None:
         placing = self._alone()
         try:
             journal = journal_for(
-                self.folder, self.owner, {name: hashes[name] for name in names}, inputs=self.inputs, force=self.force,
-                token=self.token,
-            )  # fmt: skip
+                self.folder, self.owner, hashes, inputs=self.inputs, force=self.force, token=self.token
+            )
             _write(placing / f"{JOURNAL}.part", journal.as_json())
             (placing / f"{JOURNAL}.part").replace(placing / JOURNAL)
             synced(placing)
@@ -201,9 +190,8 @@ class Stage:
                                      fix="Remove it, or choose another folder with --out") from error  # fmt: skip
                 finish_interrupted(self.folder)
                 if time.monotonic() > deadline:
-                    raise OutputError(
-                        "another cmm-uq is writing here", where=str(self.folder), fix="Wait until it is done"
-                    ) from error
+                    problem, fix = "another cmm-uq is writing here", "Wait until it is done"
+                    raise OutputError(problem, where=str(self.folder), fix=fix) from error
                 time.sleep(0.02)
             else:
                 return placing
@@ -235,15 +223,19 @@ def staged(
         try:
             with writing_to(folder, _MENDED):
                 if folder.exists() and not folder.is_dir():
-                    raise CmmUqError(
-                        "is a file, not a folder", where=str(folder), fix="Choose another folder with --out"
-                    )
+                    fix = "Choose another folder with --out"
+                    raise CmmUqError("is a file, not a folder", where=str(folder), fix=fix)
                 with interruption.changing():
                     folder.mkdir(parents=True, exist_ok=True)
                 finish_interrupted(folder)
                 journal_for(folder, owner, dict.fromkeys(expected, ""), inputs=given, force=force)
                 with interruption.changing():
-                    _open(place)
+                    # the lock before the folder: a stage whose lock nobody holds is nobody's
+                    while place.descriptor < 0:
+                        place.token = secrets.token_hex(6)
+                        place.descriptor = locked(place.lock, create=True) or -1
+                    (place.stage / NEW).mkdir(parents=True)
+                    _write(place.stage / "token", place.token.encode())
             yield place
         finally:
             place.discard()
@@ -284,15 +276,6 @@ def synced(folder: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
-
-
-def _open(place: Stage) -> None:
-    """Lock before the folder: a stage whose lock nobody holds is nobody's."""
-    while place.descriptor < 0:
-        place.token = secrets.token_hex(6)
-        place.descriptor = locked(place.lock, create=True) or -1
-    (place.stage / NEW).mkdir(parents=True)
-    _write(place.stage / "token", place.token.encode())
 
 
 def _token(placing: Path) -> str:

@@ -1,15 +1,9 @@
 """Limits and uncertainties of a length as standards and certificates write them: ``3 + L/300``, ``Q[0.2; 0.5·L/1000]``.
 
-A maximum permissible error as standards and data sheets write it: ``3 + L/300``, ``2.5 + 4·L/1000``, ``min(3 + L/300; 8)``.
-
-L is in mm and the error in µm. ISO 10360 writes A + L/K, VDI/VDE 2617 A + K·L: ``3 + 0.004·L`` is ``3 + L/250``. A decimal
-comma is taken as one, so what stands beside each other in ``min`` is then separated by a semicolon. ``1,000`` and
-``L/1.000``, which may be a thousand or one, are refused.
-
-The uncertainty of a calibrated length as its certificate states it: U or u, a number or a formula of the length.
-
-Certificates print ``U = 0.2 µm + 0.5·10⁻⁶·L, k = 2`` or ``Q[0.2; 0.5·L/1000]``, the root of the sum of both squares. L is
-in mm and the result in µm; what may be read in two ways is refused.
+L is in mm and the result in µm. ISO 10360 writes a maximum permissible error A + L/K, VDI/VDE 2617 A + K·L: ``3 + 0.004·L`` is
+``3 + L/250``. Certificates print ``U = 0.2 µm + 0.5·10⁻⁶·L, k = 2`` or ``Q[0.2; 0.5·L/1000]``, the root of the sum of both
+squares. A decimal comma is taken as one, so what stands beside each other in ``min`` is then separated by a semicolon. What
+may be read in two ways is refused, as ``1,000`` and ``L/1.000``, which may be a thousand or one.
 """
 
 from __future__ import annotations
@@ -63,26 +57,22 @@ def mpe_of(text: str) -> dict[str, float]:
 
 
 def _growing(plain: str) -> dict[str, float]:
-    found = _FORM.fullmatch(plain) or _SLOPE_ONLY.fullmatch(plain)
-    if found is None:
+    match = _FORM.fullmatch(plain) or _SLOPE_ONLY.fullmatch(plain)
+    if match is None:
         raise ValueError(HOW_MPE)
-    told = found.groupdict()
-    first = _number(told["a"]) if told.get("a") else 0.0
-    if told["per_mm"] is not None:
-        slope = _number(told["per_mm"])
+    terms = {name: float(text.replace(",", ".")) for name, text in match.groupdict().items() if text is not None}
+    first = terms.get("a", 0.0)
+    if "per_mm" in terms:
+        slope = terms["per_mm"]
         if not 0 < slope <= 1 / FLATTEST:
             raise ValueError("may have its slope in µm per mm or in µm per m: write 4 µm per m as 4·L/1000")
         return {"a_um": first, "k": 1 / slope}
-    if told["k"] is None:
+    if "k" not in terms:
         return {"b_um": first}
-    slope, k = (1.0 if told["slope"] is None else _number(told["slope"])), _number(told["k"])
+    slope, k = terms.get("slope", 1.0), terms["k"]
     if not slope or not k:
         raise ValueError(HOW_MPE)
     return {"a_um": first, "k": k / slope}
-
-
-def _number(text: str) -> float:
-    return float(text.replace(",", "."))
 
 
 HOW_U = (
@@ -130,9 +120,9 @@ def growing_of(text: str) -> Growing | float:
     plain = _LEADING_ZERO.sub("0.", plain)
     terms = _QUADRATIC.fullmatch(plain) or _QUADRATIC_BY_COMMA.fullmatch(plain)
     parts = [_term(terms["first"]), _term(terms["second"])] if terms else [_term(plain)]
-    if (terms and sorted(bool(slope) for _, slope in parts) != [False, True]) or any(
-        a and b for a, b in parts if terms
-    ):
+    # of a quadratic sum one part is fixed, and the other grows alone
+    quadratic = [(bool(fixed), bool(slope)) for fixed, slope in parts if terms]
+    if quadratic and (sorted(slope for _, slope in quadratic) != [False, True] or (True, True) in quadratic):
         raise ValueError(HOW_U)
     fixed, per_mm = (sum(column) for column in zip(*parts, strict=True))
     if not fixed + per_mm * LONGEST_MM > 0 or fixed > LARGEST_UM or per_mm * 1000 > LARGEST_UM:
@@ -148,12 +138,12 @@ def _term(plain: str) -> tuple[float, float]:
             "does not say in which unit L is: write 0.5 µm in a metre as 0.5·L/1000 (L in mm) or as 0.5·10^-6·L"
         )
     try:
-        found = mpe_of(plain)
+        keys = mpe_of(plain)
     except ValueError as error:
         raise ValueError(str(error) if "thousand" in str(error) else HOW_U) from None
-    if {"b_um", "k"} <= found.keys():
+    if {"b_um", "k"} <= keys.keys():
         raise ValueError(HOW_U)  # the lesser of two is no uncertainty
-    return found.get("b_um", found.get("a_um", 0.0)), 1 / found["k"] if "k" in found else 0.0
+    return keys.get("b_um", keys.get("a_um", 0.0)), 1 / keys["k"] if "k" in keys else 0.0
 
 
 def _checked(value: Any, number: Any) -> Any:
