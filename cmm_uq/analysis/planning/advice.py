@@ -103,13 +103,9 @@ def _title(name: str) -> Text:
 
 def odds_words(odds: float) -> Text:
     """Odds as ``3 : 1`` or ``1 : 3``."""
-    if odds >= 1:
-        return say("{odds} : 1", odds=rounded(odds))
-    return say("1 : {odds}", odds=rounded(1 / odds))
+    return say("{odds} : 1", odds=rounded(odds)) if odds >= 1 else say("1 : {odds}", odds=rounded(1 / odds))
 
 
 def rounded(odds: float) -> Text:
     """Odds of one or more, as many digits as they are worth."""
-    if odds >= 1000:
-        return say("more than 1000")
-    return number(odds, ".0f" if odds >= 10 else ".2g")
+    return say("more than 1000") if odds >= 1000 else number(odds, ".0f" if odds >= 10 else ".2g")

@@ -15,13 +15,11 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 
 CRITERIA = ("separation", "D", "A", "worst")
-
-_FLOOR = 1e-3
-"""Square of the sine below which a pair is as good as identical; keeps one such pair from hiding all others."""
-
+_FLOOR = (
+    1e-3  # square of the sine below which a pair is as good as identical; keeps one such pair from hiding all others
+)
 _GAIN = 1e-6  # least gain in the score by which a set-up is chosen; else the one that tells most of everything
-_BETTER = 1e-9
-_MOST_TRIES = 2000
+_BETTER, _MOST_TRIES = 1e-9, 2000
 Score = Callable[[Floats], Floats]  # what is to become small, (c,), of information (c, k, k)
 
 
@@ -35,15 +33,12 @@ class Selection:
 
 
 def score_of(criterion: str, placings_information: Information, targets: Sequence[int]) -> Score:
-    targets = list(targets)
-    least = 2 if criterion == "separation" else 1
+    targets, least = list(targets), 2 if criterion == "separation" else 1
     if criterion not in CRITERIA:
         raise CmmUqError(f"no criterion {criterion!r}", fix=f"Known: {', '.join(CRITERIA)}")
     if len(targets) < least:
-        raise CmmUqError(
-            f"the criterion {criterion!r} needs at least {least} effects", where="job.toml [plan]",
-            fix="Name more effects, or rivals to tell apart",
-        )  # fmt: skip
+        raise CmmUqError(f"the criterion {criterion!r} needs at least {least} effects", where="job.toml [plan]",
+                         fix="Name more effects, or rivals to tell apart")  # fmt: skip
     if criterion == "separation":
         base = [i for i in range(len(placings_information.prior)) if i not in targets]
         upper = np.triu_indices(len(targets), 1)
@@ -78,23 +73,20 @@ def choose(
     placings_information: Information, start: Floats, score: Score, count: int, *, again: bool = False
 ) -> Selection:
     """Take ``count`` candidates, greedily, then exchange them one for one; ``start`` (k, k) information already there."""
-    again = again or count > len(placings_information.each)
-    everything = score_of(
-        "D",
-        placings_information,
-        [i for i in range(len(placings_information.prior)) if i not in placings_information.nuisance],
-    )
+    each, nuisance = placings_information.each, placings_information.nuisance
+    again = again or count > len(each)
+    everything = score_of("D", placings_information, [i for i in range(len(start)) if i not in nuisance])
     taken: list[int] = []
     information, before = start.copy(), float(score(start[None])[0])
     now = before
     for _ in range(count):
-        scores = _free(step(score, information, placings_information.each), taken, again)
+        scores = _free(step(score, information, each), taken, again)
         best = int(np.argmin(scores))
         if scores[best] > now - _GAIN * (1 + abs(now)):
-            best = int(np.argmin(_free(step(everything, information, placings_information.each), taken, again)))
+            best = int(np.argmin(_free(step(everything, information, each), taken, again)))
         taken.append(best)
-        information, now = information + placings_information.each[best], float(scores[best])
-    return Selection(*_exchanged(placings_information, information, score, taken, again), before)
+        information, now = information + each[best], float(scores[best])
+    return Selection(*_exchanged(each, information, score, taken, again), before)
 
 
 def _free(scores: Floats, taken: Sequence[int], again: bool) -> Floats:
@@ -105,21 +97,16 @@ def _free(scores: Floats, taken: Sequence[int], again: bool) -> Floats:
 
 
 def _exchanged(
-    placings_information: Information, information: Floats, score: Score, taken: list[int], again: bool
+    each: Floats, information: Floats, score: Score, taken: list[int], again: bool
 ) -> tuple[tuple[int, ...], float]:
     now = float(score(information[None])[0])
     at, unchanged, tries = 0, 0, 0
     while unchanged < len(taken) and tries < _MOST_TRIES:
-        without = information - placings_information.each[taken[at]]
-        scores = _free(step(score, without, placings_information.each), taken, again)
+        without = information - each[taken[at]]
+        scores = _free(step(score, without, each), taken, again)
         best = int(np.argmin(scores))
         unchanged, tries = unchanged + 1, tries + 1
         if scores[best] < now - _BETTER * (1 + abs(now)):
-            taken[at], information, now, unchanged = (
-                best,
-                without + placings_information.each[best],
-                float(scores[best]),
-                0,
-            )
+            taken[at], information, now, unchanged = best, without + each[best], float(scores[best]), 0
         at = (at + 1) % len(taken)
     return tuple(sorted(taken)), now

@@ -25,8 +25,8 @@ from cmm_uq.maths.inference.least_squares import RANK_TOLERANCE
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown, reached
 from cmm_uq.maths.inference.noise import Components, Sizes
 
-_ROUNDING = 1e-9
-_ZERO = 1e-8
+_ROUNDING, _ZERO = 1e-9, 1e-8
+COMPARED = 10  # repeats that are compared, or one more than the plan has
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +49,11 @@ def uncertainties(linear: LinearModel, components: Components, sizes: Sizes) -> 
     """Standard uncertainties (w, k) for each of w sizes of the noise: of least squares, and with the prior of the effects."""
     unknowns, scale = linear.unknowns, scales(linear.unknowns)
     held = np.array([unknown.known for unknown in unknowns], dtype=bool)
-    design = linear.design * scale * _there(linear)
-    basis, free = _determined(linear.reduced.design * scale * _there(linear), held)
+    # 0 for columns of which the set-up leaves nothing but rounding, lest they determine each other; else 1
+    whole = np.linalg.norm(linear.design / linear.noise_scale[:, None], axis=0)
+    there = np.asarray(np.linalg.norm(linear.reduced.design, axis=0) > _ROUNDING * whole, dtype=np.float64)
+    design = linear.design * scale * there
+    basis, free = _determined(linear.reduced.design * scale * there, held)
     place = reached(linear.freedoms.dense())
     columns = np.asarray(components.turn @ np.hstack([place, design @ basis, design]))
     q, r = place.shape[1], basis.shape[1]
@@ -70,12 +73,6 @@ def uncertainties(linear: LinearModel, components: Components, sizes: Sizes) -> 
     return u * scale, with_prior * scale
 
 
-def _there(linear: LinearModel) -> Floats:
-    """(k,) 0 for columns of which the set-up leaves nothing but rounding, lest they determine each other; else 1."""
-    whole = np.linalg.norm(linear.design / linear.noise_scale[:, None], axis=0)
-    return np.asarray(np.linalg.norm(linear.reduced.design, axis=0) > _ROUNDING * whole, dtype=np.float64)
-
-
 def _determined(reduced: Floats, held: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.bool_]]:
     """Combinations (k, r) that observations determine, orthonormal under white noise; and which parameters (k,) stay free."""
     k = len(held)
@@ -91,9 +88,6 @@ def _averaged(values: Floats, weight: Floats) -> Floats:
     """Geometric mean (k,) of values (w, k), infinite where one is."""
     with np.errstate(divide="ignore"):
         return np.asarray(np.exp(weight @ np.log(values)) if len(weight) > 1 else values[0])
-
-
-COMPARED = 10  # repeats that are compared, or one more than the plan has
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +134,11 @@ def compare_repeats(setting: Setting, placings: Sequence[SetUp]) -> RepeatsCompa
         return None
     rows = []
     for repeats in range(1, max(COMPARED, setting.plan.repeats + 1) + 1):
-        points = _joined(setting, placings, repeats)
+        points = join(
+            [replace(placing, points=repeat_points(placing.points, repeats)) for placing in placings],
+            seconds_per_point=setting.plan.seconds_per_point, minutes_per_placing=setting.plan.minutes_per_placing,
+            columns=setting.plan.columns,
+        )  # fmt: skip
         model, minutes = setting.model(points), _minutes(setting, n, len(points))
         sought = [i for i, unknown in enumerate(model.unknowns) if not unknown.known]
         # information of n + 1 set-ups is to that of n as if variances were n / (n + 1) of what they are
@@ -163,14 +161,6 @@ def repeat_points(points: Points, times: int) -> Points:
         once, xyz=np.tile(once.xyz, (times, 1)), measurement=np.tile(once.measurement, times),
         point=np.tile(once.point, times), repeat=np.repeat(np.arange(1, times + 1), n), lines=np.zeros(0, dtype=np.int64),
         columns={name: np.tile(values, times) for name, values in once.columns.items()},
-    )  # fmt: skip
-
-
-def _joined(setting: Setting, placings: Sequence[SetUp], repeats: int) -> Points:
-    plan = setting.plan
-    return join(
-        [replace(placing, points=repeat_points(placing.points, repeats)) for placing in placings],
-        seconds_per_point=plan.seconds_per_point, minutes_per_placing=plan.minutes_per_placing, columns=plan.columns,
     )  # fmt: skip
 
 

@@ -25,9 +25,7 @@ from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
 
 Pair = tuple[str, str, float]  # two effects and the absolute cosine between them
 
-NOT_TOLD_APART = 0.98
-"""Cosine from which on two effects could hardly be told apart: a fifth of one is all that the other cannot imitate."""
-
+NOT_TOLD_APART = 0.98  # cosine from which on a fifth of one effect is all that the other cannot imitate
 _ROUNDING = 1e-9
 WEAK = 0.1  # part of the prior variance from which on a parameter counts as weakly determined
 
@@ -87,30 +85,26 @@ def identifiability(
     under_noise = under_white if noise is None else expected_uncertainty(model, noise)
     information = gram(model, values, noise) + certified(model.unknowns)
     names = [unknown.key[0] for unknown in model.unknowns]
-    found = []
-    effects = [i for i, name in enumerate(names) if name != ARTEFACT]
-    for i, j in combinations(effects, 2):
+    alike: list[Pair] = []
+    for i, j in combinations([i for i, name in enumerate(names) if name != ARTEFACT], 2):
         rest = [k for k in range(len(information)) if k not in (i, j)]
         left, alone = left_of(information, [i, j], rest), np.diag(information)[[i, j]]
         cosine = float(cosines(left, alone)[0, 1])
         if names[i] != names[j] and np.all(visible(left, alone)) and cosine > NOT_TOLD_APART:
-            found.append((names[i], names[j], cosine))
-    named = found
-    alike, absorbed, unseen = _among_rivals(model, rivals, noise) if rivals else ([], (), ())
-    return Identifiability(
-        _parameters(linear, estimate, under_noise, under_white), tuple(
+            alike.append((names[i], names[j], cosine))
+    others, absorbed, unseen = _among_rivals(model, rivals, noise) if rivals else ([], (), ())
+    combined = tuple(
         {u.key: float(part) for u, part in zip(estimate.unknowns, column, strict=True) if part}
         for column in estimate.null_space.T
-    ),
-        _singular_values(uncorrelated(model, values, noise), white.coordinate),
-        tuple(sorted([*named, *alike], key=lambda pair: -pair[2])), absorbed, unseen,
+    )
+    one_by_one = uncorrelated(model, values, noise)
+    uncertified = [i for i, unknown in enumerate(one_by_one.unknowns) if not unknown.known]
+    design = one_by_one.reduced.design[:, uncertified] * scales(one_by_one.unknowns)[uncertified] / white.coordinate
+    return Identifiability(
+        _parameters(linear, estimate, under_noise, under_white), combined,
+        np.asarray(linalg.svdvals(design)) if design.size else np.zeros(0),
+        tuple(sorted([*alike, *others], key=lambda pair: -pair[2])), absorbed, unseen,
     )  # fmt: skip
-
-
-def _singular_values(linear: LinearModel, sigma: float) -> Floats:
-    free = [i for i, unknown in enumerate(linear.unknowns) if not unknown.known]
-    white = linear.reduced.design[:, free] * scales(linear.unknowns)[free] / sigma
-    return np.asarray(linalg.svdvals(white)) if white.size else np.zeros(0)
 
 
 def _parameters(

@@ -26,8 +26,11 @@ from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.linear_model import Unknown
 
-_HELD = 1e12
-"""Information of a size that its certificate gives without uncertainty, 0.1 nm; more would hide all other by rounding."""
+_HELD = 1e12  # of a size that its certificate gives without uncertainty, 0.1 nm; more would hide all other by rounding
+SEEN = 1e-6  # part of an effect's information, of what it would be by itself, below which rounding hides it
+FAINT = 1.0  # below which an effect of its prior standard deviation does not stand out of the noise
+_RIDGE = 1e-13
+_PART = 0.1  # share from which on a column counts as part of what looks like another
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,16 +125,6 @@ def _sigma(model: RecordingModel, noise: PlannedNoise | None) -> float:
     if sigma is None:
         raise ValueError("the information of a measurement needs the noise")
     return sigma
-
-
-SEEN = 1e-6
-"""Part of an effect's information, of what it would be if nothing else were fitted, below which rounding hides it."""
-
-FAINT = (
-    1.0  # Information, for an effect of its prior standard deviation, below which it does not stand out of the noise
-)
-_RIDGE = 1e-13
-_PART = 0.1  # share from which on a column counts as part of what looks like another
 
 
 def left_of(information: Floats, rivals: Sequence[int], base: Sequence[int]) -> Floats:

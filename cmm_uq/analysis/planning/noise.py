@@ -61,9 +61,12 @@ class PlannedNoise:
 
     def spread(self, components: Components) -> tuple[Sizes, Floats]:
         """All sizes (w,) that are reckoned with, and their weights (w,), which sum up to one."""
-        placing, p = _known(self.placing) if self.placing is not None else _prior(PLACING, self.coordinate)
-        unknown_growth = self.growth is None and GROWTH in components.possible
-        growth, g = _prior(GROWTH, self.coordinate) if unknown_growth else _known(self.growth or 0.0)
+        placing, p = np.array([self.placing]), np.ones(1)
+        growth, g = np.array([self.growth or 0.0]), np.ones(1)
+        if self.placing is None:
+            placing, p = _prior(PLACING, self.coordinate)
+        if self.growth is None and GROWTH in components.possible:
+            growth, g = _prior(GROWTH, self.coordinate)
         sizes = _sizes(self, np.repeat(placing, len(growth)), np.tile(growth, len(placing)))
         return sizes, np.outer(p, g).ravel()
 
@@ -92,18 +95,12 @@ def white_noise(model: RecordingModel) -> PlannedNoise:
 def uncorrelated(model: RecordingModel, values: Floats, noise: PlannedNoise | None) -> LinearModel:
     """The model about parameters (k,) in uncorrelated observations with the noise of one reading each."""
     linear = model.linearised(values)
-    if noise is None:
-        return linear
-    return linear.uncorrelated(noise.components(model, values).white(noise.typical))
+    return linear if noise is None else linear.uncorrelated(noise.components(model, values).white(noise.typical))
 
 
 def _sizes(noise: PlannedNoise, placing: Floats | list[float], growth: Floats | list[float]) -> Sizes:
     reading, nothing = np.tile(noise.reading, (len(placing), 1)), np.zeros(len(placing))
     return Sizes(reading, np.asarray(placing), np.asarray(growth), nothing, nothing + 1)
-
-
-def _known(value: float) -> tuple[Floats, Floats]:
-    return np.array([value]), np.ones(1)
 
 
 def _prior(component: str, sigma: float) -> tuple[Floats, Floats]:

@@ -18,10 +18,11 @@ from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 
-VECTORS: Mapping[str, str] = {"approach": "approach_{}", "normal": "n{}"}
-"""Columns of vectors that turn with the artefact."""
-
-_LEVEL = 1e-6
+VECTORS: Mapping[str, str] = {
+    "approach": "approach_{}",
+    "normal": "n{}",
+}  # columns of vectors that turn with the artefact
+_LEVEL, _NEGLIGIBLE = 1e-6, 0.02
 _MINUTE = 60.0
 
 
@@ -79,8 +80,7 @@ class Pattern:
         }
         taken = {name.format(a) for key, name in VECTORS.items() if key in turned for a in AXES}
         columns = {name: values for name, values in points.columns.items() if name not in taken}
-        pattern = cls(about @ attitude, points.point, points.repeat, columns, turned)
-        return pattern, attitude, middle
+        return cls(about @ attitude, points.point, points.repeat, columns, turned), attitude, middle
 
     def once(self) -> Pattern:
         first = self.repeat == self.repeat.min()
@@ -111,8 +111,7 @@ class Pattern:
             if key == "approach":
                 values = np.where(np.abs(values) > _LEVEL, np.sign(values), 0.0)
             columns |= {VECTORS[key].format(a): values[:, i] for i, a in enumerate(AXES)}
-        xyz = machine.coordinates(middle + self.turned(attitude))
-        one = np.ones(len(xyz), dtype=np.int64)
+        xyz, one = machine.coordinates(middle + self.turned(attitude)), np.ones(len(self.body), dtype=np.int64)
         return SetUp(title, Points(xyz, one, self.point, self.repeat, machine, columns))
 
 
@@ -146,11 +145,8 @@ def join(
 
 def append(recorded: Points, placings: Sequence[SetUp]) -> Points:
     """A recording and further set-ups after it, columns as recorded; the set-ups must have them."""
-    numbers = range(int(recorded.measurement.max()) + 1, int(recorded.measurement.max()) + 1 + len(placings))
-    later = [
-        replace(placing.points, measurement=np.full(len(placing.points), number))
-        for number, placing in zip(numbers, placings, strict=True)
-    ]
+    first = int(recorded.measurement.max()) + 1
+    later = [replace(p.points, measurement=np.full(len(p.points), i)) for i, p in enumerate(placings, first)]
     return _concatenated([recorded, *later])
 
 
@@ -163,15 +159,12 @@ def _concatenated(parts: Sequence[Points]) -> Points:
     )  # fmt: skip
 
 
-def _measurement(number: int) -> Message:
-    return say("measurement {number}", number=number)
-
-
-def split(points: Points, title: Callable[[int], Message] = _measurement) -> tuple[SetUp, ...]:
+def split(points: Points, title: Callable[[int], Message] | None = None) -> tuple[SetUp, ...]:
     """The set-ups of a recording, in ascending order of their numbers."""
+    numbers = np.unique(points.measurement).tolist()
+    titles = [say("measurement {number}", number=number) if title is None else title(number) for number in numbers]
     return tuple(
-        SetUp(title(number), points.select(points.measurement == number))
-        for number in np.unique(points.measurement).tolist()
+        SetUp(words, points.select(points.measurement == number)) for number, words in zip(numbers, titles, strict=True)
     )
 
 
@@ -190,9 +183,6 @@ def _attitude(about: Floats) -> Floats:
         return attitude_along(u)
     v = v / size
     return np.column_stack([u, v, np.cross(u, v)])
-
-
-_NEGLIGIBLE = 0.02
 
 
 def direction_words(direction: Floats) -> Text:
@@ -218,8 +208,7 @@ def lines(size: Floats) -> list[Floats]:
     """Directions for a bar or gauge: those of a cube, and the diagonals of a volume of this size (3,)."""
     found = cube()
     for direction in cube():
-        stretched = direction * size
-        unit = stretched / np.linalg.norm(stretched)
+        unit = direction * size / np.linalg.norm(direction * size)
         if all(abs(unit @ other) < np.cos(np.radians(5.0)) for other in found):
             found.append(unit)
     return found
@@ -231,13 +220,11 @@ def _plane(first: tuple[float, float, float], second: tuple[float, float, float]
     return np.column_stack([u, v, np.cross(u, v)])
 
 
-PRINCIPAL_PLANES: tuple[tuple[Text, Floats], ...] = (
+PRINCIPAL_PLANES: tuple[tuple[Text, Floats], ...] = (  # attitudes of a plate
     (say("flat"), _plane((1, 0, 0), (0, 1, 0))),
     (say("upright along X"), _plane((1, 0, 0), (0, 0, 1))),
     (say("upright along Y"), _plane((0, 1, 0), (0, 0, 1))),
 )
-"""Attitudes of a plate."""
-
 PLANES: tuple[tuple[Text, Floats], ...] = (
     *PRINCIPAL_PLANES,
     (say("flat, turned by 45°"), _plane((1, 1, 0), (-1, 1, 0))),
@@ -248,7 +235,6 @@ PLANES: tuple[tuple[Text, Floats], ...] = (
     (say("tilted about X"), _plane((1, 0, 0), (0, 1, 1))),
     (say("tilted about Y"), _plane((0, 1, 0), (1, 0, 1))),
 )
-"""More attitudes of a plate."""
 
 
 def attitudes_of_lines(size: Floats) -> list[tuple[Text, Floats]]:

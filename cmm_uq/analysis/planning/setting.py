@@ -120,26 +120,17 @@ class Setting:
                     raise CmmUqError(f"{effect.name} needs the column {missing[0]}, which this plan does not record",
                                      where=where, fix="Leave it out, or give its value in [plan] columns")  # fmt: skip
             return tuple(effect for effect in chosen if effect.name not in named and not effect.shape)
-        return tuple(
-            effect
-            for effect in every().values()
-            if effect.tier == CONTRACT
-            and effect.name not in named
-            and not effect.shape
-            and all(column in points.columns for column in effect.columns)
-        )
+        free = [e for e in every().values() if e.tier == CONTRACT and e.name not in named and not e.shape]
+        return tuple(e for e in free if all(column in points.columns for column in e.columns))
 
 
 def _noise(job: Job) -> PlannedNoise:
     plan, stated = job.facts.plan, job.facts.recording.u_coordinate_um
-    name = results_named(plan.noise_from)
-    if name is None:
-        each = (stated or ASSUMED_NOISE_UM) * MICROMETRE
-        return PlannedNoise((each, each, each), _micrometres(plan.placing_um), _micrometres(plan.growth_um))
-    found = noise_found(job.inputs[name], str(job.folder / name))
-    x, y, z = (size * MICROMETRE for size in found.reading_um)
-    return PlannedNoise((x, y, z), _micrometres(found.placing_um), _micrometres(found.growth_um))
-
-
-def _micrometres(size: float | None) -> float | None:
-    return None if size is None else size * MICROMETRE
+    reading: tuple[float, float, float] = (stated or ASSUMED_NOISE_UM,) * 3
+    placing, growth = plan.placing_um, plan.growth_um
+    if (name := results_named(plan.noise_from)) is not None:
+        found = noise_found(job.inputs[name], str(job.folder / name))
+        reading, placing, growth = found.reading_um, found.placing_um, found.growth_um
+    x, y, z = (size * MICROMETRE for size in reading)
+    offset, growing = (None if size is None else size * MICROMETRE for size in (placing, growth))
+    return PlannedNoise((x, y, z), offset, growing)

@@ -10,9 +10,9 @@ Where it is asked for, the set-ups also show effects that the recording would no
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -37,15 +37,11 @@ from cmm_uq.machine.physics.catalogue import every
 SET_UPS, REPEATS = 8, 10  # most set-ups of a plan, and most repeats of each
 _NEVER = 1e6  # amplitude, over the prior standard deviation, of what does not show at all
 _UNSEEN = 1e-13  # part of what an effect by itself would tell, that rounding may leave of one that is not seen
-
-_ROUNDING = 1e-9
-"""Part of an effect's information, of what it would be if nothing else were fitted, below which rounding hides it."""
-
+_ROUNDING = 1e-9  # the same, below which rounding hides an effect
 _HOPELESS = 3  # repeats of a plan that cannot reach everything
 _WORTH = 0.1  # least gain in the logarithm of odds for which a plan that does not reach everything is told
 _SAME_ODDS = 1e-9  # of their logarithm, by rounding
-_CANDIDATES = 120
-_TURNED = 12  # of the candidates, how many are tried turned besides
+_CANDIDATES, _TURNED = 120, 12  # of the candidates, how many are tried turned besides
 _OF_A_GROUP = 5  # effects of a group of which all pairs are parted
 
 
@@ -59,9 +55,8 @@ class _Group:
     @property
     def pairs(self) -> list[tuple[int, int]]:
         """Those that the recording does not part already by the odds that a plan aims at."""
-        log_odds = self.log_odds.tolist()
-        all_pairs = combinations(range(len(self.names)), 2)
-        return [(a, b) for a, b in all_pairs if abs(log_odds[a] - log_odds[b]) < np.log(ODDS) + _SAME_ODDS]
+        odds, pairs = self.log_odds.tolist(), combinations(range(len(self.names)), 2)
+        return [(a, b) for a, b in pairs if abs(odds[a] - odds[b]) < np.log(ODDS) + _SAME_ODDS]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +104,10 @@ def next_plan(
         known = _information(after, model, partial(observe, facts), places, shared_freedoms=planning.shared)
     except CmmUqError:  # nowhere else to put it
         return None
-    aims = _Aims(known, groups, (), _sizes(after, groups), _variances(diagnosis))
-    everything = known.recorded + known.told.each.sum(axis=0)
-    most = aims.amplitudes(everything[None], goals)[0]
-    showing = [one for one, amplitude in zip(goals, most, strict=True) if amplitude < _NEVER]
-    aims = replace(aims, wanted=tuple(showing))
+    sizes = {(group.names[0], name): _size(after, name, group.names) for group in groups for name in group.names}
+    aims = _Aims(known, groups, (), sizes, _variances(diagnosis))
+    most = aims.amplitudes((known.recorded + known.told.each.sum(axis=0))[None], goals)[0]
+    aims = replace(aims, wanted=tuple(one for one, size in zip(goals, most, strict=True) if size < _NEVER))
     found = _within_reach(aims)
     if found is None:
         return None
@@ -126,14 +120,12 @@ def next_plan(
 
 
 def _groups(diagnosis: Diagnosis) -> list[_Group]:
-    found = []
-    combinations_found = diagnosis.search.combinations
+    found, compared = [], diagnosis.search.combinations
     index = {str.__str__(e.name): i for i, e in enumerate(diagnosis.search.first.explanations)}
     for names in diagnosis.indistinguishable:
-        taken = names[:_OF_A_GROUP]
-        instead: Mapping[int, float] = {}
-        if combinations_found is not None and names[0] in index:
-            instead = combinations_found.instead(diagnosis.search.chosen, index[names[0]])
+        taken, instead = names[:_OF_A_GROUP], {}
+        if compared is not None and names[0] in index:
+            instead = compared.instead(diagnosis.search.chosen, index[names[0]])
         odds = [1.0, *(instead.get(index.get(name, -1), 1.0) for name in taken[1:])]
         found.append(_Group(taken, np.log(odds)))
     return [group for group in found if group.pairs]
@@ -159,12 +151,7 @@ def _with_all(after: RecordingModel, names: Sequence[str]) -> RecordingModel:
 
 
 def _information(
-    after: RecordingModel,
-    model: RecordingModel,
-    observe: Observed,
-    places: Sequence[SetUp],
-    *,
-    shared_freedoms: bool,
+    after: RecordingModel, model: RecordingModel, observe: Observed, places: Sequence[SetUp], *, shared_freedoms: bool
 ) -> _Information:
     fitted = frozenset({ARTEFACT, *(effect.name for effect in after.effects)})
     joint = observe(append(model.artefact.points, places))
@@ -180,12 +167,7 @@ def _information(
     recorded = whole.each[:count].sum(axis=0)
     if not shared_freedoms and len(names) == len(model.unknowns):  # without observations that were set aside
         recorded = gram(model, values)
-    told = replace(whole, each=whole.each[count:])
-    return _Information(told, (*names, *[ARTEFACT] * more), fitted, recorded)
-
-
-def _sizes(after: RecordingModel, groups: Sequence[_Group]) -> dict[tuple[str, str], Floats]:
-    return {(group.names[0], name): _size(after, name, group.names) for group in groups for name in group.names}
+    return _Information(replace(whole, each=whole.each[count:]), (*names, *[ARTEFACT] * more), fitted, recorded)
 
 
 def _size(after: RecordingModel, name: str, group: Sequence[str]) -> Floats:
@@ -219,7 +201,7 @@ class _Aims:
 
     def after(self, chosen: Selection, repeats: int) -> Floats:
         """Information (k, k) of the recording and what is added to it."""
-        return np.asarray(self.start + self.added(repeats)[list(chosen.indices)].sum(axis=0))
+        return np.asarray(self.known.recorded + self.added(repeats)[list(chosen.indices)].sum(axis=0))
 
     def short(self, information: Floats) -> Floats:
         """By how much (c,) a plan falls short of all aims together, in logarithms; 0 where it reaches them."""
@@ -247,11 +229,8 @@ class _Aims:
 
     def shown(self, information: Floats) -> tuple[DetectionChange, ...]:
         """Every effect that is wanted, as it shows without and with this information (k, k)."""
-        both = np.stack([self.known.recorded, information])
-        found = self.amplitudes(both, self.wanted).T.tolist()
-        return tuple(
-            DetectionChange(one.effect, *amplitudes) for one, amplitudes in zip(self.wanted, found, strict=True)
-        )
+        found = self.amplitudes(np.stack([self.known.recorded, information]), self.wanted).T.tolist()
+        return tuple(DetectionChange(one.effect, *sizes) for one, sizes in zip(self.wanted, found, strict=True))
 
     def amplitudes(self, information: Floats, goals: Sequence[DetectionGoal]) -> Floats:
         """Smallest amplitude (c, w) of each effect by itself that is detected, over its prior standard deviation."""
@@ -267,15 +246,13 @@ class _Aims:
         """What (c, r, r) is left on all rows of a group, effect by effect, once what else is fitted is."""
         names = self.groups[g].names
         rows = [row for name in names for row in self.known.rows(name)]
-        left = self.known.left(information, rows, names)
-        at = np.arange(len(rows))
+        left, at = self.known.left(information, rows, names), np.arange(len(rows))
         left[:, at, at] += _UNSEEN * np.einsum("...ii->...i", information)[..., rows]  # what rounding leaves of nothing
         return left
 
     def _log_odds(self, left: Floats, g: int, a: int, b: int) -> Floats:
         """Expected log odds (c,) of the true one of two over the other, the less of the two cases; see :meth:`_of_group`."""
-        log_odds = self.groups[g].log_odds
-        before = float(log_odds[a] - log_odds[b])
+        before = float(self.groups[g].log_odds[a] - self.groups[g].log_odds[b])
         return np.minimum(before + self._gain(left, g, a, b), -before + self._gain(left, g, b, a))
 
     def _gain(self, left: Floats, g: int, true: int, other: int) -> Floats:
@@ -292,11 +269,6 @@ class _Aims:
         size = np.zeros(len(rows))  # further set-ups may have coefficients of their own, after those of the recording
         size[: len(self.sizes[names[0], names[true]])] = self.sizes[names[0], names[true]]
         return np.asarray(0.5 * np.einsum("i,cij,j->c", size, left_of(left, rows, others), size))
-
-    @cached_property
-    def start(self) -> Floats:
-        """Information (k, k) of the recording."""
-        return self.known.recorded
 
 
 def _within_reach(aims: _Aims) -> tuple[Selection, int] | None:
@@ -317,8 +289,7 @@ def _fewest(aims: _Aims) -> tuple[Selection, int] | None:
     """As few set-ups as reach all aims, each repeated no more often than that needs; what comes closest where none does."""
 
     def chosen(count: int, repeats: int) -> Selection:
-        told = replace(aims.known.told, each=aims.added(repeats))
-        return choose(told, aims.start, aims.short, count)
+        return choose(replace(aims.known.told, each=aims.added(repeats)), aims.known.recorded, aims.short, count)
 
     most = min(SET_UPS, len(aims.known.told.each))
     best = chosen(most, REPEATS)
@@ -327,14 +298,14 @@ def _fewest(aims: _Aims) -> tuple[Selection, int] | None:
     if best.after > 0:
         best = chosen(most, _HOPELESS)
         return (best, _HOPELESS) if best.after < best.before - _WORTH else None
-    few, count = 0, most
-    while count - few > 1:
-        middle = (few + count) // 2
-        reached = chosen(middle, REPEATS).after <= 0
-        few, count = (few, middle) if reached else (middle, count)
-    few, repeats = 0, REPEATS
-    while repeats - few > 1:
-        middle = (few + repeats) // 2
-        reached = chosen(count, middle).after <= 0
-        few, repeats = (few, middle) if reached else (middle, repeats)
+
+    def fewest(most: int, reached: Callable[[int], bool]) -> int:
+        few = 0
+        while most - few > 1:
+            middle = (few + most) // 2
+            few, most = (few, middle) if reached(middle) else (middle, most)
+        return most
+
+    count = fewest(most, lambda count: chosen(count, REPEATS).after <= 0)
+    repeats = fewest(REPEATS, lambda repeats: chosen(count, repeats).after <= 0)
     return chosen(count, repeats), repeats

@@ -19,6 +19,7 @@ from cmm_uq.jobs.tables.plan import PlanFacts
 
 _ALONG = np.cos(np.radians(3.0))  # cosine from which on a direction is one that a fixture allows
 _ROUNDING = 1e-6
+_FLAT = 1e-3  # extent across an artefact, over its length, below which it has none
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +37,14 @@ class Volume:
         """What a job says: ``[plan] volume_mm``, else the machine's travel, else where points were recorded (n, 3)."""
         box = np.empty((3, 2))
         for i, axis in enumerate(AXES):
+            low, high = machine.travel_mm[i]
             if axis in plan.volume_mm:
-                box[i] = _within_travel(machine, axis, plan.volume_mm[axis])
+                box[i] = plan.volume_mm[axis]
+                if box[i, 0] < low - _ROUNDING or box[i, 1] > high + _ROUNDING:  # false where the travel is not known
+                    raise CmmUqError(
+                        f"{axis} = [{box[i, 0]:g}, {box[i, 1]:g}] mm goes beyond the travel of {low:g} to {high:g} mm",
+                        where="job.toml [plan] volume_mm", fix="Keep inside the travel, or mend [machine] travel_mm",
+                    )  # fmt: skip
             elif recorded is not None and not np.all(np.isfinite(machine.travel_mm[i])):
                 box[i] = recorded[:, i].min() - plan.margin_mm, recorded[:, i].max() + plan.margin_mm
             else:
@@ -91,9 +98,8 @@ class Volume:
     def too_small(self, turned: Floats, title: Text) -> CmmUqError:
         """Why a body (n, 3) has no room."""
         extent = np.ptp(turned, axis=0)
-        over = extent - self.size
-        axis = int(np.argmax(over))
-        if over[axis] <= _ROUNDING:
+        axis = int(np.argmax(extent - self.size))
+        if extent[axis] - self.size[axis] <= _ROUNDING:
             return CmmUqError(
                 f"no height of {self.heights[0]:g} to {self.heights[1]:g} mm leaves room for it ({title})",
                 where="job.toml [plan.fixtures] heights_mm", fix="Allow other heights, or name another plan",
@@ -105,19 +111,6 @@ class Volume:
         )  # fmt: skip
 
 
-def _within_travel(machine: Machine, axis: str, interval: Sequence[float]) -> Sequence[float]:
-    low, high = machine.travel_mm[AXES.index(axis)]
-    if interval[0] < low - _ROUNDING or interval[1] > high + _ROUNDING:  # false where the travel is not known
-        raise CmmUqError(
-            f"{axis} = [{interval[0]:g}, {interval[1]:g}] mm goes beyond the travel of {low:g} to {high:g} mm",
-            where="job.toml [plan] volume_mm", fix="Keep inside the travel, or mend [machine] travel_mm",
-        )  # fmt: skip
-    return interval
-
-
-_FLAT = 1e-3  # extent across an artefact, over its length, below which it has none
-
-
 def turned_set_ups(placings: Sequence[SetUp], volume: Volume) -> Iterator[SetUp]:
     """Each set-up with the artefact turned about its own axes, where it then fits."""
     for placing in placings:
@@ -125,7 +118,8 @@ def turned_set_ups(placings: Sequence[SetUp], volume: Volume) -> Iterator[SetUp]
         for words, turn in _turns(pattern.body):
             wanted = attitude @ turn
             room = volume.room(pattern.turned(wanted))
-            if room is None or not _held(pattern.body, wanted, volume):
+            thin = np.ptp(pattern.body, axis=0)[1] < _FLAT * np.ptp(pattern.body, axis=0)[0]
+            if room is None or not volume.allows(wanted[:, 0] if thin else wanted[:, 2]):
                 continue
             middle = np.clip(placing.points.machine_xyz.mean(axis=0), room[:, 0], room[:, 1])
             title = say("{title}, {turned}", title=placing.title, turned=words)
@@ -140,11 +134,9 @@ def _turns(body: Floats) -> list[tuple[Text, Floats]]:
     ends: list[tuple[Text, Floats]] = [(say("ends exchanged"), _about(2, 2))]
     if extent[1] < _FLAT * extent[0]:
         return ends
-    # about the normal
-    quarters: list[tuple[Text, Floats]] = [
-        (say("turned by {angle:.0f}°", angle=90.0 * quarter), _about(2, quarter)) for quarter in (1, 2, 3)
-    ]
-    return [*quarters, (say("turned over"), _about(0, 2))]
+    # quarters about the normal
+    angles = [(say("turned by {angle:.0f}°", angle=90.0 * quarter), _about(2, quarter)) for quarter in (1, 2, 3)]
+    return [*angles, (say("turned over"), _about(0, 2))]
 
 
 def _about(axis: int, quarters: int) -> Floats:
@@ -155,8 +147,3 @@ def _about(axis: int, quarters: int) -> Floats:
     turn[u, u] = turn[v, v] = cosine
     turn[v, u], turn[u, v] = sine, -sine
     return turn
-
-
-def _held(body: Floats, attitude: Floats, volume: Volume) -> bool:
-    thin = np.ptp(body, axis=0)[1] < _FLAT * np.ptp(body, axis=0)[0]
-    return volume.allows(attitude[:, 0] if thin else attitude[:, 2])

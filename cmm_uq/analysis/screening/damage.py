@@ -26,8 +26,9 @@ MOST = 0.2  # part of the rows that may be left out; with more damage the record
 _PART, _STRAYS = 0.2, 0.05
 _FEW, _MANY = 16, 60
 _MOST_BALLS = 400
-_SAME_PLACE = 10.0
-_TRAVEL_TOLERANCE = 1.0
+_SAME_PLACE, _TRAVEL_TOLERANCE = 10.0, 1.0  # mm
+_SEVERAL, _EDGES = 4, 0.05
+_ABSURD = (1.0, 2e4)  # mm; a bar shorter or longer than this is in another unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +43,7 @@ class Damage:
 
 
 class DamageSearch:
-    """The points that miss an artefact, and what makes them fit.
-
-    ``points`` the recording; ``shape`` what its artefact asks of them. ``misfit`` (n,) by how much each point misses
-    the artefact, mm; ``bad`` (n,) points that miss it by too much, and a few that lie as far outside the travel as that
-    is long.
-    """
+    """The points that miss an artefact by ``misfit`` (n,), mm, and what makes them fit; ``bad`` (n,) are astray as well."""
 
     def __init__(self, points: Points, shape: ArtefactShape) -> None:
         self.points, self.shape = points, shape
@@ -96,15 +92,14 @@ class DamageSearch:
     def _finding(self, cause: Damage) -> Finding:
         rows = cause.rows
         amount = float(self.misfit[rows].max())
-        missed = (
-            say("the artefact is missed by {amount:.3g} mm, far more than any machine's error", amount=amount)
-            if np.isfinite(amount)
-            else say("the artefact is missed far more than any machine's error")
-        )
-        what = missed if amount > self.shape.tolerance else say("the readings lie far outside the travel")
-        told = say("{at_lines}: {what}; {why}", at_lines=at_lines(self.points, rows), what=what, why=cause.why)
+        what = say("the readings lie far outside the travel")
+        if amount > self.shape.tolerance and np.isfinite(amount):
+            what = say("the artefact is missed by {amount:.3g} mm, far more than any machine's error", amount=amount)
+        elif amount > self.shape.tolerance:
+            what = say("the artefact is missed far more than any machine's error")
+        why = say("{at_lines}: {what}; {why}", at_lines=at_lines(self.points, rows), what=what, why=cause.why)
         lost = tuple(int(row) for row in self._lost_with(rows))
-        return replace(finding(cause.kind, self.points, rows, told, cause.column), set_aside=True, rows=lost)
+        return replace(finding(cause.kind, self.points, rows, why, cause.column), set_aside=True, rows=lost)
 
     def _lost_with(self, rows: Ints) -> Ints:
         return np.flatnonzero(np.isin(self.points.group, self.points.group[rows])) if self.shape.together else rows
@@ -115,15 +110,12 @@ class DamageSearch:
     def _copies(self) -> Iterator[Damage]:
         """Rows with all three coordinates of another row, where they do not fit; those of one block together."""
         _, same = np.unique(self.points.xyz, axis=0, return_inverse=True)
-        rows, originals = [], []
+        keys = np.column_stack([self.points.measurement, self.points.point])
+        copies: list[tuple[int, int]] = []
         for row in np.flatnonzero(self._open):
-            others = np.flatnonzero(same.ravel() == same.ravel()[row])
-            keys = np.column_stack([self.points.measurement, self.points.point])
-            others = others[np.asarray(np.any(keys[others] != keys[np.full(len(others), row)], axis=1))]
-            if len(others):
-                rows.append(row)
-                originals.append(others[0])
-        block, source = np.array(rows, dtype=np.int64), np.array(originals, dtype=np.int64)
+            others = np.flatnonzero((same.ravel() == same.ravel()[row]) & np.any(keys != keys[row], axis=1))
+            copies += [(int(row), int(others[0]))] if len(others) else []
+        block, source = np.array(copies, dtype=np.int64).reshape(-1, 2).T
         offset = np.diff(block - source, prepend=0, append=0) if len(block) else block
         for start, end in pairwise(sorted({0, *np.flatnonzero(offset).tolist(), len(block)})):
             lines = at_lines(self.points, source[start:end])
@@ -145,18 +137,17 @@ class DamageSearch:
             xyz = self._xyz.copy()
             xyz[chosen] = xyz[chosen[::-1]]
             if self._fit(chosen, xyz, self._reference):
-                why = self._exchanged(chosen)
+                one, other = (
+                    say("point {point} of measurement {measurement}", point=point, measurement=measurement)
+                    for point, measurement in zip(
+                        self.points.point[chosen], self.points.measurement[chosen], strict=True
+                    )
+                )
+                why = say("{one} and {other} are exchanged: exchange their coordinates", one=one, other=other)
+                if self.shape.is_bar:
+                    why = say("{one} and {other}, or the other ends of these bars, are exchanged: exchange their coordinates",
+                              one=one, other=other)  # fmt: skip
                 yield Damage("swapped", chosen, why, None, (xyz, self._reference))
-
-    def _exchanged(self, pair: Ints) -> Text:
-        one, other = (
-            say("point {point} of measurement {measurement}", point=point, measurement=measurement)
-            for point, measurement in zip(self.points.point[pair], self.points.measurement[pair], strict=True)
-        )
-        if self.shape.is_bar:
-            return say("{one} and {other}, or the other ends of these bars, are exchanged: exchange their coordinates",
-                       one=one, other=other)  # fmt: skip
-        return say("{one} and {other} are exchanged: exchange their coordinates", one=one, other=other)
 
     def _blocks(self) -> Iterator[Damage]:
         both = (*row_mistakes(self.shape), *block_mistakes(self.shape))
@@ -208,20 +199,14 @@ class DamageSearch:
         return None
 
     def _fit(self, rows: Ints, xyz: Floats, reference: Floats, edges: int = 0) -> bool:
-        after = self.shape.misfit(xyz, reference, self._placings(rows))[rows]
-        return (
-            int(np.sum(after > self._fine)) <= edges
-            and not (self._inside and np.any(outside_travel(self.points.at(xyz))[rows]))
-            and self._near_repeats(rows, xyz) >= len(rows) - edges
-        )
-
-    def _near_repeats(self, rows: Ints, xyz: Floats) -> int:
-        near, points = 0, self.points
+        after, points, near = self.shape.misfit(xyz, reference, self._placings(rows))[rows], self.points, 0
+        if np.sum(after > self._fine) > edges or (self._inside and np.any(outside_travel(points.at(xyz))[rows])):
+            return False
         for row in rows:
             same = (points.measurement == points.measurement[row]) & (points.point == points.point[row]) & ~self.bad
             same[rows] = False
             near += not same.any() or bool(np.linalg.norm(xyz[same] - xyz[row], axis=1).min() < _SAME_PLACE)
-        return near
+        return near >= len(rows) - edges
 
     def _numbered_otherwise(self, rows: Ints) -> bool:
         if not self.shape.names[2:] or self.shape.names[0] == "nx" or len(rows) > _MOST_BALLS:
@@ -242,80 +227,57 @@ def outside_travel(points: Points) -> NDArray[np.bool_]:
     return np.asarray((readings < low - _TRAVEL_TOLERANCE) | (readings > high + _TRAVEL_TOLERANCE))
 
 
-_SEVERAL = 4
-_EDGES = 0.05
-_ABSURD = (1.0, 2e4)  # mm; a bar shorter or longer than this is in another unit
-
-
 def coordinate_findings(
     points: Points, shape: ArtefactShape, observe: Observed, set_aside: Collection[int], where: str
 ) -> list[Finding]:
     """Damaged coordinates, each with the rows to leave out. ``where`` the recording's name, for messages."""
-    _refuse_absurd_size(shape, where)
+    low, high = _ABSURD
+    if shape.is_bar and not np.isfinite(shape.size) and not low <= shape.extent <= high:
+        unit = "metres" if shape.extent < low else "micrometres"
+        problem = f"the recorded bars are about {shape.extent:.3g} mm long: the coordinates look like {unit}, not mm"
+        raise CmmUqError(problem, where=where, fix="Give x_mm, y_mm, z_mm in mm")
     search = DamageSearch(points, shape)
-    counted = ~np.isin(points.measurement, list(set_aside))
-    if search.bad.sum() >= _SEVERAL:
-        _refuse_whole(search, where)
+    counted, bad = ~np.isin(points.measurement, list(set_aside)), int(search.bad.sum())
+    missed = f"{bad} of {len(points)} points miss the artefact by up to {search.misfit.max():.3g} mm"
+    if bad >= _SEVERAL:
+        _refuse_whole(search, missed, where)
     if 2 * int(search.bad[counted].sum()) > counted.sum():
-        observe(search.points)
-        raise CmmUqError(
-            _missed(search), where=where, fix="Check [artefact] in job.toml, and the order of rows and columns"
-        )
-    found = search.findings() if search.bad.any() else []
+        observe(points)  # refuses another artefact in its own words, where its checks see it
+        raise CmmUqError(missed, where=where, fix="Check [artefact] in job.toml, and the order of rows and columns")
+    found = search.findings() if bad else []
     lost = {row for f in found for row in f.rows if counted[row]}
     if len(lost) > max(MOST * len(points), 2):
+        problem = f"{len(lost)} of {len(points)} points do not fit the artefact; {found[0].why}"
         raise CmmUqError(
-            f"{len(lost)} of {len(points)} points do not fit the artefact; {found[0].why}", where=where,
-            fix="So much of a recording cannot be left out: mend it, or measure again",
-        )  # fmt: skip
+            problem, where=where, fix="So much of a recording cannot be left out: mend it, or measure again"
+        )
     return found + _reversed_bars(points, shape)
 
 
-def _refuse_absurd_size(shape: ArtefactShape, where: str) -> None:
-    low, high = _ABSURD
-    if np.isfinite(shape.size) or not shape.is_bar or low <= shape.extent <= high:
-        return
-    unit = "metres" if shape.extent < low else "micrometres"
-    raise CmmUqError(
-        f"the recorded bars are about {shape.extent:.3g} mm long: the coordinates look like {unit}, not mm",
-        where=where,
-        fix="Give x_mm, y_mm, z_mm in mm",
-    )
-
-
-def _refuse_whole(search: DamageSearch, where: str) -> None:
+def _refuse_whole(search: DamageSearch, missed: str, where: str) -> None:
     points, shape = search.points, search.shape
     bad = int(search.bad.sum())
-    told = _missed(search)
     best, fewest = None, min(max(2, int(_EDGES * len(points))), bad // _SEVERAL)
     strays = max(_EDGES, _astray(points))
+    free = np.isnan(shape.size) and not shape.reference.shape[1]
     for change in (*row_mistakes(shape), *block_mistakes(shape)):
-        free = np.isnan(shape.size) and not shape.reference.shape[1]
-        if bool(free and change.kind == "unit" and change.apply(np.ones((1, 3)), np.zeros((1, 0)))[0].min() < 1):
+        if free and change.kind == "unit" and change.apply(np.ones((1, 3)), np.zeros((1, 0)))[0].min() < 1:
             continue
         xyz, reference = search.changed(change, np.arange(len(points)))
         left = int(np.sum(shape.misfit(xyz, reference) > shape.tolerance))
         if left <= fewest and _astray(points.at(xyz)) <= strays:
             best, fewest = change, left - 1
     if best is not None:
-        raise CmmUqError(f"{told}, and fit once one mistake is undone: {best.what}",
-                         where=f"{where}, column {best.columns[0]}", fix=best.fix)  # fmt: skip
+        problem = f"{missed}, and fit once one mistake is undone: {best.what}"
+        raise CmmUqError(problem, where=f"{where}, column {best.columns[0]}", fix=best.fix)
     for axis, column in zip(AXES, points.xyz.T, strict=True):
         if np.ptp(column) == 0 and bad > MOST * len(points):
-            raise CmmUqError(
-                f"{told}: {axis}_mm is stuck at {column[0]:g} in every row",
-                where=f"{where}, column {axis}_mm",
-                fix="Export the recording again",
-            )
+            problem = f"{missed}: {axis}_mm is stuck at {column[0]:g} in every row"
+            raise CmmUqError(problem, where=f"{where}, column {axis}_mm", fix="Export the recording again")
 
 
 def _astray(points: Points) -> float:
     return float(np.any(outside_travel(points), axis=1).mean())
-
-
-def _missed(search: DamageSearch) -> str:
-    bad = int(search.bad.sum())
-    return f"{bad} of {len(search.points)} points miss the artefact by up to {search.misfit.max():.3g} mm"
 
 
 def _reversed_bars(points: Points, shape: ArtefactShape) -> list[Finding]:
@@ -326,13 +288,10 @@ def _reversed_bars(points: Points, shape: ArtefactShape) -> list[Finding]:
     found = []
     placings = Placings.of(points.measurement[ends[:, 0]])
     for number, own in zip(placings.numbers, placings.rows, strict=True):
-        if len(own) < 2:
-            continue
         against = bars[own] @ bars[own[0]] < 0
-        if not against.any():
+        if len(own) < 2 or not against.any():
             continue
-        fewer = own[against] if against.sum() <= len(own) / 2 else own[~against]
-        rows = ends[fewer].ravel()
+        rows = ends[own[against] if against.sum() <= len(own) / 2 else own[~against]].ravel()
         why = say(
             "{at_lines}: balls 1 and 2 of measurement {number} are exchanged against its other repeats. "
             "The length does not show it; what was recorded beside each ball (approach, temperatures) "

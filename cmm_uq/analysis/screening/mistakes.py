@@ -16,9 +16,8 @@ from cmm_uq.analysis.screening.shape import ArtefactShape
 from cmm_uq.base.messages import Text, Verbatim, commas, plural, say
 from cmm_uq.base.points import AXES, Floats
 
+# millimetres in what the recording may hold instead
 UNITS = ((25.4, say("inches")), (1e3, say("metres")), (1e-3, say("micrometres")), (10.0, say("centimetres")))
-"""Millimetres in what the recording may hold instead."""
-
 TWICE = ((1 / 25.4, say("inches converted twice")),)
 COORDINATES = tuple(f"{a}_mm" for a in AXES)
 
@@ -36,7 +35,6 @@ class Mistake:
     edges: int = 0  # rows that it cannot mend
 
     def apply(self, xyz: Floats, reference: Floats) -> tuple[Floats, Floats]:
-        """Coordinates (k, 3) and references (k, j) as they would be without it."""
         return (xyz, self.undo(reference)) if self.of_references else (self.undo(xyz), reference)
 
 
@@ -75,14 +73,15 @@ def _units(
             columns, scale = _named(concerned), np.where(np.isin(np.arange(len(names)), chosen), factor, 1.0)
             one = say("{columns} looks like {unit}, not mm", columns=columns, unit=unit)
             many = say("{columns} look like {unit}, not mm", columns=columns, unit=unit)
-            fix = say("Convert to mm (times {factor:g})", factor=factor)
-            what = plural(len(concerned), one=one, many=many)
+            what, fix = (
+                plural(len(concerned), one=one, many=many),
+                say("Convert to mm (times {factor:g})", factor=factor),
+            )
             yield Mistake("unit", what, fix, concerned, partial(np.multiply, scale), of_references)
 
 
 def _signs(names: tuple[str, ...], *, of_references: bool = False) -> Iterator[Mistake]:
-    several = [(0, 1, 2)] if of_references else []
-    for chosen in (*((i,) for i in range(3)), *several):
+    for chosen in (*((i,) for i in range(3)), *([(0, 1, 2)] if of_references else [])):
         concerned = tuple(names[i] for i in chosen)
         columns, sign = _named(concerned), np.where(np.isin(np.arange(3), chosen), -1.0, 1.0)
         one = say("{columns} seems to have the wrong sign", columns=columns)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,26 +127,16 @@ def impossible_values(points: Points, *, balls: bool = False) -> list[Finding]:
 
 def repeated_figures(points: Points) -> list[Finding]:
     """Measurements whose coordinates repeat, digit for digit, those of another measurement; runs of them as one block."""
-    copies = sorted((original, later) for later, original in copied_measurements(points).items())
-    copies.sort(key=lambda pair: pair[1])
-    runs: list[list[tuple[int, int]]] = []
-    for a, b in copies:
-        if runs and runs[-1][-1] == (a - 1, b - 1):
-            runs[-1].append((a, b))
-        else:
-            runs.append([(a, b)])
-    return [_copied(points, run) for run in runs]
+    copies = sorted(copied_measurements(points).items())
+    blocks = groupby(enumerate(copies), key=lambda pair: (pair[1][0] - pair[0], pair[1][1] - pair[0]))
+    return [_copied(points, [(original, later) for _, (later, original) in block]) for _, block in blocks]
 
 
 def gross_outliers(linear: LinearModel, measurement: NDArray[np.int64], least: float = 0.0) -> list[tuple[int, float]]:
     """Observations (index, times of their standard deviation) that noise would hardly ever put so far off.
 
-    Externally studentised residuals against their t distribution, the probability multiplied by the number of
-    observations (Bonferroni; Barnett & Lewis 1994, 8.2); the worst is taken out and the rest tested again, up to a tenth
-    of the recording.
-
-    ``linear`` with its estimate's observations; ``measurement`` (m,) of each observation; ``least`` mm, noise that the
-    observations have however little they scatter, as that of their last digit.
+    Externally studentised residuals against their t distribution, times the number of observations (Bonferroni; Barnett &
+    Lewis 1994, 8.2); the worst is taken out and the rest tested again. ``least`` mm is noise they have at least.
     """
     reduced = linear.reduced
     keep = np.ones(len(reduced.observed), dtype=bool)
@@ -174,17 +165,17 @@ def gross_outliers(linear: LinearModel, measurement: NDArray[np.int64], least: f
 def _copied(points: Points, run: Sequence[tuple[int, int]]) -> Finding:
     originals, later = zip(*run, strict=True)
     both = np.isin(points.group, (*originals, *later))
+    first, last, original, final = (
+        points.run_of(group)[0] for group in (later[0], later[-1], originals[0], originals[-1])
+    )
     if len(run) == 1:
-        a, b = _measurement(points, originals[0]), _measurement(points, later[0])
         why = say(
             "measurement {b} repeats the coordinates of measurement {a} to the last digit: a copy, not a measurement, and "
             "counts once",
-            b=b,
-            a=a,
+            b=first,
+            a=original,
         )
-        return replace(finding("duplicate", points, both, why), measurements=(a, b))
-    ends = [_measurement(points, group) for group in (later[0], later[-1], originals[0], originals[-1])]
-    first, last, original, final = ends
+        return replace(finding("duplicate", points, both, why), measurements=(original, first))
     block = say(
         "measurements {first} to {last} repeat the coordinates of measurements {original} to {final} to the last digit: a "
         "block pasted twice, whose copies say nothing: remove them, or record what was measured",
@@ -197,10 +188,6 @@ def _copied(points: Points, run: Sequence[tuple[int, int]]) -> Finding:
     return replace(finding("repeated block", points, both, block), rows=rows)
 
 
-def _measurement(points: Points, group: int) -> int:
-    return points.run_of(group)[0]
-
-
 def _aside(item: Finding, set_aside: Collection[int]) -> bool:
     *others, last = item.measurements
     return last in set_aside or (item.kind == "duplicate" and not any(other in set_aside for other in others))
@@ -210,20 +197,15 @@ def _reversal(item: Finding, points: Points, needed: Collection[str]) -> Finding
     if item.kind != "swapped" or item.rows:
         return item
     rows = np.flatnonzero(np.isin(points.lines, item.lines)) if len(points.lines) else np.zeros(0, dtype=np.int64)
-    differing = [
-        name
-        for name in needed
-        for group in np.unique(points.group[rows])
-        if np.ptp(points.column(name)[points.group == group]) > 0
-    ]
-    if not differing:
-        return item
-    why = say(
-        "{why}; the model uses {differing}: number the balls as in the other repeats",
-        why=item.why,
-        differing=Verbatim(differing[0]),
-    )
-    return replace(item, kind=REVERSED, set_aside=True, rows=tuple(rows.tolist()), why=why)
+    for name in needed:
+        if any(np.ptp(points.column(name)[points.group == group]) > 0 for group in np.unique(points.group[rows])):
+            why = say(
+                "{why}; the model uses {differing}: number the balls as in the other repeats",
+                why=item.why,
+                differing=Verbatim(name),
+            )
+            return replace(item, kind=REVERSED, set_aside=True, rows=tuple(rows.tolist()), why=why)
+    return item
 
 
 def _left_out(item: Finding) -> Finding:

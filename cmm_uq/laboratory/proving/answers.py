@@ -57,16 +57,15 @@ class AnswersFolder:
             part.replace(sealed)
         path = self.folder / RECORDS
         content = path.read_bytes() if path.exists() else b""
-        found: dict[int, Record] = {}
-        end = 0
+        records: dict[int, Record] = {}
+        whole = 0
         for line in content.splitlines(keepends=True):
             try:
                 record: Record = json.loads(line) if line.endswith(b"\n") else {}
-                found[int(record["number"])] = record
+                records[int(record["number"])] = record
             except (ValueError, TypeError, KeyError):
                 break
-            end += len(line)
-        records, whole = found, end
+            whole += len(line)
         if whole < len(content):
             with path.open("rb+") as file:
                 file.truncate(whole)

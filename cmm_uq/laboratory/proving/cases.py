@@ -72,17 +72,14 @@ class Case:
         return {**asdict(self), "noise": micrometres(self.noise)}
 
 
-def _told(forgets_s: float) -> float | str:
-    return forgets_s if isfinite(forgets_s) else "never"
-
-
 def micrometres(noise: Noise) -> dict[str, Any]:
     """A noise for results.json."""
-    x, y, z = (float(each) / MICROMETRE for each in np.broadcast_to(np.asarray(noise.coordinate), 3))
+    coordinate = np.broadcast_to(np.asarray(noise.coordinate), 3)
+    forgets_s = noise.slow_time_s if isfinite(noise.slow_time_s) else "never"
     return {
-        **dict(zip((f"{axis}_um" for axis in AXES), (x, y, z), strict=True)),
+        **{f"{axis}_um": float(each) / MICROMETRE for axis, each in zip(AXES, coordinate, strict=True)},
         "placing_um": noise.placing / MICROMETRE, "growth_um": noise.growth / MICROMETRE,
-        "slow_um": noise.slow / MICROMETRE, "slow_time_s": _told(noise.slow_time_s) if noise.slow else None,
+        "slow_um": noise.slow / MICROMETRE, "slow_time_s": forgets_s if noise.slow else None,
         "tails_dof": noise.tails or None, "resolution_um": noise.resolution / MICROMETRE,
     }  # fmt: skip
 
@@ -91,8 +88,7 @@ SCHEMA = "cmm-uq/prove-truth/1"
 
 
 def truth_file(cases: Sequence[Case], common: Mapping[str, Any]) -> bytes:
-    whole = {"schema": SCHEMA, **common, "cases": [case.as_data() for case in cases]}
-    return canonical_json(whole)
+    return canonical_json({"schema": SCHEMA, **common, "cases": [case.as_data() for case in cases]})
 
 
 def canonical_json(data: Any) -> bytes:

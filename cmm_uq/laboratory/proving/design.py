@@ -37,8 +37,8 @@ from cmm_uq.maths.inference.noise import AXES as AXIS_NOISE, GROWTH, PLACING, SL
 _LARGEST_FOREIGN_UM = 200.0
 _SHORTEST_PERIOD_MM = 6.0  # as the diagnosis tries them; beyond the range of the readings a wave is no wave
 _ATTEMPTS = 40
+# how kinds of noise differ from the job's own, in units of its reading noise; forgetting over a part of the duration
 _AXIS_TIMES, _GROWN_TIMES, _DOF, _STEP_TIMES, _SLOW_PART, _WALKED_TIMES = 3.0, 2.0, 4.0, 3.0, 0.125, 2.0
-"""How the kinds of noise differ from the job's own, in units of its reading noise; forgetting over a part of the duration."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,20 +68,17 @@ class Design:
     def noises(self) -> tuple[str, ...]:
         """Kinds of noise that these set-ups could show, in the order of cases: every other one the job's own."""
         possible = noise_of(self.model, values=self.values).possible
-        asked = (
-            (cases.SET_UP, PLACING),
-            (cases.AXIS, AXIS_NOISE),
-            (cases.GROWING, GROWTH),
-            (cases.SLOWLY, SLOW),
-            (cases.WALKING, SLOW),
+        asked = {
+            cases.SET_UP: PLACING,
+            cases.AXIS: AXIS_NOISE,
+            cases.GROWING: GROWTH,
+            cases.SLOWLY: SLOW,
+            cases.WALKING: SLOW,
+        }
+        shown = (kind for kind, component in asked.items() if component in possible)
+        return tuple(
+            each for kind in (cases.WHITE, *shown, cases.TAILS, cases.RESOLUTION) for each in (cases.OWN, kind)
         )
-        kinds = (
-            cases.WHITE,
-            *(kind for kind, component in asked if component in possible),
-            cases.TAILS,
-            cases.RESOLUTION,
-        )
-        return tuple(each for kind in kinds for each in (cases.OWN, kind))
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
@@ -131,15 +128,15 @@ class Design:
         rank = cycle * cases.CYCLE.count(kind) + cases.CYCLE[:place].count(kind)
         noise_kind = self.noises[rank % len(self.noises)]
         noise = self.noise_of_kind(noise_kind, random)
-        sizes = self.model.artefact.sizes
-        own = self.values[len(self.values) - len(sizes) :]
-        draws = random.standard_normal(len(sizes))
-        drawn = [s.nominal + s.sd * z if s.certified else value for s, value, z in zip(sizes, own, draws, strict=True)]
-        case = Case(number, kind, noise_kind, noise, tuple(float(size) for size in drawn))
+        own, draws = self.values[len(self.coefficients) :], random.standard_normal(len(self.model.artefact.sizes))
+        sizes = (
+            float(size.nominal + size.sd * z if size.certified else value)
+            for size, value, z in zip(self.model.artefact.sizes, own, draws, strict=True)
+        )
+        case = Case(number, kind, noise_kind, noise, tuple(sizes))
         sight = self.sight(noise)
         if kind in (cases.OUTSIDE, cases.ARTEFACT):
-            stranger = self._stranger(sight, kind, random)
-            if stranger is not None:
+            if (stranger := self._stranger(sight, kind, random)) is not None:
                 return replace(case, stranger=stranger)
             kind = cases.ONE
         hidden = self._hidden(sight, 2 if kind == cases.TWO else 1, seed, rank, random) if kind != cases.NOTHING else ()
@@ -155,8 +152,7 @@ class Design:
             first = int(order[(rank + attempt) % len(order)])
             others = [i for i in range(len(self.effects)) if i != first]
             second = [int(random.choice(others))] if count == 2 and others else []
-            found = self._of_effects(sight, [self.effects[i] for i in (first, *second)], random)
-            if found:
+            if found := self._of_effects(sight, [self.effects[i] for i in (first, *second)], random):
                 return found
         return self._hidden(sight, 1, seed, rank, random) if count == 2 else ()
 
@@ -164,8 +160,12 @@ class Design:
         self, sight: Sensitivity, chosen: list[Effect], random: np.random.Generator
     ) -> tuple[HiddenEffect, ...]:
         """These effects with strengths at random; none where one would have to be larger than physics allows."""
-        shapes = [_drawn(self._between(effect) or [], random) for effect in chosen]
-        ways = [_direction(len(effect.coefficients), random) for effect in chosen]
+        shapes = [
+            tuple(float(np.exp(random.uniform(np.log(low), np.log(high)))) for low, high in self._between(effect) or [])
+            for effect in chosen
+        ]
+        ways = [random.standard_normal(len(effect.coefficients)) for effect in chosen]
+        ways = [np.asarray(way / np.linalg.norm(way)) for way in ways]
         seen = [sight.effect(e, shape) @ way for e, shape, way in zip(chosen, shapes, ways, strict=True)]
         found = []
         for i, effect in enumerate(chosen):
@@ -184,8 +184,7 @@ class Design:
     def _stranger(self, sight: Sensitivity, kind: str, random: np.random.Generator) -> UnknownCause | None:
         faults = tuple(possible_faults(self.model))
         for _ in range(_ATTEMPTS):
-            what = str(random.choice(FUNCTIONS if kind == cases.OUTSIDE else faults))
-            found = self.stranger(sight, what, random)
+            found = self.stranger(sight, str(random.choice(FUNCTIONS if kind == cases.OUTSIDE else faults)), random)
             if found is not None and found.left >= cases.WEAKEST:
                 return found
         return None
@@ -221,42 +220,27 @@ class Design:
     def recording(self, case: Case, seed: int, effects: Mapping[str, Effect]) -> Points:
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(case.number, 1)))
         given = [(effects[h.effect], *effects[h.effect].from_reported(h.parameters)) for h in case.hidden]
-        acting_ = [*self.model.effects, *(effect for effect, _, _ in given)]
+        acting = [*self.model.effects, *(effect for effect, _, _ in given)]
         coefficients = [self.coefficients, *(each for _, each, _ in given)]
         if case.stranger is not None:
-            acting_.append(self.effect_of(case.stranger))
+            acting.append(self.effect_of(case.stranger))
             coefficients.append(np.array([case.stranger.size_um]))
-        shapes = {effect.name: shape for effect, _, shape in given}
-        model = RecordingModel(self.model.artefact, tuple(acting_), shapes={**self.model.shapes, **shapes})
-        drawn = model.simulate(
-            np.concatenate(coefficients), np.array(case.sizes), self._of_all_dates(case.noise), random
-        )
-        if not np.all(np.isfinite(drawn)):
+        shapes = {**self.model.shapes, **{effect.name: shape for effect, _, shape in given}}
+        model = RecordingModel(self.model.artefact, tuple(acting), shapes=shapes)
+        noise, times = case.noise, float(np.sqrt(self.dates))
+        x, y, z = (times * float(each) for each in np.broadcast_to(np.asarray(noise.coordinate), 3))
+        noise = replace(noise, coordinate=(x, y, z), placing=times * noise.placing, growth=times * noise.growth,
+                        slow=times * noise.slow)  # fmt: skip
+        xyz = model.simulate(np.concatenate(coefficients), np.array(case.sizes), noise, random)
+        if not np.all(np.isfinite(xyz)):
             raise CmmUqError(f"case {case.number} has no finite coordinates", where="the recording drawn")
-        artefact = self.model.artefact
-        points, xyz = artefact.points, drawn.copy()
+        artefact, points, xyz = self.model.artefact, self.model.artefact.points, xyz.copy()
         rows = np.unique(artefact.rows[artefact.unread()])
         for number in np.unique(points.measurement[rows]):
             own = np.flatnonzero(points.measurement == number)
             still = np.ptp(points.xyz[own], axis=0) <= LAST_DIGIT
             xyz[np.ix_(own, np.flatnonzero(still))] = points.xyz[np.ix_(own, np.flatnonzero(still))]
         return points.at(xyz)
-
-    def _of_all_dates(self, noise: Noise) -> Noise:
-        times = float(np.sqrt(self.dates))
-        x, y, z = (times * float(each) for each in np.broadcast_to(np.asarray(noise.coordinate), 3))
-        return replace(noise, coordinate=(x, y, z), placing=times * noise.placing, growth=times * noise.growth,
-                       slow=times * noise.slow)  # fmt: skip
-
-
-def _drawn(between: list[tuple[float, float]], random: np.random.Generator) -> tuple[float, ...]:
-    return tuple(float(np.exp(random.uniform(np.log(low), np.log(high)))) for low, high in between)
-
-
-def _direction(count: int, random: np.random.Generator) -> Floats:
-    """(count,) of length one, in prior standard deviations."""
-    way = random.standard_normal(count)
-    return np.asarray(way / np.linalg.norm(way))
 
 
 def _length(columns: Floats) -> float:

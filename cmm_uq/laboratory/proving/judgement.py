@@ -26,13 +26,11 @@ from cmm_uq.laboratory.proving.rates import DetectionCurve, Rate, Tenth, cases_t
 CONSISTENT, EXPLAINED, PARTIAL, UNEXPLAINED = "consistent", "explained", "partial", "unexplained"
 VERDICTS = (CONSISTENT, EXPLAINED, PARTIAL, UNEXPLAINED)
 REFUSED = "refused"
-ANSWER = frozenset({"number", "verdict", "effects", "groups", "named", "heldout_um"})
-"""Keys that an answer has which is no refusal."""
-
+ANSWER = frozenset({"number", "verdict", "effects", "groups", "named", "heldout_um"})  # keys of what is no refusal
+# which 95 % intervals are counted: of effects that were found; of those that the job names, by what was hidden
 STATED, NAMED, NAMED_BESIDE, NAMED_GROUPED, NAMED_MISSED = (
     "found", "named, nothing hidden", "named, all found and told apart", "named, found in a group", "named, not all found",
 )  # fmt: skip
-"""Which 95 % intervals are counted: of effects that were found; of those that the job names, by what was hidden."""
 
 _CIRCLE = 2 * np.pi
 _BINS = (3.0, 4.5, 6.0, 9.0, 12.0, 15.0)
@@ -68,50 +66,28 @@ def judge(
     with_group = {name: {name}.union(*(group for group in groups if name in group)) for name in asserted}
     reached = set().union(*with_group.values()) & set(hidden)
     alone = {name for name in reached if with_group.get(name) == {name}}
-    blameless = of_artefact if case.kind == ARTEFACT else _nobody
-    wrong = sorted(name for name, group in with_group.items() if not group & set(hidden) and not blameless(name))
+    wrong = sorted(
+        name for name, group in with_group.items()
+        if not group & set(hidden) and not (case.kind == ARTEFACT and of_artefact(name))
+    )  # fmt: skip
     counted = [
         _inside(each["parameters"], hidden[name].parameters) for name, each in asserted.items() if name in hidden
     ]
     intervals = [(STATED, k, n) for k, n in counted]
-    whole = reached == set(hidden) and not wrong
+    whole, apart, verdict = reached == set(hidden) and not wrong, alone == set(hidden), record["verdict"]
     if case.kind in (NOTHING, ONE, TWO):
-        intervals.append((_beside(case, whole=whole, apart=alone == set(hidden)), *_inside(record["named"], named)))
-    verdict = record["verdict"]
+        sort = (
+            NAMED if case.kind == NOTHING else NAMED_MISSED if not whole else NAMED_BESIDE if apart else NAMED_GROUPED
+        )
+        intervals.append((sort, *_inside(record["named"], named)))
+    fitting = {NOTHING: (CONSISTENT,), ONE: (EXPLAINED,), TWO: (EXPLAINED,), OUTSIDE: (PARTIAL, UNEXPLAINED)}
+    right = verdict in fitting.get(case.kind, (EXPLAINED, PARTIAL, UNEXPLAINED)) and (whole or case.kind == NOTHING)
+    before, after = record["heldout_um"] if record["effects"] else (None, None)
     return JudgedCase(
         case, verdict, tuple(sorted(reached)), tuple(sorted(alone)), tuple(wrong),
-        tuple((float(each["probability"]), name in hidden) for name, each in asserted.items()), tuple(intervals),
-        _right(case, verdict, whole=whole), _held_out(record),
+        tuple((float(each["probability"]), name in hidden) for name, each in asserted.items()), tuple(intervals), right,
+        None if before is None or after is None else (float(before), float(after)),
     )  # fmt: skip
-
-
-def _beside(case: Case, *, whole: bool, apart: bool) -> str:
-    if case.kind == NOTHING:
-        return NAMED
-    if not whole:
-        return NAMED_MISSED
-    return NAMED_BESIDE if apart else NAMED_GROUPED
-
-
-def _nobody(name: str) -> bool:
-    return False
-
-
-def _right(case: Case, verdict: str, *, whole: bool) -> bool:
-    if case.kind == NOTHING:
-        return verdict == CONSISTENT
-    if case.kind in (ONE, TWO):
-        return verdict == EXPLAINED and whole
-    if case.kind == OUTSIDE:
-        return verdict in (PARTIAL, UNEXPLAINED) and whole
-    return verdict != CONSISTENT and whole
-
-
-def _held_out(record: Mapping[str, Any]) -> tuple[float, float] | None:
-    if not record["effects"]:
-        return None
-    before, after = record["heldout_um"]
-    return None if before is None or after is None else (float(before), float(after))
 
 
 def _inside(said: Mapping[str, Sequence[float | None]], true: Mapping[str, float]) -> tuple[int, int]:
@@ -204,23 +180,25 @@ class ProofJudgement:
     @cached_property
     def held_out_ratio(self) -> float | None:
         """Median, over these, of the rms of predictions after over that before."""
-        each = [
-            one.heldout_um[1] / one.heldout_um[0] for one in self.answered if one.heldout_um and one.heldout_um[0] > 0
-        ]
-        return float(np.median(each)) if each else None
+        pairs = [one.heldout_um for one in self.answered if one.heldout_um and one.heldout_um[0] > 0]
+        return float(np.median([after / before for before, after in pairs])) if pairs else None
+
+    @property
+    def _strengths(self) -> list[tuple[float, bool]]:
+        return [(h.strength, h.effect in one.found) for one in self.of_kind(ONE, TWO) for h in one.case.hidden]
 
     @cached_property
     def by_strength(self) -> DetectionCurve | None:
-        each = [(h.strength, h.effect in one.found) for one in self.of_kind(ONE, TWO) for h in one.case.hidden]
-        return detection_curve([s for s, _ in each], [f for _, f in each])
+        return detection_curve([s for s, _ in self._strengths], [f for _, f in self._strengths])
 
     @cached_property
     def in_bins(self) -> tuple[tuple[float, float, Rate], ...]:
         """Hidden effects that are found, by their strength: from, to, and how many."""
-        each = [(h.strength, h.effect in one.found) for one in self.of_kind(ONE, TWO) for h in one.case.hidden]
-        pairs = list(pairwise(_BINS))
-        own = [[f for s, f in each if low <= s < high or s == high == _BINS[-1]] for low, high in pairs]
-        return tuple((low, high, Rate(sum(some), len(some))) for (low, high), some in zip(pairs, own, strict=True))
+        own = {
+            (low, high): [f for s, f in self._strengths if low <= s < high or s == high == _BINS[-1]]
+            for low, high in pairwise(_BINS)
+        }
+        return tuple((low, high, Rate(sum(some), len(some))) for (low, high), some in own.items())
 
     def of_effect(self, name: str) -> tuple[Rate, int]:
         """How often an effect was found where it was hidden, and how often it was named where it did not act."""
@@ -277,19 +255,17 @@ class AcceptanceFigure:
 
 def acceptance_figures(judgement: ProofJudgement, facts: ProveFacts) -> tuple[AcceptanceFigure, ...]:
     low, high = (each / 100 for each in facts.coverage_pct)
-    found = [
-        AcceptanceFigure(
-            "false_alarms", say("False alarms"), judgement.false_alarms, 0.0, facts.false_alarms_pct / 100
+    every = (
+        ("false_alarms", say("False alarms"), judgement.false_alarms, 0.0, facts.false_alarms_pct / 100),
+        ("coverage", say("95 % intervals that hold the truth"), judgement.coverage, low, high),
+        (
+            "wrong_names",
+            say("Cases with a wrong name"),
+            judgement.wrong_names,
+            0.0,
+            (facts.wrong_names_pct or 0.0) / 100,
         ),
-        AcceptanceFigure("coverage", say("95 % intervals that hold the truth"), judgement.coverage, low, high),
-    ]
-    if facts.wrong_names_pct is not None:
-        rate = judgement.wrong_names
-        found.append(
-            AcceptanceFigure("wrong_names", say("Cases with a wrong name"), rate, 0.0, facts.wrong_names_pct / 100)
-        )
-    if facts.found_pct is not None:
-        found.append(
-            AcceptanceFigure("found", say("Hidden effects found"), judgement.found, facts.found_pct / 100, 1.0)
-        )
-    return tuple(found)
+        ("found", say("Hidden effects found"), judgement.found, (facts.found_pct or 0.0) / 100, 1.0),
+    )
+    left_out = {"wrong_names": facts.wrong_names_pct is None, "found": facts.found_pct is None}
+    return tuple(AcceptanceFigure(*figure) for figure in every if not left_out.get(figure[0]))

@@ -42,8 +42,7 @@ class Rate:
     def interval(self) -> tuple[float, float]:
         """Lower and upper end, 95 %, each missed with half of the rest; all there is where nothing was counted."""
         n = self._effective
-        k = n * self.count / self.of if self.of else 0.0
-        return clopper_pearson(k, n)
+        return clopper_pearson(n * self.count / self.of if self.of else 0.0, n)
 
     @property
     def _effective(self) -> float:
@@ -102,9 +101,7 @@ def tenths(said: Sequence[tuple[float, bool]]) -> tuple[Tenth, ...]:
 OFTEN = 0.9
 LARGEST = 30.0  # strength up to which the answer is looked for: twice the strongest that is drawn
 FEWEST = 8  # hidden effects from which on there is an answer
-_MIDDLE = np.linspace(0.0, LARGEST, 241)
-_SLOPE = np.geomspace(0.15, 6.0, 40)
-_CURVE = np.linspace(3.0, 15.0, 49)
+_MIDDLE, _SLOPE, _CURVE = np.linspace(0.0, LARGEST, 241), np.geomspace(0.15, 6.0, 40), np.linspace(3.0, 15.0, 49)
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,16 +43,12 @@ class Reach:
 def reaches(design: Design) -> tuple[Reach, ...]:
     sight = design.sight(design.noise)
     named = {effect.name for effect in design.model.effects}
-    possible, drawn = (
-        {effect.name for effect in possible_effects(design.model)},
-        {effect.name for effect in design.effects},
-    )
-    found = []
+    possible = {effect.name for effect in possible_effects(design.model)}
+    drawn, found = {effect.name for effect in design.effects}, []
     for effect in every().values():
         if effect.name in named:
             continue
-        first = effect.reported[0]
-        prior = effect.coefficients[0].prior_sd
+        first, prior = effect.reported[0], effect.coefficients[0].prior_sd
         columns = unrecorded(design.model, effect)
         common = (effect.name, effect.title)
         if effect.name not in possible:

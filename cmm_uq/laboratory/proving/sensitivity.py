@@ -39,9 +39,8 @@ class Sensitivity:
     @classmethod
     def of(cls, model: RecordingModel, values: Floats, noise: Noise) -> Sensitivity:
         components, linear = noise_of(model, values=values), model.linearised(values)
-        reading = np.hypot(
-            np.broadcast_to(np.asarray(noise.coordinate, dtype=np.float64), 3), noise.resolution / np.sqrt(12)
-        )
+        coordinate = np.broadcast_to(np.asarray(noise.coordinate, dtype=np.float64), 3)
+        reading = np.hypot(coordinate, noise.resolution / np.sqrt(12))
         time = model.artefact.points.columns.get("time_s")
         slow = noise.slow if components.slow.shape[1] else 0.0
         duration = 0.0 if time is None else float(np.ptp(time))

@@ -54,30 +54,28 @@ class FunctionForm:
     def displacement(self, points: Points) -> Floats:
         """(n, 3, 1), mm, for a size of one micrometre."""
         u = self._scaled(points.carriages[:, AXES.index(self.over)])
+        along = points.carriages[:, AXES.index(self.along)]
+        match self.what:
+            case "step":
+                value = np.asarray(u > self.at, dtype=np.float64)
+            case "cubic":
+                value = np.asarray(0.5 * (5 * u**3 - 3 * u))
+            case "bump":
+                value = np.asarray(np.exp(-0.5 * ((u - self.at) / self.width) ** 2))
+            case "wave":
+                value = np.asarray(np.sin(np.pi * self.width * u + self.at))
+            case "jump":
+                value = (self._scaled(points.column("time_s")) > self.at) * (
+                    along / max(float(np.abs(along).max()), 1e-9)
+                )
+            case _:
+                value = np.asarray((points.measurement == self.measurement) * u**2)
         found = np.zeros((len(points), 3, 1))
-        found[:, AXES.index(self.along), 0] = MICROMETRE * self._value(u, points)
+        found[:, AXES.index(self.along), 0] = MICROMETRE * value
         return found
-
-    def _value(self, u: Floats, points: Points) -> Floats:
-        """The function (n,) of a scaled reading (n,)."""
-        if self.what == "step":
-            return np.asarray(u > self.at, dtype=np.float64)
-        if self.what == "cubic":
-            return np.asarray(0.5 * (5 * u**3 - 3 * u))
-        if self.what == "bump":
-            return np.asarray(np.exp(-0.5 * ((u - self.at) / self.width) ** 2))
-        if self.what == "wave":
-            return np.asarray(np.sin(np.pi * self.width * u + self.at))
-        if self.what == "jump":
-            return np.asarray((self._scaled(points.column("time_s")) > self.at) * self._place(points))
-        return np.asarray((points.measurement == self.measurement) * u**2)
 
     def _scaled(self, value: Floats) -> Floats:
         return np.asarray((2 * value - self.low - self.high) / max(self.high - self.low, 1e-9))
-
-    def _place(self, points: Points) -> Floats:
-        reading = points.carriages[:, AXES.index(self.along)]
-        return np.asarray(reading / max(float(np.abs(reading).max()), 1e-9))
 
 
 class FormEffect(ForeignEffect):
@@ -140,15 +138,11 @@ def artefact_fault(
         number, frames = nodes(xyz, points)
         moved = MICROMETRE * np.einsum("nij,nj->ni", frames, np.asarray(errors, dtype=np.float64)[number])
     else:
-        _, index = np.unique(points.measurement, return_inverse=True)
-        index = index.ravel()
+        index = np.unique(points.measurement, return_inverse=True)[1].ravel()
         sums = np.zeros((int(index.max()) + 1, 3))
         np.add.at(sums, index, xyz)
         from_middle = xyz - np.asarray((sums / np.bincount(index)[:, None])[index])
-        warm = np.ones(len(xyz))
-        if what == "warming":
-            _, order = np.unique(points.measurement, return_inverse=True)
-            warm = order.ravel() / max(int(order.max()), 1)
+        warm = index / max(int(index.max()), 1) if what == "warming" else np.ones(len(xyz))
         moved = (cte_per_k or _NO_RATE) * warm[:, None] * from_middle
         moved = np.asarray(MICROMETRE * moved / max(float(np.linalg.norm(moved, axis=1).max()), 1e-12))
     return UnknownArtefactFault(f"artefact: {what}", -moved[:, :, None])
