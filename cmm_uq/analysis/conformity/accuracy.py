@@ -26,12 +26,11 @@ TITLES: Mapping[str, Text] = {
 UNITS: Mapping[str, Unit] = {name: PRINTED[name.rpartition("_")[2]] for name in TITLES}
 
 _DRAWS = 1000
-_NUMBERS = 3_000_000  # Random numbers to spend on repetitions
-
+_NUMBERS = 3_000_000  # random numbers to spend on repetitions
+# repetitions of each draw at least; where so many take more random numbers, fewer of the draws are repeated
 _LEAST, _LEAST_DRAWS, _MOST_NUMBERS = 10, 200, 10_000_000
-"""Repetitions of each draw at least; where so many take more random numbers, fewer of the draws are repeated."""
-
-_AT_ONCE = 300_000  # Random numbers that are held at once: no more than a processor's cache holds
+_AT_ONCE = 300_000  # random numbers that are held at once: no more than a processor's cache holds
+Repeated = Callable[[Ints, int, np.random.Generator], Floats]  # noise (w, repetitions, m), mm, anew, for w of the draws
 
 
 def figures(lengths: Floats) -> dict[str, Floats]:
@@ -51,10 +50,6 @@ def figures(lengths: Floats) -> dict[str, Floats]:
     }
 
 
-Repeated = Callable[[Ints, int, np.random.Generator], Floats]
-"""Noise (w, repetitions, m), mm, of the recording made anew, for w of the draws."""
-
-
 def repeated_draws(draws: int, lengths: int) -> Ints:
     """Which of a posterior's draws are repeated for the figures of so many lengths."""
     most = int(np.clip(_MOST_NUMBERS // (_LEAST * lengths), _LEAST_DRAWS, _DRAWS))
@@ -64,11 +59,9 @@ def repeated_draws(draws: int, lengths: int) -> Ints:
 def with_uncertainty(
     lengths: Floats, predicted: Floats, noise: Repeated, seed: int, drawn_with: Ints | None = None
 ) -> dict[str, Quantity]:
-    """Figures of recorded lengths, with uncertainty.
+    """Figures of recorded lengths (m,), mm, with uncertainty; ``predicted`` (N, m), mm, by draws without noise.
 
-    ``lengths``: (m,) as recorded, mm; ``predicted``: (N, m) lengths that draws from the posterior predict, mm, without
-    noise; see :func:`repeated_draws`; ``drawn_with``: (m,) equal where lengths share their noise: a copy has that of
-    its original. Each its own by default.
+    ``drawn_with``: (m,) equal where lengths share their noise: a copy has that of its original. Each its own by default.
     """
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
     shared: Ints | slice = slice(None)

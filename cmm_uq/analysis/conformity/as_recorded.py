@@ -58,9 +58,7 @@ class OutsideReadings:
 
     def any_of(self, rows: Ints) -> NDArray[np.bool_]:
         """Which of some values (m,), each of several points (m, j), rest on a reading that was left out as outside."""
-        if self.artefact is None:
-            return np.zeros(len(rows), dtype=bool)
-        return np.asarray(self.outside[rows].any(axis=1))
+        return np.zeros(len(rows), dtype=bool) if self.artefact is None else np.asarray(self.outside[rows].any(axis=1))
 
     @property
     def without_value(self) -> tuple[Text, ...]:
@@ -68,95 +66,113 @@ class OutsideReadings:
 
     def in_words(self, measurements: Sequence[int | None]) -> list[Text]:
         """Why readings of some measurements, or of all (``None``), were left out."""
-        every = None in measurements
-        about = [f.why for f in self.findings if every or set(f.measurements) & set(measurements)]
-        told: list[Text] = [
+        about = [f.why for f in self.findings if None in measurements or set(f.measurements) & set(measurements)]
+        words: list[Text] = [
             say("Outside, and left out of the estimates alone: {why}.", why=why) for why in about[:_NAMED]
         ]
         if len(about) > _NAMED:
-            told.append(say("Outside, too, are the readings of {count} findings more.", count=len(about) - _NAMED))
-        return told
+            words.append(say("Outside, too, are the readings of {count} findings more.", count=len(about) - _NAMED))
+        return words
 
 
-class AsRecorded(Artefact):
+class Around(Artefact):
+    """An artefact that is as another one but for what its class says otherwise."""
+
+    def __init__(self, inner: Artefact, points: Points | None = None) -> None:
+        self.inner = inner
+        self.kind, self.title, self.points, self.sizes = (
+            inner.kind,
+            inner.title,
+            inner.points if points is None else points,
+            inner.sizes,
+        )
+        self.noise_scale, self.rows = inner.noise_scale, inner.rows
+        self.measurement, self.repeat = inner.measurement, inner.repeat
+
+    def indications(self) -> Indications | None:
+        return self.inner.indications()
+
+    def lengths(self) -> Floats | None:
+        return self.inner.lengths()
+
+    def forms(self) -> Forms | None:
+        return self.inner.forms()
+
+    def lines_of(self, rows: Ints) -> tuple[Floats, Floats]:
+        return self.inner.lines_of(rows)
+
+    def bidirectional(self, rows: Ints) -> NDArray[np.bool_] | None:
+        return self.inner.bidirectional(rows)
+
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        return self.inner.fit(true_xyz, sizes)
+
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        return self.inner.project(xyz, displacement)
+
+    def size_change(self) -> Floats:
+        return self.inner.size_change()
+
+
+class AsRecorded(Around):
     """An artefact with the readings that were left out of it: what rests on others is as these alone have it."""
 
     def __init__(self, own: Artefact, raw: Artefact, left_out: OutsideReadings) -> None:
-        self.own, self._raw, self._kept, self._xyz = own, raw, left_out.kept, left_out.xyz
-        at = np.flatnonzero(self._kept)
         xyz = left_out.xyz.copy()
-        xyz[at] = own.points.xyz
-        self.kind, self.title, self.points, self.sizes = raw.kind, raw.title, raw.points.at(xyz), own.sizes
-        self.noise_scale, self.rows, self.measurement, self.repeat = (
-            raw.noise_scale,
-            raw.rows,
-            raw.measurement,
-            raw.repeat,
-        )
-        self._at, self._back = at, np.cumsum(self._kept) - 1
+        xyz[left_out.kept] = own.points.xyz
+        super().__init__(raw, raw.points.at(xyz))
+        self.own, self.sizes, self._kept, self._xyz = own, own.sizes, left_out.kept, left_out.xyz
+        self._at, self._back = np.flatnonzero(self._kept), np.cumsum(self._kept) - 1
 
     def indications(self) -> Indications | None:
-        own, raw = self.own.indications(), self._raw.indications()
+        own, raw = self.own.indications(), self.inner.indications()
         if own is None or raw is None:
             return raw
-        recorded, placed = (_distances(xyz, raw.rows) for xyz in (self._xyz, self._raw.points.xyz))
+        ends = (xyz[raw.rows[:, 1]] - xyz[raw.rows[:, 0]] for xyz in (self._xyz, self.inner.points.xyz))
+        recorded, placed = (np.asarray(np.linalg.norm(each, axis=1), dtype=np.float64) for each in ends)
         return replace(raw, errors=_merged(raw.errors + (recorded - placed), raw.rows, own.errors, self._at[own.rows]))
 
     def lengths(self) -> Floats | None:
-        own, raw = self.own.lengths(), self._raw.lengths()
+        own, raw = self.own.lengths(), self.inner.lengths()
         return raw if own is None or raw is None else _merged(raw, self.rows, own, self._at[self.own.rows])
 
     def forms(self) -> Forms | None:
-        own, raw = self.own.forms(), self._raw.forms()
+        own, raw = self.own.forms(), self.inner.forms()
         if own is None or raw is None:
             return raw
         runs, counts = (np.column_stack([f.measurement, f.repeat, f.count]).tolist() for f in (raw, own))
         chosen = {tuple(run): i for i, run in enumerate(counts)}
         same = [(i, chosen[tuple(run)]) for i, run in enumerate(runs) if tuple(run) in chosen]
         to, of = np.array(same, dtype=np.int64).reshape(-1, 2).T
-
-        def mixed(whole: Floats | None, part: Floats | None) -> Floats | None:
-            found = None if whole is None else whole.copy()
-            if found is not None and part is not None:
-                found[to] = part[of]
-            return found
-
-        form = raw.form.copy()
-        form[to] = own.form[of]
-        return replace(raw, form=form, size=mixed(raw.size, own.size), centres=mixed(raw.centres, own.centres))
+        mixed = {}
+        for name in ("form", "size", "centres"):
+            whole, part = getattr(raw, name), getattr(own, name)
+            if whole is not None and part is not None:
+                mixed[name] = whole.copy()
+                mixed[name][to] = part[of]
+        return replace(raw, **mixed)
 
     def lines_of(self, rows: Ints) -> tuple[Floats, Floats]:
-        middles, along = (each.copy() for each in self._raw.lines_of(rows))
+        middles, along = (each.copy() for each in self.inner.lines_of(rows))
         known = self._kept[rows].all(axis=1)
         if known.any():
             middles[known], along[known] = self.own.lines_of(self._back[rows[known]])
         return middles, along
 
     def bidirectional(self, rows: Ints) -> NDArray[np.bool_] | None:
-        both, known = self._raw.bidirectional(rows), self._kept[rows].all(axis=1)
+        both, known = self.inner.bidirectional(rows), self._kept[rows].all(axis=1)
         own = self.own.bidirectional(self._back[rows[known]]) if known.any() else None
         if both is not None and own is not None:
             both = both.copy()
             both[known] = own
         return both
 
-    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        return self._raw.fit(true_xyz, sizes)
-
-    def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        return self._raw.project(xyz, displacement)
-
-    def size_change(self) -> Floats:
-        return self._raw.size_change()
-
 
 def numbered(points: Points, repeats: int | None = None, *, measurements: bool = True) -> tuple[Condition, ...]:
     """That nothing is missing from the numbering of measurements, of their repeats and of the points in each.
 
-    Whoever numbers consecutively and takes a row out leaves a gap: what stood there is not known, and the test lacks it.
-
-    ``repeats``: up to which a repeat has every point of its measurement; later ones may be of a single length;
-    ``measurements``: whether these are numbered consecutively, not after those of another recording.
+    Whoever numbers consecutively and takes a row out leaves a gap: what stood there is not known. ``repeats``: up to which a
+    repeat has every point of its measurement; ``measurements``: whether these are numbered consecutively by themselves.
     """
     absent = _absent(np.unique(points.measurement)) if measurements else []
     gaps = [say("measurement {which}: numbered, and not recorded", which=_which(absent))] if absent else []
@@ -179,15 +195,11 @@ def _gaps(points: Points, repeats: int | None) -> Iterator[Message]:
     consecutive = 2 * sum(not each for each in holes.values()) > len(holes)
     for measurement, own in runs.items():
         if absent := _absent(np.array(sorted(own))):
-            yield say(
-                "repeat {which} of measurement {measurement}: numbered, and not recorded",
-                which=_which(absent), measurement=measurement,
-            )  # fmt: skip
+            yield say("repeat {which} of measurement {measurement}: numbered, and not recorded", which=_which(absent),
+                      measurement=measurement)  # fmt: skip
         if consecutive and holes[measurement]:
-            yield say(
-                "point {which} of measurement {measurement}: numbered, and not recorded",
-                which=_which(holes[measurement]), measurement=measurement,
-            )  # fmt: skip
+            yield say("point {which} of measurement {measurement}: numbered, and not recorded",
+                      which=_which(holes[measurement]), measurement=measurement)  # fmt: skip
         asked = sorted(own)[:repeats]
         usual = set().union(*(own[repeat] for repeat in asked))
         for repeat in asked:
@@ -219,10 +231,6 @@ def _of_other_repeats(points: Points, outside: NDArray[np.bool_]) -> Floats | No
             return None
         xyz[row] = points.xyz[np.argmax(same)]
     return xyz
-
-
-def _distances(xyz: Floats, rows: Ints) -> Floats:
-    return np.asarray(np.linalg.norm(xyz[rows[:, 1]] - xyz[rows[:, 0]], axis=1), dtype=np.float64)
 
 
 def _rows(points: Points, findings: Sequence[Finding]) -> NDArray[np.bool_]:

@@ -32,28 +32,26 @@ def volumetric_performance(test: Test) -> Statement:
     """Range of the ballbar's lengths (5.5.2)."""
     artefact, measured = test.artefact, test.accuracy["b89_range_um"]
     bar = artefact.sizes[0].nominal
-    budget, told = _budget(test)
+    budget, remark = _budget(test)
     u = test.at_least(budget.u if budget.u > 0 or test.answered else measured.u, bar)
-    limit = float(test.limits_um(np.array([bar]))[0])
     lengths, aside = artefact.lengths(), bool(test.set_aside(artefact.rows).any())
     value = measured.value if lengths is None or not aside else float(np.ptp(lengths)) / MICROMETRE
-    item = test.decided(value, u, limit, signed=False, length_mm=bar, set_aside=aside)
-    return test.stated(say("range of the ballbar lengths"), say("lengths"), (item,), [told], signed=False,
-                       budget=test.budget_at_least(budget, bar) if budget.u > 0 else None)  # fmt: skip
+    item = test.decided(value, u, test.limit_um(bar), signed=False, length_mm=bar, set_aside=aside)
+    quantity = say("range of the ballbar lengths")
+    return test.stated(quantity, say("lengths"), (item,), [remark], signed=False, budget=budget)
 
 
 def _budget(test: Test) -> tuple[Budget, Text]:
     stated, size = test.circumstances.uncertainty, test.artefact.sizes[0]
     two = partial(BudgetLine, origin=JUDGEMENT, unit=unit("µm"), sensitivity=float(np.sqrt(2.0)))
     expansion = abs(test.circumstances.cte_per_k or 0.0) * size.nominal / MICROMETRE
-    u = u_of_repeats(size.nominal, test.circumstances)
     lines = [
-        BudgetLine(say("repeated readings of the bar"), stated.u_repeat_um, JUDGEMENT, unit=unit("µm")),
-    ] if u == stated.u_repeat_um else [
         BudgetLine(say("temperature of the bar, twice"), stated.u_temperature_k, JUDGEMENT, unit=unit("K"),
-             sensitivity=float(np.sqrt(2.0)) * expansion),
+                   sensitivity=float(np.sqrt(2.0)) * expansion),
         two(say("fixturing of the bar, twice"), stated.u_fixturing_um),
     ]  # fmt: skip
+    if u_of_repeats(size.nominal, test.circumstances) == stated.u_repeat_um:
+        lines = [BudgetLine(say("repeated readings of the bar"), stated.u_repeat_um, JUDGEMENT, unit=unit("µm"))]
     what = say("range of the lengths of a bar of {length} mm", length=nominal(size.nominal))
     budget = Budget(what, lines, unit=unit("µm"))
     if budget.u > 0:
@@ -90,22 +88,20 @@ def offset_probe(test: Test) -> Statement:
     test.refuse_nothing_measured(bool(found), asked)
     _, along = test.artefact.lines_of(test.artefact.rows)
     aside = {position_of(along[i]) for i in np.flatnonzero(test.set_aside(test.artefact.rows))}
-    limit, known = float(test.limits_um(np.array([bar]))[0]), test.at_least(u, bar)
     items = tuple(
-        test.decided(value, known, limit, signed=True, measurement=number, length_mm=bar, position=position,
-                     set_aside=position in aside)
+        test.decided(value, test.at_least(u, bar), test.limit_um(bar), signed=True, measurement=number, length_mm=bar,
+                     position=position, set_aside=position in aside)
         for position, number, value in found
     )  # fmt: skip
-    told = say("u is what of the bar changed between both readings.") if u > 0 else NOT_STATED
-    return test.stated(say("difference of the bar's lengths with opposite offsets, worst against its limit"),
-                       say("differences"), items, [told])  # fmt: skip
+    remark = say("u is what of the bar changed between both readings.") if u > 0 else NOT_STATED
+    quantity = say("difference of the bar's lengths with opposite offsets, worst against its limit")
+    return test.stated(quantity, say("differences"), items, [remark])
 
 
 def offset_positions(plan: OffsetPlan, artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
     """Which positions were measured with tips to both sides."""
-    lacking = dict.fromkeys(plan.positions)
-    for position, _, _ in _differences(artefact):
-        lacking.pop(position, None)
+    measured = {position for position, _, _ in _differences(artefact)}
+    lacking = dict.fromkeys(position for position in plan.positions if position not in measured)
     missing = tuple(say("{position} with the stylus tip to both sides", position=position) for position in lacking)
     return (Condition(say("four diagonals in vertical planes, each with two offsets"), missing),)
 
@@ -117,12 +113,10 @@ def _differences(artefact: Artefact) -> list[tuple[Text, int, float]]:
         return []
     points, first = artefact.points, artefact.rows[:, 0]
     _, along = artefact.lines_of(artefact.rows)
-    tip = tips[first]
-    copied = np.isin(points.group[first], list(points.copies))
+    tip, copied = tips[first], np.isin(points.group[first], list(points.copies))
     sides: dict[Text, list[tuple[Floats, int, list[float]]]] = {}
     for i in np.flatnonzero(~copied & (np.linalg.norm(tip, axis=1) > OFFSET_TOLERANCE_MM)):
-        direction = along[i] / np.linalg.norm(along[i])
-        side = tip[i] / np.linalg.norm(tip[i])
+        direction, side = along[i] / np.linalg.norm(along[i]), tip[i] / np.linalg.norm(tip[i])
         if abs(float(direction @ side)) > _RIGHT_ANGLE:
             continue
         here = sides.setdefault(position_of(direction), [])

@@ -18,16 +18,15 @@ from cmm_uq.analysis.conformity.plans import (
     crossed_travel,
     position_on,
 )
-from cmm_uq.base.messages import Text, Verbatim, at_key, commas, number, say, semicolons
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, commas, number, say, semicolons
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.quantity import nominal
 
 SAME_LENGTH_MM = 1.0  # Lengths no farther from each other than this are one nominal length
-
+# Of the distance between equally spaced lengths, how far each may lie from its place: gauges have the lengths that they
+# have. This project's figure.
 SPACING = 0.75
-"""Of the distance between equally spaced lengths, how far each may lie from its place: gauges have the lengths that they have.
-This project's figure."""
 
 
 def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> tuple[Condition, ...]:
@@ -53,18 +52,15 @@ def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, 
         _spread(plan, measured),
         _shortest(plan, measured),
         _repeated(plan, measured),
-        *_both_sides(plan, artefact, measured),
+        *_both_sides(plan, measured),
         *_offset(plan, artefact),
     )
 
 
 def with_offset(points: Points, rows: Ints, offset_mm: float | None) -> NDArray[np.bool_]:
     """Lengths (m,) with the tip so far across the ram at both ends; none recorded is none, ``None`` asks for no offset."""
-    tips = tip_offsets(points)
-    if offset_mm is None:
-        return np.ones(len(rows), dtype=bool)
-    if tips is None:
-        return np.full(len(rows), offset_mm == 0)
+    if offset_mm is None or (tips := tip_offsets(points)) is None:
+        return np.full(len(rows), not offset_mm)
     across = np.linalg.norm(tips, axis=1)[rows]
     return np.asarray(np.all(np.abs(across - offset_mm) <= OFFSET_TOLERANCE_MM, axis=1))
 
@@ -81,32 +77,32 @@ def tip_offsets(points: Points) -> Floats | None:
 def _offset(plan: LengthPlan, artefact: Artefact) -> tuple[Condition, ...]:
     if not plan.offset_mm:
         return ()
-    key = at_key("tip_x_mm, tip_y_mm, tip_z_mm")
+    found, key = artefact.indications(), at_key("tip_x_mm, tip_y_mm, tip_z_mm")
     what = say("stylus tip {offset_mm:g} mm across the ram{key}", key=key, offset_mm=plan.offset_mm)
-    found = artefact.indications()
     there = found is not None and with_offset(artefact.points, found.rows, plan.offset_mm).any()
     return (Condition(what, () if there else (what,)),)
 
 
-def _both_sides(plan: LengthPlan, artefact: Artefact, places: _Places) -> tuple[Condition, ...]:
+def _both_sides(plan: LengthPlan, places: _Places) -> tuple[Condition, ...]:
     if not plan.bidirectional or not places:
         return ()
-    known = [one for found in places.values() for one in found if one.bidirectional is not None]
-    what = say("ends of each length reached from opposite sides")
-    if not known:
-        unknown = say("bidirectional lengths: from which side each end was reached is not recorded")
-        return (Condition(what, (unknown,), Verbatim("columns approach_x, approach_y, approach_z")),)
-    if not any(one.bidirectional for one in known):
-        none = say(
-            "bidirectional lengths: these are not, and no short gauge reached from both sides was measured beside them"
-        )
-        return (Condition(what, (none,)),)
+    what, remedy = say("ends of each length reached from opposite sides"), NOTHING
+    known = [one.bidirectional for found in places.values() for one in found if one.bidirectional is not None]
     counts = {line: sum(bool(one.bidirectional) for one in found) for line, found in places.items()}
     missing = tuple(
         say("{lengths} bidirectional lengths ({line}: {count})", lengths=plan.lengths, line=line, count=count)
         for line, count in counts.items() if count < min(plan.lengths, len(places[line]))
     )  # fmt: skip
-    return (Condition(what, missing),)
+    if not known:
+        missing = (say("bidirectional lengths: from which side each end was reached is not recorded"),)
+        remedy = Verbatim("columns approach_x, approach_y, approach_z")
+    elif not any(known):
+        missing = (
+            say(
+                "bidirectional lengths: these are not, and no short gauge reached from both sides was measured beside them"
+            ),
+        )
+    return (Condition(what, missing, remedy),)
 
 
 @dataclass(frozen=True)
@@ -137,15 +133,12 @@ def _lines(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> I
             at = np.flatnonzero(original & (positions == position) & (nominal == length))
             if not len(at):
                 continue
-            shares = [_share(points, middles[i], along[i], found.lengths[i]) for i in at]
-            known = [share for share in shares if share is not None]
-            yield _Measured(position, int(length), float(found.lengths[at].mean()), max(known, default=None),
+            travel = [crossed_travel(points.machine, middles[i], along[i]) for i in at]
+            shares = [
+                float(found.lengths[i] / t) if t else 0.0 for i, t in zip(at, travel, strict=True) if t is not None
+            ]
+            yield _Measured(position, int(length), float(found.lengths[at].mean()), max(shares, default=None),
                             len(np.unique(group[at])), None if both is None else bool(both[at].any()))  # fmt: skip
-
-
-def _share(points: Points, middle: Floats, along: Floats, length: float) -> float | None:
-    available = crossed_travel(points.machine, middle, along)
-    return None if available is None else float(length / available) if available else 0.0
 
 
 def nominals(lengths: Floats) -> Ints:
@@ -178,13 +171,12 @@ def _long_enough(plan: LengthPlan, machine: Machine, places: _Places) -> Conditi
 
 def _spread(plan: LengthPlan, places: _Places) -> Condition:
     """That lengths of each line are spaced equally as nearly as their gauge allows; fewer of them are missing otherwise."""
-    missing = []
-    for line, found in places.items():
-        if len(found) >= plan.lengths and not _any_spread(plan, found):
-            lengths = semicolons(number(length, ".4g") for length in sorted(one.length for one in found))
-            missing.append(say("lengths spread over the range ({line}: {lengths} mm)", line=line, lengths=lengths))
-    what = say("{lengths} lengths spread over the range on each line", lengths=plan.lengths)
-    return Condition(what, tuple(missing))
+    missing = tuple(
+        say("lengths spread over the range ({line}: {lengths} mm)", line=line,
+            lengths=semicolons(number(length, ".4g") for length in sorted(one.length for one in found)))
+        for line, found in places.items() if len(found) >= plan.lengths and not _any_spread(plan, found)
+    )  # fmt: skip
+    return Condition(say("{lengths} lengths spread over the range on each line", lengths=plan.lengths), missing)
 
 
 def _any_spread(plan: LengthPlan, found: Sequence[_Measured]) -> bool:
@@ -214,8 +206,9 @@ def _shortest(plan: LengthPlan, places: _Places) -> Condition:
         for line, length in shortest.items() if length > most
     )  # fmt: skip
     longest = say("{shortest} mm", shortest=nominal(max(shortest.values()))) if shortest else say("none")
-    what = say("shortest length at most {shortest_mm:g} mm: {longest}", shortest_mm=most, longest=longest)
-    return Condition(what, missing)
+    return Condition(
+        say("shortest length at most {shortest_mm:g} mm: {longest}", shortest_mm=most, longest=longest), missing
+    )
 
 
 def _repeated(plan: LengthPlan, places: _Places) -> Condition:

@@ -26,16 +26,15 @@ from cmm_uq.jobs.tables.circumstances import LINE_KEYS, TestUncertainty
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.quantity import nominal
 
-NORMAL_EXPANSION = (8e-6, 13e-6)
-"""1/K; a gauge outside is not of normal expansion (ISO 10360-2:2009, as commonly reported)."""
-
+NORMAL_EXPANSION = (
+    8e-6,
+    13e-6,
+)  # 1/K; a gauge outside is not of normal expansion (ISO 10360-2:2009, as commonly reported)
 REPEATS_CANCEL = say(
     "What the gauge's certificate leaves uncertain is common to the repeats and cancels; u is what of the gauge "
     "changes between them."
 )
-
-Chosen = Callable[[Artefact, Indications], NDArray[np.bool_]]
-"""Which of the lengths of a recording belong to a test, (m,)."""
+Chosen = Callable[[Artefact, Indications], NDArray[np.bool_]]  # which lengths of a recording belong to a test, (m,)
 
 
 def at_offset(offset_mm: float) -> Chosen:
@@ -64,14 +63,12 @@ def lines(artefact: Artefact, found: Indications) -> list[Text]:
 
 def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Remeasurement | None = None) -> Statement:
     """Every error of indication against its own maximum permissible error."""
-    found = test.indications()
-    rows = _of_this_test(test, found, chosen)
-    artefact, first = test.artefact, found.rows[:, 0]
-    points = artefact.points
+    found, under, points = test.indications(), test.circumstances, test.artefact.points
+    rows, others = _of_this_test(test, found, chosen)
+    first, position, aside = found.rows[:, 0], lines(test.artefact, found), test.set_aside(found.rows)
     errors, limits = found.errors / MICROMETRE, test.limits_um(found.lengths)
-    causes = causes_of_lengths(found, artefact, test.circumstances).at_least(test.least_u(found.lengths))
+    causes = causes_of_lengths(found, test.artefact, under).at_least(test.least_u(found.lengths))
     test.refuse_without_uncertainty(float(causes.u[rows].min()), "u_um")
-    position, aside = lines(artefact, found), test.set_aside(found.rows)
     items = tuple(
         test.decided(
             float(errors[i]), float(causes.u[i]), float(limits[i]), signed=True,
@@ -83,40 +80,36 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Rem
     if again is not None:
         items = with_standing(items, nominals(found.lengths)[rows], again)
     worst = least_favourable(items)
-    named = int(rows[items.index(worst)])
-    remarks = [_uncertainty_in_words(worst, test.circumstances.uncertainty), _counted_in_words(items, worst)]
-    under = test.circumstances
-    told = [unknown_expansion(test.artefact, under.cte_per_k), added_in_words(under.short_gauge, found)]
+    named, degrees = int(rows[items.index(worst)]), temperatures(found, test.artefact)
+    remarks = [*_in_words(items, worst, under.uncertainty), *others, *_again_in_words(items, again)]
+    remarks += [text for text in (unknown_expansion(test.artefact, under.cte_per_k),
+                                  added_in_words(under.short_gauge, found)) if text]  # fmt: skip
     if test.artefact.bidirectional(found.rows) is None:
-        told.append(say("Whether the lengths are bidirectional is not recorded."))
-    if under.uncertainty.u_cte_per_k and temperatures(found, test.artefact) is None:
-        told.append(
+        remarks.append(say("Whether the lengths are bidirectional is not recorded."))
+    if under.uncertainty.u_cte_per_k and degrees is None:
+        remarks.append(
             say("Without temp_artefact_c the lengths are taken to be at 20 °C, where u_cte_per_k counts for nothing.")
         )
-    remarks += _others_in_words(test, found, rows) + _again_in_words(items, again) + [text for text in told if text]
-    degrees = temperatures(found, artefact)
     budget = length_budget(
         float(found.lengths[named]), float(found.u[named]),
-        REFERENCE_TEMPERATURE if degrees is None else float(degrees[named]), test.circumstances,
+        REFERENCE_TEMPERATURE if degrees is None else float(degrees[named]), under,
         0.0 if found.u_beside is None else float(found.u_beside[named]),
     )  # fmt: skip
     return test.stated(
         say("error of indication of length, worst against its limit"), say("lengths"), items, remarks,
-        causes=causes.of(rows), budget=test.budget_at_least(budget, worst.length_mm or 0.0) if worst.u_um > 0 else None,
-        repeats=None if again is None else again.repeats,
+        causes=causes.of(rows), budget=budget, repeats=None if again is None else again.repeats,
     )  # fmt: skip
 
 
 def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = None) -> Statement:
     """Range of the first repeats of each length in each place, against the limit of repeatability."""
     found = test.indications()
-    rows = _of_this_test(test, found, chosen)
+    rows, others = _of_this_test(test, found, chosen)
     least = u_of_repeats(float(found.lengths[rows].min()), test.circumstances)
     test.refuse_without_uncertainty(least, "u_repeat_um")
-    points, first = test.artefact.points, found.rows[:, 0]
+    points, first, aside = test.artefact.points, found.rows[:, 0], test.set_aside(found.rows)
     position, both = lines(test.artefact, found), test.artefact.bidirectional(found.rows)
     kind = np.zeros(len(found.rows), dtype=np.int64) if both is None else both.astype(np.int64)
-    aside = test.set_aside(found.rows)
     keys = np.column_stack([points.measurement[first], nominals(found.lengths), kind])
     items, single = [], []
     for key in dict.fromkeys(map(tuple, keys[rows])):
@@ -127,23 +120,21 @@ def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = Non
             single.append(say("repeats of {length:.5g} mm in measurement {number}", length=length, number=int(key[0])))
             continue
         value = float(np.ptp(found.errors[own])) / MICROMETRE
-        limit = float(test.limits_um(np.array([length]))[0])
         known = test.at_least(u_of_repeats(length, test.circumstances), length)
         items.append(test.decided(
-            value, known, limit, signed=False, measurement=int(key[0]), length_mm=length, position=position[own[0]],
-            set_aside=bool(aside[own].any()),
+            value, known, test.limit_um(length), signed=False, measurement=int(key[0]), length_mm=length,
+            position=position[own[0]], set_aside=bool(aside[own].any()),
         ))  # fmt: skip
     test.refuse_nothing_measured(bool(items), "repeats of lengths")
     count = len(items)
     remarks = [
         say("The range of the first {repeats} repeats of each length: {count} ranges.", repeats=repeats, count=count),
         REPEATS_CANCEL if least > 0 else NOT_STATED,
-        *_others_in_words(test, found, rows),
+        *others,
     ]
-    quantity = say("range of repeated lengths, worst against its limit")
-    own_causes = Causes(np.zeros((count, 0)), np.array([item.u_um for item in items]), np.arange(count))
-    return test.stated(quantity, say("ranges"), tuple(items), remarks, signed=False, repeats=repeats, causes=own_causes,
-                       lacking=single)  # fmt: skip
+    causes = Causes(np.zeros((count, 0)), np.array([item.u_um for item in items]), np.arange(count))
+    return test.stated(say("range of repeated lengths, worst against its limit"), say("ranges"), tuple(items), remarks,
+                       signed=False, repeats=repeats, causes=causes, lacking=single)  # fmt: skip
 
 
 def length_unstated(artefact: ArtefactFacts) -> str | None:
@@ -175,46 +166,39 @@ def unknown_expansion(artefact: Artefact, cte_per_k: float | None) -> Text:
     )  # fmt: skip
 
 
-def _of_this_test(test: Test, found: Indications, chosen: Chosen | None) -> Ints:
+def _of_this_test(test: Test, found: Indications, chosen: Chosen | None) -> tuple[Ints, list[Text]]:
+    """Lengths that are decided, no copies among them; and how many of the recording belong to another test, in words."""
     copied = np.isin(test.recorded.points.group[found.rows[:, 0]], list(test.recorded.points.copies))
     own = ~copied & (True if chosen is None else chosen(test.artefact, found))
     test.refuse_nothing_measured(bool(own.any()), "lengths of its own positions, tips and sizes")
-    return np.flatnonzero(own)
-
-
-def _others_in_words(test: Test, found: Indications, rows: Ints) -> list[Text]:
-    copied = np.isin(test.recorded.points.group[found.rows[:, 0]], list(test.recorded.points.copies))
-    count = int((~copied).sum()) - len(rows)
+    count = int((~copied & ~own).sum())
     one = say("{count} length recorded beside them has another position, stylus tip or size, and is not decided.",
               count=count)  # fmt: skip
     many = say("{count} lengths recorded beside them have another position, stylus tip or size, and are not decided.",
                count=count)  # fmt: skip
-    return [plural(count, one=one, many=many)] if count else []
+    return np.flatnonzero(own), [plural(count, one=one, many=many)] if count else []
 
 
-def _uncertainty_in_words(worst: Decided, stated: TestUncertainty) -> Text:
-    further = any(getattr(stated, LINE_KEYS[line]) or stated.declared(line) for line in LENGTH_LINES[1:])
-    if worst.u_um > 0 and further:
-        return say("u is the test uncertainty (ISO/TS 23165), {u_um:.3g} µm for the length named.", u_um=worst.u_um)
-    if worst.u_um > 0:
-        return say(
+def _in_words(items: Sequence[Decided], worst: Decided, stated: TestUncertainty) -> tuple[Text, Text]:
+    """Where u comes from, and how many lengths are decided with it."""
+    uncertain = NOT_STATED
+    if worst.u_um > 0 and any(getattr(stated, LINE_KEYS[line]) or stated.declared(line) for line in LENGTH_LINES[1:]):
+        uncertain = say(
+            "u is the test uncertainty (ISO/TS 23165), {u_um:.3g} µm for the length named.", u_um=worst.u_um
+        )
+    elif worst.u_um > 0:
+        uncertain = say(
             "u is the part of the test uncertainty (ISO/TS 23165) that comes from the calibrated length, {u_um:.3g} µm for "
             "the length named; nothing else is stated.",
             u_um=worst.u_um,
         )
-    return NOT_STATED
-
-
-def _counted_in_words(items: Sequence[Decided], worst: Decided) -> Text:
     least = say(
         "least favourable: measurement {measurement}, repeat {repeat}, {length} mm",
         measurement=worst.measurement or 0, repeat=worst.repeat or 0, length=nominal(worst.length_mm or 0.0),
     )  # fmt: skip
-    return plural(
-        len(items),
-        one=say("{count} length decided, each by its own u and limit; {least}.", count=len(items), least=least),
-        many=say("{count} lengths decided, each by its own u and limit; {least}.", count=len(items), least=least),
-    )
+    one = say("{count} length decided, each by its own u and limit; {least}.", count=len(items), least=least)
+    many = say("{count} lengths decided, each by its own u and limit; {least}.", count=len(items), least=least)
+    return uncertain, plural(len(items), one=one, many=many)
 
 
 def _again_in_words(items: Sequence[Decided], again: Remeasurement | None) -> list[Text]:

@@ -18,17 +18,16 @@ from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model.artefact import Artefact
 
 _SEARCHED = 60  # Bars that hang together, each near another of them
+_DIRECTIONS = 400  # On a hemisphere, at which the reach of its points is looked at
 
 
 def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) -> tuple[Condition, ...]:
     """How many different positions, and in which directions; ``copies`` are groups that do not count."""
-    points = artefact.points
-    travel = points.machine.travel_mm
+    points, travel = artefact.points, artefact.points.machine.travel_mm
     known = bool(np.all(np.isfinite(travel)))
     wanted = plan.positions_in(np.ptp(travel, axis=1)) if known else plan.positions
-    # Numbers of the measurements, and the ends (q, 2, 3) of the first bar of each
-    numbers, rows = np.unique(artefact.measurement, return_index=True)
-    numbers, ends = numbers.tolist(), np.asarray(artefact.points.xyz[artefact.rows[rows]], dtype=np.float64)
+    first = np.unique(artefact.measurement, return_index=True)[1]  # bar of each measurement, with its ends (q, 2, 3)
+    numbers, ends = artefact.measurement[first].tolist(), np.asarray(points.xyz[artefact.rows[first]], dtype=np.float64)
     # Measurements that are no further position: within how many mm of which other, or a copy of it
     found: dict[int, tuple[float | None, int]] = {}
     for later, original in copies.items():
@@ -62,8 +61,8 @@ def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) 
 def most_apart(near: Mapping[int, Collection[int]]) -> set[int]:
     """A largest set of which none is near another, of equally large ones that with the earlier members.
 
-    A choice in the order of the recording could grow when one is taken away that lies between two others. Groups of more than
-    ``_SEARCHED`` that hang together are chosen from in that order all the same.
+    A choice in the order of the recording, by which groups of more than ``_SEARCHED`` are chosen from all the same, could grow
+    when one is taken away that lies between two others.
     """
     left, chosen = set(near), set[int]()
     while left:
@@ -128,9 +127,6 @@ def _apart(one: Floats, two: Floats) -> float:
     return float(min(np.linalg.norm(one - turned, axis=1).max() for turned in (two, two[::-1])))
 
 
-_DIRECTIONS = 400  # On a hemisphere, at which the reach of its points is looked at
-
-
 def sphere_points(
     plan: SpherePlan, points: Points, directions: Floats, copies: Mapping[int, int]
 ) -> tuple[Condition, ...]:
@@ -148,9 +144,8 @@ def sphere_points(
             bare.append(say("points over a hemisphere on the sphere of {name} (part of it {gap:.0f}° from the nearest point)",
                             name=name, gap=gap))  # fmt: skip
     over = say("every direction of a hemisphere within {reach_deg:g}° of a point", reach_deg=reach)
-    return Condition(say("{points} points over the sphere", points=wanted), tuple(lacking)), Condition(
-        over, tuple(bare)
-    )
+    points_over = say("{points} points over the sphere", points=wanted)
+    return Condition(points_over, tuple(lacking)), Condition(over, tuple(bare))
 
 
 def _farthest(normals: Floats) -> float:
@@ -158,8 +153,7 @@ def _farthest(normals: Floats) -> float:
     pole = normals.mean(axis=0)
     pole = pole / np.linalg.norm(pole) if np.linalg.norm(pole) > 1e-9 else np.array([0.0, 0.0, 1.0])
     height = (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
-    turn = np.pi * (1 + np.sqrt(5)) * np.arange(_DIRECTIONS)
-    radius = np.sqrt(1 - height**2)
+    turn, radius = np.pi * (1 + np.sqrt(5)) * np.arange(_DIRECTIONS), np.sqrt(1 - height**2)
     across = np.linalg.svd(pole[None])[2][1:]
     grid = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height]) @ np.vstack([across, pole])
     return float(np.degrees(np.arccos(np.clip((grid @ normals.T).max(axis=1), -1.0, 1.0)).max()))

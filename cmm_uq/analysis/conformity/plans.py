@@ -17,12 +17,10 @@ from numpy.typing import NDArray
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Machine
 
-ALIGNED = np.sin(np.radians(10.0))
-"""A direction cosine below this does not count: the line is as good as square to that axis."""
-
+ALIGNED = np.sin(np.radians(10.0))  # a direction cosine below this does not count: as good as square to that axis
+# Part of every axis' travel that a line, produced to the ends of travel, crosses on a space diagonal; this project's figure,
+# which leaves room for the fixture.
 CORNER_TO_CORNER = 0.75
-"""Part of every axis' travel that a line, produced to the ends of travel, crosses on a space diagonal; this project's figure,
-which leaves room for the fixture."""
 
 _ROUNDING = 1e-6  # mm; a line as near as this to the end of an axis' travel lies in it
 PARALLELS = tuple(say("parallel to {axis}", axis=Verbatim(a.upper())) for a in AXES)
@@ -192,9 +190,9 @@ class Condition:
 OFFSET_TOLERANCE_MM = 10.0  # Within which a stylus tip has an offset; this project's figure
 
 ISO_10360_2 = LengthPlan((*SPACE_DIAGONALS, *PARALLELS), 5, 3, 0.66, 30.0, bidirectional=True, offset_mm=0.0)
-"""E0 and R0. Seven positions, five lengths, three repeats: Harris 2004, 2.6.3, of the edition of 2000, who has 66 % and 30 mm
-too, and Renishaw's summary of ISO 10360. The four space diagonals, and the axes as the three others, are those of the edition
-of 2009 as commonly reported; other positions that its user may choose are not known here."""
+"""E0 and R0. Seven positions, five lengths, three repeats, 66 %, 30 mm: Harris 2004, 2.6.3, of the edition of 2000, and
+Renishaw's summary of ISO 10360. Four space diagonals and the axes are those of the edition of 2009 as commonly reported; other
+positions that its user may choose are not known here."""
 
 ISO_10360_2_OFFSET = tuple(
     LengthPlan(tuple(say("face diagonal {axes}", axes=Verbatim(f"{s}{plane[0]} +{plane[1]}")) for s in "+−"), 5, 3, 0.66,
@@ -213,9 +211,7 @@ how long and how short: those of ISO 10360-2, this project's choice."""
 
 B89_LINEAR = LengthPlan(PARALLELS, 10, 3, 0.66, np.inf)
 """A step gauge or laser along each axis: Harris 2004, 2.6.1. Ten lengths, three repeats, 66 %: this project's choice."""
-
 B89_REPEATABILITY = RepeatPlan(10)  # Positions of a fixed ball: Harris 2004, 2.6.1. Ten: this project's choice
-
 B89_OFFSET = OffsetPlan(tuple(
     say("face diagonal {axes}", axes=Verbatim(f"{s}{plane[0]} +{plane[1]}")) for plane in ("YZ", "XZ") for s in "+−"
 ))  # fmt: skip
@@ -235,7 +231,6 @@ of 10 to 50 mm: Harris 2004, 2.6.3, of ISO 10360-2:2000; not less than 10 mm by 
 
 ISO_10360_8 = SpherePlan(25, 45.0)  # The 25 are in the names of the characteristics; the reach is this project's figure
 
-READY: Mapping[str, Plan] = MappingProxyType(
+READY: Mapping[str, Plan] = MappingProxyType(  # by name
     {"ASME B89.4.1": B89, "ISO 10360-2": ISO_10360_2, "ISO 10360-5": ISO_10360_5}
 )
-"""By the name of the ready plan."""

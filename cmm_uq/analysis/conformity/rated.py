@@ -2,39 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say, semicolons
-from cmm_uq.base.points import Points
+from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.tables.circumstances import Circumstances, RatedConditions
 
 SECONDS_PER_HOUR = 3600.0
-
-_ROUNDING = 1e-9  # K
+_ROUNDING, _NAMED = 1e-9, 5  # K; copies that are named one by one
 
 
 def rated_conditions(circumstances: Circumstances, points: Points) -> tuple[Condition, ...]:
     """Those that the job states; what was not recorded is not shown to be met, and limits hold for stated conditions only."""
-    rated = circumstances.rated
-    found = []
+    rated, used, found = circumstances.rated, circumstances.probe, []
     if rated.temperature_c is None and rated.declared is None:
         what = say("rated conditions: the temperatures for which the limits hold are not stated")
         remedy = Verbatim('temperature_c in [rated_conditions], or there declared = { by = "…", reason = "…" }')
         found.append(Condition(what, (what,), remedy))
+    columns = {k: v for k, v in points.columns.items() if k.startswith("temp_") and k.endswith("_c")}
     if rated.temperature_c is not None:
-        found.append(_temperature(points, *rated.temperature_c))
+        found.append(_temperature(columns, *rated.temperature_c))
     if rated.change_k_per_h is not None:
-        found.append(_change(points, rated.change_k_per_h))
+        found.append(_change(columns, points.columns.get("time_s"), rated.change_k_per_h))
     if rated.difference_k is not None:
-        found.append(_difference(points, rated.difference_k))
-    used = circumstances.probe
+        found.append(_difference(columns, rated.difference_k))
     for what, wanted, given in ((say("probe"), rated.probe, used.name), (say("stylus"), rated.stylus, used.stylus)):
         if wanted is not None:
-            met = wanted == given
             asked = say("rated {what} {wanted}", what=what, wanted=Verbatim(wanted))
             lacks = say("{asked} ({given})", asked=asked, given=Verbatim(given) if given else say("not stated"))
-            found.append(Condition(asked, () if met else (lacks,)))
+            found.append(Condition(asked, () if wanted == given else (lacks,)))
     return tuple(found)
 
 
@@ -46,48 +45,36 @@ def rated_in_words(rated: RatedConditions) -> list[Text]:
     return [say("Rated conditions: declared to be met by {by}: {reason}.", by=by, reason=reason)]
 
 
-def _recorded(points: Points) -> list[str]:
-    return [name for name in points.columns if name.startswith("temp_") and name.endswith("_c")]
-
-
-def _temperature(points: Points, low: float, high: float) -> Condition:
+def _temperature(columns: Mapping[str, Floats], low: float, high: float) -> Condition:
     what = say("rated temperature {low:g} to {high:g} °C", low=low, high=high)
-    columns = _recorded(points)
     if not columns:
         return Condition(what, (say("{what}: no temperature is recorded (temp_…_c)", what=what),))
-    values = np.concatenate([points.columns[name] for name in columns])
+    values = np.concatenate(list(columns.values()))
     coldest, warmest = float(values.min()), float(values.max())
-    told = say("{what} ({coldest:.4g} to {warmest:.4g} °C)", what=what, coldest=coldest, warmest=warmest)
-    return Condition(what, () if low <= coldest and warmest <= high else (told,))
+    lacks = say("{what} ({coldest:.4g} to {warmest:.4g} °C)", what=what, coldest=coldest, warmest=warmest)
+    return Condition(what, () if low <= coldest and warmest <= high else (lacks,))
 
 
-def _change(points: Points, most: float) -> Condition:
+def _change(columns: Mapping[str, Floats], time_s: Floats | None, most: float) -> Condition:
     what = say("rated change of temperature {most:g} K/h", most=most)
-    columns = _recorded(points)
-    if not columns or "time_s" not in points.columns:
+    if not columns or time_s is None:
         key = at_key("temp_…_c, time_s")
         return Condition(what, (say("{what}: no temperature is recorded over time{key}", what=what, key=key),))
-    order = np.argsort(points.columns["time_s"], kind="stable")
-    time = points.columns["time_s"][order]
+    order = np.argsort(time_s, kind="stable")
+    time = time_s[order]
     ends = np.searchsorted(time, time + SECONDS_PER_HOUR, side="right")
-    largest = max(
-        float(np.ptp(points.columns[name][order][start:end])) for name in columns for start, end in enumerate(ends)
-    )
-    told = say("{what} ({largest:.3g} K in an hour)", what=what, largest=largest)
-    return Condition(what, () if largest <= most + _ROUNDING else (told,))
+    largest = max(float(np.ptp(v[order][start:end])) for v in columns.values() for start, end in enumerate(ends))
+    lacks = say("{what} ({largest:.3g} K in an hour)", what=what, largest=largest)
+    return Condition(what, () if largest <= most + _ROUNDING else (lacks,))
 
 
-def _difference(points: Points, most: float) -> Condition:
+def _difference(columns: Mapping[str, Floats], most: float) -> Condition:
     what = say("rated difference of temperatures {most:g} K", most=most)
-    columns = _recorded(points)
     if len(columns) < 2:
         return Condition(what, (say("{what}: one temperature at most is recorded", what=what),))
-    largest = float(np.ptp(np.array([points.columns[name] for name in columns]), axis=0).max())
-    told = say("{what} ({largest:.3g} K)", what=what, largest=largest)
-    return Condition(what, () if largest <= most + _ROUNDING else (told,))
-
-
-_NAMED = 5  # Copies that are named one by one
+    largest = float(np.ptp(np.array(list(columns.values())), axis=0).max())
+    lacks = say("{what} ({largest:.3g} K)", what=what, largest=largest)
+    return Condition(what, () if largest <= most + _ROUNDING else (lacks,))
 
 
 def copies_in_words(points: Points) -> Text:

@@ -11,13 +11,14 @@ import numpy as np
 from cmm_uq.analysis.conformity.plans import Condition, RepeatPlan, SpherePlan
 from cmm_uq.analysis.conformity.shared_causes import Causes, length_budget
 from cmm_uq.analysis.conformity.standard import NOT_STATED, Test
-from cmm_uq.analysis.conformity.statement import Decided, Statement, least_favourable
+from cmm_uq.analysis.conformity.statement import Statement, least_favourable
 from cmm_uq.analysis.conformity.uncertainty_lines import u_of_repeats
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, at_key, say
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, Forms
+from cmm_uq.maths.uncertainty.budget import Budget
 from cmm_uq.maths.uncertainty.quantity import nominal
 
 
@@ -25,72 +26,91 @@ def form_error(test: Test) -> Statement:
     """Range of the radial distances of each sphere from its least-squares sphere."""
     from cmm_uq.maths.uncertainty.budgets.machine import probing_test_uncertainty
 
-    probed = _probed(test)
-    form = probed.certified / MICROMETRE
-    budget = probing_test_uncertainty(probed.certified, test.circumstances.uncertainty.u_form_um * MICROMETRE)
-    u = float(np.hypot(form / 2, test.circumstances.uncertainty.u_form_um))
+    probed, size, u_form_um = _probed(test), test.artefact.sizes[0].nominal, test.circumstances.uncertainty.u_form_um
+    u = float(np.hypot(probed.certified / MICROMETRE / 2, u_form_um))
     test.refuse_without_uncertainty(u, "form_um")
-    known = test.at_least(u, test.artefact.sizes[0].nominal)
-    items = _items(test, probed, probed.form / MICROMETRE, known, signed=False)
-    remarks: list[Text] = [
-        say("u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, and what its calibration leaves "
-            "uncertain, {u:.2g} µm.", u=u)
-        if test.circumstances.uncertainty.u_form_um
-        else say("u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, {u:.2g} µm.", u=u)
-        if u > 0
-        else say("The test sphere is taken as perfectly round: its form deviation{key} is not given.", key=at_key("form_um"))
-    ]  # fmt: skip
-    remarks += _largest(items)
-    return test.stated(say("probing form error"), say("points"), items, remarks, signed=False,
-                       causes=_shared(known, len(items)),
-                       budget=test.budget_at_least(budget, test.artefact.sizes[0].nominal) if u > 0 else None)  # fmt: skip
+    if u > 0 and u_form_um:
+        remark = say("u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, and what its "
+                     "calibration leaves uncertain, {u:.2g} µm.", u=u)  # fmt: skip
+    elif u > 0:
+        remark = say(
+            "u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, {u:.2g} µm.", u=u
+        )
+    else:
+        remark = say(
+            "The test sphere is taken as perfectly round: its form deviation{key} is not given.", key=at_key("form_um")
+        )
+    budget = probing_test_uncertainty(probed.certified, u_form_um * MICROMETRE)
+    values = probed.form / MICROMETRE
+    return _stated(
+        test, probed, say("probing form error"), values, test.at_least(u, size), remark, budget, signed=False
+    )
 
 
 def size_error(test: Test) -> Statement:
     """Diameter of each least-squares sphere minus the certified one, from the same points as the form."""
-    probed = _probed(test)
+    probed, sphere = _probed(test), test.artefact.sizes[0]
     if probed.size is None:
         raise CmmUqError(f"{test.characteristic.name} of {test.facts.standard} compares with a certified diameter",
                          where=f"job.toml {test.key} characteristic",
                          fix="Give length_mm and u_um in [artefact], or leave the statement out")  # fmt: skip
-    sphere = test.artefact.sizes[0]
     recorded = test.artefact.points.columns.get("temp_artefact_c")
     degrees = REFERENCE_TEMPERATURE if recorded is None else float(recorded.mean())
     budget = length_budget(sphere.nominal, sphere.sd, degrees, test.circumstances)
     u = budget.u / MICROMETRE
     test.refuse_without_uncertainty(u, "u_um")
-    known = test.at_least(u, sphere.nominal)
-    items = _items(test, probed, probed.size / MICROMETRE, known, signed=True)
-    told = (
-        say("u is the test uncertainty (ISO/TS 17865, as that of a length by ISO/TS 23165): {u:.2g} µm.", u=u)
-        if u > 0
-        else NOT_STATED
-    )
-    return test.stated(say("probing size error"), say("points"), items, [told, *_largest(items)],
-                       causes=_shared(known, len(items)),
-                       budget=test.budget_at_least(budget, sphere.nominal) if u > 0 else None)  # fmt: skip
+    remark = NOT_STATED
+    if u > 0:
+        remark = say("u is the test uncertainty (ISO/TS 17865, as that of a length by ISO/TS 23165): {u:.2g} µm.", u=u)
+    values, known = probed.size / MICROMETRE, test.at_least(u, sphere.nominal)
+    return _stated(test, probed, say("probing size error"), values, known, remark, budget, signed=True)
+
+
+def _stated(
+    test: Test,
+    probed: Forms,
+    quantity: Text,
+    values: np.ndarray,
+    u: float,
+    remark: Text,
+    budget: Budget,
+    *,
+    signed: bool,
+) -> Statement:
+    """Every sphere (q,) decided on its value, µm, all with one u, which they share."""
+    size = test.artefact.sizes[0].nominal
+    runs = [(i, int(probed.measurement[i]), int(probed.repeat[i])) for i in np.flatnonzero(_originals(test, probed))]
+    items = tuple(
+        test.decided(float(values[i]), u, test.limit_um(size), signed=signed, measurement=measurement, repeat=repeat,
+                     length_mm=size, set_aside=test.set_aside_in(measurement, repeat))
+        for i, measurement, repeat in runs
+    )  # fmt: skip
+    remarks, count, worst = [remark], len(items), least_favourable(items)
+    if count > 1:
+        remarks.append(say("The largest of {count} spheres: measurement {measurement}.", count=count,
+                           measurement=worst.measurement or 0))  # fmt: skip
+    causes = Causes(np.full((count, 1), u), np.zeros(count), np.arange(count))
+    return test.stated(quantity, say("points"), items, remarks, signed=signed, causes=causes, budget=budget)
 
 
 def range_of_centres(test: Test) -> Statement:
     """Largest range, along an axis, of the middle of a sphere that was probed again and again (ASME B89.4.1-1997)."""
-    probed = _probed(test)
+    probed, size = _probed(test), test.artefact.sizes[0].nominal
     if probed.centres is None:
         raise CmmUqError(f"{test.facts.standard} compares middles of a sphere, and the {test.artefact.kind} has none",
                          where=f"job.toml {test.key} standard", fix="Leave the statement out")  # fmt: skip
-    u = u_of_repeats(test.artefact.sizes[0].nominal, test.circumstances)
+    u = u_of_repeats(size, test.circumstances)
     test.refuse_without_uncertainty(u, "u_repeat_um")
-    limit = float(test.limits_um(np.array([test.artefact.sizes[0].nominal]))[0])
-    known = test.at_least(u, test.artefact.sizes[0].nominal)
     items = []
     for number in np.unique(probed.measurement):
         own = _originals(test, probed) & (probed.measurement == number)
         if own.sum() > 1:
             value = float(np.ptp(probed.centres[own], axis=0).max()) / MICROMETRE
-            items.append(test.decided(value, known, limit, signed=False, measurement=int(number),
-                                      set_aside=test.set_aside_in(int(number))))  # fmt: skip
+            items.append(test.decided(value, test.at_least(u, size), test.limit_um(size), signed=False,
+                                      measurement=int(number), set_aside=test.set_aside_in(int(number))))  # fmt: skip
     test.refuse_nothing_measured(bool(items), "repeats of one sphere in its place")
-    told = say("u is what of the sphere changed between the repeats.") if u > 0 else NOT_STATED
-    return test.stated(say("range of the middle of a fixed ball"), say("ranges"), tuple(items), [told], signed=False)
+    remark = say("u is what of the sphere changed between the repeats.") if u > 0 else NOT_STATED
+    return test.stated(say("range of the middle of a fixed ball"), say("ranges"), tuple(items), [remark], signed=False)
 
 
 def form_unstated(artefact: ArtefactFacts) -> str | None:
@@ -101,11 +121,10 @@ def form_unstated(artefact: ArtefactFacts) -> str | None:
 
 def diameter_allowed(test: Test, plan: SpherePlan) -> tuple[Condition, ...]:
     """A test sphere of the size that the standard asks for."""
-    low, high = plan.diameter_mm
-    diameter = test.artefact.sizes[0].nominal
+    (low, high), diameter = plan.diameter_mm, test.artefact.sizes[0].nominal
     what = say("test sphere of {low:g} to {high:g} mm", low=low, high=high)
-    told = say("{what} ({diameter} mm)", what=what, diameter=nominal(diameter))
-    return (Condition(what, () if low <= diameter <= high else (told,)),)
+    lacks = say("{what} ({diameter} mm)", what=what, diameter=nominal(diameter))
+    return (Condition(what, () if low <= diameter <= high else (lacks,)),)
 
 
 def sensing_stated(test: Test) -> tuple[Condition, ...]:
@@ -123,9 +142,8 @@ def repeats_of_sphere(plan: RepeatPlan, artefact: Artefact, *, recorded: bool) -
     points = artefact.points
     copies = points.copies if recorded else {}
     runs = [points.run_of(group) for group in range(int(points.group.max()) + 1) if group not in copies]
-    most = max(np.bincount([number - min(runs)[0] for number, _ in runs]))
-    told = say("{what} ({most})", what=what, most=int(most))
-    return (Condition(what, () if most >= plan.repeats else (told,)),)
+    most = int(max(np.bincount([number - min(runs)[0] for number, _ in runs])))
+    return (Condition(what, () if most >= plan.repeats else (say("{what} ({most})", what=what, most=most),)),)
 
 
 def _probed(test: Test) -> Forms:
@@ -141,26 +159,3 @@ def _originals(test: Test, probed: Forms) -> np.ndarray:
     points = test.recorded.points
     copies = {points.run_of(group) for group in points.copies}
     return np.array([(int(m), int(r)) not in copies for m, r in zip(probed.measurement, probed.repeat, strict=True)])
-
-
-def _items(test: Test, probed: Forms, values: np.ndarray, u: float, *, signed: bool) -> tuple[Decided, ...]:
-    size = test.artefact.sizes[0].nominal
-    limit = float(test.limits_um(np.array([size]))[0])
-    runs = [(i, int(probed.measurement[i]), int(probed.repeat[i])) for i in np.flatnonzero(_originals(test, probed))]
-    return tuple(
-        test.decided(float(values[i]), u, limit, signed=signed, measurement=measurement, repeat=repeat, length_mm=size,
-                     set_aside=test.set_aside_in(measurement, repeat))
-        for i, measurement, repeat in runs
-    )  # fmt: skip
-
-
-def _shared(u_um: float, count: int) -> Causes:
-    return Causes(np.full((count, 1), u_um), np.zeros(count), np.arange(count))
-
-
-def _largest(items: tuple[Decided, ...]) -> list[Text]:
-    if len(items) < 2:
-        return []
-    worst = least_favourable(items)
-    return [say("The largest of {count} spheres: measurement {measurement}.", count=len(items),
-                measurement=worst.measurement or 0)]  # fmt: skip

@@ -51,17 +51,13 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 NOT_CONSIDERED = say(
     "Simple acceptance takes no account of the uncertainty: at the limit itself conforming is as likely as not."
 )
-
 NOT_STATED = say("No uncertainty is stated above zero: none is considered, and no probability can be given.")
-
 RAISED = say(
     "Where the test uncertainty evaluated is smaller, u is half of the laboratory's calibration and measurement capability "
     "(k = 2){key}.",
     key=at_key("[laboratory.cmc]"),
 )
-
 CMC = say("the laboratory's calibration and measurement capability")
-
 BY_MEASUREMENT_ALONE = say(
     "Probabilities are what the measurement alone says, with nothing known of such machines beforehand: where the limit is "
     "near they may be off by several points either way."
@@ -138,9 +134,8 @@ class Standard:
         asked = self.characteristic(wish.characteristic)
         if asked.lines and asked.lines != FORM_LINES and all(stated.declared(line) for line in asked.lines):
             return None
-        if asked.needs is not None and not (
-            getattr(stated, asked.needs) or stated.u_temperature_k or stated.u_fixturing_um
-        ):
+        lines = stated.u_temperature_k or stated.u_fixturing_um
+        if asked.needs is not None and not (getattr(stated, asked.needs) or lines):
             return asked.needs
         return asked.unstated(artefact)
 
@@ -202,6 +197,9 @@ class Test:
             return most
         return np.asarray(np.minimum(mpe.a_um + lengths_mm / mpe.k, most), dtype=np.float64)
 
+    def limit_um(self, length_mm: float) -> float:
+        return float(self.limits_um(np.array([length_mm]))[0])
+
     @cached_property
     def unstated(self) -> tuple[Condition, ...]:
         """Lines of the test uncertainty that are neither stated nor declared."""
@@ -222,13 +220,10 @@ class Test:
         be beyond the limit.
         """
         if u_um <= 0 and self.answered and needs_uncertainty(self.facts.rule):
-            simple = decide(value_um, 0.0, limit_um, "simple", signed=signed)
-            return replace(simple, rule=rule_words(self.facts.rule))
-        length = self.artefact.sizes[0].nominal if length_mm is None else length_mm
-        return decide(
-            value_um, u_um, limit_um, self.facts.rule, signed=signed, prior=self.prior(limit_um),
-            unstated=self._u_of_unstated(length),
-        )  # fmt: skip
+            return replace(decide(value_um, 0.0, limit_um, "simple", signed=signed), rule=rule_words(self.facts.rule))
+        unstated = self._u_of_unstated(self.artefact.sizes[0].nominal if length_mm is None else length_mm)
+        prior = self.prior(limit_um)
+        return decide(value_um, u_um, limit_um, self.facts.rule, signed=signed, prior=prior, unstated=unstated)
 
     @cached_property
     def _u_of_unstated(self) -> Callable[[float], float]:
@@ -241,9 +236,8 @@ class Test:
     ) -> Decided:  # fmt: skip
         """One value with what follows from it, and where it comes from."""
         decision = self.decide(value_um, u_um, limit_um, signed=signed, length_mm=length_mm)
-        return Decided(
-            value_um, u_um, limit_um, decision, measurement, repeat, length_mm, position, set_aside=set_aside
-        )
+        where = (measurement, repeat, length_mm, position)
+        return Decided(value_um, u_um, limit_um, decision, *where, set_aside=set_aside)
 
     def least_u(self, lengths_mm: Floats) -> Floats:
         """(m,) µm: half the laboratory's capability, k = 2 (ILAC-P14:09/2020), at lengths (m,); 0 where none is given."""
@@ -253,16 +247,6 @@ class Test:
     def at_least(self, u_um: float, length_mm: float) -> float:
         """A standard uncertainty not below that; one that is not stated stays 0."""
         return max(u_um, float(self.least_u(np.array([length_mm]))[0])) if u_um > 0 else u_um
-
-    def budget_at_least(self, budget: Budget, length_mm: float) -> Budget:
-        """A budget of a test value, with a line for what the capability has more."""
-        scale = MICROMETRE if budget.unit == unit("mm") else 1.0
-        least = float(self.least_u(np.array([length_mm]))[0]) * scale
-        if not 0 < budget.u < least:
-            return budget
-        more = BudgetLine(say("raised to the laboratory's capability"), float(np.sqrt(least**2 - budget.variance)), CMC,
-                    unit=budget.unit)  # fmt: skip
-        return replace(budget, lines=[*budget.lines, more])
 
     def prior(self, limit_um: float) -> PriorKnowledge | None:
         given = self.facts.prior
@@ -291,51 +275,66 @@ class Test:
     ) -> Statement:  # fmt: skip
         """What was decided, with what the test lacks, and what the rule leaves out.
 
-        ``causes``: of the uncertainty of each item, from which follows the probability that all conform; ``repeats``:
-        up to which a repeat has every point of its measurement; all of them by default.
+        ``causes``: of the uncertainty of each item, from which follows the probability that all conform; ``budget``: of the
+        least favourable; ``repeats``: up to which a repeat has every point of its measurement; all of them by default.
         """
-        form = self.circumstances.clauses.get(self.facts.clauses or "")
+        under, points, left_out = self.circumstances, self.recorded.points, self.left_out
+        lines, worst = self.characteristic.lines, least_favourable(items)
         clauses = [one for one in self.standard.clauses if not one.of or self.characteristic.name in one.of]
-        told, differing = in_words(self.standard.name, clauses, form)
+        checked, differing = in_words(self.standard.name, clauses, under.clauses.get(self.facts.clauses or ""))
         asked = (
             *self.characteristic.conditions(self.recorded, recorded=True),
             *self.characteristic.asks(self),
             *(Condition(what, (what,)) for what in (*lacking, *differing)),
             *self.unstated,
-            *rated_conditions(self.circumstances, self.recorded.points),
-            *numbered(self.recorded.points if self.left_out is None else self.left_out.recording, repeats),
+            *rated_conditions(under, points),
+            *numbered(points if left_out is None else left_out.recording, repeats),
             *self._gaps_of_short_gauge(),
         )
-        worst = least_favourable(items)
+        missing = {text: condition.remedy for condition in asked for text in condition.missing}
+        aside = [item for item in items if item.set_aside]
+        outside = () if left_out is None else left_out.without_value
+        more = [*remarks, *_set_aside(under.set_aside)]
+        if left_out is not None and (aside or outside):
+            more += left_out.in_words([item.measurement for item in aside] if not outside else [None])
+        more += self._of_the_rule(items, worst)
+        if copies := copies_in_words(points):
+            more.append(copies)
+        more += [*declared_in_words(lines, under.uncertainty), *rated_in_words(under.rated), *checked]
+        joint = None
+        if causes is not None and not outside and not counted(aside):
+            left = [i for i, item in enumerate(items) if item.standing != "replaced"]
+            errors, limits = [items[i].error_um for i in left], [items[i].limit_um for i in left]
+            joint = probability_of_all(errors, limits, causes.of(np.array(left, dtype=np.int64)), signed=signed)
+        if budget is not None:
+            budget = with_declared(self._at_least(budget, worst), lines, under.uncertainty) if budget.u > 0 else None
+        return Statement(
+            self.facts, self.characteristic.name, quantity, measured, items, tuple(missing), tuple(more), signed,
+            joint, budget, self._risks(worst, signed), outside, tuple(missing.values()),
+        )  # fmt: skip
+
+    def _of_the_rule(self, items: Sequence[Decided], worst: Decided) -> list[Text]:
+        """What the rule leaves out, what the standard always says, and whether the capability stood for a smaller u."""
         more: list[Text] = []
         if self.facts.rule == "simple" and worst.u_um > 0:
             more.append(NOT_CONSIDERED)
         if self.facts.prior is None and worst.u_um > 0:
             more.append(BY_MEASUREMENT_ALONE)
         more += self.standard.remarks
-        if self._raised(items):
+        nominal = self.artefact.sizes[0].nominal
+        least = self.least_u(np.array([nominal if item.length_mm is None else item.length_mm for item in items]))
+        if any(0 < item.u_um <= floor * (1 + 1e-9) for item, floor in zip(items, least, strict=True)):
             more.append(RAISED)
-        if copies := copies_in_words(self.recorded.points):
-            more.append(copies)
-        aside = [item for item in items if item.set_aside]
-        outside = () if self.left_out is None else self.left_out.without_value
-        if self.left_out is not None and (aside or outside):
-            more = [*self.left_out.in_words([item.measurement for item in aside] if not outside else [None]), *more]
-        more = [*_set_aside(self.circumstances.set_aside), *more]
-        joint = None
-        if causes is not None and not outside and not counted(aside):
-            left = [i for i, item in enumerate(items) if item.standing != "replaced"]
-            errors, limits = [items[i].error_um for i in left], [items[i].limit_um for i in left]
-            joint = probability_of_all(errors, limits, causes.of(np.array(left, dtype=np.int64)), signed=signed)
-        lines, stated = self.characteristic.lines, self.circumstances.uncertainty
-        more += [*declared_in_words(lines, stated), *rated_in_words(self.circumstances.rated), *told]
-        if budget is not None:
-            budget = with_declared(budget, lines, stated)
-        missing = {text: condition.remedy for condition in asked for text in condition.missing}
-        return Statement(
-            self.facts, self.characteristic.name, quantity, measured, items, tuple(missing), (*remarks, *more), signed,
-            joint, budget, self._risks(worst, signed), outside, tuple(missing.values()),
-        )  # fmt: skip
+        return more
+
+    def _at_least(self, budget: Budget, item: Decided) -> Budget:
+        """The budget of a value, with a line for what the capability has more."""
+        length = self.artefact.sizes[0].nominal if item.length_mm is None else item.length_mm
+        least = float(self.least_u(np.array([length]))[0]) * (MICROMETRE if budget.unit == unit("mm") else 1.0)
+        if not budget.u < least:
+            return budget
+        u, what = float(np.sqrt(least**2 - budget.variance)), say("raised to the laboratory's capability")
+        return replace(budget, lines=[*budget.lines, BudgetLine(what, u, CMC, unit=budget.unit)])
 
     def _gaps_of_short_gauge(self) -> tuple[Condition, ...]:
         gauge, found = self.circumstances.short_gauge, self.artefact.indications()
@@ -344,18 +343,10 @@ class Test:
         gaps = [text for condition in numbered(gauge.points, measurements=False) for text in condition.missing]
         return tuple(Condition(text, (say("short gauge, {gap}", gap=text),)) for text in gaps)
 
-    def _raised(self, items: Sequence[Decided]) -> bool:
-        if self.circumstances.cmc is None:
-            return False
-        nominal = self.artefact.sizes[0].nominal
-        least = self.least_u(np.array([nominal if item.length_mm is None else item.length_mm for item in items]))
-        return any(0 < item.u_um <= floor * (1 + 1e-9) for item, floor in zip(items, least, strict=True))
-
     def _risks(self, worst: Decided, signed: bool) -> Risks | None:
-        prior = self.prior(worst.limit_um)
+        prior, band = self.prior(worst.limit_um), worst.decision.guard_band
         if prior is None or worst.u_um <= 0:
             return None
-        band = worst.decision.guard_band
         accepted = -20.0 * worst.u_um if band is None else worst.limit_um - band
         return global_risks(accepted, worst.limit_um, worst.u_um, prior, signed=signed)
 

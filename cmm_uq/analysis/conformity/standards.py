@@ -6,7 +6,7 @@ tested, from which columns, and what is not: docs/standards.md.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
@@ -39,6 +39,7 @@ from cmm_uq.analysis.conformity.plans import (
     VDI_2617_2_1,
     Condition,
     ShortLengthPlan,
+    SpherePlan,
 )
 from cmm_uq.analysis.conformity.short_gauge import repeats_of_gauge, supplemented
 from cmm_uq.analysis.conformity.spheres_decided import (
@@ -83,17 +84,17 @@ def orientations(plan: ShortLengthPlan, artefact: Artefact, *, recorded: bool) -
         else:
             near.add(group)
     lacking = wanted - len(kept)
-    told = () if lacking <= 0 else (say("{lacking} of {count} orientations", lacking=lacking, count=wanted),)
+    lacks = () if lacking <= 0 else (say("{lacking} of {count} orientations", lacking=lacking, count=wanted),)
     least = min(sorted((len(groups) for _, groups in kept), reverse=True)[:wanted], default=0)
     repeats = say("{repeats} repetitions in each orientation", repeats=plan.repeats)
-    lacks = () if least >= plan.repeats else (say("{what} ({least})", what=repeats, least=least),)
+    fewer = () if least >= plan.repeats else (say("{what} ({least})", what=repeats, least=least),)
     unknown = say("bidirectional lengths: from which side each end was reached is not recorded")
     sides = Condition(
         say("ends of each length reached from opposite sides"),
         (unknown,) if len(rows) and artefact.bidirectional(found.rows) is None else (),
         Verbatim("columns approach_x, approach_y, approach_z"),
     )
-    return (Condition(what, told), Condition(repeats, lacks), sides)
+    return (Condition(what, lacks), Condition(repeats, fewer), sides)
 
 
 AGAIN = Remeasurement(repeats=3, outside=1, lengths=5, readings=10)  # Of ISO 10360-2:2009; see docs/standards.md
@@ -110,8 +111,7 @@ def _asked_of_gauges(test: Test) -> tuple[Condition, ...]:
 
 _E0 = Characteristic(
     "E0", LENGTHS, partial(errors_of_indication, chosen=at_offset(0.0), again=AGAIN), partial(conditions, ISO_10360_2),
-    length_unstated, _asked_of_gauges, beside=supplemented,
-    lines=LENGTH_LINES,
+    length_unstated, _asked_of_gauges, beside=supplemented, lines=LENGTH_LINES,
 )  # fmt: skip
 _R0 = Characteristic(
     "R0", LENGTHS, partial(repeatability_range, repeats=3, chosen=at_offset(0.0)), partial(conditions, ISO_10360_2),
@@ -119,10 +119,22 @@ _R0 = Characteristic(
 )  # fmt: skip
 _E150 = Characteristic(
     "E150", LENGTHS, partial(errors_of_indication, chosen=at_offset(150.0), again=AGAIN),
-    partial(best_of, ISO_10360_2_OFFSET), length_unstated, _asked_of_gauges, beside=supplemented,
-    lines=LENGTH_LINES,
+    partial(best_of, ISO_10360_2_OFFSET), length_unstated, _asked_of_gauges, beside=supplemented, lines=LENGTH_LINES,
 )  # fmt: skip
-_SPHERE = (partial(conditions, ISO_10360_5), partial(diameter_allowed, plan=ISO_10360_5))
+
+
+def _of_sphere(
+    form: tuple[str, ...], size: tuple[str, ...], plan: SpherePlan, asks: Callable[[Test], tuple[Condition, ...]]
+) -> tuple[Characteristic, ...]:
+    """Form and size error of a test sphere, each by its name and its other names."""
+    return tuple(
+        Characteristic(name, FORMS, decided, partial(conditions, plan), unstated, asks, tuple(also), lines=lines)
+        for (name, *also), decided, unstated, lines in (
+            (form, form_error, form_unstated, FORM_LINES), (size, size_error, length_unstated, SIZE_LINES))
+    )  # fmt: skip
+
+
+_DIAMETER = partial(diameter_allowed, plan=ISO_10360_5)
 
 
 def _superseded(by: str) -> tuple[Text, ...]:
@@ -148,21 +160,15 @@ _STANDARDS = (
         say("ASME B89.4.10360.2-2008 takes over ISO 10360-2; what it adds to it is not tested here."),
     ), "contacting"),
     Standard("ISO 10360-2:2009", (_E0, _R0, _E150), sensing="contacting"),
-    Standard("ISO 10360-5:2010", (
-        Characteristic("P_FTU", FORMS, form_error, _SPHERE[0], form_unstated, _SPHERE[1], lines=FORM_LINES),
-        Characteristic("P_STU", FORMS, size_error, _SPHERE[0], length_unstated, _SPHERE[1], lines=SIZE_LINES),
-    ), _superseded("ISO 10360-5:2020"), "contacting"),
-    Standard("ISO 10360-5:2020", (
-        Characteristic("P_Form.Sph.1x25:SS:Tact", FORMS, form_error, _SPHERE[0], form_unstated, _SPHERE[1],
-                       ("P_Form.Sph.1x25", "P_Form"), lines=FORM_LINES),
-        Characteristic("P_Size.Sph.1x25:SS:Tact", FORMS, size_error, _SPHERE[0], length_unstated, _SPHERE[1],
-                       ("P_Size.Sph.1x25", "P_Size"), lines=SIZE_LINES),
+    Standard("ISO 10360-5:2010", _of_sphere(("P_FTU",), ("P_STU",), ISO_10360_5, _DIAMETER),
+             _superseded("ISO 10360-5:2020"), "contacting"),
+    Standard("ISO 10360-5:2020", _of_sphere(
+        ("P_Form.Sph.1x25:SS:Tact", "P_Form.Sph.1x25", "P_Form"), ("P_Size.Sph.1x25:SS:Tact", "P_Size.Sph.1x25", "P_Size"),
+        ISO_10360_5, _DIAMETER,
     ), sensing="contacting"),
-    Standard("ISO 10360-8:2013", (
-        Characteristic("P_Form.Sph.1x25:Tr:ODS", FORMS, form_error, partial(conditions, ISO_10360_8), form_unstated,
-                       sensing_stated, ("P_Form.Sph.1x25", "P_Form"), lines=FORM_LINES),
-        Characteristic("P_Size.Sph.1x25:Tr:ODS", FORMS, size_error, partial(conditions, ISO_10360_8), length_unstated,
-                       sensing_stated, ("P_Size.Sph.1x25", "P_Size"), lines=SIZE_LINES),
+    Standard("ISO 10360-8:2013", _of_sphere(
+        ("P_Form.Sph.1x25:Tr:ODS", "P_Form.Sph.1x25", "P_Form"), ("P_Size.Sph.1x25:Tr:ODS", "P_Size.Sph.1x25", "P_Size"),
+        ISO_10360_8, sensing_stated,
     ), sensing="optical"),
     Standard("VDI/VDE 2617", (_E0,), (
         say("VDI/VDE 2617 is decided like ISO 10360-2:2009 here, with the same positions, lengths and repetitions."),
@@ -175,10 +181,9 @@ _STANDARDS = (
     ), sensing="contacting"),
 )  # fmt: skip
 
-BUILT_IN: Mapping[str, Standard] = MappingProxyType(
+BUILT_IN: Mapping[str, Standard] = MappingProxyType(  # by name
     {standard.name: replace(standard, clauses=CLAUSES[standard.name]) for standard in _STANDARDS}
 )
-"""The standards that are decided here, by name."""
 
 
 def statement(

@@ -29,11 +29,9 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 StatementFinding = Literal["pass", "conditional pass", "undecided", "remeasure", "conditional fail", "fail"]
 StatementOutcome = StatementFinding | Literal["incomplete"]
 
-GRAVEST: tuple[StatementFinding, ...] = (
+GRAVEST: tuple[StatementFinding, ...] = (  # findings in the order of their gravity
     "fail", "conditional fail", "remeasure", "undecided", "conditional pass", "pass",
 )  # fmt: skip
-"""Findings in the order of their gravity."""
-
 Standing = Literal["counts", "again", "replaced"]
 
 
@@ -155,7 +153,6 @@ def counted(errors: Sequence[Decided]) -> tuple[Decided, ...]:
 
 
 def least_favourable(errors: Sequence[Decided]) -> Decided:
-
     def order(item: Decided) -> tuple[int, float, float, float]:
         decision, room = item.decision, item.limit_um - abs(item.error_um)
         within, beyond = decision.probability_conforming, decision.probability_beyond
@@ -164,8 +161,7 @@ def least_favourable(errors: Sequence[Decided]) -> Decided:
     return min(counted(errors), key=order)
 
 
-TOLERANCE_WORDS = {outcome: word for word, outcome in TOLERANCE_OUTCOMES.items()}
-"""Beside a tolerance, by outcome: in, out or open."""
+TOLERANCE_WORDS = {outcome: word for word, outcome in TOLERANCE_OUTCOMES.items()}  # by outcome: in, out or open
 
 
 def by_standard(statement: Statement) -> Verdict:
@@ -176,13 +172,7 @@ def by_standard(statement: Statement) -> Verdict:
 
 
 def by_tolerance(name: str, title: Text, quantity: Quantity, tolerance: float, *, determined: bool = True) -> Verdict:
-    """A parameter against its tolerance.
-
-    A pass or a fail where the whole 95 % interval is within or beyond it (with U as guard band on both sides, ISO 14253-1),
-    undecided between, and where the recording does not determine the parameter.
-
-    ``name, title``: ``scale_x.ppm``, and in words.
-    """
+    """A parameter, named as ``scale_x.ppm`` and in words, against its tolerance by its whole 95 % interval (ISO 14253-1)."""
     if not determined:
         missing = (say("the recording does not determine it"),)
         return Verdict(name, "undecided", None, None, tolerance, quantity.unit, title=title, missing=missing)
@@ -192,11 +182,10 @@ def by_tolerance(name: str, title: Text, quantity: Quantity, tolerance: float, *
     return Verdict(name, outcome, quantity.value, quantity.expanded, tolerance, quantity.unit, title=title)
 
 
-OUTSIDE = ("fail", "conditional fail")  # Outcomes of a value that lies outside
-
+OUTSIDE = ("fail", "conditional fail")  # outcomes of a value that lies outside
+# Outcomes of one outside the zone of conformance: further readings stand for it, too, where they were made, or a larger
+# error would pass where a smaller one does not.
 NOT_INSIDE = (*OUTSIDE, "undecided", "conditional pass")
-"""Outcomes of one that lies outside the zone of conformance: further readings stand for it, too, where they were made, or a
-larger error would pass where a smaller one does not."""
 
 
 @dataclass(frozen=True)

@@ -15,21 +15,15 @@ import numpy as np
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
-from cmm_uq.jobs.tables.circumstances import LINE_KEYS, Circumstances, Declared, TestUncertainty
+from cmm_uq.jobs.tables.circumstances import LINE_KEYS, Circumstances, TestUncertainty
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.budget import Budget
 
-LENGTH_LINES = ("calibration", "expansion", "temperature", "alignment", "fixturing")
-"""Of a calibrated length, in the order of its budget."""
-
+LENGTH_LINES = ("calibration", "expansion", "temperature", "alignment", "fixturing")  # in the order of their budget
+SIZE_LINES, FORM_LINES, REPEAT_LINES = LENGTH_LINES[:3], ("form",), ("repeat",)
 WARM = 0.5  # K from 20 °C from which on an unknown expansion matters
-SIZE_LINES = LENGTH_LINES[:3]
-FORM_LINES = ("form",)
-REPEAT_LINES = ("repeat",)
-
+# what a line that is not stated may well be: of the temperature, of the coefficient (1/K), of all others
 UNSTATED_K, UNSTATED_EXPANSION, UNSTATED_UM = 0.3, 1e-6, 1.0
-"""What a line that is not stated may well be: of the temperature, of the coefficient (1/K), of all others."""
-
 STEEL, LARGEST_EXPANSION = 11.5e-6, 25e-6  # 1/K; of what gauges are made of, aluminium expands most
 
 _NAMES = {
@@ -45,7 +39,14 @@ _NAMES = {
 
 def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Circumstances) -> tuple[Condition, ...]:
     """That each of some lines is stated or declared, and what it is computed from recorded and stated."""
-    found = [_neither(line) for line in lines if not _met(line, artefact, under)]
+    found = []
+    for line in lines:
+        if not _met(line, artefact, under):
+            key = "u_um in [artefact]" if line == "calibration" else f"{LINE_KEYS[line]} in [test_uncertainty]"
+            what = say("uncertainty: {line} is neither stated nor declared negligible", line=_NAMES[line])
+            found.append(
+                _lacks(what, f'{key}, or {line} = {{ by = "…", reason = "…" }} in [test_uncertainty.negligible]')
+            )
     probed = artefact.forms()
     if "form" in lines and (probed is None or probed.certified <= 0):
         what = say("uncertainty: the form deviation of the test sphere is not stated")
@@ -56,10 +57,10 @@ def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Ci
 
 
 def u_of_unstated(lines: Collection[str], artefact: Artefact, under: Circumstances, length_mm: float) -> float:
-    """Standard uncertainty, µm, that the lines of a length which are neither stated nor declared may well have.
+    """Standard uncertainty, µm, that lines of a length which are neither stated nor declared may well have.
 
-    It counts before a value is called nonconforming, and for nothing else: the figures are this project's, and larger than a
-    laboratory that controls its temperature has. An expansion of which no coefficient is stated was not corrected at all.
+    It counts before a value is called nonconforming, and for nothing else. The figures are this project's, larger than a
+    laboratory that controls its temperature has; an expansion of which no coefficient is stated was not corrected at all.
     """
     away = away_from_20(artefact)
     per_length = {
@@ -74,7 +75,15 @@ def u_of_unstated(lines: Collection[str], artefact: Artefact, under: Circumstanc
 
 
 def _met(line: str, artefact: Artefact, under: Circumstances) -> bool:
-    return {"calibration": _calibrated, "repeat": _repeats}.get(line, _stated)(line, artefact, under)
+    """Whether a line is stated above zero or declared; of a calibration that of each length, or of the size."""
+    stated = under.uncertainty
+    if line == "calibration":
+        found = artefact.indications()
+        u = np.array([artefact.sizes[0].sd]) if found is None else found.u
+        return stated.declared(line) is not None or bool(np.all(u > 0))
+    if line == "repeat" and _both_lines(under) and _two_readings(1.0, under) > 0:
+        return True
+    return bool(getattr(stated, LINE_KEYS[line]) or stated.declared(line))
 
 
 def u_of_repeats(length_mm: float, under: Circumstances) -> float:
@@ -92,52 +101,36 @@ def _two_readings(length_mm: float, under: Circumstances) -> float:
 
 
 def _both_lines(under: Circumstances) -> bool:
+    """Whether temperature and fixturing say all that changes between readings."""
     stated = under.uncertainty
     known = bool(under.cte_per_k or stated.declared("expansion"))
     warm = bool(stated.declared("temperature")) or (known and stated.u_temperature_k > 0)
     return warm and bool(stated.declared("fixturing") or stated.u_fixturing_um)
 
 
-def _repeats(line: str, artefact: Artefact, under: Circumstances) -> bool:
-    return _stated(line, artefact, under) or (_both_lines(under) and _two_readings(1.0, under) > 0)
-
-
-def _stated(line: str, artefact: Artefact, under: Circumstances) -> bool:
-    return bool(getattr(under.uncertainty, LINE_KEYS[line]) or under.uncertainty.declared(line))
-
-
-def _calibrated(line: str, artefact: Artefact, under: Circumstances) -> bool:
-    found = artefact.indications()
-    u = np.array([artefact.sizes[0].sd]) if found is None else found.u
-    return under.uncertainty.declared(line) is not None or bool(np.all(u > 0))
-
-
 def _thermal(artefact: Artefact, under: Circumstances) -> Iterator[Condition]:
     stated = under.uncertainty
     if not under.cte_per_k and not stated.declared("expansion"):
-        yield _lacks(
-            say("uncertainty: the expansion coefficient of the artefact is not stated"),
-            "cte_per_k in [artefact], or expansion in [test_uncertainty.negligible]",
-        )
+        what = say("uncertainty: the expansion coefficient of the artefact is not stated")
+        yield _lacks(what, "cte_per_k in [artefact], or expansion in [test_uncertainty.negligible]")
     elif under.cte_per_k is None and stated.machine.expansion is None and away_from_20(artefact) >= WARM:
-        yield _lacks(
-            say(
-                "uncertainty: lengths are not brought to 20 °C, for the expansion coefficient of the artefact is not stated"
-            ),
-            "cte_per_k in [artefact], or expansion in [test_uncertainty.machine] of a machine that corrects it",
+        what = say(
+            "uncertainty: lengths are not brought to 20 °C, for the expansion coefficient of the artefact is not stated"
         )
+        corrected = "expansion in [test_uncertainty.machine] of a machine that corrects it"
+        yield _lacks(what, f"cte_per_k in [artefact], or {corrected}")
     if "temp_artefact_c" in artefact.points.columns:
         return
     if stated.machine.temperature is None:
-        yield _lacks(
-            say("uncertainty: the temperature of the artefact during the test was not recorded"),
-            "column temp_artefact_c, or temperature in [test_uncertainty.machine] of a machine that measures and corrects it",
-        )
+        what = say("uncertainty: the temperature of the artefact during the test was not recorded")
+        measured = "temperature in [test_uncertainty.machine] of a machine that measures and corrects it"
+        yield _lacks(what, f"column temp_artefact_c, or {measured}")
     elif not stated.declared("expansion"):
-        yield _lacks(
-            say("uncertainty: how far the artefact was from 20 °C, on which that of its expansion coefficient depends"),
-            "column temp_artefact_c, or expansion in [test_uncertainty.machine] or [test_uncertainty.negligible]",
+        what = say(
+            "uncertainty: how far the artefact was from 20 °C, on which that of its expansion coefficient depends"
         )
+        declared = "expansion in [test_uncertainty.machine] or [test_uncertainty.negligible]"
+        yield _lacks(what, f"column temp_artefact_c, or {declared}")
 
 
 def away_from_20(artefact: Artefact) -> float:
@@ -146,38 +139,21 @@ def away_from_20(artefact: Artefact) -> float:
     return 0.0 if recorded is None else float(np.abs(recorded - REFERENCE_TEMPERATURE).max(initial=0.0))
 
 
-def _neither(line: str) -> Condition:
-    key = "u_um in [artefact]" if line == "calibration" else f"{LINE_KEYS[line]} in [test_uncertainty]"
-    return _lacks(
-        say("uncertainty: {line} is neither stated nor declared negligible", line=_NAMES[line]),
-        f'{key}, or {line} = {{ by = "…", reason = "…" }} in [test_uncertainty.negligible]',
-    )
-
-
 def _lacks(what: Text, remedy: str) -> Condition:
     return Condition(what, (what,), Verbatim(remedy))
 
 
 def declared_in_words(lines: Collection[str], stated: TestUncertainty) -> list[Text]:
-    told: list[Text] = []
+    found: list[Text] = []
     for line in ("temperature", "fixturing", *lines) if lines == REPEAT_LINES else lines:
-        name, negligible, own = (
-            _NAMES[line],
-            getattr(stated.negligible, line, None),
-            getattr(stated.machine, line, None),
-        )
+        negligible, own = (getattr(table, line, None) for table in (stated.negligible, stated.machine))
         if negligible:
-            by, reason = _answer(negligible)
-            told.append(say("{line:capital}: declared negligible by {by}: {reason}.", line=name, by=by, reason=reason))
+            found.append(say("{line:capital}: declared negligible by {by}: {reason}.", line=_NAMES[line],
+                             by=Verbatim(negligible.by), reason=Verbatim(negligible.reason.rstrip(". "))))  # fmt: skip
         if own:
-            by, reason = _answer(own)
-            told.append(say("{line:capital}: declared the machine's own by {by}: {reason}.",
-                            line=name, by=by, reason=reason))  # fmt: skip
-    return told
-
-
-def _answer(declared: Declared) -> tuple[Text, Text]:
-    return Verbatim(declared.by), Verbatim(declared.reason.rstrip(". "))
+            found.append(say("{line:capital}: declared the machine's own by {by}: {reason}.", line=_NAMES[line],
+                             by=Verbatim(own.by), reason=Verbatim(own.reason.rstrip(". "))))  # fmt: skip
+    return found
 
 
 def with_declared(budget: Budget, lines: Sequence[str], stated: TestUncertainty) -> Budget:
