@@ -24,7 +24,6 @@ TITLES: Mapping[str, Text] = {
     "b89_max_deviation_um": say("Largest deviation from the mean length"),
 }
 UNITS: Mapping[str, Unit] = {name: PRINTED[name.rpartition("_")[2]] for name in TITLES}
-
 _DRAWS = 1000
 _NUMBERS = 3_000_000  # random numbers to spend on repetitions
 # repetitions of each draw at least; where so many take more random numbers, fewer of the draws are repeated

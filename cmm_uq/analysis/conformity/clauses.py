@@ -157,6 +157,7 @@ def _sphere(scope: str) -> tuple[Clause, ...]:
     return (first, *(one for one in _ISO_10360_5[1:] if one.name != "sphere_size"))
 
 
+# Of each standard that is decided here, and of the documents that decisions and budgets go by
 CLAUSES: Mapping[str, tuple[Clause, ...]] = MappingProxyType({
     "ISO 10360-2:2009": _ISO_10360_2,
     "ASME B89.4.10360.2-2008": (
@@ -172,7 +173,6 @@ CLAUSES: Mapping[str, tuple[Clause, ...]] = MappingProxyType({
     "VDI/VDE 2617": _ISO_10360_2[1:],
     **_RULES,
 })  # fmt: skip
-"""Of each standard that is decided here, and of the documents that decisions and budgets go by."""
 
 
 def in_words(standard: str, asked: Sequence[Clause], form: ClausesForm | None) -> tuple[list[Text], tuple[Text, ...]]:

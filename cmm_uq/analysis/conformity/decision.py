@@ -117,7 +117,6 @@ def _panels(edges: Floats) -> tuple[Floats, Floats]:
 
 
 Outcome = Literal["pass", "conditional pass", "undecided", "conditional fail", "fail"]
-
 CONFORMANCE_PROBABILITY = 0.95  # Default of ISO 14253-1:2017, 5.2: conformity or nonconformity is proved with 95 %
 COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty that a guard band is a multiple of (ILAC-G8:09/2019, 4.2.2)
 RATIO = 4.0  # Zone of the specification over the uncertainty interval, where ASME B89.7.3.1 is named without another

@@ -21,7 +21,6 @@ ALIGNED = np.sin(np.radians(10.0))  # a direction cosine below this does not cou
 # Part of every axis' travel that a line, produced to the ends of travel, crosses on a space diagonal; this project's figure,
 # which leaves room for the fixture.
 CORNER_TO_CORNER = 0.75
-
 _ROUNDING = 1e-6  # mm; a line as near as this to the end of an axis' travel lies in it
 PARALLELS = tuple(say("parallel to {axis}", axis=Verbatim(a.upper())) for a in AXES)
 SPACE_DIAGONALS = tuple(say("space diagonal {axes}", axes=Verbatim(f"{x}X {y}Y +Z")) for x in "+−" for y in "+−")
@@ -188,47 +187,44 @@ class Condition:
 
 
 OFFSET_TOLERANCE_MM = 10.0  # Within which a stylus tip has an offset; this project's figure
-
+# E0 and R0. Seven positions, five lengths, three repeats, 66 %, 30 mm: Harris 2004, 2.6.3, of the edition of 2000, and
+# Renishaw's summary of ISO 10360. Four space diagonals and the axes are those of the edition of 2009 as commonly reported;
+# other positions that its user may choose are not known here
 ISO_10360_2 = LengthPlan((*SPACE_DIAGONALS, *PARALLELS), 5, 3, 0.66, 30.0, bidirectional=True, offset_mm=0.0)
-"""E0 and R0. Seven positions, five lengths, three repeats, 66 %, 30 mm: Harris 2004, 2.6.3, of the edition of 2000, and
-Renishaw's summary of ISO 10360. Four space diagonals and the axes are those of the edition of 2009 as commonly reported; other
-positions that its user may choose are not known here."""
 
+# E150, in one of two planes that hold a vertical ram. 150 mm is in the name; two diagonals, five lengths, three repeats, as
+# commonly reported, not verified
 ISO_10360_2_OFFSET = tuple(
     LengthPlan(tuple(say("face diagonal {axes}", axes=Verbatim(f"{s}{plane[0]} +{plane[1]}")) for s in "+−"), 5, 3, 0.66,
                30.0, bidirectional=True, offset_mm=150.0)
     for plane in ("YZ", "XZ")
 )  # fmt: skip
-"""E150, in one of two planes that hold a vertical ram. 150 mm is in the name; two diagonals, five lengths, three repeats, as
-commonly reported, not verified."""
 
+# Axial, planar and spatial positions of a step gauge or of gauge blocks: Harris 2004, 2.6.2. How many lengths and repeats,
+# how long and how short: those of ISO 10360-2, this project's choice
 VDI_2617_2_1 = {
     name: LengthPlan(positions, 5, 3, 0.66, 30.0)
     for name, positions in (("U1", PARALLELS), ("U2", FACE_DIAGONALS), ("U3", SPACE_DIAGONALS))
 }
-"""Axial, planar and spatial positions of a step gauge or of gauge blocks: Harris 2004, 2.6.2. How many lengths and repeats,
-how long and how short: those of ISO 10360-2, this project's choice."""
 
+# A step gauge or laser along each axis: Harris 2004, 2.6.1. Ten lengths, three repeats, 66 %: this project's choice
 B89_LINEAR = LengthPlan(PARALLELS, 10, 3, 0.66, np.inf)
-"""A step gauge or laser along each axis: Harris 2004, 2.6.1. Ten lengths, three repeats, 66 %: this project's choice."""
 B89_REPEATABILITY = RepeatPlan(10)  # Positions of a fixed ball: Harris 2004, 2.6.1. Ten: this project's choice
+# Four diagonals in vertical planes, each with two offsets at right angles to the ram: Harris 2004, 2.6.1. Which four: this
+# project's reading
 B89_OFFSET = OffsetPlan(tuple(
     say("face diagonal {axes}", axes=Verbatim(f"{s}{plane[0]} +{plane[1]}")) for plane in ("YZ", "XZ") for s in "+−"
 ))  # fmt: skip
-"""Four diagonals in vertical planes, each with two offsets at right angles to the ram: Harris 2004, 2.6.1. Which four: this
-project's reading."""
 
+# A short gauge block in four orientations: Harris 2004, 2.6.1. 10°, three repeats, what is short: this project's choice
 B89_BIDIRECTIONAL = ShortLengthPlan(4, 10.0, 3, 50.0)
-"""A short gauge block in four orientations: Harris 2004, 2.6.1. 10°, three repeats, what is short: this project's choice."""
-
+# Twenty positions in the directions of figure 26 of the standard, as Harris 2004, figures C 1 and C 2, carries them out.
+# What a longer volume needs, what nearly cubic is, and the distance are this project's figures
 B89 = BarPlan(20, (*SPACE_DIAGONALS, *FACE_DIAGONALS, *PARALLELS), 10, 2.0, 10.0)
-"""Twenty positions in the directions of figure 26 of the standard, as Harris 2004, figures C 1 and C 2, carries them out. What
-a longer volume needs, what nearly cubic is, and the distance are this project's figures."""
-
+# Twenty-five points (Renishaw's summary of ISO 10360), spread over a hemisphere; the reach is this project's figure. A
+# sphere of 10 to 50 mm: Harris 2004, 2.6.3, of ISO 10360-2:2000; not less than 10 mm by clause 6.2.1 of the edition of 2020
+# too
 ISO_10360_5 = SpherePlan(25, 45.0, (10.0, 50.0))
-"""Twenty-five points (Renishaw's summary of ISO 10360), spread over a hemisphere; the reach is this project's figure. A sphere
-of 10 to 50 mm: Harris 2004, 2.6.3, of ISO 10360-2:2000; not less than 10 mm by clause 6.2.1 of the edition of 2020 too."""
-
 ISO_10360_8 = SpherePlan(25, 45.0)  # The 25 are in the names of the characteristics; the reach is this project's figure
 
 READY: Mapping[str, Plan] = MappingProxyType(  # by name

@@ -39,9 +39,8 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 
 FALSE_ALARMS = 0.01  # default rate at which a recording without any fault is found to have one
 _TOLD_APART = 0.95
+# Odds of another in the place of an effect from which both are named together: a set-up is suggested that gives 20 : 1
 _ODDS = 0.05
-"""Odds of another in the place of an effect from which both are named together: a set-up is suggested that gives 20 : 1."""
-
 _UNKNOWN = 0.5
 _NOISE_KIND = 0.9
 

@@ -23,10 +23,8 @@ from cmm_uq.maths.inference.posterior import NoisyPosterior, sample_with_noise
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 _LIKELY = 1e-4  # part of the largest probability below which a trial parts one mode from the next
-
+# Frequencies that are this far apart, over one in the range of the readings, with nothing likely between, are two modes
 _APART = 0.5
-"""Frequencies that are this far apart, over one in the range of the readings, with nothing likely between, are two modes."""
-
 _VALLEY = 0.1  # evidence over that of the lower of two peaks below which what lies between parts two modes
 _TOLD = 1e-3  # probability from which a mode is told
 

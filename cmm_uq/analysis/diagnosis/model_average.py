@@ -27,10 +27,8 @@ from cmm_uq.maths.uncertainty.quantity import Quantity, mixed
 
 REMAINS = 0.01  # probability from which a combination of explanations remains
 SETTLED = 0.95  # probability of one combination from which no other remains
-
+# Log evidence up to which an explanation more is not worth more than a bare mention (Kass & Raftery 1995, JASA 90, 777)
 _WORTH = float(np.log(3.2))
-"""Log evidence up to which an explanation more is not worth more than a bare mention (Kass & Raftery 1995, JASA 90, 777)."""
-
 _MOST = 12
 _DRAWS = 4000
 _ROUNDS = 3

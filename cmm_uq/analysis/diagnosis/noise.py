@@ -15,20 +15,14 @@ from cmm_uq.base.points import Floats
 from cmm_uq.maths.inference.noise import NEGLIGIBLE, Components, Sizes
 
 TAILS = 0.05  # probability of heavy tails
-
+# The same for the test whether anything is missing, whose false alarms are promised whatever the tails are. Many series of
+# routine measurements have longer tails than the normal distribution (Jeffreys 1938, Phil. Trans. A 237, 231; Hampel et al.
+# 1986, Robust Statistics, 1.2c)
 OFTEN = 0.25
-"""The same for the test whether anything is missing, whose false alarms are promised whatever the tails are.
-
-Many series of routine measurements have longer tails than the normal distribution (Jeffreys 1938, Phil. Trans. A 237,
-231; Hampel et al. 1986, Robust Statistics, 1.2c).
-"""
-
 _TAILS_DOF = 4.0
 _SHRINK = (_TAILS_DOF - 2) / _TAILS_DOF  # square of the t distribution's scale over its standard deviation
-
+# Residuals of which tails can be told, and logarithm of the ratio of likelihoods from which they are
 _FEWEST, _BETTER = 15, 4.0
-"""Residuals of which tails can be told, and logarithm of the ratio of likelihoods from which they are."""
-
 _SCALES = np.geomspace(0.3, 1.2, 40)  # of the t distribution, over the residuals' root mean square, that are tried
 _NANOMETRE = 1e-6  # mm: of residuals that are smaller, as of exact figures, the last bits say nothing of tails
 _STATED_IS_RIGHT = 0.9

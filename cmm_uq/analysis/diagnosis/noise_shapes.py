@@ -26,10 +26,8 @@ from cmm_uq.maths.inference.noise import NEGLIGIBLE, SLOW, Components, Sizes
 from cmm_uq.maths.inference.presence import beginning, present
 
 SHAPES, KEPT = 512, 7  # how many are drawn from the prior, and how many stand for all
-
+# Drawn from what the recording says, with and without something missing; how many draws must matter for none of these
 _MORE, _ENOUGH = 256, 32
-"""Drawn from what the recording says, with and without something missing; how many draws must matter for none of these."""
-
 _SLOW = 0.5  # probability of slow noise from which it is asked what the noise is beside a jump
 _TRIED = 600  # draws by which it is found what the recording says of them, in each round
 _NANOMETRE = 1e-6  # mm: noise is not taken for less

@@ -33,15 +33,12 @@ from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.noise import Components, Sizes
 
 POWER = 0.8
-
+# Sizes of an effect that are tried: its rms in all observations together, what is fitted projected out, over the noise
 SIZES = np.array([3.0, 3.7, 4.4, 5.1, 6.0, 7.5, 12.0, 30.0])
-"""Sizes of an effect that are tried: its rms in all observations together, what is fitted projected out, over the noise."""
-
 _LARGER = np.array([1.0, 1.3])  # noise as it looks, over what it is, at which the threshold of the test is found
 _TAIL = 0.2
+# Log odds of an effect against everything else from which on no other is said to be as possible
 CERTAIN = float(np.log(0.95 / 0.05))
-"""Log odds of an effect against everything else from which on no other is said to be as possible."""
-
 ALLOWED = 3.0  # prior standard deviations up to which an effect is reckoned with
 
 

@@ -27,10 +27,8 @@ from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import CONTRACT, Effect
 
 POWER = 0.9
-
+# Part of what physics allows, half of its standard deviation, that a recording with power shows of a common effect
 BLIND = 1 / 6
-"""Part of what physics allows, half of its standard deviation, that a recording with power shows of a common effect."""
-
 USUAL_LENGTH = 6.0  # visible length, over the noise, from which on a usual diagnosis detects an effect
 _FAINT = 0.5  # visible length of the largest allowed amplitude below which an effect is not looked at
 ABSORBED = 1e-5  # part of its length below which a column is the baseline's own

@@ -137,9 +137,8 @@ def _imitators(model: RecordingModel, raw: Floats) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
+# Visible lengths within which one is looked for; beyond the last nothing is said to be found
 SHORTEST, LONGEST = 1.0, 60.0
-"""Visible lengths within which one is looked for; beyond the last nothing is said to be found."""
-
 _NOISES = 7
 _Z = np.linspace(-5.0, 5.0, 101)
 

@@ -19,9 +19,8 @@ from cmm_uq.machine.model.artefact import Artefact
 THIRDS = (0.0, 0.5, 1.0)
 _FIFTHS = (0.0, 0.25, 0.5, 0.75, 1.0)
 PatternFor = Callable[[Floats], Pattern | None]  # the pattern for an attitude; ``None`` where it does not fit
-
+# Ways of setting up an artefact that the fixtures of a volume allow, by their words
 Attitudes = Callable[[Volume], list[tuple[Text, Floats]]]
-"""Ways of setting up an artefact that the fixtures of a volume allow, by their words."""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,6 @@ from cmm_uq.maths.inference.least_squares import LeastSquares, solve
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
 
 Pair = tuple[str, str, float]  # two effects and the absolute cosine between them
-
 NOT_TOLD_APART = 0.98  # cosine from which on a fifth of one effect is all that the other cannot imitate
 _ROUNDING = 1e-9
 WEAK = 0.1  # part of the prior variance from which on a parameter counts as weakly determined

@@ -15,10 +15,8 @@ from cmm_uq.base.points import AXES, Floats, Ints, Points
 Rows = NDArray[np.bool_]
 SCALES = tuple(f"temp_{a}_c" for a in AXES)
 TEMPERATURES = (*SCALES, "temp_artefact_c", "temp_table_top_c", "temp_table_bottom_c", "temp_air_c")
-
+# s between points of one set-up that no operator waits, and that no machine probes a ball in
 LONGEST_PAUSE, SHORTEST_BALL = 6 * 3600.0, 0.6
-"""s between points of one set-up that no operator waits, and that no machine probes a ball in."""
-
 _STUCK_ROWS, _STUCK_PART, _MOVING = 8, 0.15, 0.9
 
 
@@ -48,6 +46,7 @@ _TEMPERATURE = Bounds(
     ((say("kelvin"), 1.0, -273.15), (Verbatim("°F"), 5 / 9, -160 / 9), (say("thousandths of °C"), 1e-3, 0.0)),
 )  # fmt: skip
 
+# What each column may hold
 BOUNDS: Mapping[str, Bounds] = {
         "radius_mm": Bounds(1e-9, np.inf, say("a radius is positive")),
         "fit_rms_um": Bounds(0.0, np.inf, say("an rms is not negative")),
@@ -63,7 +62,6 @@ BOUNDS: Mapping[str, Bounds] = {
         "speed_mm_s": Bounds(0.0, np.inf, say("a speed is not negative")),
         **dict.fromkeys(TEMPERATURES, _TEMPERATURE),
     }  # fmt: skip
-"""What each column may hold."""
 
 SENSORS = (*BOUNDS, "time_s")  # columns that are left out where they cannot be trusted
 

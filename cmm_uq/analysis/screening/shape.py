@@ -15,9 +15,8 @@ import numpy as np
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.machine.model.artefact import Placings
 
+# Misfit that no machine's errors explain: so many mm, and so much of the artefact's size
 TOLERANCE_MM, TOLERANCE_RATIO = 0.5, 5e-3
-"""Misfit that no machine's errors explain: so many mm, and so much of the artefact's size."""
-
 _SAMPLES = 120
 _JUDGED = 1000
 _PAIRS = 60

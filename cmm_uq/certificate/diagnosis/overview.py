@@ -26,16 +26,16 @@ from cmm_uq.jobs.job import JobFile
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.quantity import alike
 
+# What a verdict means for who is to act
 STANDING: Mapping[str, Standing] = {"consistent": "good", "explained": "open", "partial": "open", "unexplained": "bad"}
-"""What a verdict means for who is to act."""
 
+# A verdict as the title of its overview
 VERDICT_TITLES: Mapping[str, Text] = {
     "consistent": say("Consistent: nothing is found to be missing"),
     "explained": say("Explained: the cause is found"),
     "partial": say("Partly explained: a cause is found, and there is more"),
     "unexplained": say("Unexplained: something is wrong that no known effect accounts for"),
 }
-"""A verdict as the title of its overview."""
 
 _RAREST = 1e-4  # probability below which only this is told
 _TOLD = 0.05  # probability from which another explanation is told beside what is asserted
@@ -193,17 +193,17 @@ VERDICTS: Mapping[str, Text] = {
     ),
 }
 
+# A verdict in a word
 VERDICT_WORDS: Mapping[str, Text] = {
     "consistent": say("consistent"), "explained": say("explained"), "partial": say("partial"),
     "unexplained": say("unexplained"),
 }  # fmt: skip
-"""A verdict in a word."""
 
+# The same, to begin a summary with
 VERDICTS_IN_SHORT: Mapping[str, Text] = {
     "consistent": say("CONSISTENT"), "explained": say("EXPLAINED"), "partial": say("PARTIAL"),
     "unexplained": say("UNEXPLAINED"),
 }  # fmt: skip
-"""The same, to begin a summary with."""
 
 
 def verdict_of(result: JobDiagnosis) -> Text:

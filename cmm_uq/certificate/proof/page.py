@@ -27,6 +27,7 @@ from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, REFUSED, VERDICTS
 from cmm_uq.laboratory.proving.rates import FEWEST, LARGEST, Rate
 from cmm_uq.laboratory.proving.sensitivity import ALLOWED
 
+# Purpose, cases, strengths, noise, seal
 METHOD: tuple[Text, ...] = (
     say(
         "Purpose: validation of a method (ISO/IEC 17025:2017, 7.2.2). The diagnosis of cmm-uq is to be fit for "
@@ -57,7 +58,6 @@ METHOD: tuple[Text, ...] = (
         "own."
     ),
 )  # fmt: skip
-"""Purpose, cases, strengths, noise, seal."""
 
 NOT_COVERED: tuple[Text, ...] = (
     say(

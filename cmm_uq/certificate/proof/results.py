@@ -32,14 +32,15 @@ from cmm_uq.laboratory.proving.rates import Rate
 
 SCHEMA = "cmm-uq/prove/1"
 
+# Below every key that is said to be a rate
 RATE: Mapping[str, str] = {
     "count": "How many.",
     "of": "Of how many.",
     "rate": "Their quotient; null of none.",
     "interval95": "Exact 95 % interval (Clopper and Pearson); of intervals for as many as would be independent.",
 }
-"""Below every key that is said to be a rate."""
 
+# By dotted name; a part in capitals stands for any name, [] for each entry of a list
 KEYS: Mapping[str, str] = {
     "schema": "Name of the layout.",
     "software.KEY": "The program and what took part, as in results of a report.",
@@ -95,7 +96,6 @@ KEYS: Mapping[str, str] = {
     "acceptance[].rate": "Rate: counted.",
     "acceptance[].standing": "met, missed, or open where so many cases do not decide it.",
 }
-"""By dotted name; a part in capitals stands for any name, ``[]`` for each entry of a list."""
 
 
 def proof_outcome(proof: DiagnosisProof) -> Outcome:

@@ -21,13 +21,10 @@ from cmm_uq.base.points import Floats, Ints
 
 MOST = 12  # the most known effects that are looked for
 WINDOW = 7.0  # a combination less probable than one of its parts by more than this, in logarithm, is not followed
-
+# Part of an effect's squared visible length up to which two others that leave no more of it are tried in its place
 LIKE = 0.02
-"""Part of an effect's squared visible length up to which two others that leave no more of it are tried in its place."""
-
+# How many combinations of each size have their evidence computed, and are followed to the next size
 SETTLED, FOLLOWED = 24, 8
-"""How many combinations of each size have their evidence computed, and are followed to the next size."""
-
 Key = frozenset[int]
 
 

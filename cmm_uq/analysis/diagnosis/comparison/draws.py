@@ -15,13 +15,9 @@ from cmm_uq.analysis.diagnosis.noise import NoiseKind, probable_tails
 from cmm_uq.base.points import Floats, Ints
 
 _ORTHOGONAL = 1e-9  # of the largest square of a row's length, what products of rows that are at right angles come to
-
+# Of freedom, of Student's t where noise has heavy tails: the fewest that have a variance, and those of the noise's model
 DEGREES = (3.0, 4.0)
-"""Of freedom, of Student's t where noise has heavy tails: the fewest that have a variance, and those of the noise's model."""
-
 _DIGITS = 7  # of what is left, over its root mean square, that rounding spares
-
-
 _LEAST_LEFT = 0.1  # part of a residual's variance that the fit must leave for it to tell of tails
 
 

@@ -26,13 +26,10 @@ _SHORTEST_PERIOD, _FINEST_PERIOD = 6.0, 2.0  # mm, searched, and told of besides
 STEP = 0.35  # between frequencies that are tried, over one in the range of the readings
 _TILTED, _BENT = (-0.9, -0.45, 0.0, 0.45, 0.9), (-0.5, 0.0, 0.5)
 _ROUGH = 0.25  # probability that an idealised effect (:attr:`Effect.idealised_over`) has another form than the simplest
-
+# Of the largest extent of a recording, over which such a form differs; a plate that lies level has next to none along Z
 _SHORTEST_OVER = 0.1
-"""Of the largest extent of a recording, over which such a form differs; a plate that lies level has next to none along Z."""
-
+# mm that an artefact must reach to show that a machine is out of adjustment: 20 ppm are 2 µm then, and 0.5 µm over a ball
 _ADJUSTED = 100.0
-"""mm that an artefact must reach to show that a machine is out of adjustment: 20 ppm are 2 µm then, and 0.5 µm over a ball."""
-
 _BEYOND = 0.5  # how readily an effect is thought of beyond the size that it mostly keeps to (:attr:`Effect.mostly`)
 _MOST_PERIODS, _MOST_SHORTER = 240, 800
 _DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)

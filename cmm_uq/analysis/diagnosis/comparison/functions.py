@@ -16,22 +16,17 @@ from cmm_uq.machine.physics.effect import Effect, Nonparametric
 
 LENGTH_SCALES = (0.6, 0.25, 0.1)  # of smooth functions, in parts of the covariate's range
 _SPACE_LENGTHS = (0.5, 0.25)
+# In parts of the diameter of a sphere of directions; the shortest lets neighbouring directions differ at will
 _DIRECTION_LENGTHS = (0.5, 0.25, 0.08)
-"""In parts of the diameter of a sphere of directions; the shortest lets neighbouring directions differ at will."""
-
 _LOBES = (2, 4, 5, 6, 7, 8, 9, 10)  # undulations in a turn; three are an effect of the catalogue
 _SPACE_PLACES, _SPACE_RANK = 120, 40
+# Jumps that are tried. A reading on the wrong side of one is off by all of it: few between many readings find none
 _MOST_STEPS = 200
-"""Jumps that are tried. A reading on the wrong side of one is off by all of it: few between many readings find none."""
-
 _MANY_DIRECTIONS, _SEEN = 12, 1e-6
-
+# Beginnings of columns that belong to a point's place, or have functions of their own
 _PLACED = ("approach_", "nx", "ny", "nz", "tip_", "reference_", "time_s")
-"""Beginnings of columns that belong to a point's place, or have functions of their own."""
-
+# mm: no jump is sought between readings nearer than this, which are one place read again; what parts these is their noise
 _SAME_PLACE = 0.1
-"""mm: no jump is sought between readings nearer than this, which are one place read again; what parts these is their noise."""
-
 _SUDDEN = ("time_s", "order")  # covariates of an observation at which an error may jump
 _KEPT = 1e-3
 _GRID = 60

@@ -53,20 +53,19 @@ def under_heavy_tails(normal: CandidateComparison, data: Floats) -> Iterator[tup
                 yield j, own
 
 
+# Probability, beforehand, of one effect of the catalogue, of several, and of the unknown; the rest is for nothing missing
 SHARES = {EFFECT: 0.3, SEVERAL: 0.06, UNKNOWN: 0.08}
-"""Probability, beforehand, of one effect of the catalogue, of several, and of the unknown; the rest is for nothing missing."""
-
 NOTHING = 1 - sum(SHARES.values())
 DRAWS = 200
 _TAIL = 0.8
+# Factor from the false-alarm rate within which a probability is found more closely: 200 draws know one of 0.01 to a factor
+# of three, and heavy tails that are reckoned with make it as much smaller
 _NEAR = 10.0
-"""Factor from the false-alarm rate within which a probability is found more closely: 200 draws know one of 0.01 to a factor of
-three, and heavy tails that are reckoned with make it as much smaller."""
 _MOST = 1000  # draws that there are then at most
 _CLEAR = 3.0  # standard errors from the false-alarm rate at which a probability is on one side of it
 _STEEPEST = 1.0  # mean excess of log odds whose tail is that of Markov's inequality
+# Mean excess below which draws lie at the floor: tails of tests with a few candidates have one half or more
 _CROWDED = 0.25
-"""Mean excess below which draws lie at the floor: tails of tests with a few candidates have one half or more."""
 
 
 def log_prior(candidates: Sequence[Explanation]) -> Floats:

@@ -17,22 +17,17 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, E
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.physics.catalogue import every
 
+# Probability of none, one, two, three and four known effects that the job does not name
 EFFECTS = (0.5, 0.27, 0.14, 0.06, 0.03)
-"""Probability of none, one, two, three and four known effects that the job does not name."""
-
 FURTHER = 0.5  # how many times less probable each further effect is where four are found
 UNKNOWNS = (0.85, 0.12, 0.03)  # of none, one and two nonparametric terms
-
+# Probability that scales and squarenesses belong together so, where nothing is said of any of them
 OUT_OF_ADJUSTMENT = 0.05
-"""Probability that scales and squarenesses belong together so, where nothing is said of any of them."""
-
+# Parameters of the beta distribution of how readily each of them then acts: mostly all of them, or nearly so
 READILY = (6.0, 1.0)
-"""Parameters of the beta distribution of how readily each of them then acts: mostly all of them, or nearly so."""
-
 ALIKE = 10.0  # ratio within which what is shown of them then lies
-
+# By how much each further one is more probable at its size: three of the sizes that are tried lie so near the first
 _NARROWER = float(np.log(AMPLITUDES / 3))
-"""By how much each further one is more probable at its size: three of the sizes that are tried lie so near the first."""
 
 
 def with_two_more(counts: tuple[float, ...]) -> tuple[float, ...]:

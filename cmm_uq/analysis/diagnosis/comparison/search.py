@@ -36,23 +36,17 @@ from cmm_uq.machine.model.noise import display_of
 
 _MISFIT = 20.0  # largest misfit, over the noise, that is reckoned with when the noise is not stated
 ASSERTED = 0.5  # probability from which an effect, or one of those that cannot be told from it, is asserted
-
+# Probability from which an effect is asserted when all that is asked is whether it has its own form or any other
 _MECHANISM = 0.2
-"""Probability from which an effect is asserted when all that is asked is whether it has its own form or any other."""
-
 _PROBABLE = 0.02  # probability of a combination from which the period in it is refined
 _SHOWN = 6.0  # log evidence of a period from which shorter ones are tried besides: less shows none
 _FEW = 6  # periods that are refined where none shows
-
+# Part of the log evidence that a period may lose where it lies between two trials (sinc² at half of a step, and more)
 _BETWEEN = 0.12
-"""Part of the log evidence that a period may lose where it lies between two trials (sinc² at half of a step, and more)."""
-
 _IMPROBABLE = 12.0  # log evidence below that of the best from which a period is not followed
 _AGAIN = 3  # times that everything is compared again about what was found
-
+# Part of an effect's squared visible length up to which a nonparametric term that leaves no more of it could pass for it
 _PASSES = 0.1
-"""Part of an effect's squared visible length up to which a nonparametric term that leaves no more of it could pass for it."""
-
 NOT_TOLD_APART = 0.02  # odds from which another effect in the place of one counts as not told apart from it
 
 
