@@ -57,19 +57,15 @@ def withhold_unresolved(result: SearchResult) -> tuple[SearchResult, tuple[Withh
 def period_settled(result: SearchResult, index: int, modes: tuple[Mode, ...]) -> bool:
     """Whether an effect with the most probable of its periods is more probable than not, as asked of any effect."""
     combinations = result.combinations
-    if combinations is None:
-        return False
-    group = group_of(combinations, result.chosen, index) | {index}
-    return combinations.of_any(group) * modes[0].probability >= ASSERTED
+    group = frozenset[int]() if combinations is None else group_of(combinations, result.chosen, index) | {index}
+    return combinations is not None and combinations.of_any(group) * modes[0].probability >= ASSERTED
 
 
 def _too_little(result: SearchResult, index: int, modes: tuple[Mode, ...]) -> Text | None:
     combinations = result.combinations
     if combinations is None or not holds_whole_period(result, index, modes[0]):
         return NOT_WHOLE
-    if period_settled(result, index, modes):
-        return None
-    return None if combinations.of(index) >= ASSERTED else UNRESOLVED
+    return None if period_settled(result, index, modes) or combinations.of(index) >= ASSERTED else UNRESOLVED
 
 
 def withhold_unpredicted(result: SearchResult, unseen: Text) -> tuple[WithheldEffect, ...]:
@@ -82,15 +78,17 @@ def effects_without_size(result: SearchResult, joint: JointPosterior) -> dict[in
     """The effects of whose size the joint posterior says too little."""
     gone, shares = {}, _chance(result, joint)
     for i in sorted(result.chosen):
-        effect = effect_of(result.first.explanations[i])
-        modes = period_modes(result, i)
+        explanation, modes = result.first.explanations[i], period_modes(result, i)
+        effect = effect_of(explanation)
         sizes = _sizes(result, joint, effect, modes)
+        # of noise, the best of many periods takes more than one
+        tried = float(sum(member.weight for member in explanation.members)) if explanation.shaped else 1.0
         why = None
         if _holds_zero(sizes):
             why = HOLDS_ZERO
         elif modes and not _phase_known(sizes):
             why = PHASE_OPEN
-        elif shares[effect.name] * _tried(result, i) > _BY_NOISE:
+        elif shares[effect.name] * tried > _BY_NOISE:
             why = WITHIN_NOISE
         if why is not None:
             gone[i] = replace(_withheld(result, i, why), modes=modes)
@@ -100,20 +98,13 @@ def effects_without_size(result: SearchResult, joint: JointPosterior) -> dict[in
 def group_of(combinations: Combinations, chosen: Key, index: int) -> Key:
     """Explanations that could stand in the place of one; functions only where without them it is no more than one half."""
     group = rivals_of(combinations, chosen, index)
-    if combinations.of_any(group | {index}) >= ASSERTED:
-        return group
-    return group | combinations.imitating(index)
+    return group if combinations.of_any(group | {index}) >= ASSERTED else group | combinations.imitating(index)
 
 
 def _withheld(result: SearchResult, index: int, why: Text) -> WithheldEffect:
     effect = effect_of(result.first.explanations[index])
     probability = result.combinations.of(index) if result.combinations is not None else 0.0
     return WithheldEffect(effect.name, effect.title, probability, why)
-
-
-def _tried(result: SearchResult, index: int) -> float:
-    explanation = result.first.explanations[index]
-    return float(sum(member.weight for member in explanation.members)) if explanation.shaped else 1.0
 
 
 def _sizes(result: SearchResult, joint: JointPosterior, effect: Effect, modes: tuple[Mode, ...]) -> Floats:
@@ -145,8 +136,7 @@ def _holds_zero(draws: Floats) -> bool:
 
 def _phase_known(draws: Floats) -> bool:
     """Whether the phases of draws (N, 2) lie within half a turn."""
-    towards = draws @ draws.mean(axis=0)
-    return float(np.mean(towards > 0)) >= _COVERED
+    return float(np.mean(draws @ draws.mean(axis=0) > 0)) >= _COVERED
 
 
 def _chance(result: SearchResult, joint: JointPosterior) -> dict[str, float]:

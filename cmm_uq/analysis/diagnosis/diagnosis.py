@@ -16,7 +16,7 @@ from cmm_uq.analysis.diagnosis.assertion import (
     withhold_unpredicted,
     withhold_unresolved,
 )
-from cmm_uq.analysis.diagnosis.comparison.search import ModelComparison, SearchResult, search, substitute, withhold
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, withhold
 from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement
 from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, joint_posterior, period_modes
 from cmm_uq.analysis.diagnosis.location import Place, locate
@@ -99,15 +99,9 @@ class Diagnosis:
 
 
 def diagnose(
-    model: RecordingModel,
-    *,
-    stated_um: float | None,
-    alpha: float,
-    seed: int,
-    progress: Progress | None = None,
-    known: NoisyPosterior | None = None,
-    observe: Observed | None = None,
-) -> Diagnosis:
+    model: RecordingModel, *, stated_um: float | None, alpha: float, seed: int, progress: Progress | None = None,
+    known: NoisyPosterior | None = None, observe: Observed | None = None,
+) -> Diagnosis:  # fmt: skip
     stated = None if stated_um is None else stated_um * MICROMETRE
     least = of_last_digit(model.artefact.points.xyz, model.estimate().least_squares.sigma_of_residuals)
     model = replace(model, least_noise=least) if least > model.least_noise else model
@@ -118,13 +112,15 @@ def diagnose(
         withheld = (*withheld, *withhold_unpredicted(found, gain.unseen))
         found = _of_all(withhold(found, found.chosen), model)
         gain, joint = improvement(model, model), joint_posterior(found, seed, progress, known)
-    noise = _noise(found, joint, stated)
+    noise, first = _noise(found, joint, stated), found.first
     after = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
+    rivals = tuple(
+        (first.explanations[i].name, float(first.probability[i])) for i in np.argsort(-first.probability)[:12]
+    )
     return Diagnosis(
-        _verdict(found, alpha), found.first.p_value, alpha, locate(found.first, alpha, found.chosen),
-        _left_out(found, joint, model), _indistinguishable(found), _rivals(found.first), noise, gain, model, after,
-        joint.components, joint.posterior, int(some.used.sum()), found, withheld,
-        average_models(found, joint, model, seed),
+        _verdict(found, alpha), first.p_value, alpha, locate(first, alpha, found.chosen), _left_out(found, joint, model),
+        _indistinguishable(found), rivals, noise, gain, model, after, joint.components, joint.posterior,
+        int(some.used.sum()), found, withheld, average_models(found, joint, model, seed),
     )  # fmt: skip
 
 
@@ -161,10 +157,8 @@ def _of_all(result: SearchResult, model: RecordingModel) -> SearchResult:
 
 
 def _verdict(result: SearchResult, alpha: float) -> str:
-    if result.first.p_value >= alpha:
-        return "consistent"
-    if not result.effects:
-        return "unexplained"
+    if result.first.p_value >= alpha or not result.effects:
+        return "consistent" if result.first.p_value >= alpha else "unexplained"
     return "partial" if result.rough or result.unexplained > _UNKNOWN else "explained"
 
 
@@ -206,13 +200,9 @@ def _probability(result: SearchResult, index: int, *, known: bool) -> tuple[floa
     combinations = result.combinations
     if combinations is None:
         return 0.0, 0.0, ()
-    group = group_of(combinations, result.chosen, index)
-    group |= frozenset() if known else combinations.imitating(index)
-    names = tuple(
-        combinations.explanations[i].name
-        for i in sorted(group, key=lambda i: -combinations.of(i))
-        if combinations.of(i) > 0
-    )
+    group = group_of(combinations, result.chosen, index) | (frozenset() if known else combinations.imitating(index))
+    ordered = sorted((i for i in group if combinations.of(i) > 0), key=lambda i: -combinations.of(i))
+    names = tuple(combinations.explanations[i].name for i in ordered)
     return combinations.of(index), combinations.of_any(group | {index}), names
 
 
@@ -238,28 +228,19 @@ def _indistinguishable(result: SearchResult) -> tuple[tuple[str, ...], ...]:
     return tuple(groups)
 
 
-def _rivals(compared: ModelComparison) -> tuple[tuple[Text, float], ...]:
-    order = np.argsort(-compared.probability)
-    return tuple((compared.explanations[i].name, float(compared.probability[i])) for i in order[:12])
-
-
 def _noise(result: SearchResult, joint: JointPosterior, stated: float | None) -> NoiseDiagnosis:
     """The noise, given what is modelled; a kind is named when it has nine parts of ten."""
-    sizes, weight = joint.posterior.sizes, result.last.noise_posterior().sum(axis=1)
+    sizes, last, weight = joint.posterior.sizes, result.last, result.last.noise_posterior().sum(axis=1)
     estimate = result.model.estimate()
     residuals = studentised(estimate.linear, joint.components, sizes.typical, estimate.least_squares.residuals)
     likeliest = int(weight.argmax())  # quick noise is no other noise than a reading's for who states that
-    squares = result.last.squares[likeliest] * result.last.kinds[likeliest].scatter ** 2
+    squares = last.squares[likeliest] * last.kinds[likeliest].scatter ** 2
+    # two-sided χ² test of the stated noise at 1 %
+    p = 0.5 if stated is None else float(special.chdtrc(last.degrees_of_freedom, squares / stated**2))
     return NoiseDiagnosis(
         Quantity.of_draws(sizes.coordinate / MICROMETRE, unit("µm")),
         Quantity.of_draws(sizes.placing / MICROMETRE, unit("µm")),
         float(np.mean(sizes.slow > 0)) > _NOISE_KIND,
-        probability_by_name(result.last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or has_heavy_tails(residuals),
-        stated is not None and _contradicts(stated, squares, result.last.degrees_of_freedom),
+        probability_by_name(last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or has_heavy_tails(residuals),
+        min(p, 1 - p) < 0.005,
     )
-
-
-def _contradicts(stated: float, squares: float, count: int) -> bool:
-    """Two-sided χ² test of the stated noise at 1 %."""
-    p = float(special.chdtrc(count, squares / stated**2))
-    return min(p, 1 - p) < 0.005

@@ -138,22 +138,19 @@ def joint_posterior(
 
 
 def _shaped(result: SearchResult, model: RecordingModel, effect: Effect, values: Floats) -> Shaped:
-    nodes = _nodes(result, effect)
-    table = np.stack([model.seen(model.columns(effect, (float(shape),), values), values) for shape in nodes])
-    keys = [unknown.key for unknown in model.unknowns]
-    return Shaped([keys.index((effect.name, c.name)) for c in effect.coefficients], nodes, table)
-
-
-def _nodes(result: SearchResult, effect: Effect) -> Floats:
-    comparison = result.first.comparison
-    index = next(i for i in result.chosen if result.first.explanations[i].name == effect.name)
+    """An effect's columns on a fine grid of its shape, wherever the search found some probability."""
+    explanations = result.first.explanations
+    index = next(i for i in result.chosen if explanations[i].name == effect.name)
     given = [v for v in result.versions if v.explanation != index]
-    member, evidence, _ = comparison.of_versions(index, given)
-    even = even_scale(effect, np.array([result.first.explanations[index].members[m].shape[0] for m in member]))
+    member, evidence, _ = result.first.comparison.of_versions(index, given)
+    even = even_scale(effect, np.array([explanations[index].members[m].shape[0] for m in member]))
     step = float(np.median(np.diff(np.sort(even)))) if len(even) > 1 else 0.1 * abs(float(even[0]))
     likely = even[evidence > evidence.max() - _IMPROBABLE]
     offsets = np.arange(-_FINER, _FINER + 1) / _FINER
     fine = np.unique(np.round((likely[:, None] + step * offsets).ravel() / step * _FINER)) * step / _FINER
     (shape,) = effect.shape
     low, high = np.sort(even_scale(effect, np.array([shape.low, shape.high])))
-    return np.sort(from_even_scale(effect, np.unique(np.clip(fine, low, high))))
+    nodes = np.sort(from_even_scale(effect, np.unique(np.clip(fine, low, high))))
+    table = np.stack([model.seen(model.columns(effect, (float(node),), values), values) for node in nodes])
+    keys = [unknown.key for unknown in model.unknowns]
+    return Shaped([keys.index((effect.name, c.name)) for c in effect.coefficients], nodes, table)

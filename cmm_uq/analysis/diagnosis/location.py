@@ -62,9 +62,8 @@ def locate(compared: ModelComparison, alpha: float, effects: Collection[int] = (
     """Where the evidence is that something is missing, significant at ``alpha``, the place with most of it first."""
     if compared.p_value >= alpha:
         return ()
-    functions = {
-        i for i, e in enumerate(compared.explanations) if e.kind == UNKNOWN and e.covariate_name and e.covariate is not None
-    }  # fmt: skip
+    every = compared.explanations
+    functions = {i for i, e in enumerate(every) if e.kind == UNKNOWN and e.covariate_name and e.covariate is not None}
     chosen: list[tuple[Version, float, tuple[Text, ...]]] = []
     while functions and len(chosen) < _MOST:
         gains = _beside(compared, [version for version, *_ in chosen], functions)
@@ -73,16 +72,12 @@ def locate(compared: ModelComparison, alpha: float, effects: Collection[int] = (
             break
         most = max(gain for gain, _ in gains.values())
         likely = [i for i, (gain, _) in gains.items() if gain > most - _AS_WELL]
-        first = max(likely, key=lambda i: (_has_form(compared, i, effects), gains[i][0]))
+        first = max(likely, key=lambda i: (any(every[i].could_be(every[e]) for e in effects), gains[i][0]))
         gain, version = gains[first]
-        still = {
-            i for i, (left, _) in _beside(compared, [*(v for v, *_ in chosen), version], set(gains) - {first}).items()
-            if _p_value(compared, left) < alpha
-        }  # fmt: skip
-        also = sorted((i for i in likely if i != first and i not in still), key=lambda i: -gains[i][0])
-        names = tuple(dict.fromkeys(compared.explanations[i].name for i in also))
-        chosen.append((version, _p_value(compared, gain), names))
-        functions = still
+        besides = _beside(compared, [*(v for v, *_ in chosen), version], set(gains) - {first})
+        functions = {i for i, (left, _) in besides.items() if _p_value(compared, left) < alpha}
+        also = sorted((i for i in likely if i != first and i not in functions), key=lambda i: -gains[i][0])
+        chosen.append((version, _p_value(compared, gain), tuple(dict.fromkeys(every[i].name for i in also))))
     return tuple(_places(compared, chosen))
 
 
@@ -103,13 +98,10 @@ def _p_value(compared: ModelComparison, log_odds: float) -> float:
     return tail_probability(compared.null_maximum, log_odds)
 
 
-def _has_form(compared: ModelComparison, function: int, effects: Collection[int]) -> bool:
-    own = compared.explanations[function]
-    return any(own.could_be(effect) for i, effect in enumerate(compared.explanations) if i in effects)
-
-
 def _places(compared: ModelComparison, chosen: Sequence[tuple[Version, float, tuple[Text, ...]]]) -> Iterable[Place]:
     fit = _Fit.of(compared, [version for version, *_ in chosen])
+    model, comparison = compared.model, compared.comparison
+    rows, left = model.artefact.rows[model.used], comparison.left * comparison.noise_scale / MICROMETRE
     for number, (version, p_value, also) in enumerate(chosen):
         explanation = compared.explanations[version.explanation]
         covariate, name, term = explanation.covariate, explanation.covariate_name, explanation.term
@@ -122,10 +114,11 @@ def _places(compared: ModelComparison, chosen: Sequence[tuple[Version, float, tu
         if not sure.any():
             continue
         region = region_of(x, y, sure) if values.shape[1] > 1 else _jump(compared, version.explanation, x, order)
-        largest = float(np.abs(y[sure]).max()) / MICROMETRE
+        each = covariate[rows] if len(covariate) == len(model.artefact.points) else covariate[:, None]
         yield Place(
-            name, region, p_value, largest, explanation.name, (x, y / MICROMETRE, u / MICROMETRE), fit.k,
-            None if term is None else term.along, term is not None and term.scale, also, _data(compared, covariate),
+            name, region, p_value, float(np.abs(y[sure]).max()) / MICROMETRE, explanation.name,
+            (x, y / MICROMETRE, u / MICROMETRE), fit.k, None if term is None else term.along,
+            term is not None and term.scale, also, (each.min(axis=1), each.max(axis=1), left),
         )  # fmt: skip
 
 
@@ -185,14 +178,6 @@ def _jump(compared: ModelComparison, index: int, x: Floats, order: Ints) -> tupl
     return float(x[min(jumps)]), float(x[max(jumps) + 1])
 
 
-def _data(compared: ModelComparison, covariate: Floats) -> tuple[Floats, Floats, Floats]:
-    """Ends of a covariate of points (n,), or itself of observations (m,), and what the baseline leaves of each in µm."""
-    model, comparison = compared.model, compared.comparison
-    rows = model.artefact.rows[model.used]
-    each = covariate[rows] if len(covariate) == len(model.artefact.points) else covariate[:, None]
-    return each.min(axis=1), each.max(axis=1), comparison.left * comparison.noise_scale / MICROMETRE
-
-
 def region_of(covariate: Floats, curve: Floats, sure: NDArray[np.bool_] | None = None) -> tuple[float, float]:
     """Range of the sorted covariate about the curve's largest value where it exceeds half of it and is ``sure``."""
     size = np.abs(curve) if sure is None else np.where(sure, np.abs(curve), 0.0)
@@ -230,40 +215,29 @@ class ResidualField:
 def residual_field(before: RecordingModel, after: RecordingModel) -> ResidualField | None:
     """The residuals of two models of one recording as vectors; ``None`` where an observation is of more than two points."""
     artefact, used = before.artefact, before.used
-    rows = artefact.rows[used]
+    rows, noise, readings = artefact.rows[used], artefact.noise_scale[used], artefact.points.machine_xyz
     left = np.column_stack(
         [model.residuals(model.estimate().least_squares.value)[used] / MICROMETRE for model in (before, after)]
     )
-    noise = artefact.noise_scale[used]
-    readings = artefact.points.machine_xyz
     if rows.shape[1] == 1:
-        # (m, 3) in which each observation sees its point move
-        points = artefact.points
-        every = np.broadcast_to(np.eye(3), (len(points), 3, 3))
-        return _of_points(rows[:, 0], artefact.project(points.xyz, every)[used], left, noise, readings)
+        every = np.broadcast_to(np.eye(3), (len(artefact.points), 3, 3))
+        directions = artefact.project(artefact.points.xyz, every)[used]  # (m, 3) in which each sees its point move
+        point, vectors, scale, dimensions = rows[:, 0], [], [], []
+        order = np.argsort(point, kind="stable")
+        for own in np.split(order, np.flatnonzero(np.diff(point[order])) + 1):
+            vectors.append(np.linalg.pinv(directions[own], rcond=_SEEN) @ left[own])
+            scale.append(float(noise[own].mean()))
+            dimensions.append(int(np.linalg.matrix_rank(directions[own], tol=_SEEN)))
+        field, seen = np.array(vectors), np.array(dimensions, dtype=np.int64)
+        return ResidualField(readings[np.unique(point)], field[:, :, 0], field[:, :, 1], np.array(scale), seen, False)
     if rows.shape[1] == 2:
-        ends = readings[rows]
+        ends, count = readings[rows], 2 * len(rows)
         along = ends[:, 1] - ends[:, 0]
         along = along / np.linalg.norm(along, axis=1, keepdims=True)
         half = 0.5 * left[:, :, None] * along[:, None, :]
         both = np.stack([-half, half], axis=1)  # (m, end, model, 3)
-        count = 2 * len(rows)
+        first, second = (both[:, :, i].reshape(count, 3) for i in (0, 1))
         return ResidualField(
-            ends.reshape(count, 3), both[:, :, 0].reshape(count, 3), both[:, :, 1].reshape(count, 3),
-            np.repeat(0.5 * noise, 2), np.ones(count, dtype=np.int64), True,
-        )  # fmt: skip
+            ends.reshape(count, 3), first, second, np.repeat(0.5 * noise, 2), np.ones(count, dtype=np.int64), True
+        )
     return None
-
-
-def _of_points(point: Ints, directions: Floats, left: Floats, noise: Floats, readings: Floats) -> ResidualField:
-    vectors, scale, dimensions, owners = [], [], [], np.unique(point)
-    order = np.argsort(point, kind="stable")
-    for own in np.split(order, np.flatnonzero(np.diff(point[order])) + 1):
-        inverse = np.linalg.pinv(directions[own], rcond=_SEEN)
-        vectors.append(inverse @ left[own])
-        scale.append(float(noise[own].mean()))
-        dimensions.append(int(np.linalg.matrix_rank(directions[own], tol=_SEEN)))
-    field = np.array(vectors)
-    return ResidualField(
-        readings[owners], field[:, :, 0], field[:, :, 1], np.array(scale), np.array(dimensions, dtype=np.int64), False
-    )

@@ -8,7 +8,7 @@ estimates, how they vary together, and what is computed from them are of one dis
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -80,18 +80,13 @@ def average_models(result: SearchResult, joint: JointPosterior, before: Recordin
     typical = joint.posterior.sizes.typical
     noise = joint.components.white(typical), float(typical.coordinate[0])
     rivals = tuple(_rival(result, combinations, noise, before, key, total[key], seed) for key in order)
-    draws = _over_all(rivals, before, seed)
-    return ModelAverage(rivals, _reported(before, draws), draws)
-
-
-def _over_all(rivals: Sequence[Rival], before: RecordingModel, seed: int) -> Floats:
-    """Draws (N, k) of the unknowns of the job's model, whichever explanation is the right one."""
     keys, each = [unknown.key for unknown in before.unknowns], []
     for rival in rivals:
-        own = {unknown.key: column for column, unknown in enumerate(rival.model.unknowns)}
-        each.append(rival.draws[:, [own[key] for key in keys]])
+        column = {unknown.key: i for i, unknown in enumerate(rival.model.unknowns)}
+        each.append(rival.draws[:, [column[key] for key in keys]])
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(18,)))
-    return mixed(each, [rival.probability for rival in rivals], random)
+    draws = mixed(each, [rival.probability for rival in rivals], random)
+    return ModelAverage(rivals, _reported(before, draws), draws)
 
 
 def needed_combinations(combinations: Combinations) -> dict[Key, float]:
@@ -107,9 +102,8 @@ def needed_combinations(combinations: Combinations) -> dict[Key, float]:
 
 
 def _rival(
-    result: SearchResult,
-    combinations: Combinations, noise: tuple[Callable[[Floats], Floats], float], before: RecordingModel,
-    key: Key, probability: float, seed: int,
+    result: SearchResult, combinations: Combinations, noise: tuple[Callable[[Floats], Floats], float],
+    before: RecordingModel, key: Key, probability: float, seed: int,
 ) -> Rival:  # fmt: skip
     """One that remains; ``noise`` is what whitens observations, and its standard deviation of a reading, mm."""
     explanations, (white, sigma) = result.first.explanations, noise
@@ -117,19 +111,15 @@ def _rival(
     combination = combinations.likeliest(
         k for k in combinations.by_key if key <= k and combinations.effects_of(k) == combinations.effects_of(key)
     )
-    versions = combinations.by_key[combination].versions
-    effects = key - frozenset(functions)
-    model = before
+    versions, effects, model = combinations.by_key[combination].versions, key - frozenset(functions), before
     if effects:
-        model = with_effects(result.first, versions, effects)
-        model = replace(model, artefact=before.artefact, used=before.used)
+        model = replace(with_effects(result.first, versions, effects), artefact=before.artefact, used=before.used)
     linear = replace(model.linearised(_about(model, before, result.model)), sigma=None)
-    for version in versions:
-        if version.explanation in functions:
-            member = explanations[version.explanation].members[version.member]
-            linear = _with_columns(linear, member.columns, version.amplitude * sigma)
-    own = linear.uncorrelated(white)
-    draws = _drawn(own, sigma, result.stated, seed)[:, : len(model.unknowns)]
+    for version in [version for version in versions if version.explanation in functions]:
+        columns, sd = explanations[version.explanation].members[version.member].columns, version.amplitude * sigma
+        more = tuple(Unknown(("unknown", str(i)), unit("1"), 0.0, sd, sd) for i in range(columns.shape[1]))
+        linear = replace(linear, design=np.hstack([linear.design, columns]), unknowns=(*linear.unknowns, *more))
+    draws = _drawn(linear.uncorrelated(white), sigma, result.stated, seed)[:, : len(model.unknowns)]
     reported = _reported(model, draws)
     added = tuple(effect.name for effect in model.effects if effect.name not in {e.name for e in before.effects})
     return Rival(
@@ -145,12 +135,6 @@ def _about(model: RecordingModel, *estimated: RecordingModel) -> Floats:
     for other in estimated:
         values |= dict(zip((unknown.key for unknown in other.unknowns), other.estimate().about, strict=True))
     return np.array([values[unknown.key] for unknown in model.unknowns])
-
-
-def _with_columns(linear: LinearModel, columns: Floats, sd: float) -> LinearModel:
-    """With what is unknown besides: columns (m, r), mm, whose coefficients have this standard deviation."""
-    more = tuple(Unknown(("unknown", str(i)), unit("1"), 0.0, sd, sd) for i in range(columns.shape[1]))
-    return replace(linear, design=np.hstack([linear.design, columns]), unknowns=(*linear.unknowns, *more))
 
 
 def _drawn(linear: LinearModel, sigma: float, stated: float | None, seed: int) -> Floats:
@@ -177,8 +161,7 @@ def _drawn(linear: LinearModel, sigma: float, stated: float | None, seed: int) -
 
 
 def _reported(model: RecordingModel, draws: Floats) -> dict[str, dict[str, Quantity]]:
-    found: dict[str, dict[str, Quantity]] = {}
-    column = 0
+    found, column = {}, 0
     for effect in model.effects:
         own = draws[:, column : column + len(effect.coefficients)]
         column += len(effect.coefficients)
@@ -186,8 +169,6 @@ def _reported(model: RecordingModel, draws: Floats) -> dict[str, dict[str, Quant
         units = {parameter.name: parameter.unit for parameter in effect.reported}
         # what shapes an effect is held here: neither it nor a phase, which goes with it, is estimated
         held = {shaped.name for shaped in effect.shape} | ({"phase_rad"} if effect.shape else set())
-        found[effect.name] = {
-            name: Quantity.of_draws(values, units[name])
-            for name, values in effect.to_reported(own, shape).items() if name not in held
-        }  # fmt: skip
+        each = {name: values for name, values in effect.to_reported(own, shape).items() if name not in held}
+        found[effect.name] = {name: Quantity.of_draws(values, units[name]) for name, values in each.items()}
     return found

@@ -133,26 +133,19 @@ def _tails_over_normal(residuals: Floats) -> float:
 def sigma_grid(stated: float | None, residual: float, least: float = 0.0) -> tuple[Floats, Floats]:
     """Noise (s,), mm, and log probabilities beforehand: a stated one mostly good to a fifth, else ln σ uniform."""
     centre = np.log(max(residual, least))
-    grid = np.linspace(centre - 4.0, centre + 1.5, _POINTS)
-    grid, log_weight = _grid(stated, grid)
+    grid, log_weight = np.linspace(centre - 4.0, centre + 1.5, _POINTS), np.full(_POINTS, -np.log(_POINTS))
+    if stated is not None:
+        at = np.log(stated)
+        grid = np.unique(np.concatenate([grid, np.linspace(at - 5 * _STATED_SPREAD, at + 5 * _STATED_SPREAD, 60)]))
+        right = np.exp(-0.5 * ((grid - at) / _STATED_SPREAD) ** 2) / _STATED_SPREAD
+        weight = _STATED_IS_RIGHT * right + (1 - _STATED_IS_RIGHT) * np.exp(-0.5 * (grid - at) ** 2)
+        log_weight = np.log(weight * np.gradient(grid) / np.sqrt(2 * np.pi))
     return np.exp(grid), np.where(np.exp(grid) >= least, log_weight, -np.inf) if least else log_weight
-
-
-def _grid(stated: float | None, grid: Floats) -> tuple[Floats, Floats]:
-    """Logarithms (s,) of the noise and their log probabilities, on a grid that holds a stated value too."""
-    if stated is None:
-        return grid, np.full(_POINTS, -np.log(_POINTS))
-    at = np.log(stated)
-    grid = np.unique(np.concatenate([grid, np.linspace(at - 5 * _STATED_SPREAD, at + 5 * _STATED_SPREAD, 60)]))
-    right = np.exp(-0.5 * ((grid - at) / _STATED_SPREAD) ** 2) / _STATED_SPREAD
-    wrong = np.exp(-0.5 * (grid - at) ** 2)
-    weight = _STATED_IS_RIGHT * right + (1 - _STATED_IS_RIGHT) * wrong
-    return grid, np.log(weight * np.gradient(grid) / np.sqrt(2 * np.pi))
 
 
 def probability_by_name(kinds: Sequence[NoiseKind], weight: Floats) -> dict[str, float]:
     """Probability of each name of ``kinds`` by their weights (k,)."""
-    total: dict[str, float] = {}
+    total = dict.fromkeys((kind.name for kind in kinds), 0.0)
     for kind, part in zip(kinds, weight, strict=True):
-        total[kind.name] = total.get(kind.name, 0.0) + float(part)
+        total[kind.name] += float(part)
     return total

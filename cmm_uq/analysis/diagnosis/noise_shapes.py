@@ -43,45 +43,32 @@ class Shapes:
 
 
 def representative_kinds(
-    linear: LinearModel,
-    components: Components,
-    estimate: LeastSquares,
-    rivals: Floats,
-    residuals: Floats,
+    linear: LinearModel, components: Components, estimate: LeastSquares, rivals: Floats, residuals: Floats,
     jumps: Floats | None = None,
-) -> list[NoiseKind]:
+) -> list[NoiseKind]:  # fmt: skip
     """Noise that a recording could show, from residuals (m,), mm, what could be missing and what may jump with time."""
     components = _for_a_unit(Marginal(linear, components, estimate))
-    either = (
-        Marginal(linear, components, estimate),
-        Marginal(_with_rivals(linear, rivals), components, _without_rivals(estimate, rivals.shape[1])),
-    )
+    either = Marginal(linear, components, estimate), _beside(linear, components, estimate, rivals)
     taken = (0.0, _determined(linear, rivals, estimate.sigma_of_residuals))
     few = [_Density.of(*each, components.fewer) for each in zip(either, taken, strict=True)]
     shapes = Shapes(drawn_shapes(components), np.full(SHAPES, 1 / SHAPES))
     shares = [density.share(shapes) for density in few]
     if SLOW in components.possible and min(1 / np.sum(share**2) for share in shares) < _ENOUGH:
-        quick = np.mean(shares, axis=0) @ components.fewer.quick(components.sizes(shapes.latent))
-        told = few
+        quick, densities = np.mean(shares, axis=0) @ components.fewer.quick(components.sizes(shapes.latent)), few
         if quick >= NEGLIGIBLE:
-            told = [_Density.of(*each, components) for each in zip(either, taken, strict=True)]
-        shapes = _more(shapes, few, told)
-        shares = [density.share(shapes) for density in told]
+            densities = [_Density.of(*each, components) for each in zip(either, taken, strict=True)]
+        shapes = _more(shapes, few, densities)
+        shares = [density.share(shapes) for density in densities]
     sizes = components.sizes(shapes.latent)
     if jumps is not None and jumps.shape[1] and np.mean(shares, axis=0)[sizes.slow > 0].sum() > _SLOW:
-        beside = Marginal(_with_rivals(linear, jumps), components, _without_rivals(estimate, jumps.shape[1]))
         used_up = _determined(linear, jumps, estimate.sigma_of_residuals)
-        shares.append(_Density.of(beside, used_up, components).share(shapes))
+        shares.append(_Density.of(_beside(linear, components, estimate, jumps), used_up, components).share(shapes))
     kept, weight = _representative(sizes, shapes.weight, np.mean(shares, axis=0))
-    scale = linear.noise_scale
-    found = [
-        replace(
-            shape_of(components, components.sizes(shapes.latent[[i]]), scale, (1 - TAILS) * w),
-            scatter=float(np.exp(shapes.latent[i, 0])),
-        )
-        for i, w in zip(kept, weight, strict=True)
-    ]
-    return [*found, heavy_tails(residuals / scale)]
+    found = []
+    for i, w in zip(kept, weight, strict=True):
+        shape = shape_of(components, components.sizes(shapes.latent[[i]]), linear.noise_scale, (1 - TAILS) * w)
+        found.append(replace(shape, scatter=float(np.exp(shapes.latent[i, 0]))))
+    return [*found, heavy_tails(residuals / linear.noise_scale)]
 
 
 def _for_a_unit(marginal: Marginal) -> Components:
@@ -177,11 +164,8 @@ def _representative(sizes: Sizes, prior: Floats, share: Floats) -> tuple[list[in
     _, first, index = np.unique(np.round(table, 9), axis=0, return_index=True, return_inverse=True)
     before, part = (np.bincount(index.ravel(), each, len(first)) for each in (prior, share))
     part = 0.9 * part / part.sum() + 0.1 * before
-    expected = KEPT * part
-    certain = expected >= 1
-    rest = np.where(certain, 0.0, part)
-    places = max(KEPT - int(certain.sum()), 0)
-    taken = np.zeros(len(part))
+    certain = KEPT * part >= 1
+    rest, places, taken = np.where(certain, 0.0, part), max(KEPT - int(certain.sum()), 0), np.zeros(len(part))
     if places and rest.sum() > 0:
         upper = np.cumsum(rest / rest.sum() * places)
         taken = np.floor(upper + 0.5) - np.floor(np.append(0.0, upper[:-1]) + 0.5)
@@ -207,13 +191,12 @@ def unreached(linear: LinearModel, columns: Floats) -> Floats:
     return np.asarray(rest - basis @ (basis.T @ rest))
 
 
-def _with_rivals(linear: LinearModel, rivals: Floats) -> LinearModel:
-    more = tuple(Unknown(("rival", str(i)), unit("1"), 0.0, 1.0, 1.0) for i in range(rivals.shape[1]))
-    return replace(linear, design=np.hstack([linear.design, rivals]), unknowns=(*linear.unknowns, *more))
-
-
-def _without_rivals(estimate: LeastSquares, count: int) -> LeastSquares:
-    return replace(estimate, value=np.append(estimate.value, np.zeros(count)))
+def _beside(linear: LinearModel, noise: Components, estimate: LeastSquares, rivals: Floats) -> Marginal:
+    """Of the model with columns (m, r) besides, whose coefficients have standard deviation one."""
+    count = rivals.shape[1]
+    more = tuple(Unknown(("rival", str(i)), unit("1"), 0.0, 1.0, 1.0) for i in range(count))
+    wider = replace(linear, design=np.hstack([linear.design, rivals]), unknowns=(*linear.unknowns, *more))
+    return Marginal(wider, noise, replace(estimate, value=np.append(estimate.value, np.zeros(count))))
 
 
 _FEW = 2  # columns
@@ -221,27 +204,18 @@ _FEW = 2  # columns
 
 def noise_kinds(model: RecordingModel, candidates: Sequence[Explanation]) -> list[NoiseKind]:
     estimate = model.estimate()
-    columns = [e.members[0].columns for e in candidates if e.kind == EFFECT and not e.shaped and not _doubled(e)]
-    rivals = np.hstack(columns) if columns else np.zeros((len(estimate.linear.observed), 0))
+    linear, fitted, residuals = estimate.linear, estimate.least_squares, estimate.least_squares.residuals
+    effects = [e for e in candidates if e.kind == EFFECT and not e.shaped]
+    doubled = [e.effect is not None and e.effect.of_artefact and len(e.effect.coefficients) <= _FEW for e in effects]
+    none = np.zeros((len(residuals), 0))
+    rivals = [none, *(e.members[0].columns for e, twice in zip(effects, doubled, strict=True) if not twice)]
     # without a degree of freedom the recording says nothing of its noise, and what is stated holds
-    components = noise_of(replace(model, sigma=None) if estimate.least_squares.degrees_of_freedom else model)
-    residuals = estimate.least_squares.residuals
-    functions = [each for each in candidates if each.kind == UNKNOWN and each.covariate_name == "time_s"]
-    found = [np.zeros((len(residuals), 0))]
-    left = estimate.linear.reduce(residuals[:, None])[:, 0]
-    for function in functions:
-        steps = [member.columns for member in function.members if member.columns.shape[1] == 1]
-        if steps:
-            rest = unreached(estimate.linear, np.hstack(steps))
+    components = noise_of(replace(model, sigma=None) if fitted.degrees_of_freedom else model)
+    left, jumps = linear.reduce(residuals[:, None])[:, 0], [none]
+    for function in [each for each in candidates if each.kind == UNKNOWN and each.covariate_name == "time_s"]:
+        if steps := [member.columns for member in function.members if member.columns.shape[1] == 1]:
+            rest = unreached(linear, np.hstack(steps))
             squares = np.sum(rest**2, axis=0)
             taken = (left @ rest) ** 2 / np.where(squares > 0, squares, np.inf)
-            found.append(steps[int(taken.argmax())])
-    jumps = np.hstack(found)
-    return representative_kinds(
-        estimate.linear, components, estimate.least_squares, rivals, estimate.least_squares.residuals, jumps
-    )
-
-
-def _doubled(explanation: Explanation) -> bool:
-    effect = explanation.effect
-    return effect is not None and effect.of_artefact and len(effect.coefficients) <= _FEW
+            jumps.append(steps[int(taken.argmax())])
+    return representative_kinds(linear, components, fitted, np.hstack(rivals), residuals, np.hstack(jumps))

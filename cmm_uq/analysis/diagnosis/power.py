@@ -113,46 +113,36 @@ def powers(
 ) -> Iterator[Power]:  # fmt: skip
     """Of the diagnosis for effects that the model does not name; ``stated``, ``sigma`` of a coordinate, claimed, true, mm."""
     compared = model_comparison(model, stated, 0)
-    rule = _Rule(compared.comparison, sigma, alpha, noise)
-    for effect in effects:
-        yield _power(rule, model, compared.values, effect, seed, draws)
-
-
-def _power(rule: _Rule, model: RecordingModel, values: Floats, effect: Effect, seed: int, draws: int) -> Power:
-    points = model.artefact.points.at(model.placed(values))
-    column = model.seen(effect.basis(points)[:, :, :1], values) / rule.comparison.noise_scale[:, None]
-    shown = rule.comparison.rest(column)
-    length = float(np.linalg.norm(shown))
-    name, unit = effect.reported[0].name, effect.coefficients[0].unit
-    allowed = ALLOWED * effect.coefficients[0].prior_sd
-    index = rule.index(effect.name)
-    if length * allowed < SIZES[0] * rule.sigma or index is None:
-        never = np.full(draws, np.inf)
-        return Power(effect.name, name, unit, allowed, 0.0, never, never)
-    noise = rule.noise(shown / length, seed, draws)
-    alarm, margin = np.empty((len(SIZES), draws)), np.empty((len(SIZES), draws))
-    for i, size in enumerate(SIZES):
-        alarm[i], margin[i] = rule(rule.sigma * (noise + size * shown / length), index)
-    return Power(
-        effect.name, name, unit, allowed, length / rule.sigma, _reached(alarm), _reached(np.minimum(alarm, margin))
+    rule, points = (
+        _Rule(compared.comparison, sigma, alpha, noise),
+        model.artefact.points.at(model.placed(compared.values)),
     )
+    for effect in effects:
+        column = model.seen(effect.basis(points)[:, :, :1], compared.values) / rule.comparison.noise_scale[:, None]
+        shown = rule.comparison.rest(column)
+        length, first, index = float(np.linalg.norm(shown)), effect.coefficients[0], rule.index(effect.name)
+        common = (effect.name, effect.reported[0].name, first.unit, ALLOWED * first.prior_sd)
+        if length * ALLOWED * first.prior_sd < SIZES[0] * sigma or index is None:
+            never = np.full(draws, np.inf)
+            yield Power(*common, 0.0, never, never)
+            continue
+        drawn = rule.noise(shown / length, seed, draws)
+        each = [rule(sigma * (drawn + size * shown / length), index) for size in SIZES]
+        alarm, margin = (np.array(rows) for rows in zip(*each, strict=True))
+        yield Power(*common, length / sigma, _reached(alarm), _reached(np.minimum(alarm, margin)))
 
 
 def _reached(margin: Floats) -> Floats:
     """Size (d,) from which on the margin (sizes, d) stays positive; linear in the size's square between those tried."""
-    squares = SIZES**2
-    count = len(SIZES)
-    found = np.full(margin.shape[1], np.inf)
-    for column in range(margin.shape[1]):
-        values = margin[:, column]
+    squares, found = SIZES**2, np.full(margin.shape[1], np.inf)
+    for column, values in enumerate(margin.T):
         below = np.flatnonzero(values <= 0)
         last = int(below[-1]) if len(below) else -1
         if last < 0:
             found[column] = SIZES[0]
-        if last in (-1, count - 1):
-            continue
-        part = -values[last] / (values[last + 1] - values[last])
-        found[column] = float(np.sqrt(squares[last] + part * (squares[last + 1] - squares[last])))
+        elif last < len(SIZES) - 1:
+            part = -values[last] / (values[last + 1] - values[last])
+            found[column] = float(np.sqrt(squares[last] + part * (squares[last + 1] - squares[last])))
     return found
 
 
@@ -194,12 +184,10 @@ class _Rule:
     @cached_property
     def _thresholds(self) -> Floats:
         """(t,) statistic at which the test rejects when the noise, which a fault enlarges, looks :data:`_LARGER` times it."""
-        comparison = self.comparison
         random = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(2,)))
-        draws = draw_nothing(comparison, random, DRAWS)
-        found = []
+        draws, found = draw_nothing(self.comparison, random, DRAWS), []
         for larger in _LARGER:
-            statistic = statistic_of(comparison, larger * draws)[0]
+            statistic = statistic_of(self.comparison, larger * draws)[0]
             start = float(np.quantile(statistic, 1 - _TAIL))
             beyond = float((statistic[statistic > start] - start).mean())
             found.append(start + beyond * float(np.log(_TAIL / self.alpha)))
@@ -231,10 +219,8 @@ class _Rule:
 
     def index(self, name: str) -> int | None:
         """Of an effect among the rivals; ``None`` where it is not one, or invisible."""
-        for i, explanation in enumerate(self.comparison.explanations):
-            if explanation.name == name and explanation.kind == EFFECT and i in self.comparison.visible:
-                return i
-        return None
+        visible, rivals = self.comparison.visible, enumerate(self.comparison.explanations)
+        return next((i for i, e in rivals if e.name == name and e.kind == EFFECT and i in visible), None)
 
     @cached_property
     def _naming(self) -> Naming:

@@ -93,23 +93,17 @@ def smallest_effects(result: SearchResult, alpha: float, model: RecordingModel) 
     which, columns = [s.index for s in visible], np.array([s.column / s.unit_length for s in visible])
     each = dict(zip(which, thresholds(view, which, columns, alpha), strict=True))
     rows = [signal.smallest(view, each.get(signal.index)) for signal in signals]
-    known = {explanation.name for explanation in view.explanations}
-    rows += [_never(effect) for effect in _motionless(result.first.model, named | known)]
-    return tuple(sorted(rows, key=lambda row: -_reach(row)))
-
-
-def _reach(row: SmallestEffect) -> float:
-    return min(float("inf") if row.detected is None else row.detected / row.allowed, 1e9)
-
-
-def _never(effect: Effect) -> SmallestEffect:
-    parameter = effect.coefficients[0]
-    allowed, common = ALLOWED * parameter.prior_sd, effect.tier == CONTRACT
-    name = effect.reported[0].name
-    return SmallestEffect(effect.name, effect.title, name, parameter.unit, allowed, None, None, 0.0, (), common)
+    for effect in _motionless(result.first.model, named | {explanation.name for explanation in view.explanations}):
+        name, first = effect.reported[0].name, effect.coefficients[0]
+        never = (ALLOWED * first.prior_sd, None, None, 0.0, (), effect.tier == CONTRACT)
+        rows.append(SmallestEffect(effect.name, effect.title, name, first.unit, *never))
+    return tuple(
+        sorted(rows, key=lambda row: -min(np.inf if row.detected is None else row.detected / row.allowed, 1e9))
+    )
 
 
 def _motionless(model: RecordingModel, known: set[str]) -> Iterator[Effect]:
+    """Common effects of which nothing shows here, though they could act and all that they need is recorded."""
     points = model.artefact.points
     for effect in every().values():
         if effect.name in known or effect.tier != CONTRACT or effect.shape:
@@ -145,46 +139,33 @@ class _Signal:
         p, m, r = raws.shape
         lefts = view.rest(raws.transpose(1, 0, 2).reshape(m, p * r)).reshape(m, p, r).transpose(1, 0, 2)
         worst, typical, way = phases(view, lefts)
-        middle = int(np.argsort(typical)[p // 2])
-        values = np.array([member.shape[0] for member in members])
-        column = lefts[middle] @ way[middle]
-        length = float(view.lengths(column[:, None])[0])
-        resolved = np.logical_not(aliased(view, lefts, values))
-        return cls(index, effect, raws[middle] @ way[middle], column, length, values, worst, typical, resolved)
+        middle, values = int(np.argsort(typical)[p // 2]), np.array([member.shape[0] for member in members])
+        raw, column = raws[middle] @ way[middle], lefts[middle] @ way[middle]
+        length, resolved = float(view.lengths(column[:, None])[0]), ~aliased(view, lefts, values)
+        return cls(index, effect, raw, column, length, values, worst, typical, resolved)
 
     def smallest(self, view: Visibility, thresholds: Thresholds | None) -> SmallestEffect:
-        effect, parameter = self.effect, self.effect.coefficients[0]
-        whole = float(np.linalg.norm(self.raw))
+        effect, parameter, whole = self.effect, self.effect.coefficients[0], float(np.linalg.norm(self.raw))
         share = float(np.linalg.norm(self.column)) / whole if whole else 0.0
-        detected = named = None
-        length = float(np.inf) if thresholds is None else thresholds.length_detected(POWER)
+        length, detected, named = float(np.inf), None, None
         if thresholds is not None:
+            length = thresholds.length_detected(POWER)
             detected = _amplitude(length, self.unit_length, parameter.prior_sd)
             if length <= self.unit_length * ALLOWED:
                 named = _amplitude(thresholds.length_named(POWER), self.unit_length, parameter.prior_sd)
-        periods = self._periods(length) if len(self.values) else None
-        taken_up = view.taking(self.raw) if share < HIDDEN else ()
         return SmallestEffect(
             effect.name, effect.title, effect.reported[0].name, parameter.unit, ALLOWED * parameter.prior_sd, detected, named,
-            share, taken_up, effect.tier == CONTRACT, periods, length if np.isfinite(length) else None,
+            share, view.taking(self.raw) if share < HIDDEN else (), effect.tier == CONTRACT,
+            self._periods(length) if len(self.values) else None, length if np.isfinite(length) else None,
         )  # fmt: skip
 
     def _periods(self, length: float) -> PeriodRange:
-        parameter = self.effect.coefficients[0]
-        shown = self.resolved & (self.worst * ALLOWED >= length)
+        parameter, shape, order = self.effect.coefficients[0], self.effect.shape[0], np.argsort(self.values)
+        shown, values = self.resolved & (self.worst * ALLOWED >= length), self.values[order]
         worst = _amplitude(length, float(self.worst[shown].min()), parameter.prior_sd) if shown.any() else None
-        shape = self.effect.shape[0]
-        order = np.argsort(self.values)
-        values = self.values[order]
-        # Runs of ascending values (p,) that are chosen
-        chosen = ~shown[order]
-        found: list[tuple[float, float]] = []
-        run = False
-        for value, one in zip(values.tolist(), chosen.tolist(), strict=True):
-            if one:
-                found.append((found.pop()[0], value) if run else (value, value))
-            run = bool(one)
-        return PeriodRange(shape.name, shape.unit, float(values[0]), float(values[-1]), worst, tuple(found))
+        runs = np.flatnonzero(np.diff(~shown[order], prepend=False, append=False)).reshape(-1, 2)
+        unresolved = tuple((float(values[start]), float(values[end - 1])) for start, end in runs)
+        return PeriodRange(shape.name, shape.unit, float(values[0]), float(values[-1]), worst, unresolved)
 
 
 def _signals(view: Visibility, listed: Sequence[tuple[int, Explanation, Effect]]) -> list[_Signal]:
@@ -193,8 +174,7 @@ def _signals(view: Visibility, listed: Sequence[tuple[int, Explanation, Effect]]
     scale, none = view.result.first.comparison.noise_scale, np.zeros(0)
     raws = np.column_stack([np.zeros((len(scale), 0)), *(e.members[0].columns[:, 0] / scale for _, e, _ in straight)])
     lefts = view.rest(raws)
-    there = np.linalg.norm(lefts, axis=0) > ABSORBED * np.linalg.norm(raws, axis=0)
-    lefts = np.where(there, lefts, 0.0)
+    lefts = np.where(np.linalg.norm(lefts, axis=0) > ABSORBED * np.linalg.norm(raws, axis=0), lefts, 0.0)
     found = [
         _Signal(i, effect, raw, left, length, none, none, none, none > 0)
         for (i, _, effect), raw, left, length in zip(

@@ -50,21 +50,13 @@ class Visibility:
     @classmethod
     def of(cls, result: SearchResult) -> Visibility:
         comparison = result.first.comparison
-        scale = comparison.noise_scale[:, None]
-        columns = [
-            comparison.explanations[v.explanation].members[v.member].columns / scale
-            for v in result.versions
-            if v.explanation in result.chosen
-        ]
-        fitted = np.zeros((len(scale), 0))
-        if columns:
-            fitted = reached(comparison.rest(np.hstack(columns)))
+        scale, chosen = comparison.noise_scale[:, None], [v for v in result.versions if v.explanation in result.chosen]
+        columns = [comparison.explanations[v.explanation].members[v.member].columns / scale for v in chosen]
+        fitted = reached(comparison.rest(np.hstack(columns))) if columns else np.zeros((len(scale), 0))
         noise = comparison.left - fitted @ (fitted.T @ comparison.left)
-        both = comparison.noise_posterior(noise)
-        weight = both.sum(axis=1)
+        both, log_sigma = comparison.noise_posterior(noise), np.log(comparison.sigma)
+        weight, of_sigma = both.sum(axis=1), both.sum(axis=0)
         squares = both @ comparison.sigma**2 / np.maximum(weight, 1e-300)
-        log_sigma = np.log(comparison.sigma)
-        of_sigma = both.sum(axis=0)
         variance = float(of_sigma @ log_sigma**2 - (of_sigma @ log_sigma) ** 2)
         left = comparison.degrees_of_freedom - fitted.shape[1]
         return cls(result, fitted, noise, weight, squares, max(0.5 / max(variance, 1e-12) - left, 0.0), left)
@@ -114,11 +106,9 @@ def aliased(view: Visibility, lefts: Floats, values: Floats) -> NDArray[np.bool_
     basis, s, _ = np.linalg.svd(lefts, full_matrices=False)
     basis = np.where((s > 1e-6 * s.max(initial=1e-300))[:, None, :], basis, 0.0)
     flat = basis.transpose(1, 0, 2).reshape(m, p * r)
-    squares = (flat.T @ flat) ** 2
-    alike = squares.reshape(p, r, p, r).sum(axis=(1, 3)) / r > _ALIKE
+    alike = ((flat.T @ flat) ** 2).reshape(p, r, p, r).sum(axis=(1, 3)) / r > _ALIKE
     place = np.argsort(np.argsort(values))
-    near = np.abs(place[:, None] - place) <= _NEIGHBOURS
-    return np.asarray((alike & ~near).any(axis=1))
+    return np.asarray((alike & (np.abs(place[:, None] - place) > _NEIGHBOURS)).any(axis=1))
 
 
 def _imitators(model: RecordingModel, raw: Floats) -> tuple[str, ...]:
@@ -182,14 +172,14 @@ class Thresholds:
         return np.asarray(passed.mean(axis=0) @ density / density.sum())
 
     def length_detected(self, power: float) -> float:
-        return _reached(self.detects, power)
+        return _length_of(self.detects, power)
 
     def length_named(self, power: float) -> float:
         """Visible length named with this probability; infinite where none is."""
-        return _reached(self.names, power) if np.all(np.isfinite(self.named)) else float(np.inf)
+        return _length_of(self.names, power) if np.all(np.isfinite(self.named)) else float(np.inf)
 
 
-def _reached(probability: Callable[[Floats], Floats], power: float) -> float:
+def _length_of(probability: Callable[[Floats], Floats], power: float) -> float:
     """Length at which a probability that grows with it reaches a power; infinite beyond the longest."""
 
     def short(length: float) -> float:

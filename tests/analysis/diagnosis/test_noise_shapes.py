@@ -16,10 +16,9 @@ from cmm_uq.analysis.diagnosis import noise_shapes as shapes
 from cmm_uq.analysis.diagnosis.comparison.functions import unknown_functions
 from cmm_uq.analysis.diagnosis.comparison.search import comparison_of
 from cmm_uq.analysis.diagnosis.noise_shapes import (
+    _beside,
     _Density,
     _determined,
-    _with_rivals,
-    _without_rivals,
     drawn_shapes,
     noise_kinds,
 )
@@ -29,7 +28,6 @@ from cmm_uq.base.units import unit
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.least_squares import solve
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
-from cmm_uq.maths.inference.marginal import Marginal
 from tests.maths.inference.test_noise import M, components
 
 
@@ -50,7 +48,7 @@ def test_shapes_that_differ_in_all_sizes_alike_are_equally_probable(rivals: int)
     estimate, noise = solve(model), components()
     taken = _determined(model, columns, estimate.sigma_of_residuals)
     assert taken == pytest.approx(rivals, abs=1e-6)
-    marginal = Marginal(_with_rivals(model, columns), noise, _without_rivals(estimate, rivals))
+    marginal = _beside(model, noise, estimate, columns)
     density = _Density.of(marginal, taken, noise)
     latent = drawn_shapes(noise)[:40]
     larger = latent + np.array([np.log(20.0), *np.zeros(latent.shape[1] - 1)])

@@ -104,18 +104,14 @@ class Combinations:
         """Odds of each other known effect in the place of one, or of one and more, the rest kept.
 
         In the place of several it counts where it is more probable than that the one is merely left out: a gauge that had
-        another temperature on each of its lines looks like two or three errors of the machine at once. Of effects that were
-        never compared by themselves, but with others that are withheld, there are no odds.
+        another temperature on each of its lines looks like several errors of the machine. Effects that were compared only
+        with others that are withheld have no odds.
         """
-        rest, whole = effects - {index}, self.of_effects.get(effects, 0.0)
+        rest, whole = self.of_effects.get(effects - {index}, 0.0), self.of_effects.get(effects, 0.0)
         odds: dict[int, float] = {}
-        if whole == 0:
-            return odds
-        for other, p in self.of_effects.items():
+        for other, p in self.of_effects.items() if whole else ():
             more = other - effects
-            if len(more) != 1 or index in other:
-                continue
-            if len(other) == len(effects) or p > self.of_effects.get(rest, 0.0):
+            if len(more) == 1 and index not in other and (len(other) == len(effects) or p > rest):
                 (it,) = more
                 odds[it] = odds.get(it, 0.0) + p / whole
         return odds
@@ -125,18 +121,14 @@ def explore(
     comparison: CandidateComparison, before: Combinations | None = None, changed: Key = frozenset()
 ) -> Combinations:
     """Follow the most probable combinations, level by level, then every exchange of one explanation of the best."""
-    found = _explored(comparison, before, changed, _counts(comparison) if before is None else before.counts)
+    counts: tuple[float, ...] = EFFECTS if before is None else before.counts
+    while before is None and len(counts) - 1 <= len(effects_of_every_machine(comparison)):
+        counts = with_two_more(counts)
+    found = _explored(comparison, before, changed, counts)
     # there may be more than were looked for; unknown functions may stand for several of them
     while len(found.counts) - 1 <= min(found.most_members, MOST - 2):
         found = _explored(comparison, found, frozenset(), with_two_more(found.counts))
     return found
-
-
-def _counts(comparison: CandidateComparison) -> tuple[float, ...]:
-    counts: tuple[float, ...] = EFFECTS
-    while len(counts) - 1 <= len(effects_of_every_machine(comparison)):
-        counts = with_two_more(counts)
-    return counts
 
 
 def effects_of_every_machine(comparison: CandidateComparison) -> list[int]:
@@ -150,11 +142,9 @@ def effects_of_every_machine(comparison: CandidateComparison) -> list[int]:
 def _explored(
     comparison: CandidateComparison, before: Combinations | None, changed: Key, counts: tuple[float, ...]
 ) -> Combinations:
-    known = (
-        {}
-        if before is None
-        else {key: one for key, one in before.by_key.items() if not key & changed and np.isfinite(one.log_posterior)}
-    )  # one of more effects than were looked for may be possible now
+    known = {} if before is None else before.by_key
+    # one of more effects than were looked for may be possible now
+    known = {key: one for key, one in known.items() if not key & changed and np.isfinite(one.log_posterior)}
     search = _Search(comparison, known, counts)
     search.climb(frozenset())
     # one of many coefficients can explain all of these at once, and then none of them is worth adding by itself
@@ -186,8 +176,7 @@ class _Search:
     def __init__(
         self, comparison: CandidateComparison, known: Mapping[Key, Combination], counts: tuple[float, ...]
     ) -> None:
-        self.comparison = comparison
-        self.known = known
+        self.comparison, self.known = comparison, known
         self.prior = CombinationPrior(comparison.explanations, counts, comparison.visible)
         self.candidates = {i for i, e in enumerate(comparison.explanations) if e.kind in (EFFECT, UNKNOWN)}
         self.settled: dict[Key, Combination] = {}
@@ -201,9 +190,8 @@ class _Search:
         while level:
             for key in level:
                 self.expand(key)
-            size = len(level[0]) + 1
-            level = [key for key in self.settle_best(size, SETTLED, start) if self.worth(key)]
-            level = self.best_of(level, FOLLOWED)
+            level = [key for key in self.settle_best(len(level[0]) + 1, SETTLED, start) if self.worth(key)]
+            level = self._first(sorted(level, key=lambda key: -self.settled[key].log_posterior), FOLLOWED)
 
     def best(self) -> Key:
         return max(self.settled, key=lambda key: self.settled[key].log_posterior)
@@ -214,36 +202,25 @@ class _Search:
         parts = [self.settled[key - {i}].log_posterior for i in key if key - {i} in self.settled]
         return posterior > max(parts, default=-np.inf) - WINDOW
 
-    def best_of(self, keys: Sequence[Key], count: int) -> list[Key]:
-        """The most probable, half of the places kept for known effects alone."""
-        order = sorted(keys, key=lambda key: -self.settled[key].log_posterior)
-        known = [key for key in order if not self._unknown(key)][: count // 2]
-        return known + [key for key in order if key not in known][: count - len(known)]
-
     def expand(self, key: Key) -> None:
         """Put every combination with one more explanation on the list."""
         if key in self._expanded:
             return
         self._expanded.add(key)
         known = self.settled[key]
-        fixed = float(self.comparison.log_evidence_of(known.versions)[0])
-        base = known.log_posterior - known.log_prior - fixed
+        base = known.log_posterior - known.log_prior - float(self.comparison.log_evidence_of(known.versions)[0])
         for i, (total, version) in self.comparison.beside(known.versions, self.candidates).items():
             if i in key or i not in self.candidates:
                 continue
-            larger = key | {i}
-            estimate = base + total + self.prior.log(larger, alike=self.alike((*known.versions, version)))
-            if larger in self.settled or estimate <= self._waiting.get(larger, (-np.inf, ()))[0]:
-                continue
-            self._waiting[larger] = estimate, (*known.versions, version)
+            larger, versions = key | {i}, (*known.versions, version)
+            estimate = base + total + self.prior.log(larger, alike=self.alike(versions))
+            if larger not in self.settled and estimate > self._waiting.get(larger, (-np.inf, ()))[0]:
+                self._waiting[larger] = estimate, versions
 
     def settle_best(self, size: int, count: int, within: Key = frozenset()) -> list[Key]:
-        """Settle the most probable of this size and with ``within`` that wait, half of the places for known effects alone."""
-        order = sorted(
-            (key for key in self._waiting if len(key) == size and within <= key), key=lambda key: -self._waiting[key][0]
-        )
-        known = [key for key in order if not self._unknown(key)][: count // 2]
-        chosen = known + [key for key in order if key not in known][: count - len(known)]
+        """Settle the most probable of this size and with ``within`` that wait."""
+        waiting = [key for key in self._waiting if len(key) == size and within <= key]
+        chosen = self._first(sorted(waiting, key=lambda key: -self._waiting[key][0]), count)
         for key in chosen:
             self.settle(self._waiting.pop(key)[1])
         return chosen
@@ -295,23 +272,25 @@ class _Search:
 
     def alike(self, versions: Iterable[Version]) -> bool:
         """Whether those of a machine out of adjustment show errors of one order of magnitude."""
-        shown = [v.amplitude * self._shown(v.explanation) for v in versions if v.explanation in self.prior.machine]
+        shown, scale = [], self.comparison.noise_scale[:, None]
+        for version in versions:
+            if version.explanation in self.prior.machine:
+                columns = self.comparison.explanations[version.explanation].members[0].columns
+                shown.append(version.amplitude * float(np.linalg.norm(columns / scale)))
         return len(shown) > 0 and max(shown) <= ALIKE * min(shown)
 
-    def _shown(self, index: int) -> float:
-        columns = self.comparison.explanations[index].members[0].columns
-        return float(np.linalg.norm(columns / self.comparison.noise_scale[:, None]))
-
-    def _unknown(self, key: Key) -> bool:
-        return any(self.comparison.explanations[i].kind == UNKNOWN for i in key)
+    def _first(self, order: Sequence[Key], count: int) -> list[Key]:
+        """The first of some combinations, half of the places kept for known effects alone."""
+        kinds = [explanation.kind for explanation in self.comparison.explanations]
+        known = [key for key in order if all(kinds[i] != UNKNOWN for i in key)][: count // 2]
+        return known + [key for key in order if key not in known][: count - len(known)]
 
 
 def log_evidence_together(
     comparison: CandidateComparison, versions: Sequence[Version]
 ) -> tuple[float, tuple[Version, ...]]:
     """Log evidence of explanations together: exact for one; of several each is summed with the others at their best."""
-    best = list(versions)
-    totals = [0.0] * len(best)
+    best, totals = list(versions), [0.0] * len(versions)
     for _ in range(4):
         before = tuple(best)
         for i, version in enumerate(best):

@@ -7,7 +7,7 @@ therefore kept: its columns weighed by each kind of noise, and their inner produ
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -65,29 +65,20 @@ class MemberGroup:
     @cached_property
     def _parts(self) -> list[tuple[int, slice]]:
         begin = self.first.tolist()
-        owners = self.explanation[self.first].tolist()
-        return [(i, slice(*ends)) for i, *ends in zip(owners, begin, [*begin[1:], len(self.explanation)], strict=True)]
+        ends = zip(self.explanation[self.first].tolist(), begin, [*begin[1:], len(self.explanation)], strict=True)
+        return [(i, slice(*end)) for i, *end in ends]
 
     def only(self, part: slice) -> MemberGroup:
         if part == slice(None):
             return self
-        return MemberGroup(
-            self.explanation[part],
-            self.member[part],
-            self.weight[part],
-            self.start[part],
-            self.amplitudes[part],
-            self.r,
-        )
+        own, numbers = (self.explanation[part], self.member[part]), (self.weight[part], self.start[part])
+        return MemberGroup(*own, *numbers, self.amplitudes[part], self.r)
 
 
 def stack_members(
-    explanations: Sequence[Explanation],
-    rest: Callable[[Floats], Floats],
-    noise_scale: Floats,
-    least_noise: float,
+    explanations: Sequence[Explanation], rest: Callable[[Floats], Floats], noise_scale: Floats, least_noise: float,
     degrees_of_freedom: int,
-) -> tuple[Floats, tuple[MemberGroup, ...]]:
+) -> tuple[Floats, tuple[MemberGroup, ...]]:  # fmt: skip
     """Columns (m, K) over the noise scale (m,) that the baseline leaves of all members, and their groups."""
     found: dict[int, list[tuple[int, int, float, Floats, float]]] = {}
     whole = [
@@ -99,27 +90,23 @@ def stack_members(
     if not whole:
         return np.zeros((len(noise_scale), 0)), ()
     every = np.hstack([columns for *_, columns in whole]) / noise_scale[:, None]
-    left = rest(every)
-    ends = np.cumsum([columns.shape[1] for *_, columns in whole])
-    starts_of = np.append(0, ends[:-1])
-    lengths, of_whole = (np.sqrt(np.add.reduceat(np.sum(each**2, axis=0), starts_of)) for each in (left, every))
-    seen = lengths > _ABSORBED * of_whole
-    for k in np.flatnonzero(seen).tolist():
+    left, ends = rest(every), np.cumsum([columns.shape[1] for *_, columns in whole])
+    begin = np.append(0, ends[:-1])
+    lengths, of_whole = (np.sqrt(np.add.reduceat(np.sum(each**2, axis=0), begin)) for each in (left, every))
+    for k in np.flatnonzero(lengths > _ABSORBED * of_whole).tolist():
         owner, j, log, columns = whole[k]
-        own = left[:, starts_of[k] : ends[k]]
-        found.setdefault(columns.shape[1], []).append((owner, j, log, own, float(lengths[k])))
-    groups, stack, start = [], [np.zeros((len(noise_scale), 0))], 0
+        member = owner, j, log, left[:, begin[k] : ends[k]], float(lengths[k])
+        found.setdefault(columns.shape[1], []).append(member)
+    groups, stack, start, largest = [], [np.zeros((len(noise_scale), 0))], 0, 1 / least_noise
     for r in sorted(found):
         chosen = found[r]
         rms = np.array([length for *_, length in chosen]) / np.sqrt(max(degrees_of_freedom, 1))
-        largest = 1 / least_noise
         smallest = np.minimum(_SMALLEST / rms, largest)
         amplitudes = largest * (smallest / largest)[:, None] ** np.linspace(0, 1, AMPLITUDES)
-        explanation, member = (np.array([item[k] for item in chosen], dtype=np.int64) for k in (0, 1))
-        weight = np.array([item[2] for item in chosen])
-        starts = start + r * np.arange(len(chosen))
-        groups.append(MemberGroup(explanation, member, weight, starts, amplitudes, r))
-        stack += [left for *_, left, _ in chosen]
+        owners, members = (np.array([item[k] for item in chosen], dtype=np.int64) for k in (0, 1))
+        weight, starts = np.array([item[2] for item in chosen]), start + r * np.arange(len(chosen))
+        groups.append(MemberGroup(owners, members, weight, starts, amplitudes, r))
+        stack += [columns for *_, columns, _ in chosen]
         start += r * len(chosen)
     return np.hstack(stack), tuple(groups)
 
@@ -174,6 +161,11 @@ class Conditioning:
     stack: Floats  # (m, K) columns of all members
     where: dict[MemberKey, slice]  # columns of the stack of each
     by_noise: Callable[[Floats], Floats]  # precision times columns (m, b), by kind of noise (k, m, b)
+    _products: dict[Basis, Floats] = field(default_factory=dict)
+    _axes: dict[MemberKey, tuple[Floats, Floats]] = field(default_factory=dict)
+    _weighed: dict[MemberKey, Floats] = field(
+        default_factory=dict
+    )  # precision times columns (k, m, r) of members given
 
     def beside(
         self, conditions: Sequence[Version], plain: Floats, weighed: Floats, log: Floats, *, own: bool
@@ -200,13 +192,10 @@ class Conditioning:
         return self.stack[:, self.where[version.explanation, version.member]]
 
     def _rows(self, conditions: Sequence[Version]) -> tuple[list[Version], Floats, Floats, Floats]:
-        """Rows (k, g, m) of what is given (see :class:`ConditionedData`).
+        """Versions as taken; rows (k, g, m); factors (k, g, r) of weighed columns or axes; half the determinant's log (k,).
 
         The widest comes first and by its principal axes, of which a search, that gives it again and again at several sizes,
         needs another length only; to what it leaves the others are added by Cholesky's factors.
-
-        Gives the versions in this order; the rows; as factors (k, g, r) of the members' weighed columns or principal
-        axes; half the logarithm (k,) of the determinant.
         """
         order = list(conditions)
         widest = max(order, key=lambda version: self.columns(version).shape[1])
@@ -216,20 +205,15 @@ class Conditioning:
         order.remove(widest)
         strengths, axes = self._principal_axes(widest)
         ratio = widest.amplitude**2 * strengths
-        lengths = widest.amplitude / np.sqrt(1 + ratio)
-        rows, logs = lengths[:, :, None] * axes, 0.5 * np.log1p(ratio).sum(axis=1)
-        mixing = lengths[:, :, None] * np.eye(wide)
+        lengths = (widest.amplitude / np.sqrt(1 + ratio))[:, :, None]
+        rows, logs, mixing = lengths * axes, 0.5 * np.log1p(ratio).sum(axis=1), lengths * np.eye(wide)
         if not order:
             return [widest], rows, mixing, logs
         more, mixed, own = self._joined(order, rows)
         whole = np.concatenate([mixing, np.zeros((*mixing.shape[:2], mixed.shape[2] - wide))], axis=2)
         mixed[:, :, :wide] = mixed[:, :, :wide] @ mixing
-        return (
-            [widest, *order],
-            np.concatenate([rows, more], axis=1),
-            np.concatenate([whole, mixed], axis=1),
-            logs + own,
-        )
+        both = (np.concatenate(pair, axis=1) for pair in ((rows, more), (whole, mixed)))
+        return [widest, *order], *both, logs + own
 
     def _joined(self, conditions: Sequence[Version], rows: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """Rows (k, g, m) of versions beside rows (k, h, m), what they are made of (k, g, h + g), and half the logarithm."""
@@ -249,15 +233,14 @@ class Conditioning:
     def products(self, basis: Basis) -> Floats:
         """Inner products (k, K, r) of all columns with a member's weighed ones, or these along its principal axes."""
         kept = self._products
-        if basis not in kept:
-            member, turned = basis
-            version = Version(*member, 1.0)
-            weighed = self._principal_axes(version)[1].swapaxes(1, 2) if turned else self._weighed_columns(version)
-            found = self.with_all(weighed)
+        if basis in kept:
+            found = kept.pop(basis)
+        else:
+            version = Version(*basis[0], 1.0)
+            turned = self._principal_axes(version)[1].swapaxes(1, 2) if basis[1] else self._weighed_columns(version)
+            found = self.with_all(turned)
             while kept and sum(each.size for each in kept.values()) + found.size > _KEPT:
                 del kept[next(iter(kept))]
-        else:
-            found = kept.pop(basis)
         kept[basis] = found  # what was asked for last is at the end
         return found
 
@@ -271,10 +254,6 @@ class Conditioning:
         """Whether the inner products of all that is given are kept."""
         return known.made_of is not None and all(basis in self._products for basis, _ in known.made_of)
 
-    @cached_property
-    def _products(self) -> dict[Basis, Floats]:
-        return {}
-
     def _principal_axes(self, version: Version) -> tuple[Floats, Floats]:
         """Eigenvalues (k, r) of a version's inner products by kind of noise, and its weighed columns along them (k, r, m)."""
         key = version.explanation, version.member
@@ -284,20 +263,11 @@ class Conditioning:
             self._axes[key] = np.maximum(strengths, 0.0), turn.swapaxes(1, 2) @ weighed.swapaxes(1, 2)
         return self._axes[key]
 
-    @cached_property
-    def _axes(self) -> dict[MemberKey, tuple[Floats, Floats]]:
-        return {}
-
     def _weighed_columns(self, version: Version) -> Floats:
         key = version.explanation, version.member
         if key not in self._weighed:
             self._weighed[key] = self.by_noise(self.columns(version))
         return self._weighed[key]
-
-    @cached_property
-    def _weighed(self) -> dict[MemberKey, Floats]:
-        """Precision times the columns of members that were ever given (k, m, r)."""
-        return {}
 
 
 def _flat(columns: Floats) -> Floats:

@@ -85,8 +85,10 @@ def draw_noise(
     length = np.sqrt(squares.diagonal())
     if abs(squares - sparse.diags_array(length**2)).max() <= _ORTHOGONAL * float(length.max()) ** 2:
         found = kind.coloured((turned @ white) / length[:, None])
-    else:  # as of readings that follow each other
-        found = _root(kind, len(order)) @ white
+    else:  # as of readings that follow each other: the symmetric root (m, m) of the covariance without what is slow
+        half = kind.coloured(np.eye(len(order)))
+        values, vectors = np.linalg.eigh(half @ half.T)
+        found = np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T, dtype=np.float64) @ white
     return found + kind.slow @ random.standard_normal((kind.slow.shape[1], draws)) if kind.slow.size else found
 
 
@@ -97,13 +99,6 @@ def tail_widths(random: np.random.Generator, heavy: NDArray[np.bool_], count: in
     square = (dof - 2) / random.chisquare(dof, found.shape)
     found[:, heavy] = np.sqrt(square[:, heavy])
     return found
-
-
-def _root(kind: NoiseKind, count: int) -> Floats:
-    """Symmetric root (m, m) of a kind's covariance without what is slow."""
-    half = kind.coloured(np.eye(count))
-    values, vectors = np.linalg.eigh(half @ half.T)
-    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T, dtype=np.float64)
 
 
 def order_and_side(left: Floats, reached: Floats) -> tuple[Ints, Floats]:

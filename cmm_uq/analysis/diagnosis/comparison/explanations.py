@@ -79,17 +79,18 @@ def effect_of(explanation: Explanation) -> Effect:
 
 def known_effects(model: RecordingModel, values: Floats, named: tuple[str, ...]) -> list[Explanation]:
     """Every effect of the catalogue that could act here and is not in the model, linear about ``values`` (k,)."""
-    points = model.artefact.points.at(model.where(values))
-    found = []
+    points, found = model.artefact.points.at(model.where(values)), []
+    # mm, the longest extent along an axis in any of its set-ups: with the artefact placed freely it shows no more
+    own = (points.xyz[points.measurement == m] for m in np.unique(points.measurement))
+    reach = max(float(np.ptp(xyz, axis=0).max()) for xyz in own)
     for effect in possible_effects(model.artefact):
         if effect.name in named or not effect.shown_in(points):
             continue
         if any(column not in points.columns for column in effect.columns):
             continue
         try:
-            members = tuple(
-                Member(_seen(model, effect, points, shape, values), shape) for shape in shapes(effect, points)
-            )
+            tried = ((shape, _seen(model, effect, points, shape, values)) for shape in shapes(effect, points))
+            members = tuple(Member(columns, shape) for shape, columns in tried)
         except BrokenPluginError:
             raise
         except CmmUqError:  # the job does not give the travel that this effect needs
@@ -99,18 +100,12 @@ def known_effects(model: RecordingModel, values: Floats, named: tuple[str, ...])
                 members = (*(replace(m, columns=effect.mostly * m.columns) for m in members),
                            *(replace(m, weight=_BEYOND) for m in members))  # fmt: skip
             members = (*members, *_roughly(model, effect, points, values))
-            found.append(
-                Explanation(
-                    Verbatim(effect.name), EFFECT, members, imitated_by=effect.imitated_by, weight=effect.prior_weight,
-                    effect=effect, together=effect.everywhere and _reach(points) >= _ADJUSTED,
-                )
-            )  # fmt: skip
+            together = effect.everywhere and reach >= _ADJUSTED
+            found.append(Explanation(
+                Verbatim(effect.name), EFFECT, members, imitated_by=effect.imitated_by, weight=effect.prior_weight,
+                effect=effect, together=together,
+            ))  # fmt: skip
     return found
-
-
-def _reach(points: Points) -> float:
-    """mm, the longest extent of an artefact along an axis in any of its set-ups: with it placed freely it shows no more."""
-    return max(float(np.ptp(points.xyz[points.measurement == m], axis=0).max()) for m in np.unique(points.measurement))
 
 
 def possible_effects(artefact: Artefact) -> Iterator[Effect]:
@@ -123,11 +118,9 @@ def possible_effects(artefact: Artefact) -> Iterator[Effect]:
 
 
 def _roughly(model: RecordingModel, effect: Effect, points: Points, values: Floats) -> Iterator[Member]:
+    """An idealised effect, larger or smaller towards the ends or one end of its axis, or of the time."""
     along = effect.course(points)
-    if along is None:
-        return
-    span = float(np.ptp(along))
-    if span == 0:
+    if along is None or (span := float(np.ptp(along))) == 0:
         return
     over = span
     if effect.idealised_over in tuple(AXES):  # a guideway has no other form within a fraction of what was measured
@@ -147,17 +140,14 @@ def refine(model: RecordingModel, values: Floats, explanation: Explanation, memb
         return explanation
     points = model.artefact.points.at(model.where(values))
     shaped = [i for i, member in enumerate(explanation.members) if member.shape]
-    even = dict(
-        zip(shaped, even_scale(effect, np.array([explanation.members[i].shape[0] for i in shaped])), strict=True)
-    )
-    step = float(np.median(np.diff(np.sort(list(even.values())))))
+    scaled = even_scale(effect, np.array([explanation.members[i].shape[0] for i in shaped]))
+    even, step = dict(zip(shaped, scaled, strict=True)), float(np.median(np.diff(np.sort(scaled))))
     kept = list(explanation.members)
     for i in members:
         kept[i] = replace(kept[i], weight=kept[i].weight / len(_DIVIDED))
-        for part in _DIVIDED:
-            if part:
-                shape = (float(from_even_scale(effect, np.array(even[i] + part * step))),)
-                kept.append(Member(_seen(model, effect, points, shape, values), shape, kept[i].weight))
+        for part in (part for part in _DIVIDED if part):
+            shape = (float(from_even_scale(effect, np.array(even[i] + part * step))),)
+            kept.append(Member(_seen(model, effect, points, shape, values), shape, kept[i].weight))
     return replace(explanation, members=tuple(kept))
 
 
@@ -194,11 +184,8 @@ def effects_together(singles: Sequence[Explanation]) -> list[Explanation]:
         return []
     together = np.hstack(columns)
     rms = np.sqrt(np.mean(together**2, axis=0))
-    return [
-        Explanation(
-            say("several effects together"), SEVERAL, (Member(UNKNOWN_SD * together / np.where(rms > 0, rms, 1.0)),)
-        )
-    ]
+    member = Member(UNKNOWN_SD * together / np.where(rms > 0, rms, 1.0))
+    return [Explanation(say("several effects together"), SEVERAL, (member,))]
 
 
 def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
@@ -206,15 +193,10 @@ def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
     axis = effect.shape[0].period_along if effect.shape else None
     if axis is None:
         yield from effect.trials()
-        return
-    readings = points.readings[axis]
-    span = float(np.ptp(readings))
-    if span <= 2 * _SHORTEST_PERIOD:
-        return
-    step = STEP / span
-    highest = min(1 / _SHORTEST_PERIOD, _MOST_PERIODS * step)
-    for frequency in np.arange(0.7 / span, highest, step):
-        yield (float(1 / frequency),)
+    elif (span := float(np.ptp(points.readings[axis]))) > 2 * _SHORTEST_PERIOD:
+        step = STEP / span
+        for frequency in np.arange(0.7 / span, min(1 / _SHORTEST_PERIOD, _MOST_PERIODS * step), step):
+            yield (float(1 / frequency),)
 
 
 def _seen(model: RecordingModel, effect: Effect, points: Points, shape: tuple[float, ...], values: Floats) -> Floats:

@@ -37,15 +37,11 @@ def unknown_functions(model: RecordingModel, values: Floats) -> list[Explanation
     points = model.artefact.points.at(model.where(values))
     found = [*_of_readings(model, points, values), *_of_place(model, points, values), *_of_time(model, points, values)]
     found += [*_of_direction(model), *_of_all_scales(model, points, values)]
-    for name, covariate in covariates(model).items():
-        functions = _functions(covariate) if name in _SUDDEN else ((f, 1.0) for f in smooth_functions(covariate))
+    for key, covariate in covariates(model).items():
+        functions = _functions(covariate) if key in _SUDDEN else ((f, 1.0) for f in smooth_functions(covariate))
         members = tuple(Member(f, weight=weight, values=f) for f, weight in functions)
-        term = Nonparametric(name)
-        found.append(
-            Explanation(
-                say("error as a function of {name}", name=in_words(name)), UNKNOWN, members, covariate, name, term
-            )
-        )
+        name = say("error as a function of {name}", name=in_words(key))
+        found.append(Explanation(name, UNKNOWN, members, covariate, key, Nonparametric(key)))
     return found
 
 
@@ -71,11 +67,8 @@ def _of_place(model: RecordingModel, points: Points, values: Floats) -> Iterator
     factors = list(_smooth_in_space(points.machine_xyz))
     for j, direction in enumerate(AXES):
         members = tuple(Member(model.seen(_along(j, factor), values)) for factor in factors)
-        yield Explanation(
-            say("error along {direction} as a function of the place", direction=Verbatim(direction.upper())),
-            UNKNOWN,
-            members,
-        )
+        name = say("error along {direction} as a function of the place", direction=Verbatim(direction.upper()))
+        yield Explanation(name, UNKNOWN, members)
 
 
 def _of_time(model: RecordingModel, points: Points, values: Floats) -> Iterator[Explanation]:
@@ -84,8 +77,7 @@ def _of_time(model: RecordingModel, points: Points, values: Floats) -> Iterator[
         return
     for i, axis in enumerate(AXES):
         readings = points.readings[axis]
-        half = 0.5 * float(np.ptp(readings))
-        if half < 1.0:
+        if (half := 0.5 * float(np.ptp(readings))) < 1.0:
             continue
         lever = (readings / half)[:, None]
         constant = any(_in_proportion(effect, points, axis) for effect in model.effects)
@@ -119,21 +111,17 @@ def _of_direction(model: RecordingModel) -> Iterator[Explanation]:
 
 
 def _of_all_scales(model: RecordingModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    """One scale of all axes, about their zero or their middle, as a function of each further column."""
     readings = points.carriages
-    middle = 0.5 * (readings.min(axis=0) + readings.max(axis=0))
-    span = 0.5 * float(np.ptp(readings, axis=0).max())
-    levers = [(readings - about) / span for about in (np.zeros(3), middle)]
-    for name, column in points.columns.items():
-        if name.startswith(_PLACED) or len(np.unique(column)) < 3:
+    middle, span = 0.5 * (readings.min(axis=0) + readings.max(axis=0)), 0.5 * float(np.ptp(readings, axis=0).max())
+    levers = [((readings - about) / span)[:, :, None] for about in (np.zeros(3), middle)]
+    for key, column in points.columns.items():
+        if key.startswith(_PLACED) or len(np.unique(column)) < 3:
             continue
-        members = tuple(
-            Member(model.seen(lever[:, :, None] * f[:, None, :], values), values=f)
-            for lever in levers
-            for f in smooth_functions(column)
-        )
-        yield Explanation(
-            say("scale of all axes as a function of {name}", name=in_words(name)), UNKNOWN, members, column, name
-        )
+        factors = [(lever, f) for lever in levers for f in smooth_functions(column)]
+        members = tuple(Member(model.seen(lever * f[:, None, :], values), values=f) for lever, f in factors)
+        name = say("scale of all axes as a function of {name}", name=in_words(key))
+        yield Explanation(name, UNKNOWN, members, column, key)
 
 
 def directions(model: RecordingModel) -> Floats:
@@ -153,17 +141,13 @@ def _along(axis: int, factor: Floats) -> Floats:
 
 def covariates(model: RecordingModel) -> dict[str, Floats]:
     """Mean (m,) of every recorded column of each observation, and its place in the order of time where one is recorded."""
-    points = model.artefact.points
-    found = {}
-    for name, values in points.columns.items():
-        found[name] = mean_of(model, values)
+    found = {name: mean_of(model, values) for name, values in model.artefact.points.columns.items()}
     if "time_s" in found:
         found["order"] = np.unique(found["time_s"], return_inverse=True)[1].ravel().astype(np.float64)
     kept: dict[str, Floats] = {}
     for name, values in found.items():
-        if len(np.unique(values)) < 3 or any(abs(np.corrcoef(values, other)[0, 1]) > 0.999 for other in kept.values()):
-            continue
-        kept[name] = values
+        if len(np.unique(values)) >= 3 and not any(abs(np.corrcoef(values, v)[0, 1]) > 0.999 for v in kept.values()):
+            kept[name] = values
     return kept
 
 
@@ -181,9 +165,8 @@ def _functions(covariate: Floats, same: float = 0.0) -> Iterator[tuple[Floats, f
     apart = np.flatnonzero(gaps > same)
     parts = np.array_split(apart, min(len(apart), _MOST_STEPS)) if len(apart) else []
     widest = np.array([part[np.argmax(gaps[part])] for part in parts], dtype=np.int64)
-    chosen = distinct[widest] + 0.5 * gaps[widest]
-    for place in chosen:
-        yield UNKNOWN_SD * np.where(covariate > place, 1.0, -1.0)[:, None], 1 / len(chosen)
+    for place in distinct[widest] + 0.5 * gaps[widest]:
+        yield UNKNOWN_SD * np.where(covariate > place, 1.0, -1.0)[:, None], 1 / len(widest)
 
 
 def _one_sided(functions: Iterable[tuple[Floats, float]]) -> Iterator[tuple[Floats, float]]:

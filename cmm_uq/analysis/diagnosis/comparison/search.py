@@ -91,26 +91,19 @@ class SearchResult:
 def search(model: RecordingModel, stated: float | None, *, alpha: float, seed: int) -> SearchResult:
     """Find what a model leaves out; squarenesses so large that the model bends are modelled, and all compared about them."""
     found = _search(model, stated, alpha, seed)
+    own = dict(zip((u.key for u in model.unknowns), model.estimate().about, strict=True))
     for _ in range(_AGAIN):
         whole = found.model
-        about = whole.estimate().about
-        if not found.effects or not whole.leans_beyond(
-            about - _without(model, whole), np.zeros_like(about), SMALL_LEAN
-        ):
+        about, before = whole.estimate().about, np.array([own.get(unknown.key, 0.0) for unknown in whole.unknowns])
+        if not found.effects or not whole.leans_beyond(about - before, np.zeros_like(about), SMALL_LEAN):
             break
         again = _search(replace(model, within=whole), stated, alpha, seed)
         if not again.effects:
             break
-        before, found = found, again
-        if found.effects == before.effects:
+        effects, found = found.effects, again
+        if found.effects == effects:
             break
     return found
-
-
-def _without(model: RecordingModel, whole: RecordingModel) -> Floats:
-    """What the model by itself estimates, as parameters (k,) of one with effects more."""
-    own = dict(zip((u.key for u in model.unknowns), model.estimate().about, strict=True))
-    return np.array([own.get(unknown.key, 0.0) for unknown in whole.unknowns])
 
 
 def _search(model: RecordingModel, stated: float | None, alpha: float, seed: int) -> SearchResult:
@@ -118,43 +111,46 @@ def _search(model: RecordingModel, stated: float | None, alpha: float, seed: int
     if first.p_value >= alpha:
         return SearchResult(first, first.comparison, None, frozenset(), (), model, 0.0, stated=stated)
     combinations = explore(first.comparison)
-    if shaped := _shaped(combinations):
+    probable = (combinations.by_key[key].versions for key, p in combinations.probability.items() if p > _PROBABLE)
+    shaped = {
+        v.explanation
+        for versions in probable
+        for v in versions
+        if first.explanations[v.explanation].members[v.member].shape
+    }
+    if shaped:
         explanations = [
             _refined(first, combinations, i) if i in shaped else e for i, e in enumerate(first.explanations)
         ]
         first = replace(first, comparison=replace(first.comparison, explanations=explanations))
         combinations = explore(first.comparison, combinations, frozenset(shaped))
     combinations = replace(combinations, imitated=_imitated(first.comparison, combinations))
-    chosen = effects_to_assert(combinations)
-    return _of(first, combinations, chosen, stated)
+    return _of(first, combinations, effects_to_assert(combinations), stated)
 
 
 def _of(first: ModelComparison, combinations: Combinations, chosen: Key, stated: float | None) -> SearchResult:
-    versions = combinations.versions(chosen)
+    versions, rough = combinations.versions(chosen), set()
     found = first.model if not chosen else with_effects(first, versions, chosen)
-    last = comparison_of(found, stated, ())
-    rough = frozenset(
-        i
-        for i in chosen
-        if _rough(first.comparison, versions, i) > ASSERTED
-        or any(combinations.of(j) > combinations.of(i) for j in combinations.imitating(i))
-    )
-    beside = combinations.unknown_beside(chosen)
-    return SearchResult(first, last, combinations, chosen, versions, found, beside, rough, stated)
+    for i in chosen:
+        member, evidence, weight = first.comparison.of_versions(i, [v for v in versions if v.explanation != i])
+        probability = np.exp(evidence + weight - special.logsumexp(evidence + weight))
+        other = float(probability[[first.explanations[i].members[m].rough for m in member]].sum())
+        if other > ASSERTED or any(combinations.of(j) > combinations.of(i) for j in combinations.imitating(i)):
+            rough.add(i)
+    last, beside = comparison_of(found, stated, ()), combinations.unknown_beside(chosen)
+    return SearchResult(first, last, combinations, chosen, versions, found, beside, frozenset(rough), stated)
 
 
 def withhold(result: SearchResult, withheld: Key) -> SearchResult:
     """The same search with some of the effects not asserted: what they stood for stays unexplained."""
-    chosen = result.chosen - withheld
-    combinations = result.combinations
+    first, chosen, combinations = result.first, result.chosen - withheld, result.combinations
     if combinations is None or not withheld:
         return result
     versions = combinations.versions(chosen)
-    model = with_effects(result.first, versions, chosen) if chosen else result.first.model
-    last = comparison_of(model, result.stated, ()) if chosen else result.first.comparison
-    return replace(
-        result, last=last, chosen=chosen, versions=versions, model=model, unexplained=1.0, rough=result.rough - withheld
-    )
+    model = with_effects(first, versions, chosen) if chosen else first.model
+    last = comparison_of(model, result.stated, ()) if chosen else first.comparison
+    rough = result.rough - withheld
+    return replace(result, last=last, chosen=chosen, versions=versions, model=model, unexplained=1.0, rough=rough)
 
 
 def substitute(result: SearchResult, index: int, tried: Key) -> tuple[SearchResult, int] | None:
@@ -170,22 +166,6 @@ def substitute(result: SearchResult, index: int, tried: Key) -> tuple[SearchResu
             instead = _of(result.first, combinations, chosen, result.stated)
             return replace(instead, unexplained=max(instead.unexplained, result.unexplained)), other
     return None
-
-
-def _rough(comparison: CandidateComparison, versions: Sequence[Version], index: int) -> float:
-    member, evidence, weight = comparison.of_versions(index, [v for v in versions if v.explanation != index])
-    probability = np.exp(evidence + weight - special.logsumexp(evidence + weight))
-    rough = [comparison.explanations[index].members[i].rough for i in member]
-    return float(probability[rough].sum())
-
-
-def _shaped(combinations: Combinations) -> set[int]:
-    return {
-        version.explanation
-        for key, probability in combinations.probability.items()
-        for version in (combinations.by_key[key].versions if probability > _PROBABLE else ())
-        if combinations.explanations[version.explanation].members[version.member].shape
-    }
 
 
 def _refined(first: ModelComparison, combinations: Combinations, index: int) -> Explanation:
@@ -225,49 +205,46 @@ def effects_to_assert(combinations: Combinations) -> Key:
     """The most probable set of known effects, without those that something else could well be instead."""
     chosen = combinations.most_probable
     if not chosen:
-        known = {key: p for key, p in combinations.of_effects.items() if key}
-        best = max(known, key=lambda key: known[key]) if known else frozenset()
-        found: Key = frozenset()
-        for i in sorted(best, key=lambda i: -combinations.of(i)):
-            alike = rivals_of(combinations, best, i) | {i}
-            beside = sum(p for key, p in known.items() if found <= key) if found else 1.0
-            own = sum(p for key, p in known.items() if found <= key and alike & key)
-            if own >= _MECHANISM * beside and combinations.of_any(alike | combinations.imitating(i)) >= ASSERTED:
-                found |= {i}
-        return found
-    doubtful = [
+        return _one_by_one(combinations)
+    doubtful = frozenset(
         i
         for i in chosen
         if combinations.of(i) < ASSERTED and probability_with_rivals(combinations, chosen, i) < ASSERTED
-    ]
-    return (chosen - frozenset(doubtful)) | _of_any_form(combinations, chosen)
+    )
+    # and effects improbable only because a nonparametric term, which could be the same, describes them as well
+    instead = {j for i in chosen for j, odds in combinations.instead(chosen, i).items() if odds > NOT_TOLD_APART}
+    besides = frozenset(
+        i for i, effect in enumerate(combinations.explanations)
+        if effect.kind == EFFECT and i not in instead and combinations.of(i) >= _MECHANISM
+        and any(combinations.of_any(frozenset((i, j))) >= ASSERTED for j in combinations.imitating(i))
+    )  # fmt: skip
+    return (chosen - doubtful) | besides
+
+
+def _one_by_one(combinations: Combinations) -> Key:
+    """Known effects of the best set of them, where nothing is most probable, that are more probable than not all the same."""
+    known = {key: p for key, p in combinations.of_effects.items() if key}
+    best, found = max(known, key=lambda key: known[key]) if known else frozenset[int](), frozenset[int]()
+    for i in sorted(best, key=lambda i: -combinations.of(i)):
+        alike = rivals_of(combinations, best, i) | {i}
+        beside = sum(p for key, p in known.items() if found <= key) if found else 1.0
+        own = sum(p for key, p in known.items() if found <= key and alike & key)
+        if own >= _MECHANISM * beside and combinations.of_any(alike | combinations.imitating(i)) >= ASSERTED:
+            found |= {i}
+    return found
 
 
 def _imitated(comparison: CandidateComparison, combinations: Combinations) -> dict[int, Key]:
     probable = [i for i in range(len(combinations.explanations)) if combinations.of(i) > _PROBABLE]
     kinds = {kind: [i for i in probable if combinations.explanations[i].kind == kind] for kind in (EFFECT, UNKNOWN)}
-    best = {i: _version(combinations, i) for i in probable}
+    best = {}
+    for i in probable:
+        most = combinations.likeliest(key for key in combinations.by_key if i in key)
+        best[i] = next(v for v in combinations.by_key[most].versions if v.explanation == i)
     return {
         i: frozenset(j for j in kinds[UNKNOWN] if comparison.left_of(best[i], [best[j]]) < _PASSES)
         for i in kinds[EFFECT]
     }
-
-
-def _version(combinations: Combinations, index: int) -> Version:
-    most = combinations.likeliest(key for key in combinations.by_key if index in key)
-    return next(v for v in combinations.by_key[most].versions if v.explanation == index)
-
-
-def _of_any_form(combinations: Combinations, chosen: Key) -> Key:
-    """Effects improbable only because a nonparametric term, which could be the same, describes them as well."""
-    found = set()
-    instead = {j for i in chosen for j, odds in combinations.instead(chosen, i).items() if odds > NOT_TOLD_APART}
-    for i, effect in enumerate(combinations.explanations):
-        if effect.kind != EFFECT or i in instead or combinations.of(i) < _MECHANISM:
-            continue
-        if any(combinations.of_any(frozenset((i, j))) >= ASSERTED for j in combinations.imitating(i)):
-            found.add(i)
-    return frozenset(found)
 
 
 def probability_with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
