@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.geometry import extremes
 from cmm_uq.maths.geometry.exchange import SCREENED, least_zones
-from cmm_uq.maths.geometry.extremes import least_zone
+from cmm_uq.maths.geometry.extremes import circumscribed, inscribed as largest_inside, least_zone
 from cmm_uq.maths.geometry.minimax import CIRCLE, CYLINDER, LINE, SPHERE
 from cmm_uq.maths.geometry.one_sided import held
 from cmm_uq.maths.geometry.placed import FeatureKind, Placed, placed
@@ -172,7 +171,7 @@ class Repeated:
         if self.placed.shape not in (CIRCLE, SPHERE, CYLINDER):
             raise CmmUqError(f"{self.placed.shape.name}: it has no size to be inscribed or circumscribed",
                              fix="Ask for circles, spheres and cylinders")  # fmt: skip
-        errors, alone = self._checked(displacements), extremes.inscribed if inscribed else extremes.circumscribed
+        errors, alone = self._checked(displacements), largest_inside if inscribed else circumscribed
         state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
         for rows in self._blocks(len(errors), 20 * BLOCK):
             local = self._local(errors[rows], rows.start)
