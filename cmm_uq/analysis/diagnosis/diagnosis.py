@@ -30,11 +30,10 @@ from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.recorded import of_last_digit
 from cmm_uq.maths.inference.ensembles import Progress
-from cmm_uq.maths.inference.least_squares import solve
+from cmm_uq.maths.inference.least_squares import solve, studentised
 from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.noise import Components
 from cmm_uq.maths.inference.posterior import NoisyPosterior
-from cmm_uq.maths.inference.studentised import studentised
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 FALSE_ALARMS = 0.01  # default rate at which a recording without any fault is found to have one

@@ -15,11 +15,10 @@ if TYPE_CHECKING:
     from cmm_uq.maths.geometry.association import Associated, Association, associate
     from cmm_uq.maths.geometry.axial import Cone, Cylinder, fit_cone, fit_cylinder
     from cmm_uq.maths.geometry.feature import BallForm, Feature
+    from cmm_uq.maths.geometry.fits import Circle, Line, Plane, Sphere, fit_circle, fit_line, fit_plane, fit_sphere
     from cmm_uq.maths.geometry.orthogonal_distance import cap_directions
     from cmm_uq.maths.geometry.placed import FeatureKind
     from cmm_uq.maths.geometry.repeated import Drawn, Repeated
-    from cmm_uq.maths.geometry.round import Circle, Sphere, fit_circle, fit_sphere
-    from cmm_uq.maths.geometry.straight import Line, Plane, fit_line, fit_plane
 
 __all__ = [
     "Associated",
@@ -52,8 +51,7 @@ _PLACES = {
     "orthogonal_distance": ("cap_directions",),
     "placed": ("FeatureKind",),
     "repeated": ("Drawn", "Repeated"),
-    "round": ("Circle", "Sphere", "fit_circle", "fit_sphere"),
-    "straight": ("Line", "Plane", "fit_line", "fit_plane"),
+    "fits": ("Circle", "Line", "Plane", "Sphere", "fit_circle", "fit_line", "fit_plane", "fit_sphere"),
 }
 
 

@@ -24,18 +24,12 @@ DEGENERATE = 1e-9  # ratio of extents below which points count as lying on one l
 class Feature:
     """A feature fitted to n points by least squares of the orthogonal distances.
 
-    Parameters
-    ----------
-    names : parameters in the order of the covariance.
-    covariance : (k, k) of the parameters, mm² and rad². It carries redundant parameters (a unit vector has three
-        components and two freedoms), so it may be singular; it propagates as it is.
-    residuals : signed orthogonal distances of the points, mm, positive outside: (n,), or (n, 2) where a distance has
-        two components (a line in space, a circle in space).
-    u_point : standard uncertainty of a point along the normal, mm: given, or estimated from the residuals.
-    u_point_given : whether it was given.
-    degrees_of_freedom : observations less parameters.
-    condition : condition number of the Jacobian with columns of unit length; large where the coverage is poor.
-    iterations : steps of the fit; 0 where it is solved directly.
+    ``covariance`` (k, k) is of the parameters ``names``, mm² and rad². It carries redundant parameters (a unit vector has
+    three components and two freedoms), so it may be singular; it propagates as it is. ``residuals`` are the signed
+    orthogonal distances of the points, mm, positive outside: (n,), or (n, 2) where a distance has two components (a line or
+    a circle in space). ``u_point`` is the standard uncertainty of a point along the normal, mm, given or estimated from
+    them. ``condition`` is that of the Jacobian with columns of unit length, large where the coverage is poor;
+    ``iterations`` is 0 where the fit is solved directly.
     """
 
     names: tuple[str, ...]

@@ -29,8 +29,6 @@ WORKING = 16  # rows a parameter that the descent looks at together; others join
 
 @dataclass(frozen=True, eq=False)
 class Extremum:
-    """A state with its proof."""
-
     state: Floats  # (k,)
     value: float  # the largest c_i
     contacts: Ints  # (p,) rows that hold it

@@ -30,8 +30,6 @@ SINGULAR = 1e12  # condition number from which the points do not determine the f
 
 @dataclass(frozen=True, eq=False)
 class Minimum(Generic[State]):
-    """Where the sum of squares is least."""
-
     state: State  # the feature, in the units of the data given
     distances: Floats  # (m,) orthogonal distances there
     root: Floats  # (k, k) upper triangular R of the Jacobian: (RᵀR)⁻¹ is the covariance for distances of unit variance
@@ -40,7 +38,6 @@ class Minimum(Generic[State]):
 
     @property
     def cost(self) -> float:
-        """Sum of squared distances."""
         return float(self.distances @ self.distances)
 
     def covariance(self) -> Floats:

@@ -13,9 +13,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.axial import fit_cone, fit_cylinder
 from cmm_uq.maths.geometry.feature import Feature, centred, frame_about
+from cmm_uq.maths.geometry.fits import fit_circle, fit_line, fit_plane, fit_sphere
 from cmm_uq.maths.geometry.minimax import CIRCLE, CONE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE, FeatureShape
-from cmm_uq.maths.geometry.round import fit_circle, fit_sphere
-from cmm_uq.maths.geometry.straight import fit_line, fit_plane
 
 FeatureKind = Literal["line", "plane", "circle", "sphere", "cylinder", "cone"]
 KINDS: tuple[FeatureKind, ...] = get_args(FeatureKind)
@@ -69,7 +68,6 @@ class Placed:
         return np.asarray(2 * radius / np.cos(state[:, 5]) if self.shape is CONE else 2 * radius)
 
     def half_angle(self, state: Floats) -> Floats | None:
-        """(N,) of a cone, rad."""
         return np.asarray(state[:, 5]) if self.shape is CONE else None
 
 

@@ -16,10 +16,9 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.geometry.exchange import SCREENED, least_zones
-from cmm_uq.maths.geometry.extremes import circumscribed, inscribed as largest_inside, least_zone
+from cmm_uq.maths.geometry.association import circumscribed, inscribed as largest_inside, least_zone
+from cmm_uq.maths.geometry.exchange import SCREENED, held, least_zones
 from cmm_uq.maths.geometry.minimax import CIRCLE, CYLINDER, LINE, SPHERE
-from cmm_uq.maths.geometry.one_sided import held
 from cmm_uq.maths.geometry.placed import FeatureKind, Placed, placed
 
 SETTLED = 1e-9  # steps, mm, below which a draw is at its minimum; what is left is far smaller
@@ -62,8 +61,6 @@ class Drawn:
 
 @dataclass(frozen=True, eq=False)
 class Raised:
-    """Errors of points along one direction of each."""
-
     heights: Floats  # (N, n) mm
     directions: Floats  # (n, d) of the points
     offset: Floats  # (n, d) errors that all draws have besides, mm
@@ -236,7 +233,6 @@ class Repeated:
         return np.asarray((J[:, 0] * d[0]).T)
 
     def _begun(self, errors: Floats | Raised) -> Floats:
-        """(B, k) states to first order."""
         if not isinstance(errors, Raised):
             return np.asarray(self.placed.state + errors.reshape(len(errors), -1) @ self._response)
         n, d = errors.directions.shape

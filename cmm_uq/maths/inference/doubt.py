@@ -24,8 +24,6 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """One cause of errors of m observations."""
-
     name: Text  # in words
     common: Floats  # (m, r) change of each observation, mm, for one standard uncertainty of each of r independent parts
     apart: Freedoms | None = None  # where each block errs by itself; ``None`` where all are known to err together
@@ -46,7 +44,6 @@ class Cause:
         return Cause(self.name, self.common[rows], apart, included)
 
     def drawn(self, shape: tuple[int, ...], random: np.random.Generator, *, apart: bool) -> Floats:
-        """Errors (*shape, m), mm, of the observations."""
         if not apart or self.apart is None:
             return np.asarray(random.standard_normal((*shape, self.common.shape[1])) @ self.common.T)
         own = random.standard_normal((*shape, self.apart.blocks, self.apart.columns.shape[1]))
@@ -74,7 +71,6 @@ class Doubt:
 
     @classmethod
     def of(cls, causes: Sequence[Cause], weights: Floats) -> Doubt:
-        """Of combinations (k, m) of the observations."""
         return cls(tuple(cause.carried(weights) for cause in causes))
 
     def variance(self, combination: Floats) -> float:

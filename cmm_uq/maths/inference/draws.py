@@ -110,7 +110,6 @@ class Draws(Mapping[str, Floats]):
 
     @classmethod
     def of_npz(cls, content: bytes, where: str) -> Draws:
-        """Draws as :meth:`as_npz` wrote them."""
         fix = "Give posterior.npz as cmm-uq report wrote it"
         try:
             with zipfile.ZipFile(io.BytesIO(content)) as archive:
@@ -128,7 +127,6 @@ class Draws(Mapping[str, Floats]):
         return cls(dict(zip(map(str, names), map(str, units), strict=True)), array, every)
 
     def flat(self) -> dict[str, Floats]:
-        """Each quantity (chain · draw,), by name."""
         return {name: np.ascontiguousarray(self.array[:, :, i]).ravel() for i, name in enumerate(self.names)}
 
     def to_arviz(self) -> Any:

@@ -144,7 +144,6 @@ class Chains:
 
     @property
     def quality(self) -> dict[str, Any]:
-        """All but the draws."""
         return {name: value for name, value in vars(self).items() if name != "draws"}
 
     def thinning(self, most: int) -> int:
@@ -152,7 +151,6 @@ class Chains:
         return max(1, min(-(-len(self.draws) // most), self.steps // 2))
 
     def thinned(self, every: int) -> Floats:
-        """Draws of every such step."""
         by_step = self.draws.reshape(ENSEMBLES, self.steps, -1, self.draws.shape[1])
         return np.asarray(by_step[:, every - 1 :: every].reshape(-1, self.draws.shape[1]))
 
@@ -200,7 +198,6 @@ def run_ensembles(
 
 
 def _randoms(seed: int) -> list[Any]:
-    """Random numbers of each ensemble, from their beginning."""
     return [np.random.RandomState(np.random.MT19937(child)) for child in np.random.SeedSequence(seed).spawn(ENSEMBLES)]
 
 

@@ -1,7 +1,11 @@
-"""Least squares by singular values: what a recording determines, and what it leaves free.
+"""Least squares by singular values: what a recording determines, and what it leaves free; studentised residuals.
 
 Normal equations and pseudo-inverses hide a rank deficiency; the singular value decomposition of the scaled design shows
 it, so that the combination of parameters that remains free can be named.
+
+What has been fitted takes part of the noise with it, and of some observations nearly all: of the mean of three repeats, where
+each placing is fitted by itself, nothing may be left. Residuals that are taken for the noise are then a mixture of large and
+small ones, and look as if a normal noise had heavy tails: they are studentised, in units of their own standard deviations.
 """
 
 from __future__ import annotations
@@ -15,6 +19,7 @@ from scipy import linalg
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+from cmm_uq.maths.inference.noise import Components, Sizes
 
 RANK_TOLERANCE = 1e-7  # part of the largest singular value; fitted placings of spheres leave 1e-8
 _NOTHING = 1e-8  # part of a parameter in a free combination, over its typical size, that is rounding
@@ -23,8 +28,6 @@ _ROUGHLY = 100.0  # times its singular value over the largest: so far noise turn
 
 @dataclass(frozen=True, eq=False)
 class LeastSquares:
-    """A least-squares estimate."""
-
     unknowns: tuple[Unknown, ...]  # k parameters; certified ones keep their certified value
     value: Floats  # (k,) of an undetermined parameter the one nearest to its prior mean that fits equally well
     covariance: Floats  # (k, k), certificates' u propagated (JCGM 100, 5.1.2); infinite variance where undetermined
@@ -117,3 +120,31 @@ def _simplest(null_space: Floats, nothing: float) -> Floats:
     pivots = order[: null_space.shape[1]]
     columns = null_space @ linalg.inv(null_space[pivots])
     return np.where(np.abs(columns) < nothing, 0.0, columns)
+
+
+# part of its variance that must be left of an observation: a smaller one is mostly what the model lacks, made large
+_LEAST_LEFT = 0.1
+_SINGULAR = 1e-9  # part of the largest singular value below which another counts as zero
+
+
+def studentised(model: LinearModel, noise: Components, sizes: Sizes, residuals: Floats) -> Floats:
+    """Residuals (n,), each of variance one over that of a reading, of the observations that the fit leaves enough of.
+
+    The design's columns and the placings are projected out under the noise without its slow part (Cook & Weisberg 1982,
+    Residuals and Influence in Regression, 2.2.1).
+
+    ``residuals``: (m,) of least squares, mm.
+    """
+    variance = (noise.variances(sizes)[0] @ noise.shares.T)[0]
+    scale = np.sqrt(variance) / float(sizes.coordinate[0])
+    placed = model.freedoms.turned(noise.turn).over(scale)
+    fitted = [i for i, unknown in enumerate(model.unknowns) if not unknown.known]
+    typical = np.array([model.unknowns[i].scale for i in fitted])
+    design = placed.without(np.asarray(noise.turn @ (model.design[:, fitted] * typical)) / scale[:, None])
+    U, s, _ = np.linalg.svd(design, full_matrices=False)
+    U = U[:, s > _SINGULAR * s.max(initial=0.0)]
+    left = 1 - np.sum(placed.reached.columns**2, axis=1) - np.sum(U**2, axis=1)
+    own = placed.without(noise.white(sizes)(residuals[:, None]))[:, 0]
+    own = own - U @ (U.T @ own)
+    kept = left > _LEAST_LEFT
+    return np.asarray(own[kept] / np.sqrt(left[kept]))

@@ -63,7 +63,6 @@ class Freedoms:
 
     @cached_property
     def rows(self) -> list[Ints]:
-        """Observations of each block."""
         order = np.argsort(self.index, kind="stable")
         return np.split(order, np.cumsum(np.bincount(self.index, minlength=self.blocks))[:-1]) if self.blocks else []
 
@@ -98,7 +97,6 @@ class Freedoms:
 
     @cached_property
     def rank(self) -> int:
-        """How many of the columns are independent."""
         return int(np.sum(self.sums(self.reached.columns**2) > 0.5))
 
     def sums(self, values: Floats) -> Floats:
@@ -111,7 +109,6 @@ class Freedoms:
         return found
 
     def without(self, columns: Floats) -> Floats:
-        """Columns (m, b) without what the freedoms reach."""
         left = columns
         for basis in self.reached.columns.T if self.blocks else ():
             left = left - basis[:, None] * self.sums(basis[:, None] * left)[self.index]
@@ -129,8 +126,6 @@ def reached(columns: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Unknown:
-    """A parameter of a linear model."""
-
     key: tuple[str, str]  # effect (or ``artefact``) and parameter name, as in results.json.
     unit: Unit  # as printed
     prior_mean: float
@@ -168,7 +163,6 @@ class LinearModel:
         return self.freedoms.over(self.noise_scale)
 
     def at(self, rows: NDArray[np.bool_]) -> LinearModel:
-        """The model of some of its observations."""
         of_rows = {name: getattr(self, name)[rows] for name in ("observed", "design", "noise_scale")}
         return replace(self, **of_rows, placing=self.freedoms.at(rows))
 

@@ -49,7 +49,6 @@ class Posterior:
 
     @cached_property
     def covariance(self) -> Floats:
-        """(k, k) of the draws."""
         return np.atleast_2d(np.cov(self.draws, rowvar=False))
 
 
@@ -84,7 +83,6 @@ class Density:
 
     @cached_property
     def _weight(self) -> Floats:
-        """(k,) inverse prior variances."""
         return np.asarray(1 / self.model.effective_sd**2, dtype=np.float64)
 
     def __call__(self, theta: Floats) -> Floats:

@@ -46,7 +46,6 @@ class Numbers:
 
     @cached_property
     def switches(self) -> tuple[str, ...]:
-        """Which of them say whether something is present."""
         return tuple(name for name in self.names if name in _SWITCHES)
 
     @cached_property
@@ -60,7 +59,6 @@ class Numbers:
 
     @cached_property
     def log_prior(self) -> Floats:
-        """(S,) of each set."""
         absent = np.array([_SWITCHES[name] for name in self.switches])
         each = np.where(self.sets, np.log1p(-absent), np.log(absent))
         if "rate" in self.switches:
@@ -69,7 +67,6 @@ class Numbers:
 
     @cached_property
     def normal(self) -> Ints:
-        """Numbers with a standard normal prior."""
         return np.array([i for i, name in enumerate(self.names) if name != "log_sigma"], dtype=np.int64)
 
     @cached_property
@@ -147,7 +144,6 @@ class Present:
         return np.zeros(len(self.numbers.names))
 
     def parameters(self, z: Floats) -> Floats:
-        """The numbers (w, d) themselves."""
         return z
 
     def draws(self, count: int, random: Any) -> Floats:

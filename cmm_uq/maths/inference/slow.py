@@ -55,7 +55,6 @@ class SlowFirst:
 
     @cached_property
     def counts(self) -> Floats:
-        """(count,) observations of each class."""
         return np.bincount(self.classes, minlength=self.count).astype(np.float64)
 
     @cached_property

@@ -19,8 +19,6 @@ from cmm_uq.maths.uncertainty.budget import REPEATS, Budget, BudgetLine
 
 @dataclass(frozen=True)
 class OneWay:
-    """Variances of readings in groups."""
-
     groups: int
     repeats: int  # readings in each group
     mean: float  # of all readings
@@ -29,7 +27,6 @@ class OneWay:
 
     @property
     def s_repeat(self) -> float:
-        """Standard deviation of a reading within its group."""
         return sqrt(self.within)
 
     @property

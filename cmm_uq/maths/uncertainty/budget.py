@@ -79,7 +79,6 @@ class Labels:
 
 
 def line_of(name: str, given: Distribution, labels: Labels, sensitivity: float = 1.0) -> BudgetLine:
-    """Line of an input by its distribution."""
     origin = foreign(labels.origins.get(name, say("not stated")))
     u, mean, dof = float(given.u), float(given.mean), float(given.dof)
     return BudgetLine(Verbatim(name), u, origin, mean, labels.unit(name), given.kind, dof, sensitivity)
@@ -101,14 +100,12 @@ class Budget:
 
     @property
     def variance(self) -> float:
-        """Combined variance."""
         total = sum(line.part for line in self.lines)
         # correlations can cancel the rest completely; what rounding leaves then is nothing
         return total if total > 1e-14 * sum(abs(line.part) for line in self.lines) else 0.0
 
     @property
     def u(self) -> float:
-        """Combined standard uncertainty."""
         return sqrt(self.variance)
 
     @property
@@ -121,7 +118,6 @@ class Budget:
 
     @property
     def k(self) -> float:
-        """Coverage factor."""
         return self.factor if self.factor is not None else float(coverage_factor(self.dof, self.coverage))
 
     @property
@@ -136,11 +132,9 @@ class Budget:
         return [line.part / variance if variance else 0.0 for line in self.lines]
 
     def of(self, value: float) -> Budget:
-        """The same with an estimate of the measurand."""
         return replace(self, value=value)
 
     def as_line(self, name: Text, sensitivity: float = 1.0) -> BudgetLine:
-        """Its result as one line of another budget."""
         origin = say("budget")
         return BudgetLine(name, self.u, origin, self.value, self.unit, "normal", self.dof, sensitivity, parts=self)
 

@@ -173,5 +173,4 @@ def statement(evaluation: Evaluation, output: str) -> Text:
 
 
 def _in(unit: Text, value: Text) -> Text:
-    """With its unit, where it has one."""
     return value if unit in ("", "1") else say("{value} {unit}", value=value, unit=unit)

@@ -45,7 +45,6 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether both ends agree within δ."""
         return max(self.low, self.high) <= self.tolerance
 
     @property
@@ -187,7 +186,6 @@ def stability(ways: Ways, row: int, digits: int) -> Text:
 
 
 def choose(model: MeasurementModel, ways: Ways, row: int, digits: int) -> tuple[Method, Text]:
-    """Method for one output, and why."""
     if ways.simulated is None:
         return _without_monte_carlo(ways, row, digits)
     findings: list[Text] = []

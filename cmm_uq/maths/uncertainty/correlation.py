@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from scipy import special
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import Floats
@@ -78,8 +79,6 @@ def correlation_of(covariance: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """Covariance of several estimates."""
-
     parameters: tuple[str, ...]  # k names
     units: tuple[str, ...]  # of each, as printed
     matrix: Floats  # (k, k); an element is in the product of the units of its row and column
@@ -147,8 +146,6 @@ def _elliptical(inputs: Sequence[Distribution], matrix: Floats) -> Draw:
 
 
 def _copula(names: Sequence[str], inputs: Sequence[Distribution], matrix: Floats) -> Draw:
-    from scipy import special
-
     underlying = np.eye(len(inputs))
     for i, j in combinations(range(len(inputs)), 2):
         r = _underlying_correlation((names[i], inputs[i]), (names[j], inputs[j]), matrix[i, j])
@@ -174,8 +171,6 @@ def _inside(probabilities: Floats) -> Floats:
 
 def _underlying_correlation(a: tuple[str, Distribution], b: tuple[str, Distribution], wanted: float) -> float:
     """Correlation of two normal variables that gives the two transformed ones the wanted correlation."""
-    from scipy import special
-
     if wanted == 0:
         return 0.0
     nodes, weights = special.roots_hermitenorm(_HERMITE_NODES)

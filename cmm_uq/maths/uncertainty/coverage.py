@@ -21,6 +21,7 @@ from math import gamma, pi
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
@@ -103,7 +104,6 @@ class Tails:
         self._high: list[Floats] = []
 
     def add(self, block: Floats) -> None:
-        """Draws in ascending order."""
         self.trials += len(block)
         self._low.append(block[: np.searchsorted(block, self._below, "right")])
         self._high.append(block[np.searchsorted(block, self._above, "left") :])
@@ -169,14 +169,11 @@ class SmallestRegion:
 
     @property
     def area(self) -> float:
-        """Area of the region."""
         return float(np.sum(self.inside * np.outer(np.diff(self.x), np.diff(self.y))))
 
 
 def elliptical_factor(outputs: int, coverage: float = 0.95) -> float:
     """Factor of the ellipsoid for normal outputs, √χ²: 2.4477 for two and 95 % (JCGM 102 table 1)."""
-    from scipy import special
-
     check_coverage(coverage)
     return float(np.sqrt(special.chdtri(outputs, 1 - coverage)))
 
@@ -236,7 +233,6 @@ def draws_in_tail(trials: int) -> int:
 
 
 def tail_of(largest: Floats, mean: float, trials: int) -> Tail:
-    """The upper tail of draws."""
     excess = largest[1:] - largest[0]
     if len(excess) < 5 or not excess[-1] > 0 or not np.isfinite(excess[-1]):
         return Tail(-np.inf, 0.0)

@@ -53,7 +53,6 @@ class Distribution:
         return self.shape
 
     def sample(self, rng: np.random.Generator, n: int) -> Floats:
-        """N independent draws."""
         return np.asarray(self.location + self.scale * self._shape.draw(rng, n))
 
     def quantile(self, p: Floats) -> Floats:
@@ -62,7 +61,6 @@ class Distribution:
 
 
 def constant(value: Number) -> Distribution:
-    """A number taken as exact."""
     _finite(value=value)
     return Distribution("constant", value, 0.0, value, 1.0, shapes.POINT)
 

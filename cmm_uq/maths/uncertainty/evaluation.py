@@ -41,8 +41,6 @@ _TRIALS_FOR_SENSITIVITY = 100_000
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of an evaluation."""
-
     method: str = "auto"  # ``first``, ``second``, ``monte_carlo`` or ``auto``
     coverage: float = 0.95  # probability of the intervals
     digits: int = 2  # significant digits of u that Monte Carlo must support, and to which clause 8 compares
@@ -61,8 +59,6 @@ class Request:
 
 @dataclass(frozen=True, eq=False)
 class OutputResult:
-    """One output: its result by the method chosen."""
-
     method: Method
     reason: Text  # why by this method
     value: float
@@ -75,8 +71,6 @@ class OutputResult:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Evaluation:
-    """All outputs of a model."""
-
     request: Request
     stated: Mapping[str, OutputResult]  # by name
     correlation: Floats  # (p, p) of the outputs; ``nan`` where one has no uncertainty

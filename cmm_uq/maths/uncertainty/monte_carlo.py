@@ -36,8 +36,6 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """Outputs of a measurement model by Monte Carlo."""
-
     outputs: Sequence[str]  # p names
     trials: int
     coverage: float  # probability of the intervals
@@ -62,7 +60,6 @@ class Simulated:
 
 
 def simulate(model: MeasurementModel, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
-    """Make a given number of trials."""
     return from_source(_source(model), trials, coverage, seed)
 
 

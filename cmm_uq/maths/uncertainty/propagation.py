@@ -44,7 +44,6 @@ class Propagated:
 
     @cached_property
     def u(self) -> Floats:
-        """(p, ...) combined standard uncertainties."""
         # correlations can cancel the variance completely, and rounding then leaves less than nothing
         return np.asarray(np.sqrt(np.maximum(_diagonal(self.covariance), 0.0)))
 
@@ -125,7 +124,6 @@ def _first_order(model: MeasurementModel, found: Derivatives, u: Sequence[Any]) 
 
 
 def _diagonal(matrices: Floats) -> Floats:
-    """(p, ...) from (p, p, ...)."""
     return np.asarray(np.einsum("pp...->p...", matrices))
 
 

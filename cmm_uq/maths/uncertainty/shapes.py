@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import special
 
 from cmm_uq.base.points import Floats
 
@@ -25,14 +26,8 @@ class DistributionShape:
     inverse: Callable[[Floats], Floats]
 
 
-def _normal_inverse(p: Floats) -> Floats:
-    from scipy import special
-
-    return np.asarray(special.ndtri(p))
-
-
 POINT = DistributionShape(0.0, lambda _, n: np.zeros(n), np.zeros_like)
-NORMAL = DistributionShape(1.0, lambda rng, n: rng.standard_normal(n), _normal_inverse)
+NORMAL = DistributionShape(1.0, lambda rng, n: rng.standard_normal(n), special.ndtri)
 RECTANGULAR = DistributionShape(1 / 3, lambda rng, n: 2 * rng.random(n) - 1, lambda p: 2 * p - 1)
 TRIANGULAR = DistributionShape(
     1 / 6,
@@ -47,25 +42,17 @@ EXPONENTIAL = DistributionShape(1.0, lambda rng, n: rng.standard_exponential(n),
 
 def student_t(dof: float) -> DistributionShape:
     """T distribution; of infinite variance with two degrees of freedom or fewer."""
-
-    def inverse(p: Floats) -> Floats:
-        from scipy import special
-
-        return np.asarray(special.stdtrit(dof, p))
-
     variance = dof / (dof - 2) if dof > 2 else np.inf
-    return DistributionShape(variance, lambda rng, n: rng.standard_t(dof, n), inverse)
+    return DistributionShape(
+        variance, lambda rng, n: rng.standard_t(dof, n), lambda p: np.asarray(special.stdtrit(dof, p))
+    )
 
 
 def gamma(order: float) -> DistributionShape:
-    """Gamma distribution of unit scale."""
 
-    def inverse(p: Floats) -> Floats:
-        from scipy import special
-
-        return np.asarray(special.gammaincinv(order, p))
-
-    return DistributionShape(order, lambda rng, n: rng.standard_gamma(order, n), inverse)
+    return DistributionShape(
+        order, lambda rng, n: rng.standard_gamma(order, n), lambda p: np.asarray(special.gammaincinv(order, p))
+    )
 
 
 def trapezoidal(beta: float) -> DistributionShape:
@@ -107,7 +94,6 @@ def rectangular_uncertain(doubt: float) -> DistributionShape:
 
 
 def empirical(draws: Floats) -> DistributionShape:
-    """Earlier draws, drawn again with replacement."""
     return DistributionShape(
         float(np.var(draws, ddof=1)),
         lambda rng, n: draws[rng.integers(len(draws), size=n)],

@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
@@ -152,8 +153,6 @@ def effective_dof(contributions: Floats, matrix: Floats, dof: Sequence[Floats | 
 
 def coverage_factor(dof: Floats | float, coverage: float) -> Floats:
     """K for a symmetric interval: the t quantile for ν truncated to an integer (JCGM 100 G.4.1, G.6.4), shape of ``dof``."""
-    from scipy import special
-
     check_coverage(coverage)
     nu = np.asarray(dof, dtype=np.float64)
     truncated = np.floor(nu * (1 + _ROUNDING))
@@ -175,6 +174,5 @@ def factor_of_noise(noise: Quantity, u_noise: float = 1.0, u_known: float = 0.0)
 
 
 def check_coverage(coverage: float) -> None:
-    """Refuse what is no coverage probability."""
     if not 0 < coverage < 1:
         raise CmmUqError(f"a coverage probability of {coverage}", fix="It lies between 0 and 1, such as 0.95")

@@ -16,7 +16,7 @@ from cmm_uq.analysis.parts.evaluation import Evaluator
 from cmm_uq.analysis.parts.plan import CommonDatum, Nominal, PartCharacteristic, PartFeature, Plan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.geometry.straight import fit_plane
+from cmm_uq.maths.geometry.fits import fit_plane
 from tests.parts_drawn import UP, ball, block, bore, circle, plane, spot
 
 AXIS = CommonDatum("A-B", ("A", "B"), "line", Nominal(np.zeros(3), UP))

@@ -13,7 +13,7 @@ from hypothesis import given, strategies as st
 
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.axial import fit_cylinder
-from cmm_uq.maths.geometry.round import fit_circle, fit_sphere
+from cmm_uq.maths.geometry.fits import fit_circle, fit_sphere
 from tests.jobs.part.parts import feature
 
 ROUND = {"diameter_mm": 30.0}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.maths.geometry.round import largest_empty, narrower, safe_radius
+from cmm_uq.maths.geometry.fits import largest_empty, narrower, safe_radius
 
 TURN = np.arange(24) * np.pi / 12
 CIRCLE = np.column_stack([np.cos(TURN), np.sin(TURN)])

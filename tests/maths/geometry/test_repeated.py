@@ -210,7 +210,7 @@ def test_each_draw_has_the_extreme_size_that_it_has_alone(kind, inscribed, monke
         alone = associate(kind, points + displaced[i], how)
         assert abs(drawn.size[i] - alone.size) < 1e-9
         assert abs(drawn.form[i] - alone.form) < 1e-6  # where it stands is held less well than how large it is
-    monkeypatch.setattr("cmm_uq.maths.geometry.one_sided.MOST_STEPS", 0)
+    monkeypatch.setattr("cmm_uq.maths.geometry.exchange.MOST_BOXES", 0)
     one_by_one = of.one_sided(displaced[:1], inscribed=inscribed)
     np.testing.assert_allclose(one_by_one.size, drawn.size[:1], rtol=0, atol=1e-8)
 

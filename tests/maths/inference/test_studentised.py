@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cmm_uq.maths.inference.least_squares import studentised
 from cmm_uq.maths.inference.linear_model import Freedoms, LinearModel, Unknown
 from cmm_uq.maths.inference.noise import AXES, GROWTH, PLACING
-from cmm_uq.maths.inference.studentised import studentised
 from tests.maths.inference.test_noise import M, components, covariance
 
 

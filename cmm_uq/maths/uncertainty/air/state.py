@@ -36,8 +36,6 @@ HELIUM_NEON_NM = 632.9908
 
 @dataclass(frozen=True)
 class AirEquation:
-    """An equation for the refractivity of air."""
-
     name: str  # as budgets cite it
     refractivity: Callable[..., Any]  # n − 1 of temperature, pressure, relative humidity, CO2 and vacuum wavelength
     u: float  # standard uncertainty of the equation itself, as its source or NIST's comparison states it
@@ -76,7 +74,6 @@ class Air:
 
     @property
     def assumed(self) -> dict[str, Distribution]:
-        """Defaults of what was not measured."""
         mean = standard_pressure(self.altitude_m)
         defaults = {
             "pressure_pa": (self.pressure_pa, rectangular(mean - 3e3, mean + 3e3)),
@@ -88,7 +85,6 @@ class Air:
 
     @property
     def inputs(self) -> dict[str, Distribution]:
-        """All inputs of an equation, measured or assumed."""
         measured = {name: getattr(self, name) for name in _UNITS if name != "equation"}
         return {name: given for name, given in measured.items() if given is not None} | self.assumed
 
@@ -116,7 +112,6 @@ def standard_pressure(altitude_m: Number) -> Any:
 
 
 def equation_by_name(name: str) -> AirEquation:
-    """Equation of :data:`EQUATIONS`."""
     if name not in EQUATIONS:
         problem = f"there is no equation {name!r} for the refractive index of air"
         raise CmmUqError(problem, fix=suggestion(name, EQUATIONS))

@@ -114,8 +114,6 @@ _SMALLEST, _LARGEST = 1e-70, 1e70
 
 @dataclass(frozen=True, eq=False)
 class ModelFile:
-    """What a model file says."""
-
     title: str  # of the page; the file's name when the file has none
     expressions: Mapping[str, Expression]  # the outputs as written
     model: MeasurementModel  # inputs, outputs and correlations
@@ -131,7 +129,6 @@ class ModelFile:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the file's bytes."""
         return hashlib.sha256(self.content).hexdigest()
 
     def evaluate(self, seed: int | None = None) -> Evaluation:
@@ -354,7 +351,6 @@ class _Reader:
 
 
 def _origins(given: Mapping[str, Any]) -> dict[str, str]:
-    """Where the figures of each input come from."""
     return {
         name: keys.get("source") or (REPEATS if "samples" in keys else say("not stated"))
         for name, keys in given.items()

@@ -112,8 +112,6 @@ class _BudgetFile(JobTable):
 
 @dataclass(frozen=True, eq=False)
 class ReadyBudget:
-    """What a file with a ready budget says."""
-
     title: str  # of the page
     table: BudgetTable  # the method and its figures
     content: bytes  # the file's bytes
@@ -126,7 +124,6 @@ class ReadyBudget:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the file's bytes."""
         return hashlib.sha256(self.content).hexdigest()
 
     @property

@@ -16,8 +16,6 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class SelfTestResult:
-    """One figure of a reference case."""
-
     case: str  # title and figure
     expected: float
     tolerance: float
