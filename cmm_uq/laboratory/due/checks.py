@@ -54,9 +54,8 @@ def check_standings(calibration: RecordedCertificate, checks: Sequence[RecordedC
     found: list[InterimCheck] = []
     before: dict[str, ValueChange] = {}
     for check in checks:
-        changes = {
-            one.name: change(stated[one.name], _stated(one, check)) for one in check.values if one.name in stated
-        }
+        known = (one for one in check.values if one.name in stated)
+        changes = {one.name: change(stated[one.name], _stated(one, check)) for one in known}
         found.append(_checked(check, changes, before))
         before = changes
     return found

@@ -131,7 +131,8 @@ def fit_fleet(
     unit = limit_for(float(np.median(limits)) if limits else None, np.concatenate([m.history.u for m in members]))
     shared = shared_by(machines, [each.model for each in members], [each.place for each in members])
     chains, count = _sampled(machines, shared, unit, seed, progress, learnt_from)
-    theta = _spaced(chains.draws, int(np.clip(MANY // len(members), LEAST_DRAWS, DRAWS)))
+    count_of_draws = int(np.clip(MANY // len(members), LEAST_DRAWS, DRAWS))
+    theta = chains.draws[np.linspace(0, len(chains.draws) - 1, count_of_draws).astype(np.intp)]
     said = messages(machines, shared, theta, unit)
     all_together = together(said, shared, theta, unit)
     covariance = np.asarray(np.linalg.inv(all_together.precision), dtype=np.float64)
@@ -151,9 +152,8 @@ def _sampled(
 ) -> tuple[Chains, int]:
     which = np.arange(len(machines))
     if len(which) > most:
-        which = np.sort(
-            np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(3,))).choice(which, most, replace=False)
-        )
+        random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(3,)))
+        which = np.sort(random.choice(which, most, replace=False))
     some, common = machines.some(which), shared.some(which)
     at_once = max(1, _AT_ONCE // len(which))
 
@@ -165,10 +165,6 @@ def _sampled(
     chains = run_ensembles(density, proposal, seed, progress, effective_samples=LEAST_EFFECTIVE_SAMPLES,
                            steps_at_once=_STEPS, walkers=_WALKERS)  # fmt: skip
     return chains, len(which)
-
-
-def _spaced(draws: Floats, count: int) -> Floats:
-    return draws[np.linspace(0, len(draws) - 1, count).astype(np.intp)]
 
 
 def _usual(

@@ -193,10 +193,9 @@ class FleetPrior:
             theta, effects, covariance = (
                 np.array(data[key], dtype=np.float64) for key in ("log", "effects", "covariance")
             )
-            found = FleetPrior(
-                float(data["unit"]), theta, tuple(data["models"]), tuple(data["places"]), effects, covariance
-            )
-            size = 1 + len(found.models) + len(found.places)
+            models, places = tuple(data["models"]), tuple(data["places"])
+            found = FleetPrior(float(data["unit"]), theta, models, places, effects, covariance)
+            size = 1 + len(models) + len(places)
             fits = theta.shape == (len(theta), len(NAMES)) and covariance.shape == (len(theta), size, size)
             sound = fits and effects.shape == (len(theta), size) and list(data["hyper_parameters"]) == list(NAMES)
         except (KeyError, TypeError, ValueError):
@@ -215,8 +214,7 @@ class FleetPrior:
 
     def prior(self, model: str = "", place: str = "") -> DriftPrior:
         """Of a machine of a model at a place; either may be new to the fleet."""
-        rate, rate_sd = self._usual_rate(model, place)
-        return learnt_prior(self.theta, rate, rate_sd, self.unit)
+        return learnt_prior(self.theta, *self._usual_rate(model, place), self.unit)
 
     def start(self, machines: Histories, models: Sequence[str], places: Sequence[str]) -> tuple[DriftPrior, DriftStart]:
         """The same of many machines, side by side: nodes common to all, and the rate of each."""

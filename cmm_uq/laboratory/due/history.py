@@ -162,26 +162,20 @@ def machine_history(
 ) -> MachineHistory:
     """The history up to a day; outcomes of values by certificate's entry and value's name."""
     known = tuple(one for one in certificates if one.day <= on)
-    remarks: list[Text] = []
-    if machine.by_name:
-        remarks.append(say("The machine has no serial number and is recognised by its name alone."))
-    late = len(certificates) - len(known)
-    if late:
+    by_name = say("The machine has no serial number and is recognised by its name alone.")
+    remarks: list[Text] = [by_name] if machine.by_name else []
+    if late := len(certificates) - len(known):
         remarks.append(plural(
             late,
             one=say("One certificate is dated after {on} and does not count: a clock or a date is wrong.", on=day(on)),
             many=say("{count} certificates are dated after {on} and do not count: a clock or a date is wrong.",
                      count=late, on=day(on)),
         ))  # fmt: skip
-    cut = (_until(one, on) for one in series.values())
     adjusted = max((one.toordinal() for one in machine.adjusted if one <= on), default=None)
-    values = tuple(
-        _value(
-            one, adjusted, (priors or {}).get(one.name), (outcomes or {}).get(int(one.entry[-1]), {}).get(one.name, "")
-        )
-        for one in cut
-        if len(one.day) and is_of_machine(one.unit)
-    )
+    cut = [one for one in (_until(one, on) for one in series.values()) if len(one.day) and is_of_machine(one.unit)]
+    stated = [(outcomes or {}).get(int(one.entry[-1]), {}).get(one.name, "") for one in cut]
+    values = tuple(_value(one, adjusted, (priors or {}).get(one.name), outcome)
+                   for one, outcome in zip(cut, stated, strict=True))  # fmt: skip
     if values and not any(one.series.limit is not None for one in values):
         remarks.append(say("No certificate has limits, so that none can be met."))
     if known and len({one.day for one in known}) == 1:
@@ -191,22 +185,16 @@ def machine_history(
 
 def _until(series: Series, on: dt.date) -> Series:
     rows = series.day <= on.toordinal()
-    if rows.all():
-        return series
     names = ("day", "value", "u", "u_artefact", "artefact", "entry", "adjusted_since", "interim")
-    return replace(series, **{name: getattr(series, name)[rows] for name in names})
+    return series if rows.all() else replace(series, **{name: getattr(series, name)[rows] for name in names})
 
 
 def _value(series: Series, adjusted_after: int | None, prior: Prior | None, outcome: str) -> ValueHistory:
-    changed = None
-    adjusted = False
+    changed, adjusted = None, False
     if len(series.day) > 1:
-        before, now = (
-            ComparedValue(
-                float(series.value[i]), float(series.u[i]), float(series.u_artefact[i]), str(series.artefact[i])
-            )
-            for i in (-2, -1)
+        columns = zip(
+            series.value.tolist(), series.u.tolist(), series.u_artefact.tolist(), series.artefact.tolist(), strict=True
         )
-        changed = change(before, now)
+        changed = change(*(ComparedValue(*row) for row in list(columns)[-2:]))
         adjusted = bool(series.adjusted_since[-2] != series.adjusted_since[-1])
     return ValueHistory(series, changed, adjusted, trend(series), adjusted_after, prior, outcome)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import optimize, special
@@ -21,8 +22,7 @@ _LARGEST = 1e4  # of a parameter: beyond, no model changes any more
 _EXPONENT = 700.0  # of e, within a double's range
 
 
-@dataclass(frozen=True)
-class ReliabilityModel:
+class ReliabilityModel(NamedTuple):
     """One model."""
 
     name: Text
@@ -223,11 +223,8 @@ def _fitted(
 
 def _most_likely(model: ReliabilityModel, data: ReliabilityData, scale: float) -> Floats:
     t, out = data.days / scale, data.tested - data.in_tolerance
-    fullest = (
-        special.xlogy(data.in_tolerance, data.in_tolerance)
-        + special.xlogy(out, out)
-        - special.xlogy(data.tested, data.tested)
-    )
+    passed, out_of, tested = (special.xlogy(count, count) for count in (data.in_tolerance, out, data.tested))
+    fullest = passed + out_of - tested
 
     def deviances(parameters: Floats) -> Floats:
         """Signed roots, whose squares add up to twice what the logarithm of the likelihood lacks."""
@@ -247,11 +244,11 @@ def _time_of(model: ReliabilityModel, parameters: Floats, level: float) -> float
     if not above[0] or above.all():
         return None
     i = int(np.argmin(above))
-    return float(
-        optimize.brentq(
-            lambda t: float(model.reliability(np.array([t]), parameters)[0]) - level, times[i - 1], times[i]
-        )
-    )
+
+    def excess(t: float) -> float:
+        return float(model.reliability(np.array([t]), parameters)[0]) - level
+
+    return float(optimize.brentq(excess, times[i - 1], times[i]))
 
 
 def _alike(intervals: Sequence[float | None]) -> list[int]:

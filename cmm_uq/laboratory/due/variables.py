@@ -7,7 +7,6 @@ Source: suncal 1.7.1 and its tests, which quote NASA-HDBK-8739.19-5, chapter 7.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,17 +86,15 @@ def interval_of_reliability(
     drift: DriftPolynomial, start: LastValue, target: float, low: float | None, high: float | None
 ) -> float:
     """Days until the probability of lying within the limits falls to the target; infinite where it hardly does."""
-    return _falls(lambda days: reliability_after(drift, start, days, low, high) - target, drift.longest)
 
+    def excess(days: Floats) -> Floats:
+        return reliability_after(drift, start, days, low, high) - target
 
-def _falls(excess: Callable[[Floats], Floats], longest: float) -> float:
-    times = np.concatenate([[0.0], np.geomspace(1e-4, _FAR, _STEPS) * longest])
+    times = np.concatenate([[0.0], np.geomspace(1e-4, _FAR, _STEPS) * drift.longest])
     short = excess(times) < 0
-    if short[0]:
-        return 0.0
-    if not short.any():
-        return float("inf")
     i = int(np.argmax(short))
+    if not i:
+        return 0.0 if short[0] else float("inf")
     return float(optimize.brentq(lambda t: float(excess(np.array([t]))[0]), times[i - 1], times[i]))
 
 
