@@ -18,25 +18,13 @@ from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.laboratory.due.drift import (
-    HORIZON,
-    PARTS,
-    YEAR,
-    DriftHistory,
-    DriftPrior,
-    Histories,
-    RecordedSeries,
-    default_prior,
-    history,
-    limit_for,
-    side_by_side,
-)
+from cmm_uq.laboratory.due import drift
 from cmm_uq.laboratory.due.drift_filter import DriftState, filtered
 
 
 def grid(gaps: int) -> Floats:
     """Days after the last certificate, (gaps + 1,): none, a week, and as many times further each up to the horizon."""
-    return np.concatenate([[0.0], np.geomspace(7.0, HORIZON * YEAR, gaps)])
+    return np.concatenate([[0.0], np.geomspace(7.0, drift.HORIZON * drift.YEAR, gaps)])
 
 
 DAYS, FINE = grid(48), grid(160)  # A sixth further each, for many machines whose dates are wide; a twentieth, for one
@@ -120,17 +108,17 @@ class Crossing:
 
     def data(self) -> dict[str, Any]:
         """For other programs: days, ``None`` beyond the horizon, and probabilities."""
-        dates = {f"day_{round(100 * part)}": self.quantile(part) for part in PARTS}
+        dates = {f"day_{round(100 * part)}": self.quantile(part) for part in drift.PARTS}
         return {
             "last": self.last.isoformat(), **{name: day.isoformat() if day else None for name, day in dates.items()},
-            "already": self.already, "within_a_year": self.after(YEAR),
+            "already": self.already, "within_a_year": self.after(drift.YEAR),
         }  # fmt: skip
 
 
 def crossing(
-    series: RecordedSeries | DriftHistory,
+    series: drift.RecordedSeries | drift.DriftHistory,
     limit: float,
-    prior: DriftPrior | None = None,
+    prior: drift.DriftPrior | None = None,
     *,
     one_sided: bool = False,
     paths: int = PATHS,
@@ -151,9 +139,9 @@ def crossing(
     """
     if not (np.isfinite(limit) and limit > 0):
         raise CmmUqError(f"a limit of {limit:g} cannot be crossed", fix="State a limit above zero")
-    known = series if isinstance(series, DriftHistory) else history(series)
-    prior = prior or default_prior(limit_for(limit, known.u))
-    machines = side_by_side([known])
+    known = series if isinstance(series, drift.DriftHistory) else drift.history(series)
+    prior = prior or drift.default_prior(drift.limit_for(limit, known.u))
+    machines = drift.side_by_side([known])
     many = crossings(machines, prior, filtered(machines, prior), limit, one_sided=one_sided, paths=paths, days=FINE)
     return many.one(0)
 
@@ -166,12 +154,12 @@ class _States(NamedTuple):
     covariance: Floats  # (N, C)
     weight: Floats  # (N, C)
     node: Ints  # (C,)
-    prior: DriftPrior
+    prior: drift.DriftPrior
 
 
 def crossings(
-    machines: Histories, prior: DriftPrior, state: DriftState, limit: Floats | float, *, one_sided: bool = False,
-    paths: int = PATHS, until: float = HORIZON * YEAR, days: Floats = DAYS,
+    machines: drift.Histories, prior: drift.DriftPrior, state: DriftState, limit: Floats | float, *, one_sided: bool = False,
+    paths: int = PATHS, until: float = drift.HORIZON * drift.YEAR, days: Floats = DAYS,
 ) -> Crossings:  # fmt: skip
     """When the errors of many machines will be; later than ``until`` days, probabilities are those of that day."""
     N, M = len(machines), state.log_weight.shape[2]
@@ -227,7 +215,7 @@ def _probabilities(
     inside = ((low <= level) & (level <= high)).astype(np.float64)
     survival = np.empty((len(which), len(days)))
     survival[:, 0] = inside.mean(axis=1)
-    for g, years in enumerate(np.diff(days) / YEAR):
+    for g, years in enumerate(np.diff(days) / drift.YEAR):
         spread = walking**2 * years
         after = level + rate * years + walking * np.sqrt(years) * walk[:, g]
         # probability that a bridge from one level to the other stays within the limits, given that its ends do

@@ -14,21 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.base.points import Floats
-from cmm_uq.laboratory.due.drift import (
-    WRONG,
-    WRONG_TIMES,
-    YEAR,
-    DriftHistory,
-    DriftPrior,
-    Histories,
-    default_prior,
-    limit_for,
-    side_by_side,
-)
+from cmm_uq.laboratory.due import drift
 
 KEPT = 12  # tales kept of a machine at a node
-_ODDS = np.log([1 - WRONG, WRONG])
-_TIMES = WRONG_TIMES**2 - 1
+_ODDS = np.log([1 - drift.WRONG, drift.WRONG])
+_TIMES = drift.WRONG_TIMES**2 - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +45,7 @@ class DriftState:
         """Density of a machine's certificates at each node, (N, K)."""
         return log_sum(self.log_weight)
 
-    def weights(self, prior: DriftPrior) -> Floats:
+    def weights(self, prior: drift.DriftPrior) -> Floats:
         """Of nodes and tales given the certificates, (N, K, M), one in all for each machine."""
         evidence = self.log_evidence + np.log(prior.weight)
         of_group = np.stack([log_sum(np.where(row, evidence, -np.inf)) for row in prior.members], axis=-1)
@@ -79,7 +69,7 @@ def log_sum(values: Floats) -> Floats:
         return np.asarray(np.log(np.exp(values - top).sum(axis=-1)) + top[..., 0], dtype=np.float64)
 
 
-def usual_start(machines: Histories, prior: DriftPrior) -> DriftStart:
+def usual_start(machines: drift.Histories, prior: drift.DriftPrior) -> DriftStart:
     """Rates of the prior, artefacts as their certificates say."""
     q, N, K = machines.shared.shape[1], len(machines), len(prior)
     mean, covariance = np.zeros((1 + q, N, K)), np.zeros((1 + q, 1 + q, N, K))
@@ -88,7 +78,9 @@ def usual_start(machines: Histories, prior: DriftPrior) -> DriftStart:
     return DriftStart(mean, covariance)
 
 
-def filtered(machines: Histories, prior: DriftPrior, start: DriftStart | None = None, kept: int = KEPT) -> DriftState:
+def filtered(
+    machines: drift.Histories, prior: drift.DriftPrior, start: DriftStart | None = None, kept: int = KEPT
+) -> DriftState:
     """Filter all certificates of all machines at all nodes, from :func:`usual_start` or another start."""
     start = start or usual_start(machines, prior)
     order = np.argsort(-machines.given.sum(axis=0), kind="stable")  # whoever has no further certificate is done
@@ -108,7 +100,7 @@ def filtered(machines: Histories, prior: DriftPrior, start: DriftStart | None = 
     return state
 
 
-def _set_back(state: DriftState, adjusted: NDArray[np.bool_], prior: DriftPrior) -> None:
+def _set_back(state: DriftState, adjusted: NDArray[np.bool_], prior: drift.DriftPrior) -> None:
     state.mean[0] *= ~adjusted
     state.covariance[0] *= ~adjusted
     state.covariance[:, 0] *= ~adjusted
@@ -130,7 +122,7 @@ def _side_by_side(parts: list[DriftState], order: NDArray[np.intp]) -> DriftStat
     )  # fmt: skip
 
 
-def _moved(state: DriftState, machines: Histories, prior: DriftPrior, k: int) -> DriftState:
+def _moved(state: DriftState, machines: drift.Histories, prior: drift.DriftPrior, k: int) -> DriftState:
     """To the day of certificate k: set back by an adjustment, along the rate, wandering; in place."""
     mean, covariance, N = state.mean, state.covariance, len(state.log_weight)
     adjusted, years = machines.adjusted[k, :N, None, None], machines.years[k, :N, None, None]
@@ -143,7 +135,7 @@ def _moved(state: DriftState, machines: Histories, prior: DriftPrior, k: int) ->
     return state
 
 
-def _measured(state: DriftState, machines: Histories, prior: DriftPrior, k: int, kept: int) -> DriftState:
+def _measured(state: DriftState, machines: drift.Histories, prior: drift.DriftPrior, k: int, kept: int) -> DriftState:
     """With certificate k: each tale becomes four (no step or one before it; right or wrong), the likeliest are kept."""
     N, K, M = state.log_weight.shape
     shared, variance = machines.shared[k, :, :N, None, None], machines.u[k, :N, None, None] ** 2
@@ -161,7 +153,7 @@ def _measured(state: DriftState, machines: Histories, prior: DriftPrior, k: int,
     return _kept(state, log_weight, seen, spread, missed, size, kept)
 
 
-def _log_steps(years: Floats, prior: DriftPrior) -> tuple[Floats, Floats]:
+def _log_steps(years: Floats, prior: drift.DriftPrior) -> tuple[Floats, Floats]:
     """Logarithms of the probabilities of no step and of one in the years since the certificate before, (N, K) each."""
     expected = years[:, None] * prior.steps_per_year
     with np.errstate(divide="ignore"):
@@ -200,7 +192,7 @@ FEWEST = 2  # certificates from which on a history says anything of a machine's 
 
 
 def change_since(
-    of: DriftHistory, days: float, *, prior: DriftPrior | None = None, limit: float | None = None
+    of: drift.DriftHistory, days: float, *, prior: drift.DriftPrior | None = None, limit: float | None = None
 ) -> float | None:
     """Root mean square change of an error by so many days after its last certificate, in its unit; ``None`` if unknown.
 
@@ -209,8 +201,8 @@ def change_since(
     """
     if len(of.day) < FEWEST or np.isfinite(of.adjusted_after):
         return None
-    known = default_prior(limit_for(limit, of.u)) if prior is None else prior
-    state, years = filtered(side_by_side([of]), known), abs(days) / YEAR
+    known = drift.default_prior(drift.limit_for(limit, of.u)) if prior is None else prior
+    state, years = filtered(drift.side_by_side([of]), known), abs(days) / drift.YEAR
     weight = state.weights(known)[0]
     rate = state.mean[1, 0] ** 2 + state.covariance[1, 1, 0]
     wandering = (known.walk**2 + known.steps_per_year * known.step_sd**2)[:, None]

@@ -17,29 +17,9 @@ from scipy import special
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.verdicts import BEYOND
+from cmm_uq.laboratory.due import drift, fleet_model
 from cmm_uq.laboratory.due.crossing import Crossings, crossings
-from cmm_uq.laboratory.due.drift import (
-    MEDIANS,
-    NAMES,
-    SPREADS,
-    YEAR,
-    DriftHistory,
-    DriftPrior,
-    Histories,
-    learnt_prior,
-    limit_for,
-    side_by_side,
-)
 from cmm_uq.laboratory.due.drift_filter import DriftStart, DriftState, filtered, log_sum
-from cmm_uq.laboratory.due.fleet_model import (
-    FleetPrior,
-    SharedEffects,
-    log_posterior,
-    messages,
-    others,
-    shared_by,
-    together,
-)
 from cmm_uq.maths.inference.ensembles import LEAST_EFFECTIVE_SAMPLES, Chains, run_ensembles
 from cmm_uq.maths.inference.proposals import tempered
 
@@ -66,7 +46,7 @@ class FleetMember:
     machine: str
     model: str
     place: str
-    history: DriftHistory
+    history: drift.DriftHistory
     limit: float | None = None
     outcome: str = ""
 
@@ -107,7 +87,7 @@ class Estimates:
 
 
 @dataclass(frozen=True, eq=False)
-class Fleet(FleetPrior):
+class Fleet(fleet_model.FleetPrior):
     """What was learnt: the prior for a further machine, and all else."""
 
     usual: tuple[UsualRate, ...]  # and spreads: what is usual, and how much differs
@@ -126,18 +106,18 @@ def fit_fleet(
     if not members:
         fix = "Record certificates, or choose another --name"
         raise CmmUqError("no machine has a certificate that states this value", fix=fix)
-    machines = side_by_side([each.history for each in members])
+    machines = drift.side_by_side([each.history for each in members])
     limits = [each.limit for each in members if each.limit]
-    unit = limit_for(float(np.median(limits)) if limits else None, np.concatenate([m.history.u for m in members]))
-    shared = shared_by(machines, [each.model for each in members], [each.place for each in members])
+    unit = drift.limit_for(float(np.median(limits)) if limits else None, np.concatenate([m.history.u for m in members]))
+    shared = fleet_model.shared_by(machines, [each.model for each in members], [each.place for each in members])
     chains, count = _sampled(machines, shared, unit, seed, progress, learnt_from)
     count_of_draws = int(np.clip(MANY // len(members), LEAST_DRAWS, DRAWS))
     theta = chains.draws[np.linspace(0, len(chains.draws) - 1, count_of_draws).astype(np.intp)]
-    said = messages(machines, shared, theta, unit)
-    all_together = together(said, shared, theta, unit)
+    said = fleet_model.messages(machines, shared, theta, unit)
+    all_together = fleet_model.together(said, shared, theta, unit)
     covariance = np.asarray(np.linalg.inv(all_together.precision), dtype=np.float64)
     mean = (covariance @ all_together.linear[..., None])[..., 0]
-    start = others(said, all_together, shared, theta, unit)
+    start = fleet_model.others(said, all_together, shared, theta, unit)
     estimates = _estimated(machines, start, theta, unit, [each.limit for each in members], crossing_paths)
     effects = 1 + len(shared.models) + len(shared.places)
     return Fleet(
@@ -148,7 +128,12 @@ def fit_fleet(
 
 
 def _sampled(
-    machines: Histories, shared: SharedEffects, unit: float, seed: int, progress: Progress | None, most: int
+    machines: drift.Histories,
+    shared: fleet_model.SharedEffects,
+    unit: float,
+    seed: int,
+    progress: Progress | None,
+    most: int,
 ) -> tuple[Chains, int]:
     which = np.arange(len(machines))
     if len(which) > most:
@@ -159,16 +144,16 @@ def _sampled(
 
     def density(theta: Floats) -> Floats:
         parts = [theta[i : i + at_once] for i in range(0, len(theta), at_once)]
-        return np.concatenate([log_posterior(some, common, part, unit) for part in parts])
+        return np.concatenate([fleet_model.log_posterior(some, common, part, unit) for part in parts])
 
-    proposal = tempered(density, np.log(MEDIANS), np.diag(SPREADS), seed)
+    proposal = tempered(density, np.log(drift.MEDIANS), np.diag(drift.SPREADS), seed)
     chains = run_ensembles(density, proposal, seed, progress, effective_samples=LEAST_EFFECTIVE_SAMPLES,
                            steps_at_once=_STEPS, walkers=_WALKERS)  # fmt: skip
     return chains, len(which)
 
 
 def _usual(
-    members: Sequence[FleetMember], shared: SharedEffects, mean: Floats, covariance: Floats
+    members: Sequence[FleetMember], shared: fleet_model.SharedEffects, mean: Floats, covariance: Floats
 ) -> tuple[UsualRate, ...]:
     """Of the fleet's average machine, of each model at the average place, and of each place for the average model."""
     average = shared.design[:, 0].mean(axis=0)
@@ -194,17 +179,17 @@ def _moments(kind: str, name: str, count: int, row: Floats, mean: Floats, covari
 
 def _spreads(draws: Floats, unit: float) -> tuple[HyperParameter, ...]:
     quantiles = np.exp(np.quantile(draws, [0.5, 0.025, 0.975], axis=0))
-    scales = [1.0 if name == "steps_per_year" else unit for name in NAMES]
+    scales = [1.0 if name == "steps_per_year" else unit for name in drift.NAMES]
     return tuple(
         HyperParameter(name, *(float(scale * q) for q in column))
-        for name, scale, column in zip(NAMES, scales, quantiles.T, strict=True)
+        for name, scale, column in zip(drift.NAMES, scales, quantiles.T, strict=True)
     )
 
 
 def _estimated(
-    machines: Histories, start: DriftStart, theta: Floats, unit: float, limits: Sequence[float | None], paths: int
+    machines: drift.Histories, start: DriftStart, theta: Floats, unit: float, limits: Sequence[float | None], paths: int
 ) -> Estimates:
-    prior = learnt_prior(theta, np.zeros(len(theta)), np.ones(len(theta)), unit)
+    prior = drift.learnt_prior(theta, np.zeros(len(theta)), np.ones(len(theta)), unit)
     limit = np.array([np.inf if each is None else each for each in limits])
     chunk = max(1, _FILTERED_AT_ONCE // len(prior))
     parts = []
@@ -219,7 +204,7 @@ def _estimated(
     return Estimates(rate, u, expected, u_expected, p, crossing)
 
 
-def _rates(state: DriftState, prior: DriftPrior, start: DriftStart) -> Floats:
+def _rates(state: DriftState, prior: drift.DriftPrior, start: DriftStart) -> Floats:
     """Rate and u with the certificates, the same before them, and the probability of so great a shift between, (5, N).
 
     If the machine is one of its fleet, the certificates shift the mean of its rate by a normal deviate whose variance is
@@ -243,7 +228,7 @@ def _rates(state: DriftState, prior: DriftPrior, start: DriftStart) -> Floats:
     return np.stack([mean, np.sqrt(total), expected, u_expected, p])
 
 
-def _without_it(state: DriftState, prior: DriftPrior) -> Floats:
+def _without_it(state: DriftState, prior: drift.DriftPrior) -> Floats:
     """Weights (N, g) that make draws of a fleet's posterior those of the same fleet without the machine.
 
     They are the inverse of the density of its certificates given those of the others, truncated (Ionides 2008): a machine far
@@ -323,7 +308,7 @@ class FleetResult:
 
     @property
     def in_a_year(self) -> float:
-        return self.newest + YEAR
+        return self.newest + drift.YEAR
 
     @property
     def compared(self) -> bool:

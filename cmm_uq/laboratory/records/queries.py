@@ -15,17 +15,7 @@ from typing import TYPE_CHECKING, Any
 from sqlalchemy import ColumnElement, Connection, Engine, Select, func, or_, select
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.laboratory.records.facts import (
-    BY_NAME,
-    STANDING,
-    ArtefactRow,
-    RecordedCertificate,
-    RecordedMachine,
-    RecordedValue,
-    ReleaseSignature,
-    Series,
-    spelled,
-)
+from cmm_uq.laboratory.records import facts
 from cmm_uq.laboratory.records.place import told
 from cmm_uq.laboratory.records.tables import (
     adjustments,
@@ -51,7 +41,7 @@ _CERTIFICATES = select(
 
 def _measured(c: Any, origin: str = "measured") -> tuple[ColumnElement[bool], ...]:
     """Reports of an origin that stand."""
-    return c.command == "report", c.origin == origin, c.state.in_(STANDING)
+    return c.command == "report", c.origin == origin, c.state.in_(facts.STANDING)
 
 
 class RecordQueries:
@@ -71,7 +61,7 @@ class RecordQueries:
         with told(self.place), self.engine.connect() as connection:
             yield connection
 
-    def machines(self) -> list[RecordedMachine]:
+    def machines(self) -> list[facts.RecordedMachine]:
         """All machines, by serial."""
         days: dict[int, list[dt.date]] = defaultdict(list)
         with self.reading() as connection:
@@ -80,18 +70,20 @@ class RecordQueries:
             rows = connection.execute(select(machines).order_by(machines.c.called)).mappings()
             return [_machine(row, days.get(row["id"], ())) for row in rows]
 
-    def machine(self, serial: str) -> RecordedMachine:
+    def machine(self, serial: str) -> facts.RecordedMachine:
         """One machine, by serial however it is spelled, or by name."""
         with self.reading() as connection:
             number = _machine_id(connection, serial)
             row = connection.execute(select(machines).where(machines.c.id == number)).mappings().one()
             return _machine(row, map(dt.date.fromisoformat, _adjusted(connection, [number])[number]))
 
-    def artefacts(self) -> list[ArtefactRow]:
+    def artefacts(self) -> list[facts.ArtefactRow]:
         """All artefacts, by serial."""
         with self.reading() as connection:
             return [
-                ArtefactRow(row.called, row.kind, row.certificate, row.laboratory, _day(row.calibrated), _day(row.due))
+                facts.ArtefactRow(
+                    row.called, row.kind, row.certificate, row.laboratory, _day(row.calibrated), _day(row.due)
+                )
                 for row in connection.execute(select(artefacts).order_by(artefacts.c.called))
             ]
 
@@ -99,7 +91,7 @@ class RecordQueries:
         self, machine: str | None = None, *, origin: str | None = "measured", states: Collection[str] | None = None,
         artefact: str | None = None, since: dt.date | None = None, limit: int | None = None, values: bool = True,
         command: str | None = "report", job: str | None = None, offset: int = 0, newest_first: bool = False,
-    ) -> list[RecordedCertificate]:  # fmt: skip
+    ) -> list[facts.RecordedCertificate]:  # fmt: skip
         """Certificates and interim checks, by day, then entry; ``None`` for all.
 
         ``since``: first day; ``limit, offset``: at most so many, the newest, and newest that are left out, for pages.
@@ -112,7 +104,7 @@ class RecordQueries:
             if states is not None:
                 where.append(_C.state.in_(tuple(states)))
             if artefact is not None:
-                key, a = spelled(artefact), artefacts.c
+                key, a = facts.spelled(artefact), artefacts.c
                 way = or_(a.called == artefact, a.recognised.in_((key, f"certificate:{key}")))
                 where.append(_C.artefact.in_(tuple(connection.execute(select(a.id).where(way)).scalars())))
             if since is not None:
@@ -121,7 +113,7 @@ class RecordQueries:
             found = self._certificates(connection, query.limit(limit).offset(offset or None), values=values)
         return found if newest_first else found[::-1]
 
-    def certificate(self, entry: int) -> RecordedCertificate:
+    def certificate(self, entry: int) -> facts.RecordedCertificate:
         """One certificate, by the number of its entry."""
         with self.reading() as connection:
             found = self._certificates(connection, _CERTIFICATES.where(_C.entry == entry))
@@ -129,7 +121,7 @@ class RecordQueries:
             raise CmmUqError(f"entry {entry} is no certificate", where="records")
         return found[0]
 
-    def named(self, certificate: str) -> list[RecordedCertificate]:
+    def named(self, certificate: str) -> list[facts.RecordedCertificate]:
         """Certificates by number, id of the job, folder, hash of results.json, or entry; by day, without values."""
         ways = [column == certificate for column in (_C.number, _C.job, _C.results_sha256, _C.folder)]
         if certificate.isascii() and certificate.isdigit() and len(certificate) < 16:
@@ -141,16 +133,16 @@ class RecordQueries:
                     return found
         return []
 
-    def latest(self, until: dt.date | None = None, *, values: bool = True) -> list[RecordedCertificate]:
+    def latest(self, until: dt.date | None = None, *, values: bool = True) -> list[facts.RecordedCertificate]:
         """Newest measured and standing certificate of each machine, none later than a day, by serial; no checks."""
-        rows: list[RecordedCertificate] = []
+        rows: list[facts.RecordedCertificate] = []
         with self.reading() as connection:
             found = connection.execute(select(newest_of_machine(until)).select_from(machines)).scalars()
             for block in blocks(sorted(entry for entry in found if entry is not None)):
                 rows += self._certificates(connection, _CERTIFICATES.where(_C.entry.in_(block)), values=values)
         return sorted(rows, key=lambda one: (one.machine, one.entry))
 
-    def checks(self) -> list[RecordedCertificate]:
+    def checks(self) -> list[facts.RecordedCertificate]:
         """Measured interim checks of all machines, neither withdrawn nor replaced, by day, then entry."""
         with self.reading() as connection:
             query = _CERTIFICATES.where(*_measured(_C), _C.interim.is_(True)).order_by(_C.day, _C.entry)
@@ -172,13 +164,13 @@ class RecordQueries:
         with self.reading() as connection:
             return {row[0]: dt.date.fromisoformat(row[1]) for row in connection.execute(query)}
 
-    def signatures(self, certificate: int) -> list[ReleaseSignature]:
+    def signatures(self, certificate: int) -> list[facts.ReleaseSignature]:
         """Who released, withdrew or replaced a certificate, in order."""
         query = select(signatures).where(signatures.c.certificate == certificate).order_by(signatures.c.entry)
         with self.reading() as connection:
             rows = connection.execute(query).all()
         moment = dt.datetime.fromisoformat
-        return [ReleaseSignature(entry, of, what, by, reason, moment(at), replaced_by)
+        return [facts.ReleaseSignature(entry, of, what, by, reason, moment(at), replaced_by)
                 for entry, of, what, by, reason, at, replaced_by in rows]  # fmt: skip
 
     def has_results(self, results_sha256: str) -> int | None:
@@ -186,7 +178,9 @@ class RecordQueries:
         with self.reading() as connection:
             return entry_of_results(connection, results_sha256)
 
-    def series(self, machine: str, names: Collection[str] | None = None, origin: str = "measured") -> dict[str, Series]:
+    def series(
+        self, machine: str, names: Collection[str] | None = None, origin: str = "measured"
+    ) -> dict[str, facts.Series]:
         """Each value of a machine over its standing certificates and interim checks."""
         import numpy as np
 
@@ -201,7 +195,7 @@ class RecordQueries:
             limits = [row.limit for row in rows if row.limit is not None]
             since = (adjusted_before(row.adjusted_since, row.day, adjusted) for row in rows)
             value, u, u_artefact = np.array([(row.value, row.u, row.u_artefact) for row in rows], dtype=float).T.copy()
-            found[name] = Series(
+            found[name] = facts.Series(
                 name, rows[-1].quantity, rows[-1].unit, limits[-1] if limits else None,
                 np.array([dt.date.fromisoformat(row.day).toordinal() for row in rows]), value, u, u_artefact,
                 np.array([row.artefact for row in rows]), np.array([row.entry for row in rows]),
@@ -232,7 +226,7 @@ class RecordQueries:
 
     def _certificates(
         self, connection: Connection, query: Select[Any], *, values: bool = True
-    ) -> list[RecordedCertificate]:
+    ) -> list[facts.RecordedCertificate]:
         rows = connection.execute(query).all()
         entries = [row.entry for row in rows]
         stated = _values(connection, entries) if values else {}
@@ -241,7 +235,7 @@ class RecordQueries:
         before = "" if self.home is None else f"{self.home}{os.sep}"
         day_of, moment_of = dt.date.fromisoformat, dt.datetime.fromisoformat
         return [
-            RecordedCertificate(
+            facts.RecordedCertificate(
                 entry, job, machine_called, artefact_called, kind, origin, day_of(day), moment_of(at),
                 adjusted_before(since, day, adjusted[machine]), state, decision, diagnosis, bool(interim),
                 _opened(before, folder), version, results, number, command, _day(due), tuple(stated.get(entry, ())),
@@ -264,7 +258,7 @@ def newest_of_machine(until: dt.date | None = None) -> Any:
 def entry_of_results(connection: Connection, results_sha256: str, *, standing: bool = False) -> int | None:
     """Number of the first entry that recorded them, of those that count where ``standing`` says so."""
     query = select(func.min(_C.entry)).where(_C.results_sha256 == results_sha256)
-    found = connection.execute(query.where(_C.state.in_(STANDING)) if standing else query).scalar()
+    found = connection.execute(query.where(_C.state.in_(facts.STANDING)) if standing else query).scalar()
     return None if found is None else int(found)
 
 
@@ -284,16 +278,16 @@ def blocks(numbers: Sequence[int]) -> Iterable[Sequence[int]]:
     return (numbers[i : i + _TOGETHER] for i in range(0, len(numbers), _TOGETHER))
 
 
-def _machine(row: Mapping[Any, Any], adjusted: Iterable[dt.date]) -> RecordedMachine:
+def _machine(row: Mapping[Any, Any], adjusted: Iterable[dt.date]) -> facts.RecordedMachine:
     rule = json.loads(row["calibrate"]) if row["calibrate"] else None
-    return RecordedMachine(
+    return facts.RecordedMachine(
         row["called"], row["name"], row["manufacturer"], row["model"], row["place"], tuple(adjusted),
-        row["recognised"].startswith(BY_NAME), rule,
+        row["recognised"].startswith(facts.BY_NAME), rule,
     )  # fmt: skip
 
 
 def _machine_id(connection: Connection, serial: str) -> int:
-    m, key = machines.c, spelled(serial)
+    m, key = machines.c, facts.spelled(serial)
     for way in (m.called == serial, m.spelled == key, m.named == key):
         rows = connection.execute(select(m.id, m.called).where(way)).all()
         if len(rows) == 1:
@@ -306,15 +300,15 @@ def _machine_id(connection: Connection, serial: str) -> int:
     raise CmmUqError(f"no machine {serial!r} is recorded", where="records", fix=fix)
 
 
-def _values(connection: Connection, entries: Sequence[int]) -> dict[int, list[RecordedValue]]:
+def _values(connection: Connection, entries: Sequence[int]) -> dict[int, list[facts.RecordedValue]]:
     f, q = figures.c, quantities.c
     names = {row[0]: row[1:] for row in connection.execute(select(q.id, q.name, q.quantity, q.unit)).all()}
-    found: dict[int, list[RecordedValue]] = defaultdict(list)
+    found: dict[int, list[facts.RecordedValue]] = defaultdict(list)
     for block in blocks(entries):
         query = select(f.certificate, f.quantity, f.value, f.u, f.lower, f.upper, f.u_artefact, f.at_most)
         query = query.where(f.certificate.in_(block)).order_by(f.certificate, f.place)
         for certificate, quantity, value, u, lower, upper, common, limit in connection.execute(query).all():
-            found[certificate].append(RecordedValue(*names[quantity], value, u, lower, upper, common, limit))
+            found[certificate].append(facts.RecordedValue(*names[quantity], value, u, lower, upper, common, limit))
     return found
 
 

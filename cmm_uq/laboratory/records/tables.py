@@ -5,23 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from sqlalchemy import (
-    BigInteger,
-    Boolean,
-    CheckConstraint,
-    Column,
-    Float,
-    ForeignKey,
-    Index,
-    Integer,
-    MetaData,
-    String,
-    Table,
-    Text,
-    UniqueConstraint,
-)
+import sqlalchemy as sa
 
-META = MetaData(
+META = sa.MetaData(
     naming_convention={
         "ix": "ix_%(table_name)s_%(column_0_N_name)s",
         "uq": "uq_%(table_name)s_%(column_0_N_name)s",
@@ -31,83 +17,87 @@ META = MetaData(
     }
 )
 
-DAY = String(10)  # ISO 8601, which sorts as days do
+DAY = sa.String(10)  # ISO 8601, which sorts as days do
 
-NUMBER = BigInteger().with_variant(Integer, "sqlite")
+NUMBER = sa.BigInteger().with_variant(sa.Integer, "sqlite")
 """Number of an entry; SQLite makes its rows' own number of an INTEGER only."""
 
-DOUBLE = Float(53)
+DOUBLE = sa.Float(53)
 
 
-def _of(column: str) -> ForeignKey:
+def _of(column: str) -> sa.ForeignKey:
     """A reference that holds when the transaction ends: rows are written table by table."""
-    return ForeignKey(column, deferrable=True, initially="DEFERRED")
+    return sa.ForeignKey(column, deferrable=True, initially="DEFERRED")
 
 
-def _id() -> Column[int]:
-    return Column("id", Integer, primary_key=True, autoincrement=False)
+def _id() -> sa.Column[int]:
+    return sa.Column("id", sa.Integer, primary_key=True, autoincrement=False)
 
 
-def _entry(name: str = "entry", of: str = "entries.number", *, key: bool = False) -> Column[int]:
+def _entry(name: str = "entry", of: str = "entries.number", *, key: bool = False) -> sa.Column[int]:
     """The number of an entry, which may be the key of the row."""
-    return Column(name, NUMBER, _of(of), primary_key=key, autoincrement=False if key else "auto", nullable=False)
+    return sa.Column(name, NUMBER, _of(of), primary_key=key, autoincrement=False if key else "auto", nullable=False)
 
 
-def _stated(kind: Any, *names: str, **options: Any) -> Iterator[Column[Any]]:
-    return (Column(name, kind, nullable=False, **options) for name in names)
+def _stated(kind: Any, *names: str, **options: Any) -> Iterator[sa.Column[Any]]:
+    return (sa.Column(name, kind, nullable=False, **options) for name in names)
 
 
-entries = Table(
-    "entries", META, Column("number", NUMBER, primary_key=True, autoincrement=False), *_stated(String(27), "at"),
-    *_stated(String(20), "kind"), *_stated(Text, "content"), *_stated(String(64), "previous", "hash"),
-    CheckConstraint("number >= 1", name="counts"), Index(None, "kind", "number"),
+entries = sa.Table(
+    "entries", META, sa.Column("number", NUMBER, primary_key=True, autoincrement=False), *_stated(sa.String(27), "at"),
+    *_stated(sa.String(20), "kind"), *_stated(sa.Text, "content"), *_stated(sa.String(64), "previous", "hash"),
+    sa.CheckConstraint("number >= 1", name="counts"), sa.Index(None, "kind", "number"),
 )  # fmt: skip
-machines = Table(
-    "machines", META, _id(), *_stated(Text, "recognised", "called", unique=True),
-    *_stated(Text, "spelled", "named", index=True), *_stated(Text, "name", "manufacturer", "model", "place"),
-    Column("calibrate", Text), *_stated(DAY, "day"), _entry(),
+machines = sa.Table(
+    "machines", META, _id(), *_stated(sa.Text, "recognised", "called", unique=True),
+    *_stated(sa.Text, "spelled", "named", index=True), *_stated(sa.Text, "name", "manufacturer", "model", "place"),
+    sa.Column("calibrate", sa.Text), *_stated(DAY, "day"), _entry(),
 )  # fmt: skip
-adjustments = Table(
-    "adjustments", META, Column("machine", Integer, _of("machines.id"), primary_key=True),
-    Column("day", DAY, primary_key=True), _entry(),
+adjustments = sa.Table(
+    "adjustments", META, sa.Column("machine", sa.Integer, _of("machines.id"), primary_key=True),
+    sa.Column("day", DAY, primary_key=True), _entry(),
 )  # fmt: skip
-artefacts = Table(
-    "artefacts", META, _id(), *_stated(Text, "recognised", unique=True), *_stated(Text, "called", index=True),
-    *_stated(Text, "kind", "certificate", "laboratory"), Column("calibrated", DAY), Column("due", DAY),
+artefacts = sa.Table(
+    "artefacts", META, _id(), *_stated(sa.Text, "recognised", unique=True), *_stated(sa.Text, "called", index=True),
+    *_stated(sa.Text, "kind", "certificate", "laboratory"), sa.Column("calibrated", DAY), sa.Column("due", DAY),
     *_stated(DAY, "day"), _entry(),
 )  # fmt: skip
-certificates = Table(
-    "certificates", META, _entry(key=True), Column("machine", Integer, _of("machines.id"), nullable=False),
-    Column("artefact", Integer, _of("artefacts.id")), *_stated(Text, "command", "job", "number", "kind", "origin"),
-    *_stated(DAY, "day"), *_stated(String(27), "at"), Column("adjusted_since", DAY),
-    *_stated(Text, "state", "decision", "diagnosis"), *_stated(Boolean(create_constraint=False), "interim"),
-    *_stated(Text, "folder", "version"), *_stated(String(64), "results_sha256"), Column("artefact_due", DAY),
-    Index(None, "machine", "command", "origin", "day", "entry"), Index(None, "command", "origin", "day", "entry"),
-    Index(None, "artefact", "day"), Index(None, "results_sha256"), Index(None, "job"), Index(None, "number"),
-    Index(None, "folder", "entry"),
+certificates = sa.Table(
+    "certificates", META, _entry(key=True), sa.Column("machine", sa.Integer, _of("machines.id"), nullable=False),
+    sa.Column("artefact", sa.Integer, _of("artefacts.id")), *_stated(sa.Text, "command", "job", "number", "kind", "origin"),
+    *_stated(DAY, "day"), *_stated(sa.String(27), "at"), sa.Column("adjusted_since", DAY),
+    *_stated(sa.Text, "state", "decision", "diagnosis"), *_stated(sa.Boolean(create_constraint=False), "interim"),
+    *_stated(sa.Text, "folder", "version"), *_stated(sa.String(64), "results_sha256"), sa.Column("artefact_due", DAY),
+    sa.Index(None, "machine", "command", "origin", "day", "entry"), sa.Index(None, "command", "origin", "day", "entry"),
+    sa.Index(None, "artefact", "day"), sa.Index(None, "results_sha256"), sa.Index(None, "job"), sa.Index(None, "number"),
+    sa.Index(None, "folder", "entry"),
 )  # fmt: skip
-quantities = Table(
-    "quantities", META, _id(), *_stated(Text, "name", "quantity", "unit"), UniqueConstraint("name", "quantity", "unit")
+quantities = sa.Table(
+    "quantities",
+    META,
+    _id(),
+    *_stated(sa.Text, "name", "quantity", "unit"),
+    sa.UniqueConstraint("name", "quantity", "unit"),
 )
-figures = Table(
+figures = sa.Table(
     "figures", META, _entry("certificate", "certificates.entry", key=True),
-    Column("place", Integer, primary_key=True, autoincrement=False),
-    Column("quantity", Integer, _of("quantities.id"), nullable=False),
-    *_stated(DOUBLE, "value", "u", "lower", "upper", "u_artefact"), Column("at_most", DOUBLE), sqlite_with_rowid=False,
+    sa.Column("place", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("quantity", sa.Integer, _of("quantities.id"), nullable=False),
+    *_stated(DOUBLE, "value", "u", "lower", "upper", "u_artefact"), sa.Column("at_most", DOUBLE), sqlite_with_rowid=False,
 )  # fmt: skip
-covariances = Table(
-    "covariances", META, _entry("certificate", "certificates.entry", key=True), *_stated(Text, "names", "lower")
+covariances = sa.Table(
+    "covariances", META, _entry("certificate", "certificates.entry", key=True), *_stated(sa.Text, "names", "lower")
 )
-signatures = Table(
+signatures = sa.Table(
     "signatures", META, _entry(key=True),
-    Column("certificate", NUMBER, _of("certificates.entry"), nullable=False, index=True),
-    *_stated(Text, "what", "by", "reason"), *_stated(String(27), "at"),
-    Column("replaced_by", NUMBER, _of("certificates.entry")),
+    sa.Column("certificate", NUMBER, _of("certificates.entry"), nullable=False, index=True),
+    *_stated(sa.Text, "what", "by", "reason"), *_stated(sa.String(27), "at"),
+    sa.Column("replaced_by", NUMBER, _of("certificates.entry")),
 )  # fmt: skip
-pending = Table(
-    "pending", META, Column("token", String(12), primary_key=True), *_stated(Text, "host", "folder"),
-    *_stated(String(64), "manifest"), *_stated(String(27), "at"), *_stated(String(20), "kind"),
-    *_stated(Text, "content"),
+pending = sa.Table(
+    "pending", META, sa.Column("token", sa.String(12), primary_key=True), *_stated(sa.Text, "host", "folder"),
+    *_stated(sa.String(64), "manifest"), *_stated(sa.String(27), "at"), *_stated(sa.String(20), "kind"),
+    *_stated(sa.Text, "content"),
 )  # fmt: skip
 
 INDEX = (machines, adjustments, artefacts, certificates, quantities, figures, covariances, signatures)

@@ -12,33 +12,12 @@ from pathlib import Path
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.jobs.tables.plan import DeclaredSource
+from cmm_uq.laboratory.live.instruments import ports, source
 from cmm_uq.laboratory.live.instruments.conversation import SECOND, Conversation, Introduction, another
 from cmm_uq.laboratory.live.instruments.ipp.machine import open_machine
 from cmm_uq.laboratory.live.instruments.library import profile_named
 from cmm_uq.laboratory.live.instruments.parsing import FramedMessage, Framer, Parser, Understood
-from cmm_uq.laboratory.live.instruments.ports import (
-    FILE,
-    NETWORK,
-    RFC2217,
-    EndOfFileError,
-    PortOpener,
-    ReplayedFile,
-    opener,
-)
 from cmm_uq.laboratory.live.instruments.profile import ProfileFile, bytes_of
-from cmm_uq.laboratory.live.instruments.source import (
-    SYSTEM,
-    Clock,
-    Event,
-    Gap,
-    Identity,
-    LiveSource,
-    Moment,
-    Port,
-    PortLostError,
-    Reading,
-    Returned,
-)
 
 RETRY_S = 0.25  # between two attempts to open a port that is gone; a return is to be noticed within 2 s
 INTRODUCED_WITHIN_S = 0.7  # time for an instrument that came back to say which one it is
@@ -48,7 +27,8 @@ class LiveInstrument:
     """An instrument at a port; a silent connection over a network is made anew: it may be dead unnoticed."""
 
     def __init__(
-        self, identity: Identity, profile: ProfileFile, opened: PortOpener, clock: Clock, *, reopen_when_silent: bool = False
+        self, identity: source.Identity, profile: ProfileFile, opened: ports.PortOpener, clock: source.Clock, *,
+        reopen_when_silent: bool = False,
     ) -> None:  # fmt: skip
         self.name = identity.name
         self._declared, self._identity = identity, identity
@@ -58,30 +38,30 @@ class LiveInstrument:
         self._number, self._gap_at, self._closed = 0, -1, False
         self._byte_at = clock.monotonic_ns()
         self._told, self._known = "", False
-        self._port: Port | None = opened()
+        self._port: source.Port | None = opened()
         self._conversation = self._begun()
-        self._held: list[Event] = []
+        self._held: list[source.Event] = []
         try:
             self._held = list(self._introduced(self._port, profile.send.answer_within_s))
-        except PortLostError as lost:
+        except source.PortLostError as lost:
             fix = "Check cable and power"
             raise CmmUqError(f"the port was lost at once: {lost}", where=self.name, fix=fix) from None
         except CmmUqError:
             self._port.close()
             raise
 
-    def identity(self) -> Identity:
+    def identity(self) -> source.Identity:
         return self._identity
 
     def close(self) -> None:
         self._closed = True
         if (port := self._port) is not None:
-            with contextlib.suppress(PortLostError):
+            with contextlib.suppress(source.PortLostError):
                 for text in self._profile.send.stop:
                     port.write(bytes_of(text))
             self._close_port()
 
-    def events(self, stop: threading.Event) -> Iterator[Event]:
+    def events(self, stop: threading.Event) -> Iterator[source.Event]:
         held, self._held = self._held, []
         yield from held
         while not stop.is_set() and not self._closed:
@@ -91,16 +71,16 @@ class LiveInstrument:
                 continue
             try:
                 yield from self._step(port)
-            except EndOfFileError as end:
+            except ports.EndOfFileError as end:
                 yield from self._rest()
                 yield from self._silent(say("{why}", why=Verbatim(str(end))))
                 return
-            except PortLostError as lost:
+            except source.PortLostError as lost:
                 if not self._closed:
                     yield from self._lost(say("the port was lost: {why}", why=Verbatim(str(lost))))
         yield from self._rest()
 
-    def _step(self, port: Port) -> Iterator[Event]:
+    def _step(self, port: source.Port) -> Iterator[source.Event]:
         now = self._clock.monotonic_ns()
         question = self._conversation.question(now)
         if question is not None:
@@ -108,7 +88,7 @@ class LiveInstrument:
                 yield from self._rest()
             port.write(question)
         received = port.read()
-        stamp = Moment.now(self._clock)
+        stamp = source.Moment.now(self._clock)
         if received:
             self._byte_at = stamp.monotonic_ns
             for framed in self._framer.feed(received):
@@ -118,7 +98,9 @@ class LiveInstrument:
         if self._conversation.overdue(self._clock.monotonic_ns()):
             yield from self._overdue(port)
 
-    def _message(self, framed: FramedMessage, stamp: Moment, port: Port | None = None) -> Iterator[Event]:
+    def _message(
+        self, framed: FramedMessage, stamp: source.Moment, port: source.Port | None = None
+    ) -> Iterator[source.Event]:
         """What came, with the return of an instrument that was silent; with a port, that is asked first who it is."""
         understood = self._parser.read(framed, max(self._conversation.asked, 0))
         if self._conversation.several and not self._conversation.waiting and understood.answers:
@@ -130,43 +112,43 @@ class LiveInstrument:
             yield self._reading(framed, understood, stamp)
 
     def _returned(
-        self, framed: FramedMessage, understood: Understood, stamp: Moment, port: Port | None
-    ) -> Iterator[Event]:
+        self, framed: FramedMessage, understood: Understood, stamp: source.Moment, port: source.Port | None
+    ) -> Iterator[source.Event]:
         """The first that an instrument says after a gap."""
         gap, self._gap_at = self._gap_at, -1
         try:
             further = [] if self._known or port is None else list(self._introduced(port, INTRODUCED_WITHIN_S))
-        except (CmmUqError, PortLostError) as error:
+        except (CmmUqError, source.PortLostError) as error:
             self._gap_at, self._conversation.gap = gap, True
             yield self._reading(framed, Understood(status=Verbatim(str(error))), stamp)
             yield from self._refused(error)
             return
         self._told = ""
-        yield Returned(self.name, stamp.utc_ns, stamp.monotonic_ns, (stamp.monotonic_ns - gap) / SECOND)
+        yield source.Returned(self.name, stamp.utc_ns, stamp.monotonic_ns, (stamp.monotonic_ns - gap) / SECOND)
         yield self._reading(framed, understood, stamp)
         yield from further
 
-    def _refused(self, error: CmmUqError | PortLostError) -> Iterator[Event]:
+    def _refused(self, error: CmmUqError | source.PortLostError) -> Iterator[source.Event]:
         """Another instrument is there, or the port is lost again: the gap goes on, and a new reason for it is said."""
         self._close_port()
         why = error.problem if isinstance(error, CmmUqError) else str(error)
         if self._told != why:
-            self._told, stamp = why, Moment.now(self._clock)
-            yield Gap(self.name, stamp.utc_ns, stamp.monotonic_ns, Verbatim(why))
+            self._told, stamp = why, source.Moment.now(self._clock)
+            yield source.Gap(self.name, stamp.utc_ns, stamp.monotonic_ns, Verbatim(why))
 
-    def _reading(self, framed: FramedMessage, understood: Understood, stamp: Moment) -> Reading:
+    def _reading(self, framed: FramedMessage, understood: Understood, stamp: source.Moment) -> source.Reading:
         self._number += 1
-        return Reading(
+        return source.Reading(
             self.name, self._number, stamp.utc_ns, stamp.monotonic_ns, framed.raw, dict(understood.values), understood.status
         )  # fmt: skip
 
-    def _rest(self) -> Iterator[Event]:
+    def _rest(self) -> Iterator[source.Event]:
         """A message whose end did not come."""
         rest = self._framer.rest()
         if rest is not None:
-            yield self._reading(rest, self._parser.read(rest), Moment.now(self._clock))
+            yield self._reading(rest, self._parser.read(rest), source.Moment.now(self._clock))
 
-    def _overdue(self, port: Port) -> Iterator[Event]:
+    def _overdue(self, port: source.Port) -> Iterator[source.Event]:
         yield from self._rest()
         asked = bool(self._profile.send.poll)
         why = say("no answer within {s:g} s", s=self._profile.send.answer_within_s) if asked else say("nothing comes")
@@ -177,17 +159,17 @@ class LiveInstrument:
             for text in self._profile.send.start:  # an instrument that was switched off has forgotten what it was told
                 port.write(bytes_of(text))
 
-    def _silent(self, why: Text) -> Iterator[Event]:
+    def _silent(self, why: Text) -> Iterator[source.Event]:
         """Say that nothing comes, once for each reason."""
         self._conversation.gap = True
-        stamp = Moment.now(self._clock)
+        stamp = source.Moment.now(self._clock)
         if self._gap_at < 0:
             self._gap_at, self._known = stamp.monotonic_ns, False
         if not self._told:
             self._told = why
-            yield Gap(self.name, stamp.utc_ns, stamp.monotonic_ns, why)
+            yield source.Gap(self.name, stamp.utc_ns, stamp.monotonic_ns, why)
 
-    def _lost(self, why: Text) -> Iterator[Event]:
+    def _lost(self, why: Text) -> Iterator[source.Event]:
         """Give up the port; what waited for its end is said first."""
         yield from self._rest()
         self._close_port()
@@ -198,7 +180,7 @@ class LiveInstrument:
         if port is not None:
             port.close()
 
-    def _reconnected(self) -> Iterator[Event]:
+    def _reconnected(self) -> Iterator[source.Event]:
         try:
             port = self._opened()
         except CmmUqError:
@@ -208,18 +190,18 @@ class LiveInstrument:
         self._conversation.gap = True
         try:
             yield from self._introduced(port, INTRODUCED_WITHIN_S)
-        except PortLostError:
+        except source.PortLostError:
             self._close_port()
             self._clock.sleep(RETRY_S)
         except CmmUqError as error:
             yield from self._refused(error)
             self._clock.sleep(RETRY_S)
 
-    def _introduced(self, port: Port, within_s: float) -> Iterator[Event]:
+    def _introduced(self, port: source.Port, within_s: float) -> Iterator[source.Event]:
         """Ask which instrument it is and begin; what comes meanwhile is kept."""
         self._byte_at = self._clock.monotonic_ns()
         wanted = self._profile.identify
-        if wanted is not None and not isinstance(port, ReplayedFile):
+        if wanted is not None and not isinstance(port, ports.ReplayedFile):
             introduction = Introduction(wanted)
             port.write(bytes_of(wanted.send))
             came, lost = self._answers(port, introduction, within_s)
@@ -241,31 +223,33 @@ class LiveInstrument:
             port.write(bytes_of(text))
 
     def _answers(
-        self, port: Port, introduction: Introduction, within_s: float
-    ) -> tuple[list[tuple[FramedMessage, Moment]], PortLostError | None]:
+        self, port: source.Port, introduction: Introduction, within_s: float
+    ) -> tuple[list[tuple[FramedMessage, source.Moment]], source.PortLostError | None]:
         """What comes until the instrument has said who it is, or the time is over, or the port is lost."""
-        came: list[tuple[FramedMessage, Moment]] = []
+        came: list[tuple[FramedMessage, source.Moment]] = []
         until = self._clock.monotonic_ns() + round(within_s * SECOND)
         while introduction.found is None and self._clock.monotonic_ns() < until:
             try:
                 received = port.read()
-            except PortLostError as lost:
+            except source.PortLostError as lost:
                 return came, lost
-            stamp = Moment.now(self._clock)
+            stamp = source.Moment.now(self._clock)
             for framed in self._framer.feed(received):
                 came.append((framed, stamp))
                 introduction.hear(framed)
         return came, None
 
     def _begun(self) -> Conversation:
-        replayed = isinstance(self._port, ReplayedFile)
+        replayed = isinstance(self._port, ports.ReplayedFile)
         return Conversation(self._profile.send, self._clock.monotonic_ns(), replayed=replayed)
 
 
-def open_source(declared: DeclaredSource, *, clock: Clock = SYSTEM, folder: Path = Path()) -> LiveSource:
+def open_source(
+    declared: DeclaredSource, *, clock: source.Clock = source.SYSTEM, folder: Path = Path()
+) -> source.LiveSource:
     """The source that a job declares, with its port open."""
     profile = profile_named(declared.profile, folder)
-    identity = Identity(
+    identity = source.Identity(
         declared.name, profile.maker or None, profile.model or None, declared.serial or None,
         certificate=declared.certificate or None,
     )  # fmt: skip
@@ -274,9 +258,11 @@ def open_source(declared: DeclaredSource, *, clock: Clock = SYSTEM, folder: Path
     return instrument(identity, profile, declared.port, clock, folder)
 
 
-def instrument(identity: Identity, profile: ProfileFile, port: str, clock: Clock, folder: Path) -> LiveInstrument:
+def instrument(
+    identity: source.Identity, profile: ProfileFile, port: str, clock: source.Clock, folder: Path
+) -> LiveInstrument:
     """An instrument that speaks as a profile says."""
-    if port.startswith(FILE):
-        return LiveInstrument(identity, profile, partial(ReplayedFile, port, folder, clock), clock)
-    far = port.startswith((*NETWORK, RFC2217))
-    return LiveInstrument(identity, profile, opener(port, profile.connection), clock, reopen_when_silent=far)
+    if port.startswith(ports.FILE):
+        return LiveInstrument(identity, profile, partial(ports.ReplayedFile, port, folder, clock), clock)
+    far = port.startswith((*ports.NETWORK, ports.RFC2217))
+    return LiveInstrument(identity, profile, ports.opener(port, profile.connection), clock, reopen_when_silent=far)

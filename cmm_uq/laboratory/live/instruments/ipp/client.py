@@ -11,22 +11,7 @@ from collections.abc import Callable, Sequence
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.live.instruments.conversation import SECOND
-from cmm_uq.laboratory.live.instruments.ipp.protocol import (
-    ACK,
-    DATA,
-    DONE,
-    LONGEST,
-    Argument,
-    BadLineError,
-    FaultError,
-    HeardLine,
-    NoAnswerError,
-    arguments_of,
-    fault_of,
-    number_text,
-    response_of,
-    terms_of,
-)
+from cmm_uq.laboratory.live.instruments.ipp import protocol
 from cmm_uq.laboratory.live.instruments.parsing import Framer
 from cmm_uq.laboratory.live.instruments.profile import MessageFrame
 from cmm_uq.laboratory.live.instruments.source import Clock, Port
@@ -51,15 +36,15 @@ class Client:
         self, port: Port, clock: Clock, *, confirm: Callable[[str], bool] | None = None, within_s: float = ANSWER_WITHIN_S
     ) -> None:  # fmt: skip
         self._port, self._clock, self._confirm, self.within_s = port, clock, confirm, within_s
-        self._framer = Framer(MessageFrame(terminator="<CR><LF>", longest=LONGEST))
+        self._framer = Framer(MessageFrame(terminator="<CR><LF>", longest=protocol.LONGEST))
         self._commands = self._events = 0
-        self._came: deque[HeardLine] = deque()
-        self.unasked: deque[HeardLine] = deque()
+        self._came: deque[protocol.HeardLine] = deque()
+        self.unasked: deque[protocol.HeardLine] = deque()
         self.sent: deque[str] = deque(maxlen=_KEPT)
 
     # --- transactions ------------------------------------------------------------
 
-    def call(self, command: str, *, event: bool = False, within_s: float | None = None) -> list[HeardLine]:
+    def call(self, command: str, *, event: bool = False, within_s: float | None = None) -> list[protocol.HeardLine]:
         """Send a command and wait for the end of its transaction, each line in time; its lines of data."""
         if event:
             self._events = self._events % 9999 + 1
@@ -71,21 +56,23 @@ class Client:
         self.sent.append(f"{tag} {command}")
         within_s = self.within_s if within_s is None else within_s
         first = self._answer(tag, command, within_s)
-        if first.response is None or first.response.sign != ACK:
-            raise NoAnswerError(f"{command} was answered {first.raw!r} before it was acknowledged with {ACK}")
+        if first.response is None or first.response.sign != protocol.ACK:
+            raise protocol.NoAnswerError(
+                f"{command} was answered {first.raw!r} before it was acknowledged with {protocol.ACK}"
+            )
         data, faults = [], []
-        while (response := (heard := self._answer(tag, command, within_s)).response) and response.sign != DONE:
-            if response.sign == ACK:
-                raise NoAnswerError(f"{command} was acknowledged twice")
-            if response.sign == DATA:
+        while (response := (heard := self._answer(tag, command, within_s)).response) and response.sign != protocol.DONE:
+            if response.sign == protocol.ACK:
+                raise protocol.NoAnswerError(f"{command} was acknowledged twice")
+            if response.sign == protocol.DATA:
                 data.append(heard)
                 continue
             try:
-                faults.append(fault_of(response.rest))
-            except BadLineError as error:
-                raise NoAnswerError(f"an error that is none of the protocol: {error}") from None
+                faults.append(protocol.fault_of(response.rest))
+            except protocol.BadLineError as error:
+                raise protocol.NoAnswerError(f"an error that is none of the protocol: {error}") from None
         if stopping := next((fault for fault in faults if fault.stops), None):
-            raise FaultError(stopping)
+            raise protocol.FaultError(stopping)
         return data
 
     def listen(self) -> bool:
@@ -95,7 +82,7 @@ class Client:
         self._came.clear()
         return bool(self.unasked)
 
-    def _answer(self, tag: str, command: str, within_s: float) -> HeardLine:
+    def _answer(self, tag: str, command: str, within_s: float) -> protocol.HeardLine:
         until = self._clock.monotonic_ns() + round(within_s * SECOND)
         while True:
             while self._came:
@@ -104,7 +91,7 @@ class Client:
                     return heard
                 self.unasked.append(heard)
             if self._clock.monotonic_ns() >= until:
-                raise NoAnswerError(f"{command} was not answered within {within_s:g} s")
+                raise protocol.NoAnswerError(f"{command} was not answered within {within_s:g} s")
             self._read()
 
     def _read(self) -> None:
@@ -112,10 +99,10 @@ class Client:
         utc, monotonic = self._clock.utc_ns(), self._clock.monotonic_ns()
         for framed in self._framer.feed(received):
             try:
-                response = response_of(framed.body) if framed.whole else None
-            except BadLineError:
+                response = protocol.response_of(framed.body) if framed.whole else None
+            except protocol.BadLineError:
                 response = None
-            self._came.append(HeardLine(framed.raw, response, utc, monotonic))
+            self._came.append(protocol.HeardLine(framed.raw, response, utc, monotonic))
 
     # --- session and errors ------------------------------------------------------------
 
@@ -155,7 +142,7 @@ class Client:
 
     # --- positions ------------------------------------------------------------
 
-    def get(self, *names: str) -> HeardLine:
+    def get(self, *names: str) -> protocol.HeardLine:
         """Ask for what the names say now, ``X``, ``Y``, ``Z`` where none is given."""
         (answer,) = self.call(f"Get({_empty(names or 'XYZ')})")
         return answer
@@ -166,7 +153,7 @@ class Client:
 
     def on_move_report(self, time_s: float, distance_mm: float, *names: str) -> str:
         """Have positions reported while the machine moves; the tag of the reports, by which :meth:`stop_daemon` ends them."""
-        spaced = f"Time({number_text(max(time_s, 0.1))}), Dis({number_text(distance_mm)})"
+        spaced = f"Time({protocol.number_text(max(time_s, 0.1))}), Dis({protocol.number_text(distance_mm)})"
         self.call(f"OnMoveReportE({spaced}, {_empty(names)})", event=True)
         return self.sent[-1].partition(" ")[0]
 
@@ -182,7 +169,7 @@ class Client:
 
     def tools(self) -> list[str]:
         """Names of the tools that may be chosen."""
-        return [str(arguments_of(_rest(answer))[0]) for answer in self.call("EnumTools()")]
+        return [str(protocol.arguments_of(_rest(answer))[0]) for answer in self.call("EnumTools()")]
 
     def tool(self) -> str:
         """Name of the active tool."""
@@ -202,16 +189,16 @@ class Client:
         """Temperatures of the scales by axis, °C, as servers of VDMA 8722 (2.5) give them; empty where the server has none."""
         answer = self._unless_unknown("GetScaleTemperatures(X(), Y(), Z())")
         try:
-            found = terms_of(_rest(answer)) if answer is not None else {}
-        except BadLineError as error:
-            raise NoAnswerError(str(error)) from None
+            found = protocol.terms_of(_rest(answer)) if answer is not None else {}
+        except protocol.BadLineError as error:
+            raise protocol.NoAnswerError(str(error)) from None
         return {axis: value[0] for axis, value in found.items() if value and isinstance(value[0], float)}
 
     # --- what moves the machine ------------------------------------------------------------
 
-    def pt_meas(self, position: Position, normal: Position | None = None) -> HeardLine:
+    def pt_meas(self, position: Position, normal: Position | None = None) -> protocol.HeardLine:
         """Measure a point, mm: the machine moves; without an outward normal in the direction from the last position."""
-        towards = f", IJK({', '.join(map(number_text, normal))})" if normal else ""
+        towards = f", IJK({', '.join(map(protocol.number_text, normal))})" if normal else ""
         (answer,) = self._moving(f"PtMeas({_place(position)}{towards})")
         return answer
 
@@ -223,7 +210,7 @@ class Client:
         """Change the tool: the machine may move; see :meth:`pt_meas`."""
         self._moving(f"ChangeTool({_quoted(name)})")
 
-    def _moving(self, command: str) -> list[HeardLine]:
+    def _moving(self, command: str) -> list[protocol.HeardLine]:
         if self._confirm is None:
             fix = "Allow it and confirm each move"
             raise CmmUqError(f"{command} moves the machine, which was not allowed", fix=fix)
@@ -231,18 +218,18 @@ class Client:
             raise CmmUqError(f"{command} was not confirmed: the machine was not moved")
         return self.call(command, within_s=MOVED_WITHIN_S)
 
-    def _unless_unknown(self, command: str) -> HeardLine | None:
+    def _unless_unknown(self, command: str) -> protocol.HeardLine | None:
         """Answer to what older servers may not know; ``None`` where this one does not, and goes on."""
         try:
             (answer,) = self.call(command)
-        except FaultError as error:
+        except protocol.FaultError as error:
             if error.fault.number not in NOT_THERE:
                 raise
             self.clear_all_errors()
             return None
         return answer
 
-    def _known(self, command: str, name: str) -> Argument | None:
+    def _known(self, command: str, name: str) -> protocol.Argument | None:
         answer = self._unless_unknown(command)
         return None if answer is None else _first(answer, name)
 
@@ -252,7 +239,7 @@ def _empty(names: Sequence[str]) -> str:
 
 
 def _place(position: Position) -> str:
-    return ", ".join(f"{axis}({number_text(value)})" for axis, value in zip("XYZ", position, strict=True))
+    return ", ".join(f"{axis}({protocol.number_text(value)})" for axis, value in zip("XYZ", position, strict=True))
 
 
 def _quoted(name: str) -> str:
@@ -261,13 +248,13 @@ def _quoted(name: str) -> str:
     return f'"{name}"'
 
 
-def _rest(heard: HeardLine) -> str:
+def _rest(heard: protocol.HeardLine) -> str:
     return heard.response.rest if heard.response else ""
 
 
-def _first(heard: HeardLine, name: str) -> Argument:
+def _first(heard: protocol.HeardLine, name: str) -> protocol.Argument:
     """The first that a term of an answer holds."""
     try:
-        return terms_of(_rest(heard))[name][0]
-    except (BadLineError, LookupError):
-        raise NoAnswerError(f"{_rest(heard)!r} where {name}(…) belongs") from None
+        return protocol.terms_of(_rest(heard))[name][0]
+    except (protocol.BadLineError, LookupError):
+        raise protocol.NoAnswerError(f"{_rest(heard)!r} where {name}(…) belongs") from None

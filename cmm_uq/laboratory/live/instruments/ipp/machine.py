@@ -10,19 +10,8 @@ from dataclasses import replace
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.laboratory.live.instruments.conversation import SECOND
+from cmm_uq.laboratory.live.instruments.ipp import protocol
 from cmm_uq.laboratory.live.instruments.ipp.client import ANSWER_WITHIN_S, Client
-from cmm_uq.laboratory.live.instruments.ipp.protocol import (
-    DATA,
-    ERROR,
-    BadLineError,
-    FaultError,
-    HeardLine,
-    NoAnswerError,
-    Term,
-    arguments_of,
-    fault_of,
-    terms_of,
-)
 from cmm_uq.laboratory.live.instruments.ports import NETWORK, PortOpener, opener
 from cmm_uq.laboratory.live.instruments.profile import Connection, Positions, ProfileFile, shown
 from cmm_uq.laboratory.live.instruments.source import Clock, Event, Gap, Identity, PortLostError, Reading, Returned
@@ -65,11 +54,11 @@ class IppMachine:
         self.client, began = Client(self._port, clock), clock.monotonic_ns()
         try:
             self._begin(take_over=False)
-        except FaultError as error:
+        except protocol.FaultError as error:
             self._port.close()
             fix = "End the session of the other program, and clear the machine's errors"
             raise CmmUqError(f"the server refuses: {error}", where=self.name, fix=fix) from None
-        except (NoAnswerError, PortLostError) as error:
+        except (protocol.NoAnswerError, PortLostError) as error:
             self._port.close()
             fix = "Check that the port is that of the I++ DME server, usually 1294"
             raise CmmUqError(f"no I++ DME server answers: {error}", where=self.name, fix=fix) from None
@@ -86,7 +75,7 @@ class IppMachine:
     def close(self) -> None:
         self._closed = True
         if self._connected:
-            with contextlib.suppress(NoAnswerError, FaultError, PortLostError):
+            with contextlib.suppress(protocol.NoAnswerError, protocol.FaultError, PortLostError):
                 self.client.end_session()
             self._port.close()
             self._connected = False
@@ -98,7 +87,7 @@ class IppMachine:
                 continue
             try:
                 yield from self._step()
-            except (PortLostError, NoAnswerError) as error:
+            except (PortLostError, protocol.NoAnswerError) as error:
                 if not self._closed:
                     yield from self._lost(say("the connection was lost: {why}", why=Verbatim(str(error))))
 
@@ -133,10 +122,10 @@ class IppMachine:
     def _position(self) -> Iterator[Event]:
         try:
             heard = self.client.get(*_REPORTED)
-        except FaultError as error:
+        except protocol.FaultError as error:
             if error.fault.severity < USER_NEEDED and not self._user_needed:
                 self.client.clear_all_errors()
-            nothing = HeardLine(b"", None, self._clock.utc_ns(), self._clock.monotonic_ns())
+            nothing = protocol.HeardLine(b"", None, self._clock.utc_ns(), self._clock.monotonic_ns())
             yield self._reading(nothing, status=say("the machine says {what}", what=Verbatim(str(error.fault))))
             return
         yield from self._unasked()
@@ -146,31 +135,31 @@ class IppMachine:
         while self.client.unasked:
             yield from self._told_by(self.client.unasked.popleft())
 
-    def _told_by(self, heard: HeardLine) -> Iterator[Event]:
+    def _told_by(self, heard: protocol.HeardLine) -> Iterator[Event]:
         response = heard.response
         if response is None:
             seen = Verbatim(shown(heard.raw[:60]))
             yield self._reading(heard, status=say("no line of I++ DME: {seen}", seen=seen))
-        elif response.sign == DATA:
+        elif response.sign == protocol.DATA:
             yield self._data(heard, response.rest)
-        elif response.sign == ERROR:
+        elif response.sign == protocol.ERROR:
             try:
-                fault = fault_of(response.rest)
+                fault = protocol.fault_of(response.rest)
                 self._user_needed = self._user_needed or fault.severity >= USER_NEEDED
                 status = say("the machine says {what}", what=Verbatim(str(fault)))
-            except BadLineError as error:
+            except protocol.BadLineError as error:
                 status = say("an error that is none of the protocol: {why}", why=Verbatim(str(error)))
             yield self._reading(heard, status=status)
 
-    def _data(self, heard: HeardLine, rest: str) -> Reading:
+    def _data(self, heard: protocol.HeardLine, rest: str) -> Reading:
         """Data of a point, a position, or something else that is no place."""
         point = None
         try:
-            found = arguments_of(rest)
-            if len(found) == 1 and isinstance(found[0], Term) and found[0].name == POINT:
+            found = protocol.arguments_of(rest)
+            if len(found) == 1 and isinstance(found[0], protocol.Term) and found[0].name == POINT:
                 point, found = POINT, found[0].arguments
-            terms = terms_of(found)
-        except BadLineError as error:
+            terms = protocol.terms_of(found)
+        except protocol.BadLineError as error:
             return self._reading(heard, status=say("not understood: {why}", why=Verbatim(str(error))))
         values = {
             f"{axis.lower()}_mm": place[0]
@@ -184,7 +173,8 @@ class IppMachine:
         return self._reading(heard, status=say("a place without X, Y and Z: {seen}", seen=Verbatim(rest)))
 
     def _reading(
-        self, heard: HeardLine, values: dict[str, float] | None = None, *, status: Text | None = None, point: str | None = None
+        self, heard: protocol.HeardLine, values: dict[str, float] | None = None, *, status: Text | None = None,
+        point: str | None = None,
     ) -> Reading:  # fmt: skip
         self._number += 1
         times = heard.utc_ns, heard.monotonic_ns
@@ -208,7 +198,7 @@ class IppMachine:
         self.client = Client(self._port, self._clock, within_s=self._again_within_s)
         try:
             self._begin(take_over=True)
-        except (NoAnswerError, FaultError, PortLostError):
+        except (protocol.NoAnswerError, protocol.FaultError, PortLostError):
             self._port.close()
             self._clock.sleep(RETRY_S)
             return
