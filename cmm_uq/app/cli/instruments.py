@@ -181,7 +181,7 @@ def simulate(
 
 
 def _show(event: Any) -> None:
-    from cmm_uq.laboratory.live.instruments.trial import beside
+    from cmm_uq.laboratory.live.instruments.library import beside
 
     raw, meaning = beside(event)
     shown = raw if len(raw) <= SHOWN else f"{raw[: SHOWN - 1]}…"

@@ -19,7 +19,7 @@ from urllib.parse import quote
 from cmm_uq.app.serve.exchange import OWN, RECORDED, RefusedRequest, WebResponse
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.output.manifest import plain_name, read_manifest
-from cmm_uq.laboratory.records.entries import Entry
+from cmm_uq.laboratory.records.facts import Entry
 
 LARGEST = 128 * 2**20  # bytes of a file that the page hands out
 

@@ -24,7 +24,7 @@ from typing import Literal
 
 from cmm_uq.jobs.verdicts import BEYOND
 from cmm_uq.laboratory.due.change import ComparedValue, ValueChange, change, each_of, two_sided, two_sided_limit
-from cmm_uq.laboratory.due.observed import is_of_machine, part_used
+from cmm_uq.laboratory.due.rule import is_of_machine, part_used
 from cmm_uq.laboratory.records.facts import RecordedCertificate, RecordedValue
 
 Standing = Literal["in control", "warning", "action", "nothing compared"]

@@ -17,8 +17,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, day, foreign, number, say
 from cmm_uq.jobs.verdicts import BEYOND, NONE
 from cmm_uq.laboratory.due.checks import InterimCheck, check_standings
-from cmm_uq.laboratory.due.observed import Pool, calibrations
-from cmm_uq.laboratory.due.rule import Rule, months_of
+from cmm_uq.laboratory.due.rule import Pool, Rule, calibrations, months_of
 from cmm_uq.laboratory.records.facts import ArtefactRow, RecordedCertificate, RecordedMachine
 
 if TYPE_CHECKING:

@@ -12,9 +12,16 @@ from cmm_uq.base.messages import Text, Verbatim, foreign, number, say
 from cmm_uq.laboratory.due.attributes import interval_test, staircase
 from cmm_uq.laboratory.due.crossing import crossing
 from cmm_uq.laboratory.due.drift import DriftPrior
-from cmm_uq.laboratory.due.observed import Pool, adjusted_between, calibrations, ended_intervals, is_of_machine
 from cmm_uq.laboratory.due.reliability import grouped, reliability_regression
-from cmm_uq.laboratory.due.rule import Rule, months_of
+from cmm_uq.laboratory.due.rule import (
+    Pool,
+    Rule,
+    adjusted_between,
+    calibrations,
+    ended_intervals,
+    is_of_machine,
+    months_of,
+)
 from cmm_uq.laboratory.due.variables import LastValue, fitted_drift, interval_of_reliability
 from cmm_uq.laboratory.records.facts import RecordedCertificate, Series
 

@@ -20,8 +20,7 @@ from cmm_uq.laboratory.live.instruments.source import Event, Moment, Reading
 from cmm_uq.laboratory.live.judging import Judge, PointJudgement
 from cmm_uq.laboratory.live.lead import Lead, PlannedPoint, Run
 from cmm_uq.laboratory.live.recorder import COORDINATES, Recorder
-from cmm_uq.laboratory.live.screen import WORDS, OperatorInput, SessionView, coming, picture, understood
-from cmm_uq.laboratory.live.soaking import Soak
+from cmm_uq.laboratory.live.screen import WORDS, OperatorInput, SessionView, Soak, coming, picture, understood
 from cmm_uq.laboratory.live.story import Place, Point, Story
 from cmm_uq.laboratory.live.table import TYPED, LiveRecording, rows_of
 

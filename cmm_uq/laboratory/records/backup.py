@@ -16,11 +16,11 @@ from sqlalchemy import select
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output.new_file import writing_to
 from cmm_uq.base.output.staging import synced
-from cmm_uq.laboratory.records.entries import Entry
+from cmm_uq.laboratory.records.facts import Entry
+from cmm_uq.laboratory.records.indexing import chain
 from cmm_uq.laboratory.records.opening import open_records
 from cmm_uq.laboratory.records.place import is_url, shown, told
 from cmm_uq.laboratory.records.tables import entries
-from cmm_uq.laboratory.records.verifying import chain
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records

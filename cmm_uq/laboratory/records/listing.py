@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import ColumnElement, Connection, func, or_, select
 
 from cmm_uq.jobs.verdicts import Verdicts, gravest
-from cmm_uq.laboratory.records.entries import Entry
-from cmm_uq.laboratory.records.facts import BY_NAME, PERFORMANCE, STANDING, RecordedMachine, spelled
+from cmm_uq.laboratory.records.facts import BY_NAME, PERFORMANCE, STANDING, Entry, RecordedMachine, spelled
 from cmm_uq.laboratory.records.queries import adjusted_before, blocks, newest_of_machine
 from cmm_uq.laboratory.records.store import Records
 from cmm_uq.laboratory.records.tables import artefacts, certificates, entries, figures, machines, quantities

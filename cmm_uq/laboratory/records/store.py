@@ -20,8 +20,7 @@ from sqlalchemy import Connection, Engine, delete, insert, select, text
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import MANIFEST, InDoubtError, finish_interrupted, is_pending, sha256_of
-from cmm_uq.laboratory.records.entries import BEGINNING, Entry, canonical, following, moment_of, now
-from cmm_uq.laboratory.records.facts import ChainFinding
+from cmm_uq.laboratory.records.facts import BEGINNING, ChainFinding, Entry, canonical, following, moment_of, now
 from cmm_uq.laboratory.records.indexing import Indexer
 from cmm_uq.laboratory.records.place import APPLICATION, shown, told
 from cmm_uq.laboratory.records.queries import RecordQueries, entry_of_results
@@ -143,7 +142,7 @@ class Records(RecordQueries):
 
     def verify(self, head: str | None = None, *, files: bool = True) -> list[ChainFinding]:
         """What is wrong of everything against the chain, and the hash of an entry that was filed elsewhere."""
-        from cmm_uq.laboratory.records.verifying import verified
+        from cmm_uq.laboratory.records.indexing import verified
 
         return verified(self, head, files=files)
 

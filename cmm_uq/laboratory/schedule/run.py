@@ -30,8 +30,7 @@ from cmm_uq.laboratory.schedule.jobs import (
     quiet_since,
     snapshot,
 )
-from cmm_uq.laboratory.schedule.notices import Notice, of_error
-from cmm_uq.laboratory.schedule.outbox import Delivery, Outbox
+from cmm_uq.laboratory.schedule.notices import Delivery, Notice, Outbox, of_error
 from cmm_uq.laboratory.schedule.settings import RunTable
 from cmm_uq.laboratory.schedule.state import Problems
 

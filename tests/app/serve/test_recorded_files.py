@@ -10,7 +10,7 @@ import pytest
 
 from cmm_uq.app.serve.exchange import RefusedRequest
 from cmm_uq.app.serve.recorded_files import RecordedFile, content_of, files_of, results_of, sent
-from cmm_uq.laboratory.records.entries import Entry
+from cmm_uq.laboratory.records.facts import Entry
 
 CONTENT = b'{"a": 1}'
 HASH = sha256(CONTENT).hexdigest()

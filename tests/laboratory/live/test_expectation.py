@@ -10,7 +10,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.laboratory.live.expectation import RARE, predicted, scatter
+from cmm_uq.laboratory.live.judging import RARE, predicted, scatter
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.conftest import ROOT

@@ -7,7 +7,7 @@ from math import pi, sin, sqrt
 import pytest
 from hypothesis import given, strategies as st
 
-from cmm_uq.laboratory.live.joining import Joined, Stream
+from cmm_uq.laboratory.live.story import Joined, Stream
 
 S = 1_000_000_000
 

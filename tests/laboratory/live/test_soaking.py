@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.laboratory.live.soaking import Soak
+from cmm_uq.laboratory.live.screen import Soak
 
 
 def fed(k_per_h: float, minutes: float, noise: float = 0.0) -> Soak:

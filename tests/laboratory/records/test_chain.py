@@ -14,7 +14,7 @@ from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.records import open_records
-from cmm_uq.laboratory.records.entries import BEGINNING, KINDS, Entry, canonical, following
+from cmm_uq.laboratory.records.facts import BEGINNING, KINDS, Entry, canonical, following
 from cmm_uq.laboratory.records.tables import TRIGGERS
 from tests.laboratory.records.histories import certificate, history, moment
 

@@ -64,7 +64,7 @@ def test_a_revision_that_fails_changes_nothing(tmp_path: Path, monkeypatch: pyte
     def fail(connection: object) -> None:
         raise OSError("no more")
 
-    monkeypatch.setattr("cmm_uq.laboratory.records.verifying.rebuild", fail)
+    monkeypatch.setattr("cmm_uq.laboratory.records.indexing.rebuild", fail)
     with pytest.raises(OSError, match="no more"):
         migrate(path)
     assert schema(path) == before

@@ -12,8 +12,7 @@ from typing import Any
 
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.laboratory.schedule.jobs import JobFolder, JobReporting
-from cmm_uq.laboratory.schedule.notices import Notice
-from cmm_uq.laboratory.schedule.outbox import Outbox
+from cmm_uq.laboratory.schedule.notices import Notice, Outbox
 from cmm_uq.laboratory.schedule.run import RunClock, ScheduledRun
 from cmm_uq.laboratory.schedule.settings import RunTable
 from cmm_uq.laboratory.schedule.state import FolderState, State

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import OutputError
-from cmm_uq.laboratory.schedule.locks import turn, turn_at, was_left
+from cmm_uq.laboratory.schedule.progress import turn, turn_at, was_left
 
 HOLD = """
 import sys, time

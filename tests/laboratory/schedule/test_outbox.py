@@ -12,9 +12,8 @@ from typing import Any
 import pytest
 
 from cmm_uq.base.errors import OutputError
-from cmm_uq.laboratory.schedule.locks import turn
-from cmm_uq.laboratory.schedule.notices import Channel, OutgoingMessage
-from cmm_uq.laboratory.schedule.outbox import MOST, Outbox
+from cmm_uq.laboratory.schedule.notices import MOST, Channel, Outbox, OutgoingMessage
+from cmm_uq.laboratory.schedule.progress import turn
 from cmm_uq.laboratory.schedule.state import FolderState
 from tests.laboratory.schedule.told import NOW, Kept, notice, notices
 

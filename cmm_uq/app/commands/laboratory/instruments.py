@@ -14,9 +14,16 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.output.new_file import write_new
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments.instrument import open_source
-from cmm_uq.laboratory.live.instruments.library import ENDING, ProfileDraft, drafted, profile_named, profile_of, ready
+from cmm_uq.laboratory.live.instruments.library import (
+    ENDING,
+    ProfileDraft,
+    Trial,
+    drafted,
+    profile_named,
+    profile_of,
+    ready,
+)
 from cmm_uq.laboratory.live.instruments.source import Event, LiveSource
-from cmm_uq.laboratory.live.instruments.trial import Trial
 
 
 def ready_profiles() -> list[tuple[str, str, str]]:

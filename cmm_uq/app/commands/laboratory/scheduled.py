@@ -19,8 +19,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.due.history import machine_history
 from cmm_uq.laboratory.records.place import NONE, beside, is_url, place_of
 from cmm_uq.laboratory.schedule.jobs import REPORTED, JobFolder, JobReporting
-from cmm_uq.laboratory.schedule.notices import Notice, of_drift, of_due, of_error
-from cmm_uq.laboratory.schedule.outbox import Outbox
+from cmm_uq.laboratory.schedule.notices import Notice, Outbox, of_drift, of_due, of_error
 from cmm_uq.laboratory.schedule.progress import Log
 from cmm_uq.laboratory.schedule.run import RunClock, ScheduledRun
 from cmm_uq.laboratory.schedule.state import FolderState, Problems, RecordsState

@@ -5,7 +5,7 @@ from __future__ import annotations
 from alembic import op
 from sqlalchemy import Column, String, Text
 
-from cmm_uq.laboratory.records.verifying import rebuild
+from cmm_uq.laboratory.records.indexing import rebuild
 
 revision = "0002"
 down_revision = "0001"
