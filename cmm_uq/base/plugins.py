@@ -11,18 +11,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from importlib.metadata import EntryPoint, entry_points
 from traceback import walk_tb
 from types import MappingProxyType
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 from cmm_uq.base.errors import CmmUqError
 
 EFFECTS, KINDS, STANDARDS, IMPORTS = "cmm_uq.effects", "cmm_uq.kinds", "cmm_uq.standards", "cmm_uq.imports"
-WHAT: Mapping[str, str] = MappingProxyType({
-    EFFECTS: "effect", KINDS: "kind", STANDARDS: "standard", IMPORTS: "format",
-})  # fmt: skip
-"""What is offered in each group of entry points."""
+# what is offered in each group of entry points
+WHAT: Mapping[str, str] = MappingProxyType({EFFECTS: "effect", KINDS: "kind", STANDARDS: "standard", IMPORTS: "format"})
 
 Offered = TypeVar("Offered")
 _FIX = "Mend the package, or uninstall it"
@@ -53,15 +51,15 @@ class Plugin:
         """What it offers; the package is imported now."""
 
         def made() -> object:
-            found = self.entry.load()
-            return found() if isinstance(found, type) else found
+            loaded = self.entry.load()
+            return loaded() if isinstance(loaded, type) else loaded
 
-        found = self.attempt(made)
-        if not isinstance(found, of):
-            raise self.broken(f"is no {of.__name__} but {type(found).__name__}")
-        if (name := getattr(found, "name", None)) != self.name:
+        offer = self.attempt(made)
+        if not isinstance(offer, of):
+            raise self.broken(f"is no {of.__name__} but {type(offer).__name__}")
+        if (name := getattr(offer, "name", None)) != self.name:
             raise self.broken(f"calls itself {name!r}")
-        return found
+        return offer
 
     def attempt(self, what: Callable[[], Any]) -> Any:
         """What the package's code returns; errors of its own are said to be its own."""
@@ -82,12 +80,9 @@ Of = TypeVar("Of", bound=Plugin)
 
 def offered(group: str, of: type[Of]) -> tuple[Of, ...]:
     """What the installed packages offer in a group, by name; nothing is imported."""
-    found = sorted(_entries(group, tuple(sys.path)), key=lambda entry: (entry.name, entry.value))
-    return tuple(of(*((e.dist.name, e.dist.version) if e.dist else (e.module, "")), e) for e in found)
-
-
-def _entries(group: str, path: tuple[str, ...]) -> EntryPoints:
-    return cast("EntryPoints", _installed(path).select(group=group))
+    entries: list[EntryPoint] = [*_installed(tuple(sys.path)).select(group=group)]
+    entries.sort(key=lambda entry: (entry.name, entry.value))
+    return tuple(of(*((e.dist.name, e.dist.version) if e.dist else (e.module, "")), e) for e in entries)
 
 
 # What is installed follows from where packages are looked for, so that is the key; looking takes a hundredth of a second.
@@ -147,7 +142,8 @@ def _at_fault(error: Exception) -> tuple[Plugin, ...]:
 
 
 def _broken(plugins: tuple[Plugin, ...], why: str) -> BrokenPluginError:
-    package = " ".join(filter(None, (plugins[0].package, plugins[0].version)))
-    return BrokenPluginError(
-        f"{' or '.join(plugin.what for plugin in plugins)} {why}", where=f"package {package}", fix=_FIX
+    package, what = (
+        f"{plugins[0].package} {plugins[0].version}".rstrip(),
+        " or ".join(plugin.what for plugin in plugins),
     )
+    return BrokenPluginError(f"{what} {why}", where=f"package {package}", fix=_FIX)

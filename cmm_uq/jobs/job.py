@@ -36,13 +36,7 @@ Tolerance = Annotated[float, Field(gt=0, le=1e9), at_least(1e-9)]  # A permissib
 
 
 class JobFacts(Identification):
-    """``[job]``: identification, and free text for the certificate.
-
-    ``origin`` and ``derived_from`` are written by the commands that make a recording out of another.
-    ``recalibration_agreed`` is the date of the next calibration, where the customer agreed to be told one
-    (ISO/IEC 17025:2017, 7.8.4.3); no other is printed. ``as_found`` names the results.json, or the folder it lies in, of the
-    machine before it was adjusted (7.8.4.1 d).
-    """
+    """``[job]``: identification, and free text for the certificate."""
 
     diagnosis_on_certificate: bool = False
     """Whether the whole diagnosis is printed in the certificate's annex."""
@@ -109,18 +103,11 @@ class Recorded(JobTable):
 
 
 class RecordingFacts(ImportKeys, Recorded):
-    """``[recording]``. Measurements named in ``set_aside`` stay on the certificate but are not used for estimates.
-
-    ``earlier`` names a recording of the same artefact in the same placings at an earlier date: what is estimated then is what
-    changed between. The other keys are those of a file in another format than the project's own.
-    """
+    """``[recording]``. Measurements named in ``set_aside`` stay on the certificate but are not used for estimates."""
 
 
 class ModelFacts(JobTable):
-    """``[model]``: the physics that the simulation is told about.
-
-    ``tolerances``: largest permissible size of an effect's (first) parameter, by its name and in its unit.
-    """
+    """``[model]``: the physics that the simulation is told about."""
 
     effects: Names
     """The physics that the simulation is told about: names of effects; what is not named is left out of it."""
@@ -180,8 +167,7 @@ class JobFile(JobTable):
                 continue  # what is wrong with these is said instead
             by_points = artefact.with_references and artefact.u_um is None  # which the recording may state of each
             whole = artefact.model_copy(update={"u_um": 1.0}) if by_points else artefact
-            key = uncertainty_missing(wish, whole, info.data["test_uncertainty"], standards_in(info))
-            if key is not None:
+            if key := uncertainty_missing(wish, whole, info.data["test_uncertainty"], standards_in(info)):
                 raise ValueError(". ".join(needed(key, wish)))
         return wishes
 
@@ -319,12 +305,7 @@ class Job:
         return f"<Job {facts.job.id}: {facts.artefact.kind} on {facts.machine.name}, {len(self.points)} points, {self.origin}>"
 
     def _repr_html_(self) -> str:
-        rows = (
-            ("Id", self.facts.job.id),
-            ("Machine", self.facts.machine.name),
-            ("Artefact", self.facts.artefact.kind),
-            ("Points", len(self.points)),
-            ("Recording", self.origin),
-            ("Effects", ", ".join(self.facts.model.effects)),
-        )
-        return html_table("Job", (), rows)
+        facts, count, effects = self.facts, len(self.points), ", ".join(self.facts.model.effects)
+        texts = (facts.job.id, facts.machine.name, facts.artefact.kind, count, self.origin, effects)
+        heads = ("Id", "Machine", "Artefact", "Points", "Recording", "Effects")
+        return html_table("Job", (), tuple(zip(heads, texts, strict=True)))

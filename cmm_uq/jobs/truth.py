@@ -34,14 +34,7 @@ class ByAxis(JobTable):
 
 
 class NoiseFacts(JobTable):
-    """``[noise]``: standard deviations of a coordinate.
-
-    ``coordinate_um`` is that of each reading, of every coordinate or ``{ x = …, y = …, z = … }``; ``placing_um`` that of each
-    point of each placing, which its repeats share; ``growth_um`` what is added at the longest distance in a placing, in
-    proportion to it; ``slow_um`` that of slow noise, which forgets over ``slow_time_s`` and needs ``time_s`` in the recording;
-    with ``"never"`` it walks at random from the first reading on, and ``slow_um`` is its root mean square over the recording.
-    ``tails_dof`` makes the readings Student's t of the same standard deviation; ``resolution_um`` are the display's steps.
-    """
+    """``[noise]``: standard deviations of a coordinate."""
 
     coordinate_um: Uncertainty | ByAxis = 0.0
     """Standard deviation of each reading, of every coordinate or by axis."""
@@ -67,11 +60,7 @@ class NoiseFacts(JobTable):
 
 
 class Truth(JobTable):
-    """All of truth.toml.
-
-    ``effects`` gives the reported parameters of each effect that acts, whatever the job's model names; ``artefact`` the true
-    sizes; ``columns`` values that hold for every row of the recording, such as temperatures.
-    """
+    """All of truth.toml."""
 
     effects: Annotated[dict[str, dict[str, AnyFloat]], Field(max_length=EFFECTS.most)] = {}
     """True parameters of each effect that acts, by the effect's name, whatever the job's model names."""

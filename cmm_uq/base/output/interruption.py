@@ -74,7 +74,11 @@ def placing(folder: Path, staged: Unplaced | None = None) -> Iterator[None]:
     give_way()  # of a thread that is not the one that a signal stops
     _going_in.append(folder)  # before the lock: a signal in between must not stop whoever holds it
     try:
-        _turn()
+        _placing.acquire()
+        while _signalled:  # a signal came while others had the lock: it is not for who waited
+            _placing.release()
+            give_way()
+            _placing.acquire()
         _inside.append((folder, staged))
         try:
             yield
@@ -85,15 +89,6 @@ def placing(folder: Path, staged: Unplaced | None = None) -> Iterator[None]:
             _placing.release()
     finally:
         _going_in.remove(folder)
-
-
-def _turn() -> None:
-    """Take the lock; where a signal came while others had it, it is not for who waited."""
-    _placing.acquire()
-    while _signalled:
-        _placing.release()
-        give_way()
-        _placing.acquire()
 
 
 @contextlib.contextmanager
@@ -128,9 +123,8 @@ def watch() -> None:
     raises leaves no half-written file either.
     """
     reading, writing = os.pipe()
-    with contextlib.suppress(
-        AttributeError, OSError
-    ):  # on Windows pipes always block, and a pipe of two bytes never fills
+    # on Windows pipes always block, and a pipe of two bytes never fills
+    with contextlib.suppress(AttributeError, OSError):
         os.set_blocking(writing, False)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stand_still)

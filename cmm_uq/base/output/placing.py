@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.output.manifest import MANIFEST, Manifest, Owner, plain_name, read_manifest, sha256_of
+from cmm_uq.base.output.manifest import MANIFEST, Owner, plain_name, read_manifest, sha256_of
 
 JOURNAL, NEW, OLD = "journal.json", "new", "old"
 PREVIOUS = ".previous"
@@ -106,38 +106,25 @@ def journal_for(
 ) -> Journal:
     """What has to happen to the files of a folder for a new set; ``force`` renames what is not the owner's."""
     old = read_manifest(folder)
+    before = {} if old is None else old.files
     stranger = old is not None and old.owner != owner
     if stranger and old is not None and not force:
         raise CmmUqError(f"holds what {old.owner} wrote", where=str(folder), fix=WAY_OUT)
     names = (*files, MANIFEST)
-    mine = {} if old is None or stranger else _unchanged(folder, old)
+    mine = {} if stranger else {name: digest for name, digest in before.items() if sha256_of(folder / name) == digest}
     in_the_way = [name for name in names if os.path.lexists(folder / name) and name not in mine]
-    if old is not None and stranger:
-        in_the_way += [name for name in old.files if name not in in_the_way and os.path.lexists(folder / name)]
+    if stranger:
+        in_the_way += [name for name in before if name not in in_the_way and os.path.lexists(folder / name)]
     elif old is not None and MANIFEST in in_the_way:
         in_the_way.remove(MANIFEST)
-    _spare_inputs(folder, (*names, *in_the_way), inputs)
-    if in_the_way and not force:
-        name = in_the_way[0]
-        why = (
-            "was changed after it was written"
-            if old is not None and name in old.files
-            else f"was not written by {owner}"
-        )
-        raise CmmUqError(why, where=str(folder / name), fix=WAY_OUT)
-    kept = {name: free_name(folder, name) for name in in_the_way}
-    stale = {name: digest for name, digest in mine.items() if name not in files}
-    return Journal(token, dict(files), {name: mine[name] for name in files if name in mine}, kept, stale)
-
-
-def _unchanged(folder: Path, manifest: Manifest) -> dict[str, str]:
-    return {name: digest for name, digest in manifest.files.items() if sha256_of(folder / name) == digest}
-
-
-def _spare_inputs(folder: Path, names: Iterable[str], inputs: Iterable[Path]) -> None:
     given = [path for path in inputs if path.exists()]
-    for name in names:
-        target = folder / name
+    for target in [folder / name for name in (*names, *in_the_way)]:
         if target.exists() and any(target.samefile(path) for path in given):
             raise CmmUqError("is an input of this command, and would be replaced", where=str(target),
                              fix="Choose another folder with --out")  # fmt: skip
+    if in_the_way and not force:
+        why = "was changed after it was written" if in_the_way[0] in before else f"was not written by {owner}"
+        raise CmmUqError(why, where=str(folder / in_the_way[0]), fix=WAY_OUT)
+    kept = {name: free_name(folder, name) for name in in_the_way}
+    stale = {name: digest for name, digest in mine.items() if name not in files}
+    return Journal(token, dict(files), {name: mine[name] for name in files if name in mine}, kept, stale)

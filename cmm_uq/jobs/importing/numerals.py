@@ -48,7 +48,7 @@ def decimal_sign(columns: Sequence[Sequence[Cell]], at: At, asked: str | None) -
     """The decimal sign of the numbers of a table."""
     if asked is not None:
         return asked
-    texts = [_joined(column) for column in columns]
+    texts = ["\n".join([cell if isinstance(cell, str) else "" for cell in column]) for column in columns]
     if not any("," in text for text in texts):
         return "," if any(_POINT_GROUPS.search(text) for text in texts) else "."
     points = any("." in text for text in texts)
@@ -70,13 +70,6 @@ def decimal_sign(columns: Sequence[Sequence[Cell]], at: At, asked: str | None) -
                      fix='Say decimal = "," or decimal = "."')  # fmt: skip
 
 
-def _joined(cells: Sequence[Cell]) -> str:
-    """The texts among the cells, each on its line."""
-    if set(map(type, cells)) <= {str}:
-        return "\n".join(cells)  # type: ignore[arg-type]
-    return "\n".join([cell if isinstance(cell, str) else "" for cell in cells])
-
-
 def _first(texts: Sequence[str], patterns: Sequence[re.Pattern[str]]) -> tuple[int, int, str] | None:
     """Column, row and text of the first cell that shows one of the patterns."""
     for i, text in enumerate(texts):
@@ -89,14 +82,14 @@ def _first(texts: Sequence[str], patterns: Sequence[re.Pattern[str]]) -> tuple[i
 def split_units(cells: Sequence[Cell], at: Callable[[int], str]) -> tuple[Sequence[Cell], WrittenUnit | None]:
     """Cells without the unit that all of them end in, and that unit."""
     first = next((cell for cell in cells if isinstance(cell, str) and cell), None)
-    found = apart(first) if first else None
-    if found is None:
+    parts = apart(first) if first else None
+    if parts is None:
         return cells, None
-    unit, bare = found[1], list(cells)
+    unit, bare = parts[1], list(cells)
     for row, cell in enumerate(cells):
-        own = apart(cell) if isinstance(cell, str) else None
         if cell == "":
             continue
+        own = apart(cell) if isinstance(cell, str) else None
         if own is None or own[1] != unit:
             raise CmmUqError(f"{cell!r} among numbers in {unit.name}: the column mixes units", where=at(row),
                              fix="Export the column in one unit")  # fmt: skip
@@ -108,7 +101,11 @@ def values_of(cells: Sequence[Cell], sign: str, at: Callable[[int], str], fix: s
     """Values (n,) of cells."""
     sorts = set(map(type, cells))
     if str not in sorts:
-        return _of_numbers(np.array(cells, dtype=np.float64), at, fix)
+        values = np.array(cells, dtype=np.float64)
+        bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
+        if bad.size:
+            raise CmmUqError(f"{values[bad[0]]:g} is no number that can be used", where=at(int(bad[0])), fix=fix)
+        return values
     if len(sorts) > 1:
         return np.array([values_of([cell], sign, lambda _, row=row: at(row), fix)[0] for row, cell in enumerate(cells)])  # type: ignore[misc]
     texts: Sequence[str] = cells  # type: ignore[assignment]
@@ -121,13 +118,6 @@ def values_of(cells: Sequence[Cell], sign: str, at: Callable[[int], str], fix: s
     elif sign == ",":
         texts = joined.replace(",", ".").split("\n")
     return numbers(texts, at, fix)
-
-
-def _of_numbers(values: Floats, at: Callable[[int], str], fix: str) -> Floats:
-    bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
-    if bad.size:
-        raise CmmUqError(f"{values[bad[0]]:g} is no number that can be used", where=at(int(bad[0])), fix=fix)
-    return values
 
 
 def _plain(text: str, sign: str, row: int, at: Callable[[int], str]) -> str:
@@ -150,8 +140,7 @@ def is_number(cell: Cell) -> bool:
     if not isinstance(cell, str):
         return True
     plain = cell.replace("−", "-")
-    if apart(plain) is not None and unit_named(plain) is None:
-        plain = apart(plain)[0]  # type: ignore[index]
-    return number_problem(plain.replace(",", ".")) is None or any(
-        pattern.fullmatch(plain) for pattern in _GROUPED.values()
-    )
+    if (parts := apart(plain)) is not None and unit_named(plain) is None:
+        plain = parts[0]
+    grouped = any(pattern.fullmatch(plain) for pattern in _GROUPED.values())
+    return grouped or number_problem(plain.replace(",", ".")) is None

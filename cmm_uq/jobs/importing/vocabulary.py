@@ -78,9 +78,8 @@ _LONGEST = 120  # characters of a heading; longer text is none
 COVERAGE = re.compile(r"[\[(,;]?\s*\bk\s*=\s*(\d+(?:[.,]\d+)?)\s*[\])]?", re.IGNORECASE)
 """Coverage factor in a heading, as ``U (µm), k = 2``."""
 
+# what certificates print above a column, beside its unit or its coverage factor
 _SYMBOLS: Mapping[str, str] = {"U": "reference_U_um", "U95": "reference_U_um", "u": "reference_u_um"}
-"""What certificates print above a column, beside its unit or its coverage factor."""
-
 _FIGURES = frozenset("0123456789+-−.,")
 _OWN = frozenset((*REQUIRED, *OPTIONAL))
 _IN_BRACKETS = re.compile(r"\s*[\[(<{]\s*([^\])>}]*?)\s*[\])>}]\s*$")
@@ -119,13 +118,13 @@ def understood(heading: str) -> Heading:
 
 
 def _without_unit(heading: str) -> tuple[str, WrittenUnit | None, str]:
-    if found := _IN_BRACKETS.search(heading):
-        unit = unit_named(found[1])
-        return heading[: found.start()], unit, "" if unit else found[1]
+    if match := _IN_BRACKETS.search(heading):
+        unit = unit_named(match[1])
+        return heading[: match.start()], unit, "" if unit else match[1]
     for pattern in (_AFTER_SIGN, _AT_THE_END):
-        found = pattern.search(heading)
-        if found and found.start() > 0 and (unit := unit_named(found[1])):
-            return heading[: found.start()], unit, ""
+        match = pattern.search(heading)
+        if match and match.start() > 0 and (unit := unit_named(match[1])):
+            return heading[: match.start()], unit, ""
     return heading, None, ""
 
 
@@ -137,11 +136,10 @@ def _words(text: str) -> list[str]:
 def _column(words: tuple[str, ...]) -> str | None:
     axes = [word for word in words if word in ("x", "y", "z")]
     if len(axes) == 1:
-        return _of_axis(axes[0], frozenset(word for word in words if word != axes[0]))
-    if found := _COLUMNS.get(" ".join(words)):
-        return found
-    plain = [word for word in words if word not in _SMALL]
-    return _COLUMNS.get(" ".join(plain)) if plain else None
+        others = {word for word in words if word != axes[0]}
+        fitting = (column for known, column in _AXIS_COLUMNS if others <= known)
+        return None if others & (_NOMINAL | _DEVIATION) else next(fitting, "").format(axis=axes[0]) or None
+    return _COLUMNS.get(" ".join(words)) or _COLUMNS.get(" ".join(word for word in words if word not in _SMALL))
 
 
 _AXIS_COLUMNS = (
@@ -149,13 +147,6 @@ _AXIS_COLUMNS = (
     (_COORDINATE | _APPROACH, "approach_{axis}"),
     (_NORMAL, "n{axis}"), (_TEMPERATURE, "temp_{axis}_c"), (_TIP | _COORDINATE, "tip_{axis}_mm"),
 )  # fmt: skip
-
-
-def _of_axis(axis: str, others: frozenset[str]) -> str | None:
-    """Column of an axis by the words beside its letter."""
-    if others & (_NOMINAL | _DEVIATION):
-        return None
-    return next((column.format(axis=axis) for words, column in _AXIS_COLUMNS if others <= words), None)
 
 
 def is_nominal(heading: str) -> bool:

@@ -63,16 +63,16 @@ def check_mark(folder: Path, origin: str, recording: bytes, where: str) -> None:
     """That a recording which was derived says so."""
     if origin != MEASURED:
         return
-    written = _WRITTEN.match(recording)
-    if written:
-        found = written[1].decode()
-        raise CmmUqError(f"was {found}, and job.toml says measured", where=f"{where} line 1",
-                         fix=f'Write origin = "{found}" in [job]')  # fmt: skip
     manifest = read_manifest(folder)
-    if manifest is not None and manifest.owner.command in DERIVING:
-        found = DERIVING[manifest.owner.command]
-        raise CmmUqError(f"the recording was {found}, and job.toml says measured", where=str(folder / MANIFEST),
-                         fix=f'Write origin = "{found}" in [job]')  # fmt: skip
+    if mark := _WRITTEN.match(recording):
+        made, problem, place = mark[1].decode(), "was", f"{where} line 1"
+    elif manifest is not None and manifest.owner.command in DERIVING:
+        made, problem, place = DERIVING[manifest.owner.command], "the recording was", str(folder / MANIFEST)
+    else:
+        return
+    raise CmmUqError(
+        f"{problem} {made}, and job.toml says measured", where=place, fix=f'Write origin = "{made}" in [job]'
+    )
 
 
 def check_examples(toml: bytes, origin: str, where: str) -> None:

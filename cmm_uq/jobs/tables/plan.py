@@ -17,11 +17,7 @@ Direction = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_
 
 
 class FixtureFacts(JobTable):
-    """``[plan.fixtures]``: how the artefact may stand.
-
-    ``directions``: of a bar or gauge along its length, of a plate or triangle across it, either way; any without them.
-    ``heights_mm``: lowest and highest z reading of the artefact's middle.
-    """
+    """``[plan.fixtures]``: how the artefact may stand."""
 
     directions: Annotated[list[Direction], Field(max_length=LISTED.most)] = []
     """Directions in which a bar or gauge can be held, either way along it, or normals of a plate or triangle; any
@@ -41,9 +37,8 @@ class FixtureFacts(JobTable):
 class PlanFacts(JobTable):
     """``[plan]``.
 
-    ``ready`` names the plan to start from where there is no recording. With a ``criterion`` a better one is searched for:
-    of ``number`` placings, or of ``more`` beside those that there are. The noise is that of ``noise_from``, the results.json
-    of an earlier recording, or has the set-up offset and growth that are stated.
+    With a ``criterion`` a better plan than the ready one is searched for: of ``number`` placings, or of ``more`` beside those
+    that there are.
     """
 
     ready: str | None = None
