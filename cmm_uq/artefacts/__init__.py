@@ -20,12 +20,13 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import Kind
 
+# where each built-in kind is
 BUILT_IN: Mapping[str, str] = MappingProxyType({
-    "ballbar": "ballbar", "bryan": "bryan", "step_gauge": "step_gauge", "gauge_blocks": "gauge_blocks", "plate": "plate",
-    "triangle": "triangle", "sphere": "sphere", "plane": "plane", "shift": "shifting", "error_map": "error_maps",
-    "digitizer": "digitizer",
+    "ballbar": "ballbar.kind:KIND", "bryan": "bryan.kind:KIND", "step_gauge": "gauge_lines.kind:STEP_GAUGE",
+    "gauge_blocks": "gauge_lines.kind:GAUGE_BLOCKS", "plate": "plate.kind:KIND", "triangle": "triangle.kind:KIND",
+    "sphere": "sphere.kind:KIND", "plane": "plane.kind:KIND", "shift": "shifting.kind:KIND",
+    "error_map": "error_maps.kind:KIND", "digitizer": "digitizer.kind:KIND",
 })  # fmt: skip
-"""Folder of each built-in kind."""
 
 
 def names() -> tuple[str, ...]:
@@ -36,8 +37,9 @@ def names() -> tuple[str, ...]:
 def kind_named(name: str) -> Kind | None:
     """A kind by its name; ``None`` where there is none. A built-in kind cannot be replaced."""
     if name in BUILT_IN:
-        found: Kind = import_module(f"cmm_uq.artefacts.{BUILT_IN[name]}.kind").KIND
-        return found
+        module, _, constant = BUILT_IN[name].partition(":")
+        kind: Kind = getattr(import_module(f"cmm_uq.artefacts.{module}"), constant)
+        return kind
     outside = named(_offered(), name)
     return None if outside is None else outside.loaded(Kind)
 

@@ -93,7 +93,12 @@ def swept(volume: Volume, length: float, count: int, repeats: int, centre: Float
     ``length`` of the bar, mm; ``centre`` (3,) of the fixed ball in scale readings; the middle of the volume by default.
     """
     middle = volume.box.mean(axis=1) if centre is None else centre
-    spiral = _spiral(_TRIED)
+    # directions (count, 3) spread evenly over the sphere (Fibonacci lattice)
+    i = np.arange(_TRIED) + 0.5
+    z = 1 - 2 * i / _TRIED
+    azimuth = np.pi * (1 + np.sqrt(5)) * i
+    r = np.sqrt(1 - z**2)
+    spiral = np.column_stack([r * np.cos(azimuth), r * np.sin(azimuth), z])
     held = np.array([volume.allows(direction) for direction in spiral])
     places = middle + length * spiral
     inside = np.all((places >= volume.box[:, 0] - 1e-6) & (places <= volume.box[:, 1] + 1e-6), axis=1)
@@ -112,15 +117,6 @@ def swept(volume: Volume, length: float, count: int, repeats: int, centre: Float
         points = Points(xyz, one, one, np.arange(1, repeats + 1), volume.machine)
         found.append(SetUp(direction_words(spiral[i]), points))
     return tuple(found)
-
-
-def _spiral(count: int) -> Floats:
-    """Directions (count, 3) spread evenly over the sphere (Fibonacci lattice)."""
-    i = np.arange(count) + 0.5
-    z = 1 - 2 * i / count
-    azimuth = np.pi * (1 + np.sqrt(5)) * i
-    r = np.sqrt(1 - z**2)
-    return np.column_stack([r * np.cos(azimuth), r * np.sin(azimuth), z])
 
 
 def _spread(places: Floats, count: int) -> list[int]:

@@ -75,23 +75,19 @@ class FreeInPlane:
 
 def free_in_plane(plate: PlacedPlate, model: PlaneModel) -> FreeInPlane:
     """By the singular values of what low-order errors change of the readings beyond balls and placings."""
-    names, effects = _low_order(plate, model)
+    # names, and change of the readings (2n, ·), of scales, squareness, and a bow or slope of each function
+    names = [*(SCALE[AXES[a]].name for a in plate.axes), SQUARENESS[plate.plane].name]
+    columns = [*model.smooth.columns.T[:3]]
+    for index, f in enumerate(model.smooth.functions):
+        place = (2 * f.position - f.low - f.high) / f.range
+        names.append(f.name)
+        columns.append(f.factor * (place if index >= 4 else place**2))
+    effects = np.column_stack(columns)
     effects = effects / np.linalg.norm(effects, axis=0)
     basis = linalg.orth(model.smooth.flat)
     rest = effects - basis @ (basis.T @ effects)
     _, sizes, right = np.linalg.svd(rest, full_matrices=False)
     return FreeInPlane(_combinations(names, right[sizes < _ALIKE]), _periods(plate))
-
-
-def _low_order(plate: PlacedPlate, model: PlaneModel) -> tuple[list[str], Floats]:
-    """Names, and change of the readings (2n, ·), of scales, squareness, and a bow or slope of each function."""
-    names = [*(SCALE[AXES[a]].name for a in plate.axes), SQUARENESS[plate.plane].name]
-    effects = [*model.smooth.columns.T[:3]]
-    for index, f in enumerate(model.smooth.functions):
-        place = (2 * f.position - f.low - f.high) / f.range
-        names.append(f.name)
-        effects.append(f.factor * (place if index >= 4 else place**2))
-    return names, np.column_stack(effects)
 
 
 def _combinations(names: list[str], free: Floats) -> tuple[tuple[str, ...], ...]:

@@ -101,18 +101,15 @@ class SmoothModel:
             low, high = [*low, SIGMA_BOUNDS[0]], [*high, SIGMA_BOUNDS[1]]
         return np.log(low), np.log(high)
 
-    def _log_prior(self, theta: Floats) -> Floats:
+    def log_density(self, theta: Floats) -> Floats:
+        """Log posterior density of θ, up to a constant: (w, dimension) → (w,)."""
         count = len(self.functions)
         amplitudes = theta[:, :count]
         value = np.sum(amplitudes - np.log1p(np.exp(2 * amplitudes)), axis=1)
         value -= 0.5 * ((theta[:, count] - np.log(_LENGTH)) / _LENGTH_SPREAD) ** 2
         value -= 0.5 * (theta[:, count + 1] / _GROWTH_SPREAD) ** 2
         low, high = self._bounds()
-        return np.where(np.all((theta > low) & (theta < high), axis=1), value, -np.inf)
-
-    def log_density(self, theta: Floats) -> Floats:
-        """Log posterior density of θ, up to a constant: (w, dimension) → (w,)."""
-        value = self._log_prior(theta)
+        value = np.where(np.all((theta > low) & (theta < high), axis=1), value, -np.inf)
         inside = np.flatnonzero(np.isfinite(value))
         if not inside.size:
             return value
@@ -123,7 +120,18 @@ class SmoothModel:
         """Mode (d,) and triangular factor (d, d) of the covariance about it."""
         from scipy import optimize  # takes longer to import than most commands run
 
-        start = self._coarse()
+        # the best of a few hundred places to start from
+        count = len(self.functions)
+        noise = [0.0] if self.scatter is None else [np.log(self.scatter.sigma)]
+        if self.sigma is None and self.scatter is None:
+            noise = list(np.log([1e-4, 3e-4, 1e-3, 3e-3, 1e-2]))
+        starts = [
+            [*[a] * count, np.log(length), growth, *([s] if self.sigma is None else [])]
+            for a in np.log([0.1, 0.5, 2.0, 8.0]) for length in (0.12, 0.2, 0.33) for growth in (0.0, 1.0) for s in noise
+        ]  # fmt: skip
+        low, high = np.array(self._inner()).T
+        theta = np.clip(np.array(starts), low, high)
+        start = np.asarray(theta[np.argmax(self.log_density(theta))])
         found = optimize.minimize(self._value_and_slope, start, jac=True, method="L-BFGS-B", bounds=self._inner())
         centre = np.asarray(found.x, dtype=np.float64)
         curvature = self._curvature(centre)
@@ -135,20 +143,6 @@ class SmoothModel:
         low, high = self._bounds()
         margin = 0.02
         return list(zip(low + margin, high - margin, strict=True))
-
-    def _coarse(self) -> Floats:
-        """The best of a few hundred places to start from."""
-        count = len(self.functions)
-        noise = [0.0] if self.scatter is None else [np.log(self.scatter.sigma)]
-        if self.sigma is None and self.scatter is None:
-            noise = list(np.log([1e-4, 3e-4, 1e-3, 3e-3, 1e-2]))
-        starts = [
-            [*[a] * count, np.log(length), growth, *([s] if self.sigma is None else [])]
-            for a in np.log([0.1, 0.5, 2.0, 8.0]) for length in (0.12, 0.2, 0.33) for growth in (0.0, 1.0) for s in noise
-        ]  # fmt: skip
-        low, high = np.array(self._inner()).T
-        theta = np.clip(np.array(starts), low, high)
-        return np.asarray(theta[np.argmax(self.log_density(theta))])
 
     def _value_and_slope(self, centre: Floats) -> tuple[float, Floats]:
         d, step = self.dimension, 1e-4

@@ -90,7 +90,13 @@ def predicted_errors(
         raise _copied(prediction)
     errors = predicted - artefact.fit(predicted, sizes)
     _refuse_absurd(errors, prediction, rows)
-    turned = _of_turning(artefact.points, predicted, errors)
+    # uncertainty (n,), mm, of errors predicted for an artefact that lay in another direction by up to a degree or so
+    placings = Placings.of(artefact.points.measurement)
+    aside = artefact.points.xyz - predicted
+    turned, reach = (np.linalg.norm(v - placings.means(v), axis=1) for v in (aside, artefact.points.xyz))
+    own = np.linalg.norm(errors - placings.means(errors), axis=1)
+    far = reach > _REACH * reach.max(initial=0.0)
+    turned = np.asarray(2 * float((own[far] / reach[far]).max(initial=0.0)) * turned)
     return PredictedErrors(errors, prediction.u[rows], turned, frame, apart, unused)
 
 
@@ -149,20 +155,6 @@ def _of_lengths(artefact: Artefact, prediction: Prediction, rows: Ints, sizes: F
     each[ends.ravel()] = np.repeat(u / np.sqrt(2.0), 2)
     _refuse_absurd(errors, prediction, rows)
     return errors, each
-
-
-def _of_turning(points: Points, predicted: Floats, errors: Floats) -> Floats:
-    """Uncertainty (n,), mm, of errors predicted for an artefact that lay in another direction by up to a degree or so.
-
-    Errors that stretch by e along some direction, turned by θ against it, differ at a distance L by up to 2·e·θ·L; and θ·L is
-    how far a point lies from where it was predicted once the middle of its placing does not.
-    """
-    placings = Placings.of(points.measurement)
-    aside = points.xyz - predicted
-    turned, reach = (np.linalg.norm(v - placings.means(v), axis=1) for v in (aside, points.xyz))
-    own = np.linalg.norm(errors - placings.means(errors), axis=1)
-    far = reach > _REACH * reach.max(initial=0.0)
-    return np.asarray(2 * float((own[far] / reach[far]).max(initial=0.0)) * turned)
 
 
 def _frame(prediction: Prediction, rows: Ints, recorded: Floats) -> Frame:

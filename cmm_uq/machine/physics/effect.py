@@ -345,7 +345,16 @@ class CommonSize(Effect):
         """Root mean square of the errors, for one vector of coefficients, or for each of many draws (N, k)."""
         errors = self.errors(coefficients)
         if errors.ndim == 2 and len(errors) > 1:
-            errors = _shrunk(errors)
+            mean = errors.mean(axis=0)
+            v, axes = np.linalg.eigh(np.atleast_2d(np.cov(errors, rowvar=False)))
+            v = np.maximum(v, 0.0)
+            about, c = (errors - mean) @ axes, mean @ axes
+            free = v > _HELD * v.max(initial=0.0)  # what no coefficient does is no error
+            k = np.ones(errors.shape)
+            if free.any():
+                squares = _sizes(c[free], v[free], len(errors))[:, None] ** 2
+                k[:, free] = squares / (squares + v[free])
+            errors = np.asarray((k * c + np.sqrt(k) * about) @ axes.T, dtype=np.float64)
         return {self.size.name: np.sqrt(np.mean(errors**2, axis=-1))}
 
     def from_reported(self, parameters: Mapping[str, float]) -> tuple[Floats, tuple[float, ...]]:
@@ -361,25 +370,6 @@ class CommonSize(Effect):
         drawn = np.random.default_rng(int(seed)).standard_normal(len(self.coefficients))
         rms = float(np.sqrt(np.mean(self.errors(drawn) ** 2)))
         return drawn * (parameters[self.size.name] / rms if rms > 0 else 0.0), ()
-
-
-def _shrunk(draws: Floats) -> Floats:
-    """Draws (N, j) of errors with their common size for a hyper-parameter, known as well as they themselves tell.
-
-    Along each principal axis of their covariance an error ĉ of variance v is, given a size s, normal about k·ĉ with variance
-    k·v, k = s²/(s² + v). Each draw has its own s, of the posterior p(s) ∝ Π N(ĉ; 0, s² + v) under a constant prior (A. Gelman,
-    Bayesian Analysis 1 (2006) 515, section 4), so that what is not known of the size widens its interval.
-    """
-    mean = draws.mean(axis=0)
-    v, axes = np.linalg.eigh(np.atleast_2d(np.cov(draws, rowvar=False)))
-    v = np.maximum(v, 0.0)
-    about, c = (draws - mean) @ axes, mean @ axes
-    free = v > _HELD * v.max(initial=0.0)  # what no coefficient does is no error
-    k = np.ones(draws.shape)
-    if free.any():
-        squares = _sizes(c[free], v[free], len(draws))[:, None] ** 2
-        k[:, free] = squares / (squares + v[free])
-    return np.asarray((k * c + np.sqrt(k) * about) @ axes.T, dtype=np.float64)
 
 
 def _sizes(c: Floats, v: Floats, count: int) -> Floats:

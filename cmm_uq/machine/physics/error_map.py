@@ -253,22 +253,18 @@ def _read_line(reading: _Reading, line: str, where: str) -> None:
         reading.axis = table[1].lower()
     elif reading.axis and _LETTERS.fullmatch(line):
         letters = "".join(line.split()).lower()
-        _check_letters(letters, reading.axis, where)
+        if letters[:2] != 2 * reading.axis or sorted(letters[1:4]) != list(AXES) or sorted(letters[4:]) != list(AXES):
+            raise CmmUqError(
+                f"axis letters {' '.join(letters.upper())} are no heading of axis {reading.axis}",
+                where=where,
+                fix="They are the axis itself, then each axis once for displacements (linear first) and once for rotations",
+            )
         reading.columns[reading.axis] = letters[1:]
     elif reading.axis and re.match(r"[-+.\d]", line):
         reading.rows[reading.axis].append((_numbers(line, where), where))
     elif not reading.axis and (pair := _SQUARENESS.search(line)):
         name = "zx" if pair[1].lower() == "xz" else pair[1].lower()
         reading.squareness[name] = _numbers(pair[2], where, 1)[0]
-
-
-def _check_letters(letters: str, axis: str, where: str) -> None:
-    if letters[:2] != 2 * axis or sorted(letters[1:4]) != list(AXES) or sorted(letters[4:]) != list(AXES):
-        raise CmmUqError(
-            f"axis letters {' '.join(letters.upper())} are no heading of axis {axis}",
-            where=where,
-            fix="They are the axis itself, then each axis once for displacements (linear first) and once for rotations",
-        )
 
 
 def _numbers(text: str, where: str, wanted: int = 7) -> list[float]:

@@ -126,7 +126,13 @@ class ErrorMaps:
         """
         outside = self._outside(readings)
         if beyond == "refuse" and outside.any():
-            self._refuse_position(readings, outside, lines, first)
+            row, axis = np.argwhere(outside)[0]
+            low, high = self.span(AXES[axis])
+            raise CmmUqError(
+                f"{AXES[axis]} reads {readings[row, axis]:.6g} mm, the error map reaches from {low:g} to {high:g} mm",
+                where=_point(row, lines, first),
+                fix="Check origin_mm and the map's range, or allow it to be extrapolated",
+            )
         weights, hot = self._weights(temperatures, len(readings))
         if beyond == "refuse" and hot.any():
             self._refuse_temperature(temperatures, hot, lines, first)
@@ -207,15 +213,6 @@ class ErrorMaps:
         lower = np.clip(np.searchsorted(known, held, side="right") - 1, 0, len(known) - 2)
         weight = (held - known[lower]) / (known[lower + 1] - known[lower])
         return (int(lower), float(weight)) if np.ndim(temperature) == 0 else (lower, weight)
-
-    def _refuse_position(self, readings: Floats, outside: NDArray[np.bool_], lines: Ints | None, first: int) -> None:
-        row, axis = np.argwhere(outside)[0]
-        low, high = self.span(AXES[axis])
-        raise CmmUqError(
-            f"{AXES[axis]} reads {readings[row, axis]:.6g} mm, the error map reaches from {low:g} to {high:g} mm",
-            where=_point(row, lines, first),
-            fix="Check origin_mm and the map's range, or allow it to be extrapolated",
-        )
 
     def _refuse_temperature(
         self, temperatures: Floats | float | None, hot: NDArray[np.bool_], lines: Ints | None, first: int

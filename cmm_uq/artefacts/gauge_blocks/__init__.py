@@ -1,1 +1,0 @@
-"""Gauge blocks: the two faces of each."""

@@ -1,1 +1,0 @@
-"""Step gauge: faces at certified distances along one line."""
