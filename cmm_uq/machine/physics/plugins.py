@@ -17,8 +17,6 @@ from cmm_uq.base.plugins import EFFECTS, Plugin, offered
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.physics.effect import Amount, Effect, Parameter, Shape
 
-OWN = "cmm-uq"  # the package that the built-in effects belong to
-
 
 class EffectPlugin(Plugin):
     """An effect that another package offers."""
@@ -83,7 +81,7 @@ def outside_effects(own: Container[str]) -> dict[str, EffectPlugin]:
     found: dict[str, EffectPlugin] = {}
     for plugin in offered(EFFECTS, EffectPlugin):
         name = plugin.name
-        other = OWN if name in own else found[name].package if name in found else None
+        other = "cmm-uq" if name in own else found[name].package if name in found else None
         if other is not None:
             raise CmmUqError(
                 f"{plugin.what} comes from {other} and from {plugin.package}",
