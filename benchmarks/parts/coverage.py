@@ -23,9 +23,9 @@ from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmod
 from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Plan, Stylus
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
-from cmm_uq.artefacts.ballbar.observe import Ballbar
+from cmm_uq.artefacts.ballbar.bar import Ballbar
 from cmm_uq.machine.model import RecordingModel
-from cmm_uq.machine.model.drawn_noise import Noise
+from cmm_uq.machine.model.recorded import Noise
 from cmm_uq.machine.physics.catalogue import effects
 from tests.conftest import ROOT
 from tests.parts_drawn import block

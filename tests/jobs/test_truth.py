@@ -65,7 +65,7 @@ def test_components_are_drawn_in_their_sizes(ballbar_points) -> None:  # type: i
     from dataclasses import replace
 
     from cmm_uq.machine.model import Noise
-    from cmm_uq.machine.model.drawn_noise import distances_in_placing
+    from cmm_uq.machine.model.recorded import distances_in_placing
 
     random = np.random.default_rng(1)
     timed = replace(ballbar_points, columns={"time_s": 10.0 * np.arange(len(ballbar_points))})

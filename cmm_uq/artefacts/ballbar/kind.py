@@ -18,10 +18,10 @@ BEGINNING = Beginning(
 
 KIND = Kind(
     name="ballbar",
-    observe="cmm_uq.artefacts.ballbar.observe:Ballbar",
-    screen="cmm_uq.artefacts.ballbar.observe:SCREENING",
-    plan="cmm_uq.artefacts.ballbar.observe:PLANNING",
-    page="cmm_uq.artefacts.ballbar.page:PAGE",
+    observe="cmm_uq.artefacts.ballbar.bar:Ballbar",
+    screen="cmm_uq.artefacts.ballbar.bar:SCREENING",
+    plan="cmm_uq.artefacts.ballbar.bar:PLANNING",
+    page="cmm_uq.artefacts.ballbar.bar:PAGE",
     begin="cmm_uq.artefacts.ballbar.kind:BEGINNING",
     tested=(BARS, LENGTHS),
 )

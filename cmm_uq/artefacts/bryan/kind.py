@@ -15,9 +15,9 @@ BEGINNING = Beginning(
 
 KIND = Kind(
     name="bryan",
-    observe="cmm_uq.artefacts.bryan.observe:Bryan",
-    screen="cmm_uq.artefacts.bryan.observe:SCREENING",
-    plan="cmm_uq.artefacts.bryan.observe:PLANNING",
-    page="cmm_uq.artefacts.bryan.page:PAGE",
+    observe="cmm_uq.artefacts.bryan.bar:Bryan",
+    screen="cmm_uq.artefacts.bryan.bar:SCREENING",
+    plan="cmm_uq.artefacts.bryan.bar:PLANNING",
+    page="cmm_uq.artefacts.bryan.bar:PAGE",
     begin="cmm_uq.artefacts.bryan.kind:BEGINNING",
 )

@@ -1,10 +1,4 @@
-"""What a recording of a laser digitizer aligned on a reference sphere observes and is asked for.
-
-What the digitizer was aligned on: the reference sphere by its points, or its centre as fitted elsewhere.
-
-Both are held to one place for the whole recording: the ball tower stays where it is while the digitizer is turned.
-
-Laser digitizer on a reference sphere, in several attitudes: where its mount lies (Harris 2004 sections 4.4 and 5.3).
+"""Laser digitizer on a reference sphere, in several attitudes: where its mount lies (Harris 2004 sections 4.4 and 5.3).
 
 With the mount at true coordinates D, a point of the scan plane lies at D + q, q = E·([u v 0] − [U1 V1 W1]). Recorded are
 the points of the sphere (``u_mm``, ``v_mm``, and the scale readings as x, y, z), or the readings with the origin of the scan
@@ -37,7 +31,7 @@ from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size
-from cmm_uq.machine.model.radial import Radial
+from cmm_uq.machine.model.placed import Radial
 from cmm_uq.machine.model.recorded import expansion
 from cmm_uq.machine.physics.digitizer import Alignment, MountOffset, mount_offset
 from cmm_uq.machine.physics.effects.probing import attitudes

@@ -22,8 +22,9 @@ from cmm_uq.machine.physics.kinematics import euler_313
 ANGLES = ("alpha_deg", "beta_deg", "gamma_deg")
 SCAN = ("u_mm", "v_mm")
 
+# standard uncertainty of a component of the offset, in those of one centre, from which on attitudes determine
+# nothing
 MOST = 100.0
-"""Standard uncertainty of a component of the offset, in those of one centre, from which on attitudes determine nothing."""
 
 _SAME = 1e-9  # degrees by which the rows of one measurement may differ
 _LITTLE = 0.005  # part of a direction that is not told
@@ -113,11 +114,11 @@ def words(direction: Floats) -> Text:
     return text
 
 
+# α, β, γ in degrees of the source's alignments 1, 2 and 3 (Harris 2004 section 5.3)
 THREE = ((90.0, 90.0, 0.0), (90.0, 90.0, 90.0), (180.0, 90.0, 0.0))
-"""α, β, γ in degrees of the source's alignments 1, 2 and 3 (Harris 2004 section 5.3)."""
 
+# points over what the digitizer sees of the sphere: degrees from the line of sight, how many
 RINGS = ((0.0, 1), (25.0, 6), (50.0, 12), (75.0, 18))
-"""Points over what the digitizer sees of the sphere: degrees from the line of sight, how many."""
 
 
 def seen_directions() -> Floats:

@@ -1,17 +1,10 @@
-"""The distance equations of US 4,437,151: scale errors and axis angles from positions of a bar.
-
-Symmetric equations as US 4,437,151 solves them: Doolittle's triangular factors, and Jacobi's eigenvalues.
-
-Both work on normal equations, whose condition number is the square of that of the equations themselves. They are here to be
-compared with an orthogonal factorisation, which is what the package reports.
-
-The distance equations of US 4,437,151: scale errors and axis angles from positions a known distance apart.
+"""The distance equations of US 4,437,151: scale errors and axis angles from positions a known distance apart.
 
     d² = (1+e1)dX² + 2e2 dXdY + 2e3 dXdZ + (1+e4)dY² + 2e5 dYdZ + (1+e6)dZ²                     (100), (110)
 
-A second way to the six factors, beside the measurement model, with the model's answer to compare: to first order e1, e4 and
-e6 are twice the scale errors, and e2, e3, e5 the squareness errors XY, ZX, YZ with the opposite sign. Any artefact with two
-positions a known distance apart serves; a swept bar gives them once its fixed ball is found (108).
+A second way to the six factors, beside the measurement model: to first order e1, e4 and e6 are twice the scale errors, and e2,
+e3, e5 the squareness errors XY, ZX, YZ with the opposite sign. Doolittle's triangular factors and Jacobi's eigenvalues work on
+normal equations, whose condition number is the square; they are compared with an orthogonal factorisation, which is reported.
 """
 
 from __future__ import annotations
@@ -76,20 +69,20 @@ def jacobi_eigenvalues(matrix: Floats) -> tuple[Floats, Floats]:
 
 UNKNOWNS = 6
 
+# effects that the equations give, with their parameters
 FACTORS = tuple((effect.name, "ppm") for effect in SCALE.values()) + tuple(
     (effect.name, "angle_arcsec") for effect in SQUARENESS.values()
 )
-"""Effects that the equations give, with their parameters."""
 
+# ratio of singular values of the equations for unit distances below which a factor hangs on set-up and noise
 POORLY_POSED = 1e-3
-"""Ratio of singular values of the equations for unit distances below which a factor hangs on set-up and noise."""
 
+# orthogonal factorisation, which is reported, and the patent's two ways to solve its normal equations
 SOLUTIONS: dict[str, Callable[[Floats, Floats], Floats]] = {
     "QR": lambda A, b: _by_qr(A, b),
     "Doolittle": lambda A, b: by_doolittle(A.T @ A, A.T @ b),
     "Jacobi": lambda A, b: by_jacobi(A.T @ A, A.T @ b),
 }
-"""Orthogonal factorisation, which is reported, and the patent's two ways to solve its normal equations."""
 
 PLACINGS: dict[Text, tuple[int, int, int]] = {
     say("along X"): (1, 0, 0), say("along Y"): (0, 1, 0), say("along Z"): (0, 0, 1),

@@ -1,6 +1,9 @@
 """Error maps of one machine side by side: each error of each carriage in every map, and what is odd among their figures.
 
-A figure that stands in several maps was measured once; it says nothing of how the maps differ.
+A column that is another map's to the last digit, but for a constant, for a few readings, or for having been rounded further, was
+measured once, whatever temperature stands above it. A spike leaves the course of what a map differs by from the others on both
+sides of it, and comes back; a narrow feature that every map has is none, nor is the place where a map goes on at another level.
+The measure is how far the readings of that very map usually lie off their neighbours.
 """
 
 from __future__ import annotations
@@ -9,14 +12,202 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.analysis.screening.finding import Finding
-from cmm_uq.artefacts.error_maps.copies import copies
-from cmm_uq.artefacts.error_maps.spikes import DAMAGED, spikes
 from cmm_uq.base.messages import Text, Verbatim, commas, listed, number, say, signed
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, Unit, unit
 from cmm_uq.machine.physics.error_map import COLUMNS, ErrorMap
+
+_LAST_DIGIT = 1e-9  # mm
+
+# part of the readings that are the same to the last digit, from which on a column is another one with a few changed
+_MOST = 0.8
+
+_FEWEST, _VALUES = 6, 4  # same readings, and different values among them, without which that is coincidence
+_DIGITS = range(5)  # after the point, in the column's unit
+_EXACT = 1e-6  # of the last digit
+
+
+def copies(values: Floats, unit: float) -> list[tuple[int, ...]]:
+    """Groups of maps (indices into ``values``, ascending) that give one column with the same figures.
+
+    ``values`` (k, p) of one error in k maps, mm; a map that is zero throughout is in no group; ``unit`` size of the
+    column's unit in ``values``.
+    """
+    groups: list[list[int]] = []
+    for k in range(len(values)):
+        if not np.any(values[k]):
+            continue
+        group = next((group for group in groups if any(_same(values[j], values[k], unit) for j in group)), None)
+        if group is None:
+            groups.append([k])
+        else:
+            group.append(k)
+    return [tuple(group) for group in groups if len(group) > 1]
+
+
+def _same(one: Floats, other: Floats, unit: float) -> bool:
+    apart = one - other
+    if np.ptp(apart) <= _LAST_DIGIT:
+        return True
+    same = np.abs(apart - np.median(apart)) <= _LAST_DIGIT
+    if same.mean() >= _MOST and _no_coincidence(one[same]):
+        return True
+    coarse, fine = sorted((one, other), key=lambda course: _digits(course, unit))
+    digits = _digits(coarse, unit)
+    rounded = np.abs(coarse - fine) <= (0.5 + _EXACT) * 10.0**-digits * unit
+    return digits < _digits(fine, unit) and bool(rounded.all()) and _no_coincidence(coarse)
+
+
+def _no_coincidence(readings: Floats) -> bool:
+    return len(readings) >= _FEWEST and len(np.unique(np.round(readings, 9))) >= _VALUES
+
+
+def _digits(course: Floats, unit: float) -> int:
+    figures = course / unit
+    enough = (n for n in _DIGITS if np.all(np.abs(figures * 10**n - np.round(figures * 10**n)) < _EXACT * 10**n))
+    return next(enough, _DIGITS.stop)
+
+
+# readings on each side that a reading is judged by: nearly half of the former may be spikes themselves, and the
+# latter follow a course that wanders
+SIDE, NEAR = 7, 3
+
+WIDEST = 2  # readings in a row that are a spike; more are a part of the travel where the map differs
+_FEWEST_of_spikes = 6  # readings of a column
+
+# weight of what the first and the last reading are off: there is no other side on which the course would come back
+_AT_AN_END = 0.5
+
+_FAR = 7.0  # of its robust standard deviations, by which a reading off its neighbours is a spike
+
+# part of a spike that shows in the course of one of two maps, and not in that of the other, for it to be that one's
+_OWN = 0.5
+
+_SEEN = 3.0  # of the standard deviations between maps, by which a jump of a map's own course is off the others too
+_BESIDE = 0.4  # part of a spike by which a reading beside it belongs to it
+_ROUNDS = 5
+
+# part of the readings of a map that may be spikes; with more, what is left of the column is not believed
+DAMAGED = 0.25
+
+_FINEST = 0.3  # part of the last digit that no reading is better than
+
+
+def spikes(positions: Floats, values: Floats, unit: float) -> NDArray[np.bool_]:
+    """Which readings (k, p) of one error in k maps are spikes.
+
+    ``positions`` (p,) mm, ascending; ``values`` (k, p) mm; ``unit`` size of the column's unit in ``values``.
+    """
+    found, left = np.zeros(values.shape, dtype=bool), values.copy()
+    if values.shape[1] < _FEWEST_of_spikes:
+        return found
+    beside, finest = (_Beside.of(positions, SIDE), _Beside.of(positions, NEAR)), _finest(values, unit)
+    for _ in range(_ROUNDS):
+        off, new = _round(beside, left, finest)
+        new &= ~found
+        if not new.any():
+            break
+        found |= new
+        left = np.where(new, left - off, left)  # as the others say: maps may begin at different levels
+    return found
+
+
+def _round(beside: tuple[_Beside, _Beside], values: Floats, finest: float) -> tuple[Floats, NDArray[np.bool_]]:
+    """How far the readings are off, and which of them are spikes, (k, p) each."""
+    off, alike, courses = (np.zeros(values.shape) for _ in range(3))
+    shown = np.zeros(values.shape, dtype=bool)
+    wide, near = beside
+    for k, own in enumerate(values):
+        against = own - np.median(np.delete(values, k, axis=0), axis=0)
+        off[k], alike[k] = wide.off(against)
+        courses[k], jump = wide.off(own)
+        closely, beside_it = near.off(against)
+        scales = (max(1.4826 * float(np.median(np.abs(some))), finest) for some in (off[k], courses[k], closely))
+        between, along, close = scales
+        # against the others it is followed best, but where these are the noisy ones, the map's own course says more
+        sure = (alike[k] > _FAR * between) | ((beside_it > _FAR * close) & (alike[k] > _OWN * beside_it))
+        sure |= (jump > _FAR * along) & (off[k] * np.sign(courses[k]) > np.maximum(_OWN * jump, _SEEN * between))
+        alike[k] = np.where(sure, np.maximum(alike[k], _OWN * jump), alike[k])
+        shown[k] = sure & _narrow(alike[k] * np.sign(off[k]))
+    if len(values) == 2:
+        # one of the two: the one whose own course jumps
+        apart = np.abs(courses - off)
+        return off, shown & (apart + _OWN * np.abs(off) < apart[::-1])
+    return off, shown & (np.abs(off) >= np.abs(off).max(axis=0))
+
+
+def _finest(values: Floats, unit: float) -> float:
+    """Least standard deviation of a reading that its digits allow, mm."""
+    steps = np.diff(np.unique(np.round(values / unit, 6)))
+    return _FINEST * float(steps.min()) * unit if len(steps) else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """The readings beside each of p readings."""
+
+    positions: Floats
+    index: NDArray[np.intp]  # (p, 2·side) says which, those before first
+    there: NDArray[np.bool_]  # whether they are
+    # (p, 2·side) which of the p − 1 steps lie about the reading, ``steps`` whether they are there
+    slopes: NDArray[np.intp]
+    steps: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, positions: Floats, side: int) -> _Beside:
+        p = len(positions)
+        about = np.concatenate([np.arange(-side, 0), np.arange(1, side + 1)])
+        index = np.arange(p)[:, None] + about
+        slopes = np.arange(p)[:, None] + np.arange(-side, side)
+        return cls(
+            positions, np.clip(index, 0, p - 1), (index >= 0) & (index < p), np.clip(slopes, 0, p - 2),
+            (slopes >= 0) & (slopes < p - 1),
+        )  # fmt: skip
+
+    def off(self, values: Floats) -> tuple[Floats, Floats]:
+        """How far each reading (p,) is off its neighbours, and by how much off those on either side alike; 0 where it is not.
+
+        By medians of what the neighbours say, brought along by the usual slope about the reading.
+        """
+        slope = _median((np.diff(values) / np.diff(self.positions))[self.slopes], self.steps)
+        apart = self.positions[:, None] - self.positions[self.index]
+        gap = values[:, None] - values[self.index] - slope[:, None] * apart
+        off, alike = _median(gap, self.there), np.full(len(values), np.inf)
+        half = self.index.shape[1] // 2
+        for side in (slice(None, half), slice(half, None)):
+            there = self.there[:, side]
+            own = _median(gap[:, side], there) * np.sign(off)
+            alike = np.where(there.any(axis=1), np.minimum(alike, np.maximum(own, 0.0)), alike)
+        alike = np.minimum(alike, np.abs(off))
+        alike[[0, -1]] *= _AT_AN_END
+        return off, alike
+
+
+def _median(values: Floats, there: NDArray[np.bool_]) -> Floats:
+    """Of those of each row (p, n) that are there; 0 where none is."""
+    ordered, count = np.sort(np.where(there, values, np.inf), axis=1), there.sum(axis=1)
+    low, high = (
+        np.take_along_axis(ordered, i[:, None], axis=1)[:, 0] for i in (np.maximum(count - 1, 0) // 2, count // 2)
+    )
+    return np.where(count > 0, 0.5 * (low + high), 0.0)
+
+
+def _narrow(alike: Floats) -> NDArray[np.bool_]:
+    """Which readings (p,) are not part of a longer stretch that lies off in the same direction."""
+    kept = np.ones(len(alike), dtype=bool)
+    for i in np.flatnonzero(alike):
+        beside = alike * np.sign(alike[i]) > _BESIDE * abs(alike[i])
+        low = high = int(i)
+        while low > 0 and beside[low - 1]:
+            low -= 1
+        while high < len(alike) - 1 and beside[high + 1]:
+            high += 1
+        kept[i] = high - low < WIDEST
+    return kept
+
 
 LEAST_POSITIONS = 4  # positions that the maps of a column must share
 _TURNED = 0.3  # part of the misfit that is left when a column with the wrong sign is turned

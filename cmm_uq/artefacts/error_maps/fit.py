@@ -1,11 +1,8 @@
-"""What follows of compared maps: how they differ, squareness, and how large an expansion is that they show.
+"""How error maps of one machine differ, their squareness, and how large an expansion is that they show.
 
-How large an expansion is that error maps of one machine show, as one scale error among others that a map may have.
-
-A map is one run of an interferometer, whose wavelength (air, laser, alignment) and whose reading of the scale's temperature
-are as wrong as they are that day. So each map has a scale error of its own beside the expansion, however many positions it
-has. How large such errors are is little known beforehand, and the k − 2 contrasts between k maps that no expansion makes say
-something of it: the coefficient is averaged over what they leave open.
+A map is one run of an interferometer, whose wavelength and whose reading of the scale's temperature are as wrong as they are that
+day: each map has a scale error of its own beside the expansion. How large such errors are is little known beforehand, and the
+k − 2 contrasts between k maps that no expansion makes say something of it; the coefficient is averaged over the rest.
 """
 
 from __future__ import annotations
@@ -176,17 +173,17 @@ def _by_temperature(maps: Sequence[ErrorMap]) -> list[ErrorMap]:
     return sorted(maps, key=lambda m: m.temperature)
 
 
+# normal distributions that are mixed: log weights, means, standard deviations, each (n,)
 Normals = tuple[Floats, Floats, Floats]
-"""Normal distributions that are mixed: log weights, means, standard deviations, each (n,)."""
 
+# probability of a combination, and of a kind of noise, from which it counts for the coefficient's distribution
 _FOLLOWED = 0.05
-"""Probability of a combination, and of a kind of noise, from which it counts for the coefficient's distribution."""
 
 _DRAWS = 20_000
 
+# scale of the half-Cauchy prior (Gelman 2006) of the standard deviation of the maps' own scale errors, ppm: 0.2 K of
+# a steel scale's temperature, or 2 K of the air's, or 7 hPa of its pressure (the refractive index of air, Edlén)
 _OWN_PPM = 2.0
-"""Scale of the half-Cauchy prior (Gelman 2006) of the standard deviation of the maps' own scale errors, ppm: 0.2 K of a steel
-scale's temperature, or 2 K of the air's, or 7 hPa of its pressure (the refractive index of air, Edlén)."""
 
 _SIZES_PPM = np.geomspace(0.125, 64.0, 19)  # standard deviations that are tried, ppm
 _LOG_SIGMA = np.linspace(-1.5, 1.5, 31)  # about the likeliest ln σ, where the noise is integrated

@@ -62,8 +62,8 @@ KIND = Kind(
     name="error_map",
     table=ErrorMapFacts,
     begin="cmm_uq.artefacts.error_maps.kind:BEGINNING",
-    check="cmm_uq.artefacts.error_maps.analysis:refuse_unfit",
-    own="cmm_uq.artefacts.error_maps.outcome:OWN",
+    check="cmm_uq.artefacts.error_maps.diagnosis:refuse_unfit",
+    own="cmm_uq.artefacts.error_maps.page:OWN",
     refusal="error maps cannot be {}: they are free functions, no points of an artefact",
     instead="cmm-uq diagnose JOB compares them with each other",
 )

@@ -1,20 +1,21 @@
-"""The diagnosis of error maps: from data to page and results."""
+"""The diagnosis of error maps as a page and as results."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from cmm_uq import __version__
-from cmm_uq.artefacts.error_maps.analysis import MapsDiagnosed
-from cmm_uq.artefacts.error_maps.diagnosis import Difference
+from cmm_uq.artefacts.error_maps.diagnosis import Difference, MapsDiagnosed, diagnose_error_maps
 from cmm_uq.artefacts.error_maps.fit import squareness_data, squareness_sections
-from cmm_uq.artefacts.error_maps.overview import overview_of
 from cmm_uq.artefacts.error_maps.search import ColumnComparison
-from cmm_uq.artefacts.error_maps.words import VERDICTS, difference_words, next_words, noise_words
+from cmm_uq.artefacts.error_maps.words import VERDICTS, difference_words, next_words, noise_words, overview_of, told
 from cmm_uq.base.messages import Text, Verbatim, commas, day, lines, names, number, say
-from cmm_uq.certificate.diagnosis.overview import held_out, sure
+from cmm_uq.certificate.diagnosis.overview import held_out, summary_of, sure
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
+from cmm_uq.certificate.effect_words import effect_of, size_of, titles
+from cmm_uq.certificate.outcome import Outcome, OwnAnalysis, Recipe
 from cmm_uq.certificate.plots.residuals import curve_with_band
+from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.results.contents import effect_data, false_alarms, finding_data, head, improvement_data
 from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.sections.findings import improvement_table
@@ -212,3 +213,15 @@ def _most_probable(compared: ColumnComparison) -> tuple[Text, Text]:
 
 def _short(compared: ColumnComparison, index: int) -> Text:
     return compared.rivals[index].short
+
+
+def outcome(found: MapsDiagnosed, seed: int) -> Outcome:
+    verdict = found.diagnosis.verdict
+    short = summary_of(found.job.facts, verdict, told(found), found.findings)
+    with lettered_in(found.job.facts.job.language):
+        document = maps_document(found, seed)
+    consistent = verdict == "consistent"
+    return Outcome(found, lambda: document, maps_results(found, seed), short, document.warnings, in_order=consistent)
+
+
+OWN = OwnAnalysis(diagnose=Recipe(diagnose_error_maps, outcome))

@@ -1,4 +1,6 @@
-"""Error maps of one machine against each other: what changes with temperature, and which map contradicts the others.
+"""The rivals for how the maps of a column differ, and the kinds of noise along an axis.
+
+Error maps of one machine against each other: what changes with temperature, and which map contradicts the others.
 
 Every error of every carriage is a free function of position, the same in all maps; what is left is how the maps differ. Each
 map starts anywhere, and a straightness points anywhere. The rivals for what is left: the scale expands; the function changes
@@ -12,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, sparse
 
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key, explore
 from cmm_uq.analysis.diagnosis.comparison.conditional import Version
@@ -20,19 +22,43 @@ from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.functions import smooth_functions
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import lack_of_fit
-from cmm_uq.analysis.diagnosis.noise import heavy_tails
+from cmm_uq.analysis.diagnosis.noise import TAILS, NoiseKind, heavy_tails
 from cmm_uq.artefacts.error_maps.columns import MapColumn, roughness
-from cmm_uq.artefacts.error_maps.noise import kinds_along
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.base.points import Floats
+from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import REFERENCE_TEMPERATURE
 from cmm_uq.machine.physics.effects.thermal import EXPANSION, SCALE_EXPANSION
+
+WHITE = "white"
+
+
+def kinds_along(chain: Ints, white: float, correlations: Sequence[float]) -> list[NoiseKind]:
+    """Kinds of noise of readings (m,) in the order of their positions.
+
+    ``chain`` (m,) readings with one number follow each other.
+    """
+    identity = sparse.csr_array(sparse.eye_array(len(chain)))
+    share = (1 - white) / len(correlations)
+    return [NoiseKind(WHITE, identity, 0.0, white - TAILS), *(_correlated(phi, chain, share) for phi in correlations)]
+
+
+def _correlated(phi: float, chain: Ints, probability: float) -> NoiseKind:
+    """First-order autoregression along each chain."""
+    m, innovation = len(chain), np.sqrt(1 - phi**2)
+    follows = np.append(False, chain[1:] == chain[:-1])
+    diagonal = np.where(follows, 1 / innovation, 1.0)
+    after = np.flatnonzero(follows)
+    rows, columns = np.append(np.arange(m), after), np.append(np.arange(m), after - 1)
+    values = np.append(diagonal, np.full(len(after), -phi / innovation))
+    whitening = sparse.csr_array((values, (rows, columns)), shape=(m, m))
+    return NoiseKind("correlated", whitening, float(np.log(diagonal).sum()), probability)
+
 
 _SIGMAS = 300
 _ASSERTED = 0.8  # probability from which an effect is asserted: what one map that is off can imitate is not
 
+# noise of a map: its readings are taken one after the other in one run, while interferometer and air drift
 _WHITE, _CORRELATIONS = 0.5, (0.4, 0.6, 0.8, 0.9)
-"""Noise of a map: its readings are taken one after the other in one run, while interferometer and air drift."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,4 @@
-"""What the certificate of a gauge states beside the estimates: each line by itself, its scale and linearity.
-
-What each line of a step gauge tells by itself: its scale, its linearity, its periodic part, its backlash.
-
-These are descriptions of a recording, line by line, without any model of the machine; the measurement model explains them.
-"""
+"""What each line of a step gauge tells by itself, without a model of the machine: scale, linearity, periodic part, backlash."""
 
 from __future__ import annotations
 
@@ -25,8 +20,8 @@ from cmm_uq.maths.inference.draws import evenly, uncertainty_of_sum
 
 LEAST_FACES = 8  # faces on a line from which on a periodic error can be told from scatter
 
+# probability of a periodic part so large by chance, over all periods looked at, below which it is reported
 SIGNIFICANT = 0.01
-"""Probability of a periodic part so large by chance, over all periods looked at, below which it is reported."""
 
 _FINENESS = 4  # frequencies looked at for each independent one
 

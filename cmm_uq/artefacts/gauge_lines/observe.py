@@ -1,18 +1,9 @@
-"""Lengths along lines, as step gauges and gauge blocks have them: what is measured, observed and asked of a recording.
-
-What is measured of a step gauge or of gauge blocks in one placing, and the lines that the standard asks for.
-
-Lines follow ISO 10360-2:2009, 6.3: the four space diagonals and the three axes, five lengths each.
-
-Step gauge and gauge blocks: faces at certified distances along one line, in several places.
+"""Step gauge and gauge blocks: faces at certified distances along one line, in several places.
 
 Every face is an observation: how far along the line it was found, against its certified distance. The line runs from the
 first to the farthest face as recorded, so its two directions across cost nothing, and its position is free in each
-measurement. What lies across the line (where on a face the probe touched) says nothing and is left as it is.
-
-What the certificate leaves open is its uncertainty of every length by itself (``u_between``). Where several lengths are taken
-together it is one error of the gauge that all have in common, in proportion to the lengths where a number is stated, since
-that is the part that no number of faces averages out.
+measurement. Where several lengths are taken together, the certificate's uncertainty is one error of the gauge that all have in
+common, since that is the part that no number of faces averages out. Lines follow ISO 10360-2:2009, 6.3.
 """
 
 from __future__ import annotations
@@ -34,12 +25,10 @@ from cmm_uq.base.units import unit
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Artefact, Indications, Placings, Size
-from cmm_uq.machine.model.artefact_doubt import by_certificate, faults
-from cmm_uq.machine.model.certified_places import CertifiedPlaces
+from cmm_uq.machine.model.artefact_doubt import CertifiedPlaces, by_certificate, faults
 from cmm_uq.machine.model.recorded import check_length, columns_needed, expansion, place
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.machine.physics.effects.own_body import Body
-from cmm_uq.machine.physics.effects.own_errors import ALONG_A_LINE
+from cmm_uq.machine.physics.effects.own_errors import ALONG_A_LINE, Body
 from cmm_uq.maths.inference.doubt import Cause
 from cmm_uq.maths.inference.linear_model import Freedoms
 

@@ -40,9 +40,9 @@ BEGINNING = Beginning(
 KIND = Kind(
     name="plane",
     table=PlaneFacts,
-    observe="cmm_uq.artefacts.plane.observe:PlaneSurface",
-    screen="cmm_uq.artefacts.plane.observe:SCREENING",
-    plan="cmm_uq.artefacts.plane.observe:PLANNING",
-    page="cmm_uq.artefacts.plane.page:PAGE",
+    observe="cmm_uq.artefacts.plane.surface:PlaneSurface",
+    screen="cmm_uq.artefacts.plane.surface:SCREENING",
+    plan="cmm_uq.artefacts.plane.surface:PLANNING",
+    page="cmm_uq.artefacts.plane.surface:PAGE",
     begin="cmm_uq.artefacts.plane.kind:BEGINNING",
 )

@@ -1,6 +1,4 @@
-"""What a recording of a ball plate or hole plate observes and is asked for, and where it is placed.
-
-Plate: balls or holes at reference positions, placed rigidly and anyhow in each measurement.
+"""Plate: balls or holes at reference positions, placed rigidly and anyhow in each measurement.
 
 All three coordinates of every ball are observations; the six freedoms of each placing are projected out exactly. What the
 certificate leaves open is in the length of the plate as far as all positions have it in common, and an error of each ball
@@ -34,12 +32,11 @@ from cmm_uq.jobs.recording.references import NOISE_RATIO
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Indications, Placings, Size
-from cmm_uq.machine.model.artefact_doubt import by_certificate, faults, since_earlier
-from cmm_uq.machine.model.certified_places import CertifiedPlaces
+from cmm_uq.machine.model.artefact_doubt import CertifiedPlaces, by_certificate, faults, since_earlier
+from cmm_uq.machine.model.placed import Rigid
 from cmm_uq.machine.model.recorded import check_length, columns_needed, expansion, place
-from cmm_uq.machine.model.rigid import Rigid
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.machine.physics.effects.own_body import Body
+from cmm_uq.machine.physics.effects.own_errors import Body
 from cmm_uq.maths.inference.doubt import Cause
 
 DRILLED_UM = 30.0  # standard deviation of holes from their nominal places, and of balls glued to a plate, µm

@@ -1,16 +1,10 @@
-"""The three integrations of Shimizu, Kiyono & Gao, and the uncertainty of an integrated curve.
-
-The three integrations of Shimizu, Kiyono & Gao, "A Self-calibration Method for Coordinate Measuring Machines".
+"""The three integrations of Shimizu, Kiyono & Gao, "A Self-calibration Method for Coordinate Measuring Machines".
 
 An artefact is read twice, at a[i] and, shifted by D, at b[i]. The calibration curve h, true = h(reading), has the slope
 D/(b − a) about there (3), which is summed from the first point on: by (6) for equal or unequal pitch, by (8) improved for
 unequal pitch. Two signs of the source contradict its other equations and are mended here: (4) must be the mean of b − a
-for (3) to hold, and (8) must halve the sum of neighbouring slopes, as (7) does.
-
-Uncertainty of an integrated curve: law of propagation, and Monte Carlo.
-
-Sums of slopes share readings, so neighbouring points are strongly correlated: without a known length the curve is worst at
-its end, with one it is pinned at two points and worst between them.
+for (3) to hold, and (8) must halve the sum of neighbouring slopes, as (7) does. Sums of slopes share readings, so neighbouring
+points are strongly correlated.
 """
 
 from __future__ import annotations

@@ -1,7 +1,5 @@
 """Readings of one artefact in several placings along an axis, and what shifts cannot tell.
 
-What shifts cannot tell: errors of the machine that the artefact's own dimensions imitate.
-
 A function with a period that divides every shift is the same in all placings, so it looks like an artefact of other
 dimensions. Between places that no chain of shifts joins, the error may differ by any amount; only smoothness decides there.
 """
@@ -22,8 +20,8 @@ from cmm_uq.base.units import HOUR
 
 _ALIKE = 1e-3  # shifts nearer to each other than this are the same, mm
 _LATER = 0.01  # root of the sum of squares of the times between repeats, h, from which on they show a drift
+# part of the artefact's length by which a placing may differ from its nominal shift, at most and at least 1 mm
 _MISPLACED = 0.1
-"""Part of the artefact's length by which a placing may differ from its nominal shift, at most and at least 1 mm."""
 
 
 @dataclass(frozen=True)
@@ -212,8 +210,9 @@ def _cosines(means: Floats, series: Ints, along: int) -> Floats:
     return found
 
 
+# shifts whose rest is below this part of the smallest are multiples of each other, as far as smooth functions can
+# see
 _ALIKE_of_undetermined = 0.05
-"""Shifts whose rest is below this part of the smallest are multiples of each other, as far as smooth functions can see."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from typing import Any
 
 from cmm_uq.artefacts.shift_axis.curve import Curve
 from cmm_uq.artefacts.shift_axis.page import curve_data, sampling_data
-from cmm_uq.artefacts.shift_plate.analysis import PlaneShiftResult
-from cmm_uq.artefacts.shift_plate.undetermined import title
+from cmm_uq.artefacts.shift_plate.model import title
+from cmm_uq.artefacts.shift_plate.plane import PlaneShiftResult
 from cmm_uq.artefacts.shifting.found import artefact_section, figures_section, method_section, summary_of, table_file
 from cmm_uq.base.messages import (
     NOTHING,

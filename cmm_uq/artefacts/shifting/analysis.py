@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from cmm_uq import __version__
 from cmm_uq.artefacts.shift_axis import page as axis_page
-from cmm_uq.artefacts.shift_axis.analysis import ShiftResult, analyse_shift
+from cmm_uq.artefacts.shift_axis.analysis import ShiftResult, analyse_shift, checked_series
 from cmm_uq.artefacts.shift_axis.page import shift_results
 from cmm_uq.artefacts.shift_plate import page as plane_page
-from cmm_uq.artefacts.shift_plate.analysis import PlaneShiftResult, analyse_plane
 from cmm_uq.artefacts.shift_plate.page import plane_shift_results
+from cmm_uq.artefacts.shift_plate.plane import PlaneShiftResult, analyse_plane, checked_plate
 from cmm_uq.artefacts.shifting.correction_table import table_text
 from cmm_uq.artefacts.shifting.found import table_file
 from cmm_uq.artefacts.shifting.kind import shift_facts
@@ -21,6 +21,13 @@ from cmm_uq.certificate.results.plain import posterior_file
 from cmm_uq.certificate.sections.results import as_found_data, as_found_section
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.ensembles import Progress
+
+
+def refuse_unfit(job: Job) -> None:
+    if shift_facts(job).plane is not None:
+        checked_plate(job)
+    else:
+        checked_series(job)
 
 
 def analyse(job: Job, *, seed: int = 0, progress: Progress | None = None) -> ShiftResult | PlaneShiftResult:

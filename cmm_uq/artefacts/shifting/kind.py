@@ -67,8 +67,8 @@ def shift_facts(job: Job) -> ShiftFacts:
 
 SIDE, PITCH = 3, 150.0  # balls along a side of the plate, and their distance, mm
 
+# shift of the plate's middle along x and y, mm, and turn, °: enough to part the plate from the machine
 PLACINGS = ((0.0, 0.0, 0.0), (150.0, 0.0, 0.0), (0.0, 150.0, 0.0), (0.0, 0.0, 90.0))
-"""Shift of the plate's middle along x and y, mm, and turn, °: enough to part the plate from the machine."""
 
 AXIS = Beginning(
     title="Self-calibration of an axis by shifting an uncalibrated gauge",
@@ -124,7 +124,7 @@ KIND = Kind(
     plan="cmm_uq.artefacts.shift_axis.plan:PLANNING",
     begin="cmm_uq.artefacts.shifting.kind:AXIS",
     begin_also={"shift_plate": "cmm_uq.artefacts.shifting.kind:PLANE"},
-    check="cmm_uq.artefacts.shifting.check:refuse_unfit",
+    check="cmm_uq.artefacts.shifting.analysis:refuse_unfit",
     own="cmm_uq.artefacts.shifting.analysis:OWN",
     refusal="a shift job cannot be {}: its machine error is a free function, no list of effects",
     instead="cmm-uq report JOB estimates it",

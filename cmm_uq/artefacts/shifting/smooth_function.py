@@ -1,19 +1,13 @@
 """A smooth error of one position, and the density of observations with everything linear integrated out.
 
-A smooth error of one position: what it may look like before anything is measured.
-
 A function is a Gaussian process with Matérn correlation of order 7/2 (three times differentiable), whose size may differ
 between the middle of the range and its ends. It is written as a sum of sines (the Hilbert-space basis of Solin & Särkkä
 2020, eq. 56 and 68), so that for given amplitude A, correlation length ℓ and growth r it is linear in Gaussian coefficients:
 
     f(x) = (1 + (r − 1)·u⁶) · Σ_j w_j · sin(ω_j (x − x₀)),   w_j ~ N(0, A²·S(ω_j, ℓ)),   u = −1 … 1 over the range.
-
-The density of observations with everything linear integrated out, in the smaller of two spaces.
-
     observed = (even + (r − 1)·ends) · w + columns · x + noise,   w ~ N(0, sd²), x ~ N(0, column_sd²), noise ~ N(0, σ²)
 
-Few observations: factor their covariance. Fewer coefficients than observations: factor the coefficients' precision
-(Rasmussen & Williams 2006, 2.1.1 and A.3). Both give the same density and the same distribution of draws.
+Few observations: factor their covariance. Fewer coefficients: factor their precision (Rasmussen & Williams 2006, A.3).
 """
 
 from __future__ import annotations
@@ -32,8 +26,8 @@ FINEST = 1 / 40  # shortest correlation length as a part of the range that is tr
 _BOUNDARY = 2.5  # the sines vanish at this many half ranges from the middle, so far that the range hardly feels it
 _ORDER = 3.5
 _GROWTH_POWER = 6
+# of the Matérn spectral density (Rasmussen & Williams 2006, eq. 4.15, one dimension)
 _DENSITY = 2 * sqrt(pi) * gamma(_ORDER + 0.5) / gamma(_ORDER) * (2 * _ORDER) ** _ORDER
-"""Of the Matérn spectral density (Rasmussen & Williams 2006, eq. 4.15, one dimension)."""
 
 
 @dataclass(frozen=True, eq=False)

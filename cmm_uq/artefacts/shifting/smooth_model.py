@@ -26,11 +26,12 @@ from cmm_uq.maths.inference.proposals import refined
 DRAWS = 2000  # of everything linear, taken evenly from the chains
 EFFECTIVE_SAMPLES = 2000
 _AMPLITUDE_BOUNDS = (1e-4, 1e2)  # of each amplitude over its typical size
+# median correlation length as a part of the range, and the standard deviation of its logarithm: five hills or so
 _LENGTH, _LENGTH_SPREAD = 0.2, 0.6
-"""Median correlation length as a part of the range, and the standard deviation of its logarithm: five hills or so."""
 _GROWTH_SPREAD = 1.5  # standard deviation of the logarithm of the ends' size over the middle's
+# ends that are quieter than the middle by more than this look all the same: a plateau on which chains would get
+# stuck
 _GROWTH_BOUNDS = 0.5, 8.0
-"""Ends that are quieter than the middle by more than this look all the same: a plateau on which chains would get stuck."""
 
 
 @dataclass(frozen=True)

@@ -39,10 +39,10 @@ BEGINNING = Beginning(
 KIND = Kind(
     name="sphere",
     table=SphereFacts,
-    observe="cmm_uq.artefacts.sphere.observe:SphereArtefact",
-    screen="cmm_uq.artefacts.sphere.observe:SCREENING",
-    plan="cmm_uq.artefacts.sphere.observe:PLANNING",
-    page="cmm_uq.artefacts.sphere.page:PAGE",
+    observe="cmm_uq.artefacts.sphere.ball:SphereArtefact",
+    screen="cmm_uq.artefacts.sphere.ball:SCREENING",
+    plan="cmm_uq.artefacts.sphere.ball:PLANNING",
+    page="cmm_uq.artefacts.sphere.ball:PAGE",
     begin="cmm_uq.artefacts.sphere.kind:BEGINNING",
     tested=(FORMS,),
 )

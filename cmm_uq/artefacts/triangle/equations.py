@@ -16,8 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.artefacts.triangle.observe import PLANES, Triangle
-from cmm_uq.artefacts.triangle.standard import SIDES_OF_DIMENSIONS, corners
+from cmm_uq.artefacts.triangle.observe import PLANES, SIDES_OF_DIMENSIONS, Triangle, corners
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats
@@ -29,8 +28,8 @@ _ALIGNED = np.cos(np.radians(3.0))
 _ANOTHER_PLACE = 20.0  # mm between readings, or between tips, from which on two placings differ
 _X, _, _Z, _TIP_X, _TIP_Y, _ = range(6)
 
+# what the equations give, by the names of the effects, in their units (ppm, ″, ″/m)
 PARAMETERS = tuple(effect.name for family in (SCALE, SQUARENESS, ROTATION) for effect in family.values())
-"""What the equations give, by the names of the effects, in their units (ppm, ″, ″/m)."""
 
 
 @dataclass(frozen=True, eq=False)

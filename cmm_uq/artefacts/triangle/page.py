@@ -11,8 +11,7 @@ from typing import Any, cast
 import numpy as np
 
 from cmm_uq.artefacts.triangle.equations import PARAMETERS, solve_equations
-from cmm_uq.artefacts.triangle.observe import Triangle
-from cmm_uq.artefacts.triangle.standard import DRAWS
+from cmm_uq.artefacts.triangle.observe import DRAWS, Triangle
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, semicolons, signed
 from cmm_uq.base.points import Floats, Ints

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmm_uq.machine.model.drawn_noise import Noise
 from cmm_uq.machine.model.measurement import Estimate, RecordingModel
+from cmm_uq.machine.model.recorded import Noise
 
 __all__ = ["Estimate", "Noise", "RecordingModel"]

@@ -1,11 +1,8 @@
 """What an artefact is: how points become observations, and what it leaves undetermined, set-up by set-up.
 
-What an artefact is: how points become observations, and what it leaves undetermined.
-
-An artefact of known sizes, placed somewhere on the table, says where its points truly are up to that placing. Hence three
-questions, asked of every kind: where would its points lie, placed as well as the recording allows (:meth:`~Artefact.fit`)?
-Along which directions does a recording speak about errors (:meth:`~Artefact.project`)? What remains free
-(:meth:`~Artefact.placing`, and sizes without a certificate)?
+An artefact of known sizes, placed somewhere on the table, says where its points truly are up to that placing: where would they
+lie, placed as well as the recording allows (:meth:`~Artefact.fit`)? Along which directions does a recording speak about errors
+(:meth:`~Artefact.project`)? What remains free (:meth:`~Artefact.placing`, and sizes without a certificate)?
 """
 
 from __future__ import annotations

@@ -18,23 +18,18 @@ from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact
 
-LENGTHS = "calibrated lengths"
-"""That a standard may be decided on: ``Artefact.indications``."""
+LENGTHS = "calibrated lengths"  # That a standard may be decided on: ``Artefact.indications``
 
-BARS = "lengths of one bar"
-"""The same: ``Artefact.lengths`` of one bar in many positions, and figures of their range."""
+BARS = "lengths of one bar"  # The same: ``Artefact.lengths`` of one bar in many positions, and figures of their range
 
-FORMS = "forms of test spheres"
-"""The same: ``Artefact.forms``."""
+FORMS = "forms of test spheres"  # The same: ``Artefact.forms``
 
 Facet = TypeVar("Facet")
 
-Observe = Callable[..., Artefact]
-"""``(facts, points, *, where)``: the artefact that a job describes, as recorded."""
+Observe = Callable[..., Artefact]  # ``(facts, points, *, where)``: the artefact that a job describes, as recorded
 
 
-Observed = Callable[[Points], Artefact]
-"""The same with what the job says of the artefact filled in."""
+Observed = Callable[[Points], Artefact]  # The same with what the job says of the artefact filled in
 
 
 @dataclass(frozen=True)

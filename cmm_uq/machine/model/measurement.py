@@ -1,14 +1,10 @@
 """Effects, an artefact and a recording, joined into one model.
 
-Effects, an artefact and a recording, joined into one model.
-
 Forward: an artefact of given sizes stands where the recording says, and the machine's errors turn its true points into
-indicated ones. Inverse: the difference between the indicated points of the recording and of that forward model, seen along
-the directions in which the artefact speaks, is linear in the parameters, and least squares iterates on it (Gauss–Newton).
-
-The design is taken at the points of the *artefact*, not at the recorded ones. With recorded lengths the columns of the
-three scale errors would add up to the observation itself, a careless fit would be perfect and wrong; with the artefact's
-own length they add up to the column of that length, and an uncalibrated bar shows its free scale as an exact null space.
+indicated ones. Inverse: the difference between recorded and predicted points, seen along the directions in which the artefact
+speaks, is linear in the parameters, and least squares iterates on it (Gauss–Newton). The design is taken at the points of the
+*artefact*: with recorded lengths the columns of the three scale errors would add up to the observation itself; with the artefact's
+own they add up to the column of its length, and an uncalibrated bar shows its free scale as an exact null space.
 """
 
 from __future__ import annotations
@@ -24,7 +20,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, Unit
 from cmm_uq.machine.model.artefact import Artefact
-from cmm_uq.machine.model.drawn_noise import Noise
+from cmm_uq.machine.model.recorded import Noise
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.superposition import About, Superposition
 from cmm_uq.maths.inference.curvature import bend, bent

@@ -6,9 +6,8 @@ import numpy as np
 from scipy import sparse
 
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.machine.model.drawn_noise import distances_in_placing
 from cmm_uq.machine.model.measurement import RecordingModel
-from cmm_uq.machine.model.recorded import Display, display_step
+from cmm_uq.machine.model.recorded import Display, display_step, distances_in_placing
 from cmm_uq.maths.inference.noise import AXES, FREQUENCIES, GROWTH, PLACING, SLOW, Components
 
 # part of the observations' variance that each of two axes must have for their noises to be told apart

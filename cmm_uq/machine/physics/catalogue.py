@@ -1,21 +1,107 @@
-"""Every effect by its name.
+"""Every effect by its name, built in or from other packages (entry points of the group ``cmm_uq.effects``).
 
 ``CATALOGUE`` holds the effects that every job file may count on. ``FURTHER`` holds rarer ones: a job may name them, simulate
 them and have them estimated like the others; a diagnosis thinks of them less readily. ``OWN`` holds the faults of the artefact
-itself. Other packages add theirs (:mod:`cmm_uq.machine.physics.plugins`); :func:`every` has them all.
+itself. An entry point has the name of the effect and gives an ``Effect``, or a class of one that is made without arguments.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property, lru_cache
 from types import MappingProxyType
 
+import numpy as np
+
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.machine.physics.effect import CONTRACT, FURTHER as RARER, OWN as OF_ARTEFACTS, Effect
+from cmm_uq.base.messages import Text, foreign
+from cmm_uq.base.plugins import EFFECTS, Plugin, offered
+from cmm_uq.base.points import Floats, Points
+from cmm_uq.machine.physics.effect import (
+    CONTRACT,
+    FURTHER as RARER,
+    OWN as OF_ARTEFACTS,
+    Amount,
+    Effect,
+    Parameter,
+    Shape,
+)
 from cmm_uq.machine.physics.effects import drives, own_errors, own_states, probing, rigid_body, thermal
-from cmm_uq.machine.physics.plugins import EffectPlugin, outside_effects
+
+
+class EffectPlugin(Plugin):
+    """An effect that another package offers."""
+
+    @cached_property
+    def effect(self) -> Effect:
+        made = self.loaded(Effect)  # type: ignore[type-abstract]
+        for field in ("title", "formula", "mechanism", "points_to", "coefficients"):
+            if not getattr(made, field, None):
+                raise self.broken(f"says no {field}")
+        return _Outside(made, self)
+
+
+class _Outside(Effect):
+    """An effect of another package: the same, but what its code does wrong is said with its package's name."""
+
+    def __init__(self, effect: Effect, plugin: EffectPlugin) -> None:
+        self._effect, self._plugin = effect, plugin
+        self.name, self.title, self.formula = effect.name, foreign(effect.title), effect.formula
+        self.mechanism, self.points_to = effect.mechanism, foreign(effect.points_to)
+        self.coefficients, self.shape, self.columns = effect.coefficients, effect.shape, effect.columns
+        self.tier, self.idealised_over, self.imitated_by = effect.tier, effect.idealised_over, effect.imitated_by
+        self.along_motion, self.plane, self.stands_for = effect.along_motion, effect.plane, effect.stands_for
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        found = np.asarray(self._plugin.attempt(lambda: self._effect.basis(points, shape)))
+        wanted = (len(points), 3, len(self.coefficients))
+        if found.shape != wanted or found.dtype != np.float64 or not np.isfinite(found).all():
+            raise self._plugin.broken(f"gives a basis {found.shape} {found.dtype}, not one {wanted} of finite float64")
+        return found
+
+    def lean(self, points: Points) -> Floats:
+        return np.asarray(self._plugin.attempt(lambda: self._effect.lean(points)), dtype=np.float64)
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        return foreign(self._plugin.attempt(lambda: self._effect.meaning(amounts)))
+
+    def course(self, points: Points) -> Floats | None:
+        found = self._plugin.attempt(lambda: self._effect.course(points))
+        return None if found is None else np.asarray(found, dtype=np.float64)
+
+    def trials(self) -> Iterator[tuple[float, ...]]:
+        return self._effect.trials()
+
+    @property
+    def prior_weight(self) -> float:
+        return self._effect.prior_weight
+
+    @property
+    def reported(self) -> tuple[Parameter | Shape, ...]:
+        return self._effect.reported
+
+    def to_reported(self, coefficients: Floats, shape: Floats) -> dict[str, Floats]:
+        return self._effect.to_reported(coefficients, shape)
+
+    def from_reported(self, parameters: Mapping[str, float]) -> tuple[Floats, tuple[float, ...]]:
+        return self._effect.from_reported(parameters)
+
+
+def outside_effects(own: Container[str]) -> dict[str, EffectPlugin]:
+    """Effects that the installed packages offer, by name; none is imported."""
+    found: dict[str, EffectPlugin] = {}
+    for plugin in offered(EFFECTS, EffectPlugin):
+        name = plugin.name
+        other = "cmm-uq" if name in own else found[name].package if name in found else None
+        if other is not None:
+            raise CmmUqError(
+                f"{plugin.what} comes from {other} and from {plugin.package}",
+                fix=f"Uninstall {plugin.package}, or rename it",
+            )
+        found[name] = plugin
+    return found
+
 
 _ROOMS = (rigid_body, drives, thermal, probing, own_errors, own_states)
 

@@ -1,14 +1,8 @@
 """From indicated to true coordinates by error maps and back, and the probe offset on a plane surface.
 
-From indicated to true coordinates by the machine's error maps, and back.
-
-``compensate`` adds e; ``indicated_from_true`` finds the coordinates that the machine would indicate, by iteration: the map
-changes by far less than it is displaced, so every round gains three digits or more.
-
-Probe offset on a plane surface: which way the material lies, and where the surface is (US 4,866,643 claim 1).
-
+The inverse is found by iteration: the map changes by far less than it is displaced, so every round gains three digits or more.
 A probe of finite diameter touches a plane with its side, so that the points of contact lie on a plane one offset away from
-the surface. A point just before contact tells on which side the probe was.
+the surface; a point just before contact tells on which side the probe was (US 4,866,643 claim 1).
 """
 
 from __future__ import annotations

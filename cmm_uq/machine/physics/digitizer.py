@@ -1,6 +1,4 @@
-"""Laser digitizer on the ram, and its alignment on the reference sphere.
-
-Laser digitizer on the ram: from scan-plane coordinates and scale readings to true coordinates (Harris 2004 ch. 4 and 5).
+"""Laser digitizer on the ram: from scan plane and scale readings to true coordinates, and its alignment (Harris 2004 ch. 4, 5).
 
 The digitizer measures u and v in its scan plane, w = 0. Its attitude is three Euler angles 3-1-3; its mount, the end of
 the ram, lies at [U1 V1 W1] in its own frame. So a point lies at q = E·([u v 0] − [U1 V1 W1]) from the mount, the mount's
@@ -8,11 +6,8 @@ own attitude turns q by A, and the mount is at scale readings plus their error:
 
     X = A·q + D + e(D)                                                                                       (35)
 
-Aligning a laser digitizer on the reference sphere, and where its mount lies (Harris 2004 sections 4.4 and 5.3).
-
-An alignment is the scale reading at which the origin of the scan plane falls on the centre of the sphere. Three of them,
-in different attitudes, tell the offset [U1 V1 W1] of the mount and the place of the sphere: nine equations for six
-unknowns, solved all at once by least squares.
+An alignment is the scale reading at which the origin of the scan plane falls on the centre of the reference sphere. Three of
+them, in different attitudes, tell the offset of the mount and the place of the sphere: nine equations for six unknowns.
 """
 
 from __future__ import annotations

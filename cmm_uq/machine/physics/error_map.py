@@ -1,15 +1,9 @@
 """Error maps: the six errors of each carriage along its travel, as CSV or as service contractors hand them over.
 
-Error maps: the six errors of each carriage, tabulated along its travel at one temperature.
-
-Inside, displacements are mm and rotations rad, true = indicated + e. Files carry µm and arc seconds.
-
-Error maps as service contractors hand them over: a text file with a table for each axis (Harris 2004 appendix B).
-
-The columns of an axis are its position, the linear error, two straightnesses and three rotations; a line of axis letters
-above the table says along or about which axis each of them is. Displacements are µm, angles arc seconds. The squareness
-is printed as 90° less the angle between the axes, with the sign opposite to the project's, and is turned here. Scanned
-copies repeat the headings at every page and carry stray marks; both are passed over.
+Inside, displacements are mm and rotations rad, true = indicated + e. Files carry µm and arc seconds. A contractor's text has a table
+for each axis (Harris 2004 appendix B): its position, the linear error, two straightnesses and three rotations; a line of axis
+letters above the table says along or about which axis each of them is. The squareness is printed as 90° less the angle between
+the axes, with the sign opposite to the project's, and is turned here. Repeated headings and stray marks are passed over.
 """
 
 from __future__ import annotations

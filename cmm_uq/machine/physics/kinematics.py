@@ -56,11 +56,11 @@ class ParametricError:
 
 _KINDS: tuple[Literal["displacement", "rotation"], ...] = ("displacement", "rotation")
 
+# all 21 in the order of every Jacobian here: of carriages x, y, z the displacements and rotations, then squareness
 PARAMETRIC_ERRORS = (
     *(ParametricError(kind, a, b) for a in AXES for kind in _KINDS for b in AXES),
     *(ParametricError("squareness", pair[0], pair[1]) for pair in SQUARENESSES),
 )
-"""All 21 in the order of every Jacobian here: of carriages x, y, z the displacements and rotations, then squareness."""
 
 _VDI = re.compile(r"([xyz])([trw])([xyz])")
 _GREEK = re.compile(r"(?:(δ|delta|d)|(ε|ϵ|epsilon|eps|e))_?([xyz])_?\(?([xyz])\)?")

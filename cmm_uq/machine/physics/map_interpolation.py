@@ -37,10 +37,8 @@ class _Stack:
     """Errors of one carriage in every map, on common positions."""
 
     positions: Floats
-    values: Floats
-    """(6, k, m) in k maps."""
-    step: float
-    """Of equal positions, mm; 0 where they are not equal."""
+    values: Floats  # (6, k, m) in k maps
+    step: float  # Of equal positions, mm; 0 where they are not equal
 
     def place(self, readings: Floats) -> tuple[Ints, Floats]:
         """Interval (n,) of each reading, and how far along it (n,) the reading is; below 0 or above 1 only outside."""

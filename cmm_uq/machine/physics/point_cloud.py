@@ -1,11 +1,7 @@
 """Point clouds larger than memory: read in blocks, transformed, and written as they came.
 
-Point clouds larger than memory: read from disk in blocks, transformed, and written as they go.
-
 A cloud is one ``.csv`` or ``.npy`` file, a folder of ``.npy`` files in the order of their names, or (with pyarrow installed)
-one ``.parquet`` file. Its rows are numbers in the columns that the transformation takes, such as u, v, D, E, F of a
-digitizer; the result has columns x, y, z. Memory stays that of one block whatever the length of the cloud; the target is
-written whole or not at all.
+one ``.parquet`` file. Memory stays that of one block; the target is written whole or not at all.
 """
 
 from __future__ import annotations

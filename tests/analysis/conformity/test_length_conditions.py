@@ -9,7 +9,7 @@ import pytest
 
 from cmm_uq.analysis.conformity.length_conditions import lengths_measured, nominals
 from cmm_uq.analysis.conformity.plans import LengthPlan
-from cmm_uq.artefacts.ballbar.observe import Ballbar
+from cmm_uq.artefacts.ballbar.bar import Ballbar
 from cmm_uq.artefacts.gauge_lines.observe import StepGauge
 from cmm_uq.base.points import Machine
 from tests.analysis.conformity.recorded import MACHINE, bars, gauge

@@ -13,7 +13,7 @@ from cmm_uq.analysis.conformity.short_gauge import supplemented
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.ballbar.observe import Ballbar
+from cmm_uq.artefacts.ballbar.bar import Ballbar
 from cmm_uq.artefacts.gauge_lines.observe import StepGauge
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.recording.short_gauge import ShortGauge, ShortGaugeFacts

@@ -13,7 +13,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.machine.model.rigid import Rigid
+from cmm_uq.machine.model.placed import Rigid
 from tests.conftest import ROOT
 
 PLATE, BARS = (read_job(ROOT / "examples" / name) for name in ("plate-simulated", "iota-1102-20C"))

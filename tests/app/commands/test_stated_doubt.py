@@ -12,10 +12,10 @@ import pytest
 
 from benchmarks.coverage.stated_doubt import held, recorded
 from cmm_uq.app.commands.report import analyse
-from cmm_uq.artefacts.ballbar.page import figures as bar_figures
+from cmm_uq.artefacts.ballbar.bar import figures as bar_figures
 from cmm_uq.artefacts.gauge_lines.analysis import figures
 from cmm_uq.certificate.result import Result
-from cmm_uq.machine.model.certified_places import CALIBRATION
+from cmm_uq.machine.model.artefact_doubt import CALIBRATION
 from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT
 

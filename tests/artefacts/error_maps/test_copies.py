@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts.error_maps.columns import columns_of
-from cmm_uq.artefacts.error_maps.copies import copies
+from cmm_uq.artefacts.error_maps.columns import columns_of, copies
 from cmm_uq.artefacts.error_maps.diagnosis import diagnose_maps
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import MICROMETRE

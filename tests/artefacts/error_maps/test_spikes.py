@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from cmm_uq.artefacts.error_maps.columns import columns_of
-from cmm_uq.artefacts.error_maps.spikes import spikes
+from cmm_uq.artefacts.error_maps.columns import columns_of, spikes
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, read_error_map
 from tests.conftest import ROOT

@@ -7,8 +7,16 @@ import pytest
 
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.triangle.equations import PARAMETERS, solve_equations
-from cmm_uq.artefacts.triangle.observe import SEVEN_PLACINGS, SHIFTED, Placing, Triangle, placed_triangle
-from cmm_uq.artefacts.triangle.standard import TriangleStandard, corner_changes, corners
+from cmm_uq.artefacts.triangle.observe import (
+    SEVEN_PLACINGS,
+    SHIFTED,
+    Placing,
+    Triangle,
+    TriangleStandard,
+    corner_changes,
+    corners,
+    placed_triangle,
+)
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from tests.artefacts.constructions import estimated, free, indicated, model

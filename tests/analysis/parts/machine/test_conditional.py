@@ -33,12 +33,12 @@ from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.app.commands.model import recorded_model
-from cmm_uq.artefacts.ballbar.observe import Ballbar
+from cmm_uq.artefacts.ballbar.bar import Ballbar
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import RecordingModel
-from cmm_uq.machine.model.drawn_noise import Noise
 from cmm_uq.machine.model.noise import noise_of
+from cmm_uq.machine.model.recorded import Noise
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.noise import Sizes
 from cmm_uq.maths.inference.posterior import sample_with_noise

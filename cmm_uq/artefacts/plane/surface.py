@@ -1,6 +1,4 @@
-"""What a recording of a probed plane observes and is asked for, and where it is placed.
-
-Plane: points probed on a flat surface, whose place and tilt are free in each measurement.
+"""Plane: points probed on a flat surface, whose place and tilt are free in each measurement; observed, planned, stated.
 
 The observation is the distance of each point of contact from the plane. A point 0, where there is one, is the direction
 point just before contact: it tells on which side the probe was (US 4,866,643 claim 1) and is no observation.
@@ -9,7 +7,7 @@ point just before contact: it tells on which side the probe was (US 4,866,643 cl
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,22 +18,27 @@ from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, flat_misfit, no_references, spread
 from cmm_uq.artefacts.plane.kind import PlaneFacts
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import say
+from cmm_uq.base.messages import Text, in_a_row, number, say
 from cmm_uq.base.points import Floats, Ints, Points
-from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.certificate.document import Block, Column, Section, Table
+from cmm_uq.certificate.outcome import Page
+from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
+from cmm_uq.certificate.result import Result
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size
 from cmm_uq.machine.model.recorded import place
 from cmm_uq.machine.physics.compensation import DirectionPointError, OffsetPlane, offset_plane
 from cmm_uq.maths.inference.linear_model import Freedoms
+from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 DIRECTION_POINT = 0
+# points of contact in a measurement: three make a plane (US 4,866,643 claim 1 b), a fourth says something of it
 LEAST_POINTS = 3
-"""Points of contact in a measurement: three make a plane (US 4,866,643 claim 1 b), a fourth says something of it."""
 
+# extent across over extent along below which points lie on one line and leave the plane free to turn about it
 _ON_A_LINE = 1e-3
-"""Extent across over extent along below which points lie on one line and leave the plane free to turn about it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,18 +112,18 @@ class PlaneSurface(Artefact):
         """
         found = []
         off = self.off_plane()
-        for number in self.placings.numbers:
-            own = off[self.measurement == number]
+        for measurement in self.placings.numbers:
+            own = off[self.measurement == measurement]
             given = u_point if len(own) == LEAST_POINTS else None
-            surface = None if self.offset is None else self._surface(int(number), self.offset, given)
+            surface = None if self.offset is None else self._surface(int(measurement), self.offset, given)
             flatness = float(np.ptp(own)) if len(own) > LEAST_POINTS else None
-            found.append(ProbedPlane(int(number), len(own), flatness, surface))
+            found.append(ProbedPlane(int(measurement), len(own), flatness, surface))
         return tuple(found)
 
-    def _surface(self, number: int, offset: float, u_point: float | None) -> OffsetPlane:
+    def _surface(self, measurement: int, offset: float, u_point: float | None) -> OffsetPlane:
         """The surface of one measurement; the C1 of a direction point is the lowest point of contact of its own repeat."""
-        points, contact = self.points, self.rows[self.measurement == number, 0]
-        ahead = self._ahead(number)
+        points, contact = self.points, self.rows[self.measurement == measurement, 0]
+        ahead = self._ahead(measurement)
         other = points.repeat[contact] != points.repeat[ahead][:, None]
         first = np.array([np.lexsort((points.repeat[contact], points.point[contact], row))[0] for row in other])
         return offset_plane(
@@ -128,25 +131,25 @@ class PlaneSurface(Artefact):
             u_offset=self.u_offset, u_point=u_point,
         )  # fmt: skip
 
-    def _ahead(self, number: int) -> Ints:
+    def _ahead(self, measurement: int) -> Ints:
         points = self.points
-        return np.flatnonzero((points.measurement == number) & (points.point == DIRECTION_POINT))
+        return np.flatnonzero((points.measurement == measurement) & (points.point == DIRECTION_POINT))
 
     def _refuse_no_side(self, offset: float, where: str | None) -> None:
         points = self.points
-        for number in self.placings.numbers:
-            if not len(self._ahead(number)):
+        for measurement in self.placings.numbers:
+            if not len(self._ahead(measurement)):
                 raise CmmUqError(
-                    f"measurement {number} has no direction point (point 0), so that nothing says to which side the probe's "
-                    "offset goes",
-                    where=place(points, points.measurement == number, where),
+                    f"measurement {measurement} has no direction point (point 0), so that nothing says to which side the "
+                    "probe's offset goes",
+                    where=place(points, points.measurement == measurement, where),
                     fix="Record a point 0 just before contact, or leave out probe_offset_mm",
                 )
             try:
-                self._surface(number, offset, 1.0)  # an angle depends on no uncertainty
+                self._surface(measurement, offset, 1.0)  # an angle depends on no uncertainty
             except DirectionPointError as rejected:
-                row = np.arange(len(points)) == self._ahead(number)[rejected.index]
-                raise CmmUqError(f"measurement {number}: {rejected.problem}", where=place(points, row, where),
+                row = np.arange(len(points)) == self._ahead(measurement)[rejected.index]
+                raise CmmUqError(f"measurement {measurement}: {rejected.problem}", where=place(points, row, where),
                                  fix=rejected.fix) from rejected  # fmt: skip
 
     def off_plane(self) -> Floats:
@@ -165,9 +168,9 @@ class PlaneSurface(Artefact):
 
     def _refuse_no_plane(self, where: str | None) -> None:
         points = self.points
-        for number in np.setdiff1d(points.measurement, self.measurement):
-            raise CmmUqError(f"measurement {number} has no points of contact",
-                             where=place(points, points.measurement == number, where),
+        for measurement in np.setdiff1d(points.measurement, self.measurement):
+            raise CmmUqError(f"measurement {measurement} has no points of contact",
+                             where=place(points, points.measurement == measurement, where),
                              fix="Points of contact are numbered 1, 2, …; point 0 is the direction point")  # fmt: skip
         touched = points.xyz[self.rows[:, 0]]
         about = touched - self.placings.means(touched)
@@ -175,12 +178,12 @@ class PlaneSurface(Artefact):
         few = self.placings.sizes < LEAST_POINTS
         if np.any(poor := few | (extents[:, 1] <= _ON_A_LINE**2 * extents[:, 2])):
             which = int(np.argmax(poor))
-            number, count = self.placings.numbers[which], self.placings.sizes[which]
+            measurement, count = self.placings.numbers[which], self.placings.sizes[which]
             problem = (
                 f"{count} points of contact are too few" if few[which] else "all points of contact lie on one line"
             )
             raise CmmUqError(
-                f"measurement {number}: {problem}", where=place(points, points.measurement == number, where),
+                f"measurement {measurement}: {problem}", where=place(points, points.measurement == measurement, where),
                 fix=f"Record at least {LEAST_POINTS} points spread over the plane",
             )  # fmt: skip
 
@@ -226,3 +229,160 @@ def _shape(setting: Setting) -> PatternFor:
 
 _PLACES = VolumeCandidates(across_planes, _shape, RelocatedCandidates(across_planes))
 PLANNING = Planning({"surface plate": surface_places}, _PLACES.candidates, _PLACES.elsewhere)
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneFigures:
+    """One plane with what is uncertain of its surface."""
+
+    probed: ProbedPlane
+    coverage_factor: float
+
+    @property
+    def flatness_um(self) -> float | None:
+        """Range of the distances from the least-squares plane, µm; ``None`` of three points, which have none."""
+        return None if self.probed.flatness is None else self.probed.flatness / MICROMETRE
+
+    @property
+    def surface(self) -> SurfaceFigures | None:
+        return None if self.probed.surface is None else SurfaceFigures(self.probed.surface, self.coverage_factor)
+
+    def as_data(self) -> dict[str, Any]:
+        surface = self.surface
+        return {
+            "measurement": self.probed.measurement, "points": self.probed.count, "flatness_um": self.flatness_um,
+            "surface": None if surface is None else surface.as_data(),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceFigures:
+    """A compensated surface with its uncertainty; k is that of the noise."""
+
+    surface: OffsetPlane
+    coverage_factor: float
+
+    @property
+    def expanded_across(self) -> float:
+        """U of its position along the normal, mm."""
+        normal = self.surface.normal
+        return self.coverage_factor * float(np.sqrt(normal @ self.surface.covariance[:3, :3] @ normal))
+
+    @property
+    def expanded_normal(self) -> float:
+        """U of the least certain component of the normal."""
+        return self.coverage_factor * float(np.sqrt(np.diag(self.surface.covariance)[3:].max()))
+
+    @property
+    def angle_deg(self) -> float:
+        return float(np.degrees(self.surface.angle))
+
+    def as_data(self) -> dict[str, Any]:
+        surface = self.surface
+        return {
+            "point_mm": surface.point.tolist(), "normal": surface.normal.tolist(),
+            "normal_reversed": surface.reversed, "approach_deg": self.angle_deg,
+            "U_across_um": self.expanded_across / MICROMETRE, "U_normal": self.expanded_normal, "k": self.coverage_factor,
+            "covariance": {
+                "parameters": ["x_mm", "y_mm", "z_mm", "nx", "ny", "nz"], "units": ["mm"] * 3 + ["1"] * 3,
+                "matrix": surface.covariance.tolist(),
+            },
+        }  # fmt: skip
+
+
+def figures(result: Result) -> tuple[PlaneFigures, ...]:
+    plane, noise = cast("PlaneSurface", result.artefact), result.noise.coordinate.value * MICROMETRE
+    return tuple(PlaneFigures(one, result.noise.coverage_factor) for one in plane.probed(noise))
+
+
+def results(result: Result) -> dict[str, Any]:
+    return {"planes": [one.as_data() for one in figures(result)]}
+
+
+def off_plane_um(plane: PlaneSurface) -> Floats:
+    """(n,) distance of each point of contact from its least-squares plane, µm."""
+    return plane.off_plane() / MICROMETRE
+
+
+def sections(result: Result) -> list[Section]:
+    plane = cast("PlaneSurface", result.artefact)
+    probed = figures(result)
+    blocks: list[Block] = [_flatness(result, probed), _by_point(result, plane), residual_volume(result, say("points"))]
+    if any(one.surface is not None for one in probed):
+        blocks.insert(1, _surfaces(result, probed))
+    return [Section(say("The plane"), tuple(blocks))]
+
+
+def _flatness(result: Result, probed: tuple[PlaneFigures, ...]) -> Table:
+    noise = result.noise.coordinate.value
+    rows = tuple(
+        (
+            number(one.probed.measurement),
+            number(one.probed.count),
+            (say("–") if one.flatness_um is None else rounded(one.flatness_um, noise)[0]),
+        )
+        for one in probed
+    )
+    columns = (Column(say("Measurement"), numeric=False), Column(say("Points")), Column(say("Flatness"), unit("µm")))
+    note = say("Flatness: range of the distances from the least-squares plane, of surface, machine and probe together.")
+    return Table(say("Flatness as recorded"), columns, rows, (note,))
+
+
+def _surfaces(result: Result, probed: tuple[PlaneFigures, ...]) -> Table:
+    rows: list[tuple[Text, ...]] = []
+    for one in probed:
+        if (found := one.surface) is None:
+            continue
+        across, surface = found.expanded_across, found.surface
+        place = in_a_row(rounded(float(v), across)[0] for v in surface.point)
+        normal = in_a_row(rounded(float(v), max(found.expanded_normal, 2e-9))[0] for v in surface.normal)
+        U = rounded(0.0, across / MICROMETRE)[1]
+        rows.append((number(one.probed.measurement), place, normal, U, number(found.angle_deg, ".0f")))
+    columns = (
+        Column(say("Measurement"), numeric=False),
+        Column(say("Point of the surface"), unit("mm"), numeric=False),
+        Column(say("Outward normal"), numeric=False),
+        Column(say("U across"), unit("µm")),
+        Column(say("Approach"), unit("°")),
+    )
+    notes = (
+        say(
+            "The plane of the probe's centre, moved by the probe's offset against the normal that points "
+            "to where the probe came from (US 4,866,643, claim 1). U (k = {k}) of the surface's position "
+            "along the normal, at its middle.",
+            k=number(result.noise.coverage_factor, ".2f"),
+        ),
+    )
+    return Table(say("Surface, compensated for the probe's offset"), columns, tuple(rows), notes)
+
+
+def _by_point(result: Result, plane: PlaneSurface) -> Block:
+    off = off_plane_um(plane)
+    residuals, expanded = result.residuals / MICROMETRE, result.noise.expanded
+    low, high, low_after, high_after = alike(off.min(), off.max(), residuals.min(), residuals.max())
+    return length_plot(
+        plane.points.point[plane.rows[:, 0]],
+        off,
+        residuals,
+        expanded_before_um=expanded,
+        expanded_after_um=expanded,
+        reference=say("least-squares plane"),
+        flagged=result.flagged,
+        position_label=say("Point on the plane"),
+        caption=say(
+            "Distance of each point from its plane, as recorded and after the fitted model, with U (k = {k}).",
+            k=number(result.noise.coverage_factor, ".2f"),
+        ),
+        alternative=say(
+            "{count} points: as recorded they lie {low} to {high} µm from their plane; after the "
+            "fitted model {low_after} to {high_after} µm remain.",
+            count=len(off),
+            low=low,
+            high=high,
+            low_after=low_after,
+            high_after=high_after,
+        ),
+    )
+
+
+PAGE = Page(sections, results)
