@@ -1,8 +1,9 @@
 """Ballbar: two balls a fixed distance apart, in many places; observed, planned, stated.
 
-The observation is the distance of the two ball centres; placing and direction cancel, and a bar without a certificate leaves
-one scale common to all axes undetermined. The twenty positions follow figure 26 of ASME B89.4.1-1997 as the recording of Harris
-(2004, figures C 1 and C 2) carries them out; its position 18, which repeats 14 there, is taken between 14 and 11.
+The observation is the distance of the two ball centres; placing and direction cancel, and a bar without a certificate
+leaves one scale common to all axes undetermined. The twenty positions follow figure 26 of ASME B89.4.1-1997 as the
+recording of Harris (2004, figures C 1 and C 2) carries them out; its position 18, which repeats 14 there, is taken between
+14 and 11.
 """
 
 from __future__ import annotations

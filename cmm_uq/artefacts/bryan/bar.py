@@ -1,7 +1,8 @@
-"""Bryan gauge: a bar with one ball fixed to the table, the other swept through the machine's volume; observed, planned, stated.
+"""Bryan gauge: one ball fixed to the table, the other swept through the volume; observed, planned, stated.
 
 The observation is the distance of the swept ball from the fixed one, whose place is free for the whole job, and the bar's
-length too when no certificate gives it (US 4,437,151, equations 108 and 110, solved together instead of one after the other).
+length too when no certificate gives it (US 4,437,151, equations 108 and 110, solved together instead of one after the
+other).
 """
 
 from __future__ import annotations

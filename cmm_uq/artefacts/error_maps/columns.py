@@ -1,9 +1,9 @@
 """Error maps of one machine side by side: each error of each carriage in every map, and what is odd among their figures.
 
-A column that is another map's to the last digit, but for a constant, for a few readings, or for having been rounded further, was
-measured once, whatever temperature stands above it. A spike leaves the course of what a map differs by from the others on both
-sides of it, and comes back; a narrow feature that every map has is none, nor is the place where a map goes on at another level.
-The measure is how far the readings of that very map usually lie off their neighbours.
+A column that is another map's to the last digit, but for a constant, for a few readings, or for having been rounded
+further, was measured once, whatever temperature stands above it. A spike leaves the course of what a map differs by from
+the others on both sides of it, and comes back; a narrow feature that every map has is none, nor is the place where a map
+goes on at another level. The measure is how far the readings of that very map usually lie off their neighbours.
 """
 
 from __future__ import annotations

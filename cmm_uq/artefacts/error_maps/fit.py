@@ -1,8 +1,9 @@
 """How error maps of one machine differ, their squareness, and how large an expansion is that they show.
 
-A map is one run of an interferometer, whose wavelength and whose reading of the scale's temperature are as wrong as they are that
-day: each map has a scale error of its own beside the expansion. How large such errors are is little known beforehand, and the
-k − 2 contrasts between k maps that no expansion makes say something of it; the coefficient is averaged over the rest.
+A map is one run of an interferometer, whose wavelength and whose reading of the scale's temperature are as wrong as they
+are that day: each map has a scale error of its own beside the expansion. How large such errors are is little known
+beforehand, and the k − 2 contrasts between k maps that no expansion makes say something of it; the coefficient is averaged
+over the rest.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What each line of a step gauge tells by itself, without a model of the machine: scale, linearity, periodic part, backlash."""
+"""What each line of a step gauge tells by itself, without a model of the machine: scale, linearity, period, backlash."""
 
 from __future__ import annotations
 

@@ -4,10 +4,11 @@
     e_i = scale_i·r_i + linearity_i(r_i) + straightness_j_i(r_j) + c·r_j,
     e_j = scale_j·r_j + linearity_j(r_j) + straightness_i_j(r_i),
 
-of axes i and j (Schwenke et al. 2008, "Geometric error measurement and compensation of machines", 2.3, to first order), and the
-rotation about the normal of each carriage that carries another one of the plane. Positions and levers are counted from the
-middle of what was read. A plate that is only shifted shears and stretches as well as the machine; turned by 90° it parts them,
-but for the common scale. A bow with the rotation that belongs to it looks like a turned placing while the plate moves along it.
+of axes i and j (Schwenke et al. 2008, "Geometric error measurement and compensation of machines", 2.3, to first order), and
+the rotation about the normal of each carriage that carries another one of the plane. Positions and levers are counted from
+the middle of what was read. A plate that is only shifted shears and stretches as well as the machine; turned by 90° it
+parts them, but for the common scale. A bow with the rotation that belongs to it looks like a turned placing while the plate
+moves along it.
 """
 
 from __future__ import annotations

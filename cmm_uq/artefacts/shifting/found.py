@@ -1,9 +1,10 @@
 """What every analysis of shifted artefacts gives, along an axis or in a plane, and what certificates show of it.
 
-The largest difference of a drawn curve is never zero and grows with every uncertainty (JCGM 101:2008, 9.4), so an interval of such
-draws lies above the truth, and never holds a straight curve. Here the differences c_i − c_j between all pairs of positions get one
-factor k, from the draws, that holds them all at once: the largest lies between the largest d_ij − k·u_ij, no less than 0, and the
-largest d_ij + k·u_ij. With 99.5 % it says which pairs can be the largest at all, and with 95.5 % of these alone (Bonferroni).
+The largest difference of a drawn curve is never zero and grows with every uncertainty (JCGM 101:2008, 9.4), so an interval
+of such draws lies above the truth, and never holds a straight curve. Here the differences c_i − c_j between all pairs of
+positions get one factor k, from the draws, that holds them all at once: the largest lies between the largest d_ij − k·u_ij,
+no less than 0, and the largest d_ij + k·u_ij. With 99.5 % it says which pairs can be the largest at all, and with 95.5 % of
+these alone (Bonferroni).
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Triangle standard of gauge blocks and cylinders (Manlay, *Fast checking of CMM geometry with a patented tool*).
 
-A block touches a cylinder at each end, so a side between two cylinder axes is the block and two radii. Recorded are the axes of
-the cylinders. In the source's equations a rotation of any carriage acts on the stylus tip offset too, and two tips of different
-length part yaw from scale; so ``tip_x_mm, tip_y_mm, tip_z_mm`` count for every carriage. The source counts seven placings and
-describes eight: the horizontal one shifted along X gives the yaw of Y, which the vertical ones give over a longer lever.
+A block touches a cylinder at each end, so a side between two cylinder axes is the block and two radii. Recorded are the
+axes of the cylinders. In the source's equations a rotation of any carriage acts on the stylus tip offset too, and two tips
+of different length part yaw from scale; so ``tip_x_mm, tip_y_mm, tip_z_mm`` count for every carriage. The source counts
+seven placings and describes eight: the horizontal one shifted along X gives the yaw of Y, which the vertical ones give over
+a longer lever.
 """
 
 from __future__ import annotations

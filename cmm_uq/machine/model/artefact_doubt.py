@@ -1,14 +1,16 @@
 """What is in doubt of an artefact: its certified places, temperature, expansion, alignment and fixturing, and its faults.
 
-A certificate states U of every length as a number or a formula of it, or of each place by itself, or with covariances. Without
-these nobody knows whether the errors of several lengths have one cause or each their own: figures of several lengths are taken
-with either, and the larger uncertainty stands. Sensitivities are those of the test uncertainty of a length L (ISO/TS 23165).
+A certificate states U of every length as a number or a formula of it, or of each place by itself, or with covariances.
+Without these nobody knows whether the errors of several lengths have one cause or each their own: figures of several
+lengths are taken with either, and the larger uncertainty stands. Sensitivities are those of the test uncertainty of a
+length L (ISO/TS 23165).
 
-Sizes and weights of faults are judgements, stated here once. A certificate with an uncertainty leaves little: mostly three times
-its standard uncertainty, and is less readily doubted than the machine. One time in three it is plainly wrong, or the artefact has
-changed since, and may then be off like one without a certificate: what a single set-up shows beyond the certificate's uncertainty
-is the artefact's with odds of one to ten, and both are named until another set-up tells. Where nothing is certified it is the
-other way round: holes and balls were mostly placed by a worse machine than the one that measures them.
+Sizes and weights of faults are judgements, stated here once. A certificate with an uncertainty leaves little: mostly three
+times its standard uncertainty, and is less readily doubted than the machine. One time in three it is plainly wrong, or the
+artefact has changed since, and may then be off like one without a certificate: what a single set-up shows beyond the
+certificate's uncertainty is the artefact's with odds of one to ten, and both are named until another set-up tells. Where
+nothing is certified it is the other way round: holes and balls were mostly placed by a worse machine than the one that
+measures them.
 """
 
 from __future__ import annotations

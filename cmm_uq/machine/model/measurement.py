@@ -1,10 +1,11 @@
 """Effects, an artefact and a recording, joined into one model.
 
 Forward: an artefact of given sizes stands where the recording says, and the machine's errors turn its true points into
-indicated ones. Inverse: the difference between recorded and predicted points, seen along the directions in which the artefact
-speaks, is linear in the parameters, and least squares iterates on it (Gauss–Newton). The design is taken at the points of the
-*artefact*: with recorded lengths the columns of the three scale errors would add up to the observation itself; with the artefact's
-own they add up to the column of its length, and an uncalibrated bar shows its free scale as an exact null space.
+indicated ones. Inverse: the difference between recorded and predicted points, seen along the directions in which the
+artefact speaks, is linear in the parameters, and least squares iterates on it (Gauss–Newton). The design is taken at the
+points of the *artefact*: with recorded lengths the columns of the three scale errors would add up to the observation
+itself; with the artefact's own they add up to the column of its length, and an uncalibrated bar shows its free scale as an
+exact null space.
 """
 
 from __future__ import annotations

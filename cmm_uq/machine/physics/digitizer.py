@@ -1,13 +1,13 @@
 """Laser digitizer on the ram: from scan plane and scale readings to true coordinates, and its alignment (Harris 2004 ch. 4, 5).
 
-The digitizer measures u and v in its scan plane, w = 0. Its attitude is three Euler angles 3-1-3; its mount, the end of
-the ram, lies at [U1 V1 W1] in its own frame. So a point lies at q = E·([u v 0] − [U1 V1 W1]) from the mount, the mount's
-own attitude turns q by A, and the mount is at scale readings plus their error:
+The digitizer measures u and v in its scan plane, w = 0. Its attitude is three Euler angles 3-1-3; its mount, the end of the
+ram, lies at [U1 V1 W1] in its own frame. So a point lies at q = E·([u v 0] − [U1 V1 W1]) from the mount, the mount's own
+attitude turns q by A, and the mount is at scale readings plus their error:
 
     X = A·q + D + e(D)                                                                                       (35)
 
-An alignment is the scale reading at which the origin of the scan plane falls on the centre of the reference sphere. Three of
-them, in different attitudes, tell the offset of the mount and the place of the sphere: nine equations for six unknowns.
+An alignment is the scale reading at which the origin of the scan plane falls on the centre of the reference sphere. Three
+of them, in different attitudes, tell the offset of the mount and the place of the sphere: nine equations for six unknowns.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Error maps: the six errors of each carriage along its travel, as CSV or as service contractors hand them over.
 
-Inside, displacements are mm and rotations rad, true = indicated + e. Files carry µm and arc seconds. A contractor's text has a table
-for each axis (Harris 2004 appendix B): its position, the linear error, two straightnesses and three rotations; a line of axis
-letters above the table says along or about which axis each of them is. The squareness is printed as 90° less the angle between
-the axes, with the sign opposite to the project's, and is turned here. Repeated headings and stray marks are passed over.
+Inside, displacements are mm and rotations rad, true = indicated + e. Files carry µm and arc seconds. A contractor's text
+has a table for each axis (Harris 2004 appendix B): its position, the linear error, two straightnesses and three rotations;
+a line of axis letters above the table says along or about which axis each of them is. The squareness is printed as 90° less
+the angle between the axes, with the sign opposite to the project's, and is turned here. Repeated headings and stray marks
+are passed over.
 """
 
 from __future__ import annotations
