@@ -1,4 +1,4 @@
-"""Laser digitizer on the ram: from scan plane and scale readings to true coordinates, and its alignment (Harris 2004 ch. 4, 5).
+"""Laser digitizer on the ram: from scan plane and scale readings to true coordinates, and its alignment (Harris 2004 ch. 4–5).
 
 The digitizer measures u and v in its scan plane, w = 0. Its attitude is three Euler angles 3-1-3; its mount, the end of the
 ram, lies at [U1 V1 W1] in its own frame. So a point lies at q = E·([u v 0] − [U1 V1 W1]) from the mount, the mount's own
