@@ -16,16 +16,17 @@ from cmm_uq.artefacts.shift_axis.curve import Curve
 from cmm_uq.artefacts.shift_axis.integration import KnownSpan
 from cmm_uq.artefacts.shift_plate.model import FreeInPlane, PlaneModel, free_in_plane, plane_model
 from cmm_uq.artefacts.shift_plate.placed_plate import PlacedPlate, placed_plate
-from cmm_uq.artefacts.shifting.correction_table import plane_correction_table
+from cmm_uq.artefacts.shifting.correction_table import error_map_of
 from cmm_uq.artefacts.shifting.found import Reported, ShiftFound, listed_draws, peak_to_valley
 from cmm_uq.artefacts.shifting.kind import KnownLength, shift_facts
 from cmm_uq.artefacts.shifting.smooth_model import Coefficients, sampled
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.points import AXES, Floats
+from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, Unit, unit
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.machine.physics.error_map import ErrorMap
+from cmm_uq.machine.physics.kinematics import carried_offset
 from cmm_uq.maths.inference.ensembles import Chains, Progress
 from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of
 
@@ -258,6 +259,32 @@ class PlaneShiftResult(ShiftFound):
     @cached_property
     def table(self) -> ErrorMap:
         return plane_correction_table(self.estimate, self.job.points.machine)
+
+
+def plane_correction_table(estimate: PlaneEstimate, machine: Machine) -> ErrorMap:
+    """Error map of the two carriages of a plane; the squareness stands in it as a slope of the second axis' straightness.
+
+    A map counts levers from the scales' zero, the estimate from the middle of what was read: the difference goes into the
+    displacements. Scales that the placings leave open are left as they are.
+    """
+    found: dict[int, tuple[Floats, Floats]] = {}
+    axes, normal = estimate.plate.axes, 3 - sum(estimate.plate.axes)
+    for which, axis in enumerate(axes):
+        x = estimate.positions[which]
+        errors = np.zeros((len(x), 6))
+        errors[:, axis] = estimate.linearity[which].error
+        errors[:, axes[1 - which]] = estimate.straightness[which].error
+        if axis in estimate.rotations:
+            turn = estimate.rotations[axis].error
+            arm = carried_offset(AXES[axis], estimate.plate.middle[None], chain=machine.chain)[0, list(axes)]
+            errors[:, axes[0]] += arm[1] * turn
+            errors[:, axes[1]] -= arm[0] * turn
+            errors[:, 3 + normal] = turn
+        found[axis] = x, errors
+    if SQUARENESS[estimate.plate.plane].name not in estimate.free.names:
+        y, errors = found[axes[1]]
+        errors[:, axes[0]] -= estimate.squareness.mean() * (y - y[0])
+    return error_map_of(found, machine)
 
 
 def analyse_plane(job: Job, *, seed: int = 0, progress: Progress | None = None) -> PlaneShiftResult:

@@ -110,13 +110,17 @@ def parse_error_map(content: bytes, where: str, *, temperature: float = 20.0, un
     return ErrorMap((x, y, z), temperature=temperature, source=where, sha256=hashlib.sha256(content).hexdigest())
 
 
-def write_error_map(error_map: ErrorMap, path: Path) -> None:
-    """Write the carriages' errors as CSV; squareness and temperature belong to the job that names the file."""
+def error_map_csv(error_map: ErrorMap) -> str:
+    """The carriages' errors as CSV; squareness and temperature belong to the job that names the file."""
     lines = [",".join(("axis", "position_mm", *COLUMNS))]
     for axis, carriage in zip(AXES, error_map.axes, strict=True):
         for position, errors in zip(carriage.positions, carriage.errors / UNITS, strict=True):
             lines.append(",".join([axis, f"{position:.12g}", *(f"{value:.12g}" for value in errors)]))
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return "\n".join(lines) + "\n"
+
+
+def write_error_map(error_map: ErrorMap, path: Path) -> None:
+    path.write_text(error_map_csv(error_map), encoding="utf-8")
 
 
 def check_positions(axis: str, positions: Sequence[float], places: Sequence[str], where: str) -> None:

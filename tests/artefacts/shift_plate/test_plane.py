@@ -10,8 +10,7 @@ import pytest
 from cmm_uq.artefacts.shift_axis.integration import KnownSpan
 from cmm_uq.artefacts.shift_plate.model import FreeInPlane, free_in_plane, plane_model
 from cmm_uq.artefacts.shift_plate.placed_plate import placed_plate
-from cmm_uq.artefacts.shift_plate.plane import PlaneEstimate, estimate_plane
-from cmm_uq.artefacts.shifting.correction_table import plane_correction_table
+from cmm_uq.artefacts.shift_plate.plane import PlaneEstimate, estimate_plane, plane_correction_table
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.machine.physics.compensation import compensate_points, machine_compensation
