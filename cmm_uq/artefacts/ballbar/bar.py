@@ -9,7 +9,7 @@ recording of Harris (2004, figures C 1 and C 2) carries them out; its position 1
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from math import hypot
 from typing import Any, cast
@@ -31,7 +31,7 @@ from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.planning.volume import Volume
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, bar_misfit, common_length, no_references, rows_by
 from cmm_uq.artefacts.distances import adjustment as adjustment_section
-from cmm_uq.artefacts.distances.adjustment import AdjustmentSetting, Lengths, lengths_of, settings
+from cmm_uq.artefacts.distances.adjustment import Lengths, lengths_of, settings
 from cmm_uq.artefacts.distances.equations import DistanceSolution, second_way_data, solve_distances
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
@@ -245,32 +245,19 @@ _PLACES = VolumeCandidates(along_lines, _shape, RelocatedCandidates(along_lines)
 PLANNING = Planning({"ASME B89.4.1": ballbar_positions}, _PLACES.candidates, _PLACES.elsewhere)
 
 
-@dataclass(frozen=True, eq=False)
-class BallbarFigures:
-    """Lengths against the certified one, or their mean; the budget of one; what to adjust, and the second way to it."""
-
-    lengths: Lengths
-    budget: Budget
-    settings: tuple[AdjustmentSetting, ...]
-    second_way: DistanceSolution | Text
-
-
-def figures(result: Result) -> BallbarFigures:
-    bar = cast("Ballbar", result.artefact)
+def _lengths(result: Result, bar: Ballbar) -> Lengths:
+    """Lengths against the certified one, or their mean."""
     lengths = bar.lengths()
-    reference = bar.sizes[0].nominal if bar.sizes[0].certified else float(lengths.mean())
-    return BallbarFigures(
-        lengths_of(result, lengths, reference), _budget(result, bar), settings(result), _second_way(result, bar)
-    )
+    return lengths_of(result, lengths, bar.sizes[0].nominal if bar.sizes[0].certified else float(lengths.mean()))
 
 
 def results(result: Result) -> dict[str, Any]:
-    found = figures(result)
+    bar = cast("Ballbar", result.artefact)
     return {
-        "lengths": found.lengths.as_data(),
-        "length_budget": budget_data(found.budget),
-        "adjustments": [setting.as_data() for setting in found.settings],
-        **second_way_data(found.second_way, result.at_least),
+        "lengths": _lengths(result, bar).as_data(),
+        "length_budget": budget_data(_budget(result, bar)),
+        "adjustments": [setting.as_data() for setting in settings(result)],
+        **second_way_data(_second_way(result, bar), result.at_least),
     }
 
 
@@ -314,8 +301,9 @@ _ROWS_SHOWN = 60
 
 
 def sections(result: Result) -> list[Section]:
-    found, size = figures(result), result.artefact.sizes[0]
-    lengths, name = found.lengths, (say("certified length") if size.certified else say("mean length"))
+    bar = cast("Ballbar", result.artefact)
+    size, lengths = bar.sizes[0], _lengths(result, bar)
+    name = say("certified length") if size.certified else say("mean length")
     deviations, residuals, expanded = lengths.deviation_um, lengths.residual_um, lengths.expanded_um
     plot = length_plot(
         lengths.measurement.astype(float),
@@ -336,11 +324,11 @@ def sections(result: Result) -> list[Section]:
             say("from the {name}", name=name), deviations, residuals, ".0f",
         ),
     )  # fmt: skip
-    volume = residual_volume(result, say("bars"))
+    volume, budget = residual_volume(result, say("bars")), _budget(result, bar)
     return [
         Section(say("Lengths"), (plot, volume, _table(lengths, name))),
-        Section(say("Budget of one length"), tuple(budget_blocks(say("the deviation of one length"), found.budget))),
-        adjustment_section.section(result, found.settings, found.second_way),
+        Section(say("Budget of one length"), tuple(budget_blocks(say("the deviation of one length"), budget))),
+        adjustment_section.section(result, settings(result), _second_way(result, bar)),
     ]
 
 
@@ -354,13 +342,9 @@ def _table(lengths: Lengths, name: Text) -> Table:
         place = numbered(lengths.measurement[i], lengths.repeat[i] if repeated else None)
         mark = say("set aside") if not lengths.used[i] else say("see warnings") if lengths.flagged[i] else NOTHING
         rows.append((place, shown, deviation, residual, mark))
-    columns = (
-        Column(say("Position"), numeric=False),
-        Column(say("Length"), unit("mm")),
-        Column(say("From the {name}", name=name), unit("µm")),
-        Column(say("Residual"), unit("µm")),
-        Column(say("Remark"), numeric=False),
-    )
+    columns: tuple[Column, ...] = (Column(say("Position"), numeric=False), Column(say("Length"), unit("mm")))
+    columns += (Column(say("From the {name}", name=name), unit("µm")), Column(say("Residual"), unit("µm")))
+    columns += (Column(say("Remark"), numeric=False),)
     left = len(lengths.length) - len(rows)
     note = say(
         "U = {U} µm (k = {k}) for each length, from the standard uncertainty of a coordinate and how well that is known.",

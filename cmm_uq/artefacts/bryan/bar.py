@@ -7,7 +7,7 @@ other).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -17,7 +17,7 @@ from cmm_uq.analysis.planning.setting import Planning, Setting, Start
 from cmm_uq.analysis.planning.volume import Volume
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, ball_misfit, no_references
 from cmm_uq.artefacts.distances import adjustment as adjustment_section
-from cmm_uq.artefacts.distances.adjustment import AdjustmentSetting, Lengths, lengths_of, settings
+from cmm_uq.artefacts.distances.adjustment import Lengths, lengths_of, settings
 from cmm_uq.artefacts.distances.equations import FACTORS, DistanceSolution, second_way_data, solve_distances
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, number, say
@@ -58,7 +58,7 @@ class Bryan(Radial):
         whole_job = np.zeros(len(points), dtype=np.int64)
         super().__init__(facts, points, Placings(whole_job, np.array([0])), expansion(facts, points), where)
 
-    def in_two_steps(self, method: str = "QR", xyz: Floats | None = None) -> tuple[DistanceSolution, Floats]:
+    def in_two_steps(self, xyz: Floats | None = None) -> tuple[DistanceSolution, Floats]:
         """The patent's way: centre, and the length if it is not certified, from the sphere (108); then e1 … e6 from (110).
 
         The sphere is fitted as if the machine had no errors, and bends to them: unless the swept positions surround the
@@ -72,7 +72,7 @@ class Bryan(Radial):
         centre = self.centres(readings, self.sizes[0].nominal if certified else None)[0]
         differences = readings - centre
         length = self.sizes[0].nominal
-        return solve_distances(differences, length * self.expansion, method), centre
+        return solve_distances(differences, length * self.expansion), centre
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
@@ -161,20 +161,10 @@ def _centre(artefact: Artefact) -> Floats:
 PLANNING = Planning({"swept bar": swept_bar}, candidates, elsewhere, shared=True)
 
 
-@dataclass(frozen=True, eq=False)
-class BryanFigures:
-    """Distances of the swept ball from the best centre against their mean, what to adjust, and the second way to it."""
-
-    lengths: Lengths
-    settings: tuple[AdjustmentSetting, ...]
-    second_way: DistanceSolution | Text
-
-
-def figures(result: Result) -> BryanFigures:
-    bar = cast("Bryan", result.artefact)
+def _distances(result: Result, bar: Bryan) -> Lengths:
+    """Distances of the swept ball from the best centre against their mean."""
     distances = bar.distances(bar.points.xyz, None) / bar.expansion
-    lengths = lengths_of(result, distances, float(distances.mean()))
-    return BryanFigures(lengths, settings(result), _second_way(result, bar))
+    return lengths_of(result, distances, float(distances.mean()))
 
 
 def _second_way(result: Result, bar: Bryan) -> DistanceSolution | Text:
@@ -194,11 +184,11 @@ def _second_way(result: Result, bar: Bryan) -> DistanceSolution | Text:
 
 
 def results(result: Result) -> dict[str, Any]:
-    found = figures(result)
+    bar = cast("Bryan", result.artefact)
     return {
-        "lengths": found.lengths.as_data(),
-        "adjustments": [setting.as_data() for setting in found.settings],
-        **second_way_data(found.second_way, result.at_least),
+        "lengths": _distances(result, bar).as_data(),
+        "adjustments": [setting.as_data() for setting in settings(result)],
+        **second_way_data(_second_way(result, bar), result.at_least),
     }
 
 
@@ -209,8 +199,8 @@ IN_TWO_STEPS = say(
 
 
 def sections(result: Result) -> list[Section]:
-    found = figures(result)
-    lengths = found.lengths
+    bar = cast("Bryan", result.artefact)
+    lengths = _distances(result, bar)
     deviations, residuals = lengths.deviation_um, lengths.residual_um
     plot = length_plot(
         lengths.measurement.astype(float),
@@ -232,7 +222,7 @@ def sections(result: Result) -> list[Section]:
     )  # fmt: skip
     return [
         Section(say("Distances"), (plot, residual_volume(result, say("swept positions")))),
-        adjustment_section.section(result, found.settings, found.second_way, IN_TWO_STEPS),
+        adjustment_section.section(result, settings(result), _second_way(result, bar), IN_TWO_STEPS),
     ]
 
 

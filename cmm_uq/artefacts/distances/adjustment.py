@@ -197,14 +197,9 @@ def _adjustments(settings: tuple[AdjustmentSetting, ...]) -> list[Block]:
         rows.append((setting.adjustment.what, value, U, setting.figure.unit, moved, needed))
     if not rows:
         return []
-    columns = (
-        Column(say("Adjustment"), numeric=False),
-        Column(say("Value")),
-        Column(say("U")),
-        Column(say("Unit"), numeric=False),
-        Column(say("Over the travel"), unit("µm")),
-        Column(say("Beyond doubt"), numeric=False),
-    )
+    columns: tuple[Column, ...] = (Column(say("Adjustment"), numeric=False), Column(say("Value")), Column(say("U")))
+    columns += (Column(say("Unit"), numeric=False), Column(say("Over the travel"), unit("µm")))
+    columns += (Column(say("Beyond doubt"), numeric=False),)
     notes = (
         say(
             "X stays; Y is turned square to X, then Z to both, about X first. Turns are right-handed about the named axis."
@@ -244,15 +239,9 @@ def _second_way(result: Result, solution: DistanceSolution | Text, remarks: tupl
         beside = (NOTHING, NOTHING) if model is None else expanded(next(iter(model.values())))[:2]
         beside = (say("not determined"), NOTHING) if effect in result.free else beside
         rows.append((name, value, U, k, *beside, unit("ppm") if i < 3 else unit("″")))
-    columns = (
-        Column(say("Factor"), numeric=False),
-        Column(say("Distance equations")),
-        Column(say("U")),
-        Column(say("k")),
-        Column(say("Fitted model")),
-        Column(say("U")),
-        Column(say("Unit"), numeric=False),
-    )
+    columns: tuple[Column, ...] = (Column(say("Factor"), numeric=False), Column(say("Distance equations")))
+    columns += (Column(say("U")), Column(say("k")), Column(say("Fitted model")), Column(say("U")))
+    columns += (Column(say("Unit"), numeric=False),)
     e = commas(say("e{i} = {e}", i=i, e=signed(v, ".3e")) for i, v in enumerate(solution.e, 1))
     sd = say("{residual_sd:.3g} µm", residual_sd=solution.residual_sd / MICROMETRE)
     notes = (

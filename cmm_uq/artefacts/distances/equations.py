@@ -3,15 +3,13 @@
     d² = (1+e1)dX² + 2e2 dXdY + 2e3 dXdZ + (1+e4)dY² + 2e5 dYdZ + (1+e6)dZ²                     (100), (110)
 
 A second way to the six factors, beside the measurement model: to first order e1, e4 and e6 are twice the scale errors, and e2,
-e3, e5 the squareness errors XY, ZX, YZ with the opposite sign. Doolittle's triangular factors and Jacobi's eigenvalues work on
-normal equations, whose condition number is the square; they are compared with an orthogonal factorisation, which is reported.
+e3, e5 the squareness errors XY, ZX, YZ with the opposite sign. The patent solves normal
+equations, whose condition number is the square; here they are solved by an orthogonal factorisation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -24,49 +22,6 @@ from cmm_uq.certificate.result import AtLeast, as_evaluated
 from cmm_uq.machine.physics.effects.rigid_body import SCALE, SQUARENESS
 from cmm_uq.maths.uncertainty.type_a import coverage_factor
 
-_SWEEPS = 30  # of Jacobi rotations; convergence is quadratic, and ten suffice for rounding accuracy at this size
-
-
-def by_doolittle(matrix: Floats, right: Floats) -> Floats:
-    """Solve by matrix = L·U with a unit diagonal in L, in order, without pivoting."""
-    n = len(matrix)
-    L, U = np.eye(n), np.zeros((n, n))
-    for i in range(n):
-        U[i, i:] = matrix[i, i:] - L[i, :i] @ U[:i, i:]
-        if U[i, i] == 0:
-            raise CmmUqError(f"normal equations: pivot {i + 1} is zero", fix="Record placings in more directions")
-        L[i + 1 :, i] = (matrix[i + 1 :, i] - L[i + 1 :, :i] @ U[:i, i]) / U[i, i]
-    return np.asarray(np.linalg.solve(U, np.linalg.solve(L, right)), dtype=np.float64)
-
-
-def by_jacobi(matrix: Floats, right: Floats) -> Floats:
-    """Solve by matrix = V·diag(values)·Vᵀ from Jacobi rotations."""
-    values, V = jacobi_eigenvalues(matrix)
-    if np.abs(values).min() <= np.finfo(np.float64).eps * np.abs(values).max():
-        raise CmmUqError("normal equations: an eigenvalue is zero", fix="Record placings in more directions")
-    return np.asarray(V @ ((V.T @ right) / values), dtype=np.float64)
-
-
-def jacobi_eigenvalues(matrix: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues (n,) and eigenvectors (n, n) of a symmetric matrix, by cyclic Jacobi rotations (Golub & Van Loan, 8.5)."""
-    A, n = matrix.astype(np.float64, copy=True), len(matrix)
-    V = np.eye(n)
-    for _ in range(_SWEEPS):
-        if np.linalg.norm(A - np.diag(np.diag(A))) <= np.finfo(np.float64).eps * np.linalg.norm(A):
-            break
-        for p, q in combinations(range(n), 2):
-            if A[p, q] == 0:
-                continue
-            half = (A[q, q] - A[p, p]) / (2 * A[p, q])
-            t = np.copysign(1.0, half) / (abs(half) + np.hypot(half, 1.0))
-            c = 1 / np.hypot(t, 1.0)
-            turn = np.array([[c, t * c], [-t * c, c]])
-            A[:, [p, q]] = A[:, [p, q]] @ turn
-            A[[p, q], :] = turn.T @ A[[p, q], :]
-            V[:, [p, q]] = V[:, [p, q]] @ turn
-    return np.diag(A).copy(), V
-
-
 UNKNOWNS = 6
 
 # effects that the equations give, with their parameters
@@ -76,13 +31,6 @@ FACTORS = tuple((effect.name, "ppm") for effect in SCALE.values()) + tuple(
 
 # ratio of singular values of the equations for unit distances below which a factor hangs on set-up and noise
 POORLY_POSED = 1e-3
-
-# orthogonal factorisation, which is reported, and the patent's two ways to solve its normal equations
-SOLUTIONS: dict[str, Callable[[Floats, Floats], Floats]] = {
-    "QR": lambda A, b: _by_qr(A, b),
-    "Doolittle": lambda A, b: by_doolittle(A.T @ A, A.T @ b),
-    "Jacobi": lambda A, b: by_jacobi(A.T @ A, A.T @ b),
-}
 
 PLACINGS: dict[Text, tuple[int, int, int]] = {
     say("along X"): (1, 0, 0), say("along Y"): (0, 1, 0), say("along Z"): (0, 0, 1),
@@ -196,7 +144,7 @@ def second_way_data(second_way: DistanceSolution | Text, at_least: AtLeast) -> d
     }
 
 
-def solve_distances(differences: Floats, distance: float | Floats, method: str = "QR") -> DistanceSolution:
+def solve_distances(differences: Floats, distance: float | Floats) -> DistanceSolution:
     """Solve equation 100 for e1 … e6 by least squares.
 
     ``differences`` (m, 3) readings of one position minus those of the other, mm; ``distance`` the known distance, one
@@ -208,11 +156,12 @@ def solve_distances(differences: Floats, distance: float | Floats, method: str =
     # divided by 2d, an equation is one of lengths: its noise is that of a length, the same for all
     A = quadratic_terms(differences) / (2 * d)[:, None]
     b = (d**2 - np.sum(differences**2, axis=1)) / (2 * d)
-    e = SOLUTIONS[method](A, b)
+    Q, R = np.linalg.qr(A)
+    e = np.asarray(np.linalg.solve(R, Q.T @ b), dtype=np.float64)
     residuals = b - A @ e
     freedom = len(b) - UNKNOWNS
     sd = float(np.sqrt(residuals @ residuals / freedom)) if freedom else 0.0
-    inverse = np.linalg.inv(np.linalg.qr(A, mode="r"))
+    inverse = np.linalg.inv(R)
     return DistanceSolution(e, sd**2 * inverse @ inverse.T, residuals, sd)
 
 
@@ -268,11 +217,6 @@ def refuse_poor_placings(differences: Floats) -> None:
             many=say("Add {count} placings: {wanted}", count=len(wanted), wanted=commas(wanted)),
         ),
     )
-
-
-def _by_qr(A: Floats, b: Floats) -> Floats:
-    Q, R = np.linalg.qr(A)
-    return np.asarray(np.linalg.solve(R, Q.T @ b), dtype=np.float64)
 
 
 def _cosines(e: Floats) -> Floats:

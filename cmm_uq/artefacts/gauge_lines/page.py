@@ -82,15 +82,9 @@ def _table(result: Result, found: tuple[LineFigures, ...]) -> Table:
         if both:
             row += _gap(one)
         rows.append(tuple(row))
-    columns = [
-        Column(say("Line"), numeric=False),
-        Column(say("Position"), numeric=False),
-        Column(say("Length"), unit("mm")),
-        Column(say("Faces")),
-        Column(say("Slope"), unit("µm/m")),
-        Column(say("U"), unit("µm/m")),
-        Column(say("Off slope"), unit("µm")),
-    ]
+    columns = [Column(say("Line"), numeric=False), Column(say("Position"), numeric=False)]
+    columns += [Column(say("Length"), unit("mm")), Column(say("Faces")), Column(say("Slope"), unit("µm/m"))]
+    columns += [Column(say("U"), unit("µm/m")), Column(say("Off slope"), unit("µm"))]
     notes = [
         say(
             "Slope: indicated minus certified distance, over the distance. Off slope: largest deviation "

@@ -231,95 +231,59 @@ _PLACES = VolumeCandidates(across_planes, _shape, RelocatedCandidates(across_pla
 PLANNING = Planning({"surface plate": surface_places}, _PLACES.candidates, _PLACES.elsewhere)
 
 
-@dataclass(frozen=True, eq=False)
-class PlaneFigures:
-    """One plane with what is uncertain of its surface."""
-
-    probed: ProbedPlane
-    coverage_factor: float
-
-    @property
-    def flatness_um(self) -> float | None:
-        """Range of the distances from the least-squares plane, µm; ``None`` of three points, which have none."""
-        return None if self.probed.flatness is None else self.probed.flatness / MICROMETRE
-
-    @property
-    def surface(self) -> SurfaceFigures | None:
-        return None if self.probed.surface is None else SurfaceFigures(self.probed.surface, self.coverage_factor)
-
-    def as_data(self) -> dict[str, Any]:
-        surface = self.surface
-        return {
-            "measurement": self.probed.measurement, "points": self.probed.count, "flatness_um": self.flatness_um,
-            "surface": None if surface is None else surface.as_data(),
-        }  # fmt: skip
+def _planes(result: Result) -> tuple[ProbedPlane, ...]:
+    return cast("PlaneSurface", result.artefact).probed(result.noise.coordinate.value * MICROMETRE)
 
 
-@dataclass(frozen=True, eq=False)
-class SurfaceFigures:
-    """A compensated surface with its uncertainty; k is that of the noise."""
-
-    surface: OffsetPlane
-    coverage_factor: float
-
-    @property
-    def expanded_across(self) -> float:
-        """U of its position along the normal, mm."""
-        normal = self.surface.normal
-        return self.coverage_factor * float(np.sqrt(normal @ self.surface.covariance[:3, :3] @ normal))
-
-    @property
-    def expanded_normal(self) -> float:
-        """U of the least certain component of the normal."""
-        return self.coverage_factor * float(np.sqrt(np.diag(self.surface.covariance)[3:].max()))
-
-    @property
-    def angle_deg(self) -> float:
-        return float(np.degrees(self.surface.angle))
-
-    def as_data(self) -> dict[str, Any]:
-        surface = self.surface
-        return {
-            "point_mm": surface.point.tolist(), "normal": surface.normal.tolist(),
-            "normal_reversed": surface.reversed, "approach_deg": self.angle_deg,
-            "U_across_um": self.expanded_across / MICROMETRE, "U_normal": self.expanded_normal, "k": self.coverage_factor,
-            "covariance": {
-                "parameters": ["x_mm", "y_mm", "z_mm", "nx", "ny", "nz"], "units": ["mm"] * 3 + ["1"] * 3,
-                "matrix": surface.covariance.tolist(),
-            },
-        }  # fmt: skip
+def _expanded(surface: OffsetPlane, factor: float) -> tuple[float, float]:
+    """U of a surface's position along the normal, mm, and of the least certain component of the normal."""
+    across = factor * float(np.sqrt(surface.normal @ surface.covariance[:3, :3] @ surface.normal))
+    return across, factor * float(np.sqrt(np.diag(surface.covariance)[3:].max()))
 
 
-def figures(result: Result) -> tuple[PlaneFigures, ...]:
-    plane, noise = cast("PlaneSurface", result.artefact), result.noise.coordinate.value * MICROMETRE
-    return tuple(PlaneFigures(one, result.noise.coverage_factor) for one in plane.probed(noise))
+def _surface_data(surface: OffsetPlane, factor: float) -> dict[str, Any]:
+    across, of_normal = _expanded(surface, factor)
+    return {
+        "point_mm": surface.point.tolist(), "normal": surface.normal.tolist(),
+        "normal_reversed": surface.reversed, "approach_deg": float(np.degrees(surface.angle)),
+        "U_across_um": across / MICROMETRE, "U_normal": of_normal, "k": factor,
+        "covariance": {
+            "parameters": ["x_mm", "y_mm", "z_mm", "nx", "ny", "nz"], "units": ["mm"] * 3 + ["1"] * 3,
+            "matrix": surface.covariance.tolist(),
+        },
+    }  # fmt: skip
 
 
 def results(result: Result) -> dict[str, Any]:
-    return {"planes": [one.as_data() for one in figures(result)]}
-
-
-def off_plane_um(plane: PlaneSurface) -> Floats:
-    """(n,) distance of each point of contact from its least-squares plane, µm."""
-    return plane.off_plane() / MICROMETRE
+    factor = result.noise.coverage_factor
+    return {
+        "planes": [
+            {
+                "measurement": plane.measurement, "points": plane.count,
+                "flatness_um": None if plane.flatness is None else plane.flatness / MICROMETRE,
+                "surface": None if plane.surface is None else _surface_data(plane.surface, factor),
+            }
+            for plane in _planes(result)
+        ]
+    }  # fmt: skip
 
 
 def sections(result: Result) -> list[Section]:
     plane = cast("PlaneSurface", result.artefact)
-    probed = figures(result)
+    probed = _planes(result)
     blocks: list[Block] = [_flatness(result, probed), _by_point(result, plane), residual_volume(result, say("points"))]
     if any(one.surface is not None for one in probed):
         blocks.insert(1, _surfaces(result, probed))
     return [Section(say("The plane"), tuple(blocks))]
 
 
-def _flatness(result: Result, probed: tuple[PlaneFigures, ...]) -> Table:
+def _flatness(result: Result, probed: tuple[ProbedPlane, ...]) -> Table:
     noise = result.noise.coordinate.value
     rows = tuple(
         (
-            number(one.probed.measurement),
-            number(one.probed.count),
-            (say("–") if one.flatness_um is None else rounded(one.flatness_um, noise)[0]),
+            number(one.measurement),
+            number(one.count),
+            (say("–") if one.flatness is None else rounded(one.flatness / MICROMETRE, noise)[0]),
         )
         for one in probed
     )
@@ -328,23 +292,20 @@ def _flatness(result: Result, probed: tuple[PlaneFigures, ...]) -> Table:
     return Table(say("Flatness as recorded"), columns, rows, (note,))
 
 
-def _surfaces(result: Result, probed: tuple[PlaneFigures, ...]) -> Table:
+def _surfaces(result: Result, probed: tuple[ProbedPlane, ...]) -> Table:
     rows: list[tuple[Text, ...]] = []
     for one in probed:
-        if (found := one.surface) is None:
+        if (surface := one.surface) is None:
             continue
-        across, surface = found.expanded_across, found.surface
+        across, of_normal = _expanded(surface, result.noise.coverage_factor)
         place = in_a_row(rounded(float(v), across)[0] for v in surface.point)
-        normal = in_a_row(rounded(float(v), max(found.expanded_normal, 2e-9))[0] for v in surface.normal)
+        normal = in_a_row(rounded(float(v), max(of_normal, 2e-9))[0] for v in surface.normal)
         U = rounded(0.0, across / MICROMETRE)[1]
-        rows.append((number(one.probed.measurement), place, normal, U, number(found.angle_deg, ".0f")))
-    columns = (
-        Column(say("Measurement"), numeric=False),
-        Column(say("Point of the surface"), unit("mm"), numeric=False),
-        Column(say("Outward normal"), numeric=False),
-        Column(say("U across"), unit("µm")),
-        Column(say("Approach"), unit("°")),
-    )
+        rows.append((number(one.measurement), place, normal, U, number(float(np.degrees(surface.angle)), ".0f")))
+    columns: tuple[Column, ...] = (Column(say("Measurement"), numeric=False),)
+    columns += (Column(say("Point of the surface"), unit("mm"), numeric=False),)
+    columns += (Column(say("Outward normal"), numeric=False), Column(say("U across"), unit("µm")))
+    columns += (Column(say("Approach"), unit("°")),)
     notes = (
         say(
             "The plane of the probe's centre, moved by the probe's offset against the normal that points "
@@ -357,7 +318,7 @@ def _surfaces(result: Result, probed: tuple[PlaneFigures, ...]) -> Table:
 
 
 def _by_point(result: Result, plane: PlaneSurface) -> Block:
-    off = off_plane_um(plane)
+    off = plane.off_plane() / MICROMETRE
     residuals, expanded = result.residuals / MICROMETRE, result.noise.expanded
     low, high, low_after, high_after = alike(off.min(), off.max(), residuals.min(), residuals.max())
     return length_plot(

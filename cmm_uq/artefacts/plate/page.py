@@ -225,14 +225,9 @@ def _table(result: Result, found: PlateFigures) -> Table:
     for one in found.spread:
         sizes = (one.rms_before_um, one.largest_before_um, one.rms_after_um, one.largest_after_um)
         rows.append((number(one.measurement), number(one.count), *(rounded(size, noise)[0] for size in sizes)))
-    columns = (
-        Column(say("Placing"), numeric=False),
-        Column(say("Balls")),
-        Column(say("rms before"), unit("µm")),
-        Column(say("Largest before"), unit("µm")),
-        Column(say("rms after"), unit("µm")),
-        Column(say("Largest after"), unit("µm")),
-    )
+    columns: tuple[Column, ...] = (Column(say("Placing"), numeric=False), Column(say("Balls")))
+    columns += (Column(say("rms before"), unit("µm")), Column(say("Largest before"), unit("µm")))
+    columns += (Column(say("rms after"), unit("µm")), Column(say("Largest after"), unit("µm")))
     note = say(
         "Coordinates of every ball minus its reference position, before and after the fitted model; "
         "the placing is fitted."

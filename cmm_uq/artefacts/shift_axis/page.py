@@ -131,12 +131,8 @@ def curve_section(result: ShiftResult) -> Section:
         )
         for x, e, one, band in _sparse(curve.position, curve.error, result.stated_along(curve), curve.band)
     )
-    columns = (
-        Column(say("Reading"), unit("mm")),
-        Column(say("Error"), unit("µm")),
-        Column(say("U"), unit("µm")),
-        Column(say("Band"), unit("µm")),
-    )
+    columns: tuple[Column, ...] = (Column(say("Reading"), unit("mm")), Column(say("Error"), unit("µm")))
+    columns += (Column(say("U"), unit("µm")), Column(say("Band"), unit("µm")))
     notes = (
         SIGN,
         say("U: 95 % at that position; band: half width of the band for the whole curve, k = {k:.2f}.", k=k),
@@ -190,15 +186,9 @@ def beside_integrations(result: ShiftResult) -> tuple[Table, ...]:
         (number(x[0], ".3f"), *(number(v / MICROMETRE, ".2f") for v in x[1:]))
         for x in _sparse(joint.position, *(v for c in curves for v in (c.error, c.u)), joint.error, joint.u)
     )
-    columns = (
-        Column(say("Reading"), unit("mm")),
-        Column(say("Integrated"), unit("µm")),
-        Column(say("u"), unit("µm")),
-        Column(say("Improved"), unit("µm")),
-        Column(say("u"), unit("µm")),
-        Column(say("Joint fit"), unit("µm")),
-        Column(say("u"), unit("µm")),
-    )
+    columns: tuple[Column, ...] = (Column(say("Reading"), unit("mm")), Column(say("Integrated"), unit("µm")))
+    columns += (Column(say("u"), unit("µm")), Column(say("Improved"), unit("µm")), Column(say("u"), unit("µm")))
+    columns += (Column(say("Joint fit"), unit("µm")), Column(say("u"), unit("µm")))
     notes = (
         say(
             "Integrated: sum of local slopes, improved: with slopes of both neighbours (Shimizu, Kiyono "
@@ -346,11 +336,8 @@ def _artefact(result: ShiftResult) -> Section:
             (number(n), *(rounded(x, U) if U > 0 else (number(x, ".4f"), Number("0"))))
             for n, x, _, U in zip(estimate.series.numbers, *result.distances, strict=True)
         )
-        columns = (
-            Column(say("Point")),
-            Column(say("Distance from the first"), unit("mm")),
-            Column(say("U"), unit("mm")),
-        )
+        columns: tuple[Column, ...] = (Column(say("Point")), Column(say("Distance from the first"), unit("mm")))
+        columns += (Column(say("U"), unit("mm")),)
         note = say("U is for a coverage probability of 95 %, from the posterior distribution.")
         blocks.append(Table(say("The artefact's own dimensions"), columns, cells[:MOST_ROWS], (note,)))
     return artefact_section(result.job, say("Uncalibrated artefact, shifted"), say("points"), rows, *blocks)

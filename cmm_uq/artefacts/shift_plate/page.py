@@ -315,13 +315,9 @@ def _placings(result: PlaneShiftResult) -> Section:
             plate.placings, plate.turned_deg, plate.middles, plate.counts, strict=True
         )
     )
-    columns = (
-        Column(say("Placing")),
-        Column(say("Turned"), unit("°")),
-        Column(say("Middle {plane}", plane=Verbatim(plate.plane[0])), unit("mm")),
-        Column(say("Middle {plane}", plane=Verbatim(plate.plane[1])), unit("mm")),
-        Column(say("Balls")),
-    )
+    columns: tuple[Column, ...] = (Column(say("Placing")), Column(say("Turned"), unit("°")))
+    columns += (Column(say("Middle {plane}", plane=Verbatim(plate.plane[0])), unit("mm")),)
+    columns += (Column(say("Middle {plane}", plane=Verbatim(plate.plane[1])), unit("mm")), Column(say("Balls")))
     return Section(say("Placings"), (Table(say("Placings, as found from the readings"), columns, rows),))
 
 
@@ -334,13 +330,8 @@ def _plate(result: PlaneShiftResult) -> Section:
             (number(ball), *(text for x, s in zip(place, spread, strict=True) for text in _coordinate(x, s)))
             for ball, place, spread in zip(estimate.plate.numbers, mean, expanded_places, strict=True)
         )
-        columns = (
-            Column(say("Ball")),
-            Column(say("First"), unit("mm")),
-            Column(say("U"), unit("mm")),
-            Column(say("Second"), unit("mm")),
-            Column(say("U"), unit("mm")),
-        )
+        columns: tuple[Column, ...] = (Column(say("Ball")), Column(say("First"), unit("mm")))
+        columns += (Column(say("U"), unit("mm")), Column(say("Second"), unit("mm")), Column(say("U"), unit("mm")))
         note: Text = say(
             "From the first ball, along the axes as the plate lay in the first placing. U, for a coverage probability of "
             "95 %, is of the best fit of all balls."

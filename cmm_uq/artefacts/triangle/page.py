@@ -219,12 +219,8 @@ def _standard(standard: StandardFigures) -> Table:
         shown = rounded(degrees(angle), degrees(spread))[0]
         rows.append((say("Angle at {i}", i=i), shown, say("{U}″", U=rounded(0.0, spread / ARCSECOND)[1]), unit("°")))
     rows.append((say("Height over side 1–2"), *rounded(*standard.height), unit("mm")))
-    columns = (
-        Column(say("Quantity"), numeric=False),
-        Column(say("Value")),
-        Column(say("U")),
-        Column(say("Unit"), numeric=False),
-    )
+    columns: tuple[Column, ...] = (Column(say("Quantity"), numeric=False), Column(say("Value")), Column(say("U")))
+    columns += (Column(say("Unit"), numeric=False),)
     note = say(
         "U for a coverage probability of 95 % by Monte Carlo, {draws} draws of the dimensions of blocks and cylinders; "
         "angles by the cosine rule.",
@@ -268,14 +264,8 @@ def _two_ways(result: Result, equations: tuple[ByEquations, ...] | Text) -> list
             quantity = next(iter(result.parameters[one.effect].values()))
             fitted = (say("not determined"), NOTHING) if one.effect in result.free else expanded(quantity)[:2]
         rows.append((one.title, value, U, *fitted, one.unit))
-    columns = (
-        Column(say("Parameter"), numeric=False),
-        Column(say("Equations")),
-        Column(say("U")),
-        Column(say("Fitted model")),
-        Column(say("U")),
-        Column(say("Unit"), numeric=False),
-    )
+    columns: tuple[Column, ...] = (Column(say("Parameter"), numeric=False), Column(say("Equations")), Column(say("U")))
+    columns += (Column(say("Fitted model")), Column(say("U")), Column(say("Unit"), numeric=False))
     notes = (
         say(
             "Equations: one after the other from the sides of aligned placings (Manlay, Fast checking of "
