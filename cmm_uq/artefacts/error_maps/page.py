@@ -12,7 +12,6 @@ from cmm_uq.artefacts.error_maps.words import VERDICTS, difference_words, next_w
 from cmm_uq.base.messages import Text, Verbatim, commas, day, lines, names, number, say
 from cmm_uq.certificate.diagnosis.overview import held_out, summary_of, sure
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
-from cmm_uq.certificate.effect_words import effect_of, size_of, titles
 from cmm_uq.certificate.outcome import Outcome, OwnAnalysis, Recipe
 from cmm_uq.certificate.plots.residuals import curve_with_band
 from cmm_uq.certificate.plots.style import lettered_in

@@ -20,8 +20,7 @@ from cmm_uq.base.messages import (
 )
 from cmm_uq.certificate.diagnosis.overview import STANDING, gained, share_of
 from cmm_uq.certificate.document import Overview
-from cmm_uq.certificate.effect_words import effect_of, size_of, title_of
-from cmm_uq.certificate.wording import probability
+from cmm_uq.certificate.wording import effect_of, effect_title, probability, size_of
 
 VERDICTS: Mapping[str, Text] = {
     "consistent": say("The maps agree with each other within their noise."),

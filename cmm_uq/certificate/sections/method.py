@@ -8,7 +8,7 @@ from cmm_uq.certificate.diagnosis.overview import VERDICTS
 from cmm_uq.certificate.document import Facts, Paragraph, Section
 from cmm_uq.certificate.plots.corner import corner_plot
 from cmm_uq.certificate.result import RecordingNoise, Result
-from cmm_uq.certificate.wording import title_of
+from cmm_uq.certificate.wording import title_of, with_uncertainty
 from cmm_uq.machine.model.artefact_doubt import CALIBRATION
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.inference.ensembles import Chains
