@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks.coverage.stated_doubt import held, recorded
 from cmm_uq.app.commands.report import analyse
-from cmm_uq.artefacts.ballbar.bar import figures as bar_figures
+from cmm_uq.artefacts.ballbar.bar import results as bar_results
 from cmm_uq.artefacts.gauge_lines.analysis import figures
 from cmm_uq.certificate.result import Result
 from cmm_uq.machine.model.artefact_doubt import CALIBRATION
@@ -63,7 +63,7 @@ def test_figures_of_a_bar_and_the_second_way_have_it_too(place: Path) -> None:
     assert after.accuracy["b89_range_um"].u > before.accuracy["b89_range_um"].u
     assert {cause.name for cause in after.causes} == {"fixturing of the artefact"}
     assert after.relative_doubt == pytest.approx(30e-3 / after.artefact.sizes[0].nominal, rel=1e-3)
-    assert bar_figures(after).second_way is not None
+    assert "distance_equations" in bar_results(after)
 
 
 def test_a_difference_of_scales_has_what_each_set_up_errs_by(place: Path) -> None:
