@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import gc
+import inspect
 import os
 import shutil
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
+from functools import cache
 from pathlib import Path
+from types import CodeType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,8 +66,46 @@ def pytest_make_collect_report(
     return report
 
 
+STARTERS = {
+    "browser": {"browser"},
+    "server": {"RecordsServer", "serving", "mail_server", "web_server", "hanging_server", "get_server", "NotebookClient"},
+    "process": {"Popen", "subprocess.run", "ProcessPoolExecutor", "fork", "openpty", "get_server", "NotebookClient"},
+}  # fmt: skip
+"""What a test that starts a browser, a server or a process names, or what it calls does: such tests are marked so."""
+
+
+@cache
+def names_in(function: Callable[..., object]) -> frozenset[str]:
+    """Names in the code of a function, and of all that it calls of the tests and the benchmarks."""
+    found, left = set[str](), [inspect.unwrap(function)]
+    seen = set(left)
+    while left:
+        function = left.pop()
+        codes = [function.__code__]
+        for code in codes:
+            codes += [const for const in code.co_consts if isinstance(const, CodeType)]
+            found |= {*code.co_names, *(["subprocess.run"] if {"subprocess", "run"} <= {*code.co_names} else [])}
+        named = {name for code in codes for name in code.co_names}
+        values = [function.__globals__.get(name) for name in named]
+        values += [vars(value).get(name) for value in values if inspect.ismodule(value) for name in named]
+        called = {inspect.unwrap(value) for value in values if inspect.isfunction(value)} - seen
+        left += [each for each in called if each.__module__.startswith(("tests", "benchmarks"))]
+        seen |= called
+    return frozenset(found)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files that take longest; those of a folder otherwise stay in their order, in every worker."""
+    """Mark what starts a browser, a server or a process, and begin with the files that take longest.
+
+    Files of a folder otherwise stay in their order, in every worker.
+    """
+    for item in items:
+        if isinstance(item, pytest.Function):
+            fixtures = [made[-1].func for made in item._fixtureinfo.name2fixturedefs.values()]
+            named = {*item.fixturenames, *(name for each in (item.function, *fixtures) for name in names_in(each))}
+            for mark, starters in STARTERS.items():
+                if named & starters:
+                    item.add_marker(mark)
     first = {ROOT / "tests" / name: place for place, name in enumerate(LONG)}
     items.sort(key=lambda item: (first.get(item.path, len(LONG)), item.path.parts))
 
