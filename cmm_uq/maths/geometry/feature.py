@@ -78,10 +78,8 @@ class Feature:
             problem = f"{what}: u_point = {u_point} is no standard uncertainty"
             raise CmmUqError(problem, fix="Give a positive number, mm")
         if u_point is None and freedom < 1:
-            raise CmmUqError(
-                f"{what}: so few points leave nothing to estimate their uncertainty from",
-                fix="Measure more points, or give the standard uncertainty of a point (u_point)",
-            )
+            fix = "Measure more points, or give the standard uncertainty of a point (u_point)"
+            raise CmmUqError(f"{what}: so few points leave nothing to estimate their uncertainty from", fix=fix)
         u = float(np.sqrt(np.sum(distances**2) / freedom)) if u_point is None else float(u_point)
         return cls(
             names=tuple(names.split()),
@@ -142,10 +140,8 @@ def with_known_radius(feature: Round, radius: float) -> Round:
     """Refuse a radius known to less than a quarter of itself: within their scatter the points are as good as flat."""
     what = type(feature).__name__.lower()
     if not feature.u("r") < radius / 4:
-        raise CmmUqError(
-            f"{what}: the points do not determine its radius (r = {radius:.6g} mm, u = {feature.u('r'):.2g} mm)",
-            fix=f"Cover more of the {what}",
-        )
+        problem = f"{what}: the points do not determine its radius (r = {radius:.6g} mm, u = {feature.u('r'):.2g} mm)"
+        raise CmmUqError(problem, fix=f"Cover more of the {what}")
     return feature
 
 

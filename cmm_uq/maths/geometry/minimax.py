@@ -133,11 +133,6 @@ def _newton(rows: Rows, start: Floats, near: float, exact: float, redundant: boo
         if size <= exact and size > 0.1 * last:
             break
         last = size
-    return _judged(rows, state, contacts, multipliers, exact)
-
-
-def _judged(rows: Rows, state: Floats, contacts: Ints, multipliers: Floats, exact: float) -> Extremum:
-    c, A = rows(state)
     met = (
         np.linalg.norm(multipliers @ A[contacts]) < 10 * exact
         and multipliers.min() >= -exact

@@ -97,10 +97,8 @@ def minimise(
         # the more of the expected gain came true, the less damping (Nielsen 1999); none where the model holds well
         damping *= max(1 / 3, 1 - (2 * gain / expected - 1) ** 3) if expected > 0 else 1 / 3
         last, damping, rise = size, damping if damping > 1e-9 else 0.0, 2.0
-    raise CmmUqError(
-        f"{what}: the fit does not settle on these {rows.shape[1]} points",
-        fix=f"Cover more of the {what} (k = {k} parameters), and remove points that are not on it",
-    )
+    fix = f"Cover more of the {what} (k = {k} parameters), and remove points that are not on it"
+    raise CmmUqError(f"{what}: the fit does not settle on these {rows.shape[1]} points", fix=fix)
 
 
 def _step(R: Floats, damping: float) -> tuple[Floats, float]:

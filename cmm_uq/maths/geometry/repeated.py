@@ -253,10 +253,8 @@ class Repeated:
             if not np.isfinite(largest).all():
                 break
         draw = first + int(np.argmax(np.where(np.isfinite(largest), largest, np.inf))) + 1
-        raise CmmUqError(
-            f"{self.placed.shape.name}: draw {draw} does not settle",
-            fix="Draw errors that are small against the feature, or cover more of it",
-        )
+        fix = "Draw errors that are small against the feature, or cover more of it"
+        raise CmmUqError(f"{self.placed.shape.name}: draw {draw} does not settle", fix=fix)
 
     def _drawn(self, state: Floats, form: Floats) -> Drawn:
         of = self.placed

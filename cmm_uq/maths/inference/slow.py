@@ -192,13 +192,17 @@ def root(function: Callable[[float], float], low: float, high: float, tolerance:
         least, half = (tolerance + _RELATIVE * abs(now)) / 2, (far - now) / 2
         if not at_now or abs(half) < least:
             return now
-        tried = None
-        if abs(last) > least and abs(at_now) < abs(at_before):
-            tried = _interpolated(before, now, far, at_before, at_now, at_far)
-        if tried is not None and 2 * abs(tried) < min(abs(last), 3 * abs(half) - least):
-            last, step = step, tried
-        else:
-            last = step = half
+        last, step, earlier = half, half, (last, step)
+        if abs(earlier[0]) > least and abs(at_now) < abs(at_before):
+            if before == far:  # zero of a line through two of the values
+                tried = -at_now * (now - before) / (at_now - at_before)
+            else:  # of the inverse quadratic function through three
+                to_before, to_far = (at_before - at_now) / (before - now), (at_far - at_now) / (far - now)
+                tried = (
+                    -at_now * (at_far * to_far - at_before * to_before) / (to_far * to_before * (at_far - at_before))
+                )
+            if 2 * abs(tried) < min(abs(earlier[0]), 3 * abs(half) - least):
+                last, step = earlier[1], tried
         before, at_before = now, at_now
         now += step if abs(step) > least else copysign(least, half)
         at_now = _value(function, now)
@@ -214,12 +218,3 @@ def _value(function: Callable[[float], float], place: float) -> float:
 
 def _opposite(a: float, b: float) -> bool:
     return copysign(1.0, a) != copysign(1.0, b)
-
-
-def _interpolated(before: float, now: float, far: float, at_before: float, at_now: float, at_far: float) -> float:
-    """Step to the zero of a line through two of the values, or of the inverse quadratic function through three."""
-    if before == far:
-        return -at_now * (now - before) / (at_now - at_before)
-    to_before = (at_before - at_now) / (before - now)
-    to_far = (at_far - at_now) / (far - now)
-    return -at_now * (at_far * to_far - at_before * to_before) / (to_far * to_before * (at_far - at_before))

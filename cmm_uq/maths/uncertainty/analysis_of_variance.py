@@ -82,10 +82,8 @@ def one_way(readings: Sequence[float] | Floats, group: Sequence[int] | Ints) -> 
     values, of = np.asarray(readings, dtype=np.float64), np.asarray(group)
     names, counts = np.unique(of, return_counts=True)
     if len(names) < 2 or counts.min() < 2 or counts.min() != counts.max():
-        raise CmmUqError(
-            f"{len(names)} groups with {', '.join(map(str, counts.tolist()))} readings",
-            fix="Give two groups at least, and as many readings in each, two at least",
-        )
+        fix = "Give two groups at least, and as many readings in each, two at least"
+        raise CmmUqError(f"{len(names)} groups with {', '.join(map(str, counts.tolist()))} readings", fix=fix)
     table = np.array([values[of == name] for name in names])
     groups, repeats = table.shape
     means = table.mean(axis=1)

@@ -151,11 +151,9 @@ def _copula(names: Sequence[str], inputs: Sequence[Distribution], matrix: Floats
         r = _underlying_correlation((names[i], inputs[i]), (names[j], inputs[j]), matrix[i, j])
         underlying[i, j] = underlying[j, i] = r
     if np.linalg.eigvalsh(underlying)[0] < -1e-9:
-        raise CmmUqError(
-            f"the correlations of {', '.join(names)} cannot be had together with their distributions",
-            where="correlation",
-            fix="Describe them by a joint sample, or by quantities that are independent",
-        )
+        problem = f"the correlations of {', '.join(names)} cannot be had together with their distributions"
+        fix = "Describe them by a joint sample, or by quantities that are independent"
+        raise CmmUqError(problem, where="correlation", fix=fix)
     root = square_root(underlying)
 
     def draw(rng: np.random.Generator, n: int) -> list[Floats]:

@@ -203,10 +203,8 @@ def smallest_region(draws: Floats, coverage: float = 0.95, cells: int = 60) -> S
     """
     check_coverage(coverage)
     if len(draws) != 2 or draws.shape[1] < 100 * cells:
-        raise CmmUqError(
-            f"{draws.shape[1]} draws of {len(draws)} outputs for a mesh of {cells} × {cells} cells",
-            fix="It takes two outputs and more draws, or fewer cells",
-        )
+        problem = f"{draws.shape[1]} draws of {len(draws)} outputs for a mesh of {cells} × {cells} cells"
+        raise CmmUqError(problem, fix="It takes two outputs and more draws, or fewer cells")
     counts, x, y = np.histogram2d(draws[0], draws[1], bins=cells)
     fullest = np.argsort(-counts, axis=None, kind="stable")
     held = np.cumsum(counts.ravel()[fullest])

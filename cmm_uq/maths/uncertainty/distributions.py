@@ -5,22 +5,106 @@ takes), its ``dof`` (how well ``u`` itself is known) and its ``standard_deviatio
 and the standard deviation differ where ``u`` is itself in doubt: there the law of propagation counts the doubt as
 degrees of freedom (JCGM 100:2008 G.4.2) and Monte Carlo as width, each once. So a t distribution has u = s/√n and the
 standard deviation u√(ν/(ν−2)), and a rectangular one with uncertain limits has the u of its mean width.
+
+A shape is a distribution without place and size (JCGM 101:2008 6.4); a bounded one lies between −1 and 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.uncertainty import shapes
-from cmm_uq.maths.uncertainty.shapes import DistributionShape
 
 Number = float | Floats  # or an array (n,) with one entry a point, where only the law of propagation is asked for
+_BISECTIONS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class DistributionShape:
+    variance: float
+    draw: Callable[[np.random.Generator, int], Floats]  # n values
+    inverse: Callable[[Floats], Floats]  # value below which the probability is p
+
+
+POINT = DistributionShape(0.0, lambda _, n: np.zeros(n), np.zeros_like)
+NORMAL = DistributionShape(1.0, lambda rng, n: rng.standard_normal(n), special.ndtri)
+RECTANGULAR = DistributionShape(1 / 3, lambda rng, n: 2 * rng.random(n) - 1, lambda p: 2 * p - 1)
+TRIANGULAR = DistributionShape(
+    1 / 6,
+    lambda rng, n: rng.random(n) + rng.random(n) - 1,
+    lambda p: np.where(p < 0.5, np.sqrt(2 * p) - 1, 1 - np.sqrt(2 * (1 - p))),
+)
+ARCSINE = DistributionShape(
+    1 / 2, lambda rng, n: np.sin(2 * np.pi * rng.random(n)), lambda p: np.sin(np.pi * (p - 0.5))
+)
+EXPONENTIAL = DistributionShape(1.0, lambda rng, n: rng.standard_exponential(n), lambda p: -np.log1p(-p))
+
+
+def t_shape(dof: float) -> DistributionShape:
+    """T distribution; of infinite variance with two degrees of freedom or fewer."""
+    variance = dof / (dof - 2) if dof > 2 else np.inf
+    return DistributionShape(
+        variance, lambda rng, n: rng.standard_t(dof, n), lambda p: np.asarray(special.stdtrit(dof, p))
+    )
+
+
+def gamma_shape(order: float) -> DistributionShape:
+
+    return DistributionShape(
+        order, lambda rng, n: rng.standard_gamma(order, n), lambda p: np.asarray(special.gammaincinv(order, p))
+    )
+
+
+def trapezoid(beta: float) -> DistributionShape:
+    """Trapezoid whose top is ``beta`` times its base."""
+
+    def inverse(p: Floats) -> Floats:
+        tail = np.minimum(p, 1 - p)
+        slope = 1 - np.sqrt(2 * tail * (1 - beta**2))
+        top = (1 + beta) * (0.5 - tail)
+        return np.sign(p - 0.5) * np.where(tail < (1 - beta) / (2 * (1 + beta)), slope, top)
+
+    def draw(rng: np.random.Generator, n: int) -> Floats:
+        return (1 + beta) * rng.random(n) + (1 - beta) * rng.random(n) - 1
+
+    return DistributionShape((1 + beta**2) / 6, draw, inverse)
+
+
+def blurred_rectangle(doubt: float) -> DistributionShape:
+    """Rectangle whose half-width is itself rectangular between 1 − doubt and 1 + doubt (curvilinear trapezoid)."""
+
+    def beyond(x: Floats) -> Floats:
+        """Probability of more than x, 1 − doubt ≤ x: that of a rectangle, averaged over its half-width."""
+        return np.asarray((1 + doubt - x - x * np.log((1 + doubt) / x)) / (4 * doubt))
+
+    def inverse(p: Floats) -> Floats:
+        tail = np.minimum(p, 1 - p)
+        straight = (0.5 - tail) * 4 * doubt / np.log((1 + doubt) / (1 - doubt))
+        low, high = np.full(np.shape(tail), 1 - doubt), np.full(np.shape(tail), 1 + doubt)
+        for _ in range(_BISECTIONS):
+            x = (low + high) / 2
+            inside = beyond(x) > tail
+            low, high = np.where(inside, x, low), np.where(inside, high, x)
+        return np.asarray(np.sign(p - 0.5) * np.where(straight <= 1 - doubt, straight, low))
+
+    def draw(rng: np.random.Generator, n: int) -> Floats:
+        return (1 + doubt * (2 * rng.random(n) - 1)) * (2 * rng.random(n) - 1)
+
+    return DistributionShape((1 + doubt**2 / 3) / 3, draw, inverse)
+
+
+def empirical(draws: Floats) -> DistributionShape:
+    return DistributionShape(
+        float(np.var(draws, ddof=1)),
+        lambda rng, n: draws[rng.integers(len(draws), size=n)],
+        lambda p: np.quantile(draws, p, method="inverted_cdf"),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +130,8 @@ class Distribution:
     @property
     def _shape(self) -> DistributionShape:
         if self.shape is None:
-            raise CmmUqError(
-                "degrees of freedom that differ from point to point cannot be drawn",
-                fix="Ask for Monte Carlo at one point at a time",
-            )
+            fix = "Ask for Monte Carlo at one point at a time"
+            raise CmmUqError("degrees of freedom that differ from point to point cannot be drawn", fix=fix)
         return self.shape
 
     def sample(self, rng: np.random.Generator, n: int) -> Floats:
@@ -62,7 +144,7 @@ class Distribution:
 
 def constant(value: Number) -> Distribution:
     _finite(value=value)
-    return Distribution("constant", value, 0.0, value, 1.0, shapes.POINT)
+    return Distribution("constant", value, 0.0, value, 1.0, POINT)
 
 
 def normal(value: Number, u: Number, dof: Number = np.inf) -> Distribution:
@@ -82,7 +164,7 @@ def rectangular(low: Number, high: Number, dof: Number = np.inf) -> Distribution
     1/√(2 dof) of JCGM 100 G.4.2.
     """
     if np.all(np.isinf(dof)):
-        return _bounded("rectangular", low, high, dof, shapes.RECTANGULAR, 1 / 3)
+        return _bounded("rectangular", low, high, dof, RECTANGULAR, 1 / 3)
     _limits(low, high, dof)
     return rectangular_uncertain(low, high, (np.asarray(high) - low) / 2 / np.sqrt(2 * np.asarray(dof)), dof)
 
@@ -99,32 +181,32 @@ def rectangular_uncertain(low: Number, high: Number, limit: Number, dof: Number 
     _need(np.asarray(limit) < half_width, overlap, "The doubt must be below half the width")
     doubt = limit / half_width
     nu = np.maximum(1.0, 0.5 / doubt**2) if dof is None else dof
-    shape = shapes.rectangular_uncertain(float(doubt)) if np.ndim(doubt) == 0 else None
+    shape = blurred_rectangle(float(doubt)) if np.ndim(doubt) == 0 else None
     return _bounded("rectangular_uncertain", low, high, nu, shape, 1 / 3, limit=limit)
 
 
 def triangular(low: Number, high: Number, dof: Number = np.inf) -> Distribution:
     """Sum of two rectangular quantities of the same width (JCGM 101 6.4.5)."""
-    return _bounded("triangular", low, high, dof, shapes.TRIANGULAR, 1 / 6)
+    return _bounded("triangular", low, high, dof, TRIANGULAR, 1 / 6)
 
 
 def trapezoidal(low: Number, high: Number, beta: float, dof: Number = np.inf) -> Distribution:
     """Sum of two rectangular quantities; ``beta`` is the ratio of top to base (JCGM 101 6.4.4)."""
     _need(0 <= beta <= 1, f"beta is {beta}", "The ratio of top to base lies between 0 and 1")
-    shape = shapes.trapezoidal(beta)
+    shape = trapezoid(beta)
     return _bounded("trapezoidal", low, high, dof, shape, shape.variance, beta=beta)
 
 
 def arcsine(low: Number, high: Number, dof: Number = np.inf) -> Distribution:
     """A quantity that cycles sinusoidally between two limits, at an unknown phase (JCGM 101 6.4.6)."""
-    return _bounded("arcsine", low, high, dof, shapes.ARCSINE, 1 / 2)
+    return _bounded("arcsine", low, high, dof, ARCSINE, 1 / 2)
 
 
 def exponential(value: Number) -> Distribution:
     """A quantity that cannot be negative, of which only the estimate is known (JCGM 101 6.4.10)."""
     _finite(value=value)
     _positive(value=value)
-    return Distribution("exponential", value, value, 0.0, value, shapes.EXPONENTIAL)
+    return Distribution("exponential", value, value, 0.0, value, EXPONENTIAL)
 
 
 def gamma(count: float, repetitions: int = 1) -> Distribution:
@@ -133,7 +215,7 @@ def gamma(count: float, repetitions: int = 1) -> Distribution:
     _need(count >= 0, f"a count of {count}", "A count is not negative")
     _need(repetitions >= 1, f"{repetitions} counting intervals", "Count at least once")
     mean, u = (count + 1) / repetitions, np.sqrt(count + 1) / repetitions
-    return Distribution("gamma", mean, u, 0.0, 1 / repetitions, shapes.gamma(count + 1), stated={"count": count})
+    return Distribution("gamma", mean, u, 0.0, 1 / repetitions, gamma_shape(count + 1), stated={"count": count})
 
 
 def sampled(draws: Floats, together: str = "") -> Distribution:
@@ -141,7 +223,7 @@ def sampled(draws: Floats, together: str = "") -> Distribution:
     values = np.asarray(draws, dtype=np.float64)
     _need(values.ndim == 1 and len(values) >= 2, "fewer than two draws", "Give a list of draws")
     _finite(samples=values)
-    shape = shapes.empirical(values)
+    shape = empirical(values)
     _need(shape.variance > 0, "all draws are the same", "Give the value as a constant")
     u = float(np.sqrt(shape.variance))
     return Distribution("sampled", float(values.mean()), u, 0.0, 1.0, shape, together=together, draws=values)
@@ -151,9 +233,9 @@ def _normal_or_t(kind: str, value: Number, u: Number, dof: Number) -> Distributi
     _finite(value=value, u=u)
     _positive(u=u)
     _known(dof)
-    shape: DistributionShape | None = shapes.NORMAL
+    shape: DistributionShape | None = NORMAL
     if not np.all(np.isinf(dof)):
-        shape = shapes.student_t(float(dof)) if np.ndim(dof) == 0 else None
+        shape = t_shape(float(dof)) if np.ndim(dof) == 0 else None
     return Distribution(kind, value, u, value, u, shape, dof)
 
 

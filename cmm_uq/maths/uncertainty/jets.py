@@ -67,10 +67,8 @@ ONE: Mapping[np.ufunc, tuple[Partial, Rule]] = {
     np.arcsinh: (lambda x, _f: 1.0 / np.sqrt(1.0 + x * x), lambda x, _f: -x / (1.0 + x * x) ** 1.5),
     np.arccosh: (lambda x, _f: 1.0 / np.sqrt(x * x - 1.0), lambda x, _f: -x / (x * x - 1.0) ** 1.5),
     np.arctanh: (lambda x, _f: 1.0 / (1.0 - x * x), lambda x, _f: 2.0 * x / (1.0 - x * x) ** 2),
-    np.deg2rad: (lambda _x, _f: np.pi / 180.0, None),
-    np.radians: (lambda _x, _f: np.pi / 180.0, None),
-    np.rad2deg: (lambda _x, _f: 180.0 / np.pi, None),
-    np.degrees: (lambda _x, _f: 180.0 / np.pi, None),
+    **dict.fromkeys((np.deg2rad, np.radians), (lambda _x, _f: np.pi / 180.0, None)),
+    **dict.fromkeys((np.rad2deg, np.degrees), (lambda _x, _f: 180.0 / np.pi, None)),
 }
 
 # by x, y, xx, xy, yy
@@ -125,10 +123,8 @@ COMPLEX: Mapping[np.ufunc, Callable[..., Operand]] = {
     np.cbrt: lambda x: sign(x) * np.power(sign(x) * x, 1.0 / 3.0),
     np.arctan2: _complex_arctan2,
     np.hypot: lambda x, y: np.sqrt(x * x + y * y),
-    np.deg2rad: lambda x: x * (np.pi / 180.0),
-    np.radians: lambda x: x * (np.pi / 180.0),
-    np.rad2deg: lambda x: x * (180.0 / np.pi),
-    np.degrees: lambda x: x * (180.0 / np.pi),
+    **dict.fromkeys((np.deg2rad, np.radians), lambda x: x * (np.pi / 180.0)),
+    **dict.fromkeys((np.rad2deg, np.degrees), lambda x: x * (180.0 / np.pi)),
 }
 """Analytic continuations, exact to first order in an imaginary part that is negligible beside the real part."""
 

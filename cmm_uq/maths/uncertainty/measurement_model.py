@@ -110,14 +110,10 @@ def _hessian(outputs: Sequence[Any], m: int, shape: tuple[int, ...], kind: type[
 class MeasurementModel:
     """Outputs from inputs.
 
-    Parameters
-    ----------
-    function : called with the inputs by name; gives a mapping from output name to value, or, where there is one output,
-        its value. Must take arrays and be written with NumPy's functions.
-    inputs : what is known of each input; with arrays for parameters the law of propagation works at all points at once.
-    outputs : names of the outputs.
-    correlation : coefficients of correlated pairs of inputs.
-    differentiation : ``"jets"`` for models of elementary functions, ``"complex_step"`` for other analytic models.
+    ``function`` is called with the inputs by name and gives a mapping from output name to value, or, where there is one
+    output, its value; it must take arrays and be written with NumPy's functions. With arrays for parameters of ``inputs`` the
+    law of propagation works at all points at once. ``correlation``: coefficients of correlated pairs of inputs.
+    ``differentiation``: ``"jets"`` for models of elementary functions, ``"complex_step"`` for other analytic models.
     """
 
     function: Callable[..., Any]

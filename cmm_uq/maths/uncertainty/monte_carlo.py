@@ -154,10 +154,9 @@ def _source(model: MeasurementModel) -> Source:
     model.must_be_at_one_point()
     for name, given in model.inputs.items():
         if not np.isfinite(given.standard_deviation):
-            raise CmmUqError(
-                f"{name} has {given.dof:g} degrees of freedom, and so no standard deviation to draw with",
-                fix="Repeat the readings (JCGM 101 6.4.9.5 needs four or more), or use the law of propagation",
-            )
+            problem = f"{name} has {given.dof:g} degrees of freedom, and so no standard deviation to draw with"
+            fix = "Repeat the readings (JCGM 101 6.4.9.5 needs four or more), or use the law of propagation"
+            raise CmmUqError(problem, fix=fix)
     draw = joint_draws(model.inputs, model.correlation_matrix)
 
     def outputs(rng: np.random.Generator, n: int) -> Floats:
@@ -250,10 +249,8 @@ class _Run:
         lengths, variances = ends[:, 3] - ends[:, 2], np.diagonal(self._comoment)
         for name, variance, length in zip(self.source.outputs, variances, lengths, strict=True):
             if not np.isfinite(variance) or (variance == 0 and length > 0):
-                raise CmmUqError(
-                    f"the variance of {name} is beyond what floating-point numbers hold",
-                    fix="State the quantities in units that make their numbers moderate",
-                )
+                fix = "State the quantities in units that make their numbers moderate"
+                raise CmmUqError(f"the variance of {name} is beyond what floating-point numbers hold", fix=fix)
         covariance = self._comoment / (self.trials - 1)
         figures = self._mean, covariance, ends[:, :2], ends[:, 2:], self.standard_errors(), stable, *self.tails()
         density = self._counts / (self.trials * self._width[:, None])

@@ -66,10 +66,8 @@ def first_order(model: MeasurementModel) -> Propagated:
 def second_order(model: MeasurementModel) -> Propagated:
     """Propagate by first and second derivatives, with the third ones where they belong to the same order."""
     if model.differentiation == "complex_step":
-        raise CmmUqError(
-            "second derivatives by complex steps are not exact",
-            fix="Write the model with NumPy's elementary functions, or use Monte Carlo",
-        )
+        fix = "Write the model with NumPy's elementary functions, or use Monte Carlo"
+        raise CmmUqError("second derivatives by complex steps are not exact", fix=fix)
     u = [np.asarray(given.u) for given in model.inputs.values()]
     found = derivatives(model, model.means, order=2)
     linear, correlation = _first_order(model, found, u), model.correlation_matrix

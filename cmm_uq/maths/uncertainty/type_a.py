@@ -119,10 +119,8 @@ def _table(readings: Mapping[str, Sequence[float] | Floats]) -> Floats:
         if not np.all(np.isfinite(column)):
             raise CmmUqError(f"a reading of {name} is not finite")
         if np.ptp(column) == 0:
-            raise CmmUqError(
-                f"all readings of {name} are the same",
-                fix="Their scatter is below the resolution: state that as a rectangular input",
-            )
+            fix = "Their scatter is below the resolution: state that as a rectangular input"
+            raise CmmUqError(f"all readings of {name} are the same", fix=fix)
     return table
 
 
@@ -157,10 +155,8 @@ def coverage_factor(dof: Floats | float, coverage: float) -> Floats:
     nu = np.asarray(dof, dtype=np.float64)
     truncated = np.floor(nu * (1 + _ROUNDING))
     if np.any(truncated < 1) or np.any(np.isnan(nu)):
-        raise CmmUqError(
-            f"{float(np.min(nu)):.3g} effective degrees of freedom support no coverage interval",
-            fix="Repeat the readings that dominate the uncertainty",
-        )
+        fix = "Repeat the readings that dominate the uncertainty"
+        raise CmmUqError(f"{float(np.min(nu)):.3g} effective degrees of freedom support no coverage interval", fix=fix)
     p = (1 + coverage) / 2
     # a t quantile with very many degrees of freedom is that of the normal distribution
     many = truncated > 1e10

@@ -26,27 +26,16 @@ from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 
 @dataclass(frozen=True, eq=False)
 class Interferometer:
-    """What a displacement measured by laser rests on.
+    """What a displacement measured by laser rests on."""
 
-    Parameters
-    ----------
-    vacuum_mm : displacement counted in vacuum wavelengths, mm; its uncertainty is that of resolution and noise.
-    air : at the time of the reading.
-    dead_path_mm : between the interferometer and the place of zeroing, mm.
-    zero_refractivity : n₀ − 1 when the counter was zeroed; None means the air has not changed since.
-    angle_rad : between beam and motion, rad.
-    material_c, cte_per_k : temperature and expansion coefficient of what is measured; None leaves the length as it is.
-    origins : where the figures come from, by the names of the model's inputs.
-    """
-
-    vacuum_mm: Distribution
-    air: Air
-    dead_path_mm: Distribution | None = None
-    zero_refractivity: Distribution | None = None
-    angle_rad: Distribution | None = None
-    material_c: Distribution | None = None
-    cte_per_k: Distribution | None = None
-    origins: Mapping[str, str] = field(default_factory=dict)
+    vacuum_mm: Distribution  # displacement in vacuum wavelengths; its uncertainty is that of resolution and noise
+    air: Air  # at the time of the reading
+    dead_path_mm: Distribution | None = None  # between the interferometer and the place of zeroing
+    zero_refractivity: Distribution | None = None  # n₀ − 1 at zeroing; None means the air has not changed since
+    angle_rad: Distribution | None = None  # between beam and motion
+    material_c: Distribution | None = None  # temperature of what is measured; None leaves the length as it is
+    cte_per_k: Distribution | None = None  # its expansion coefficient
+    origins: Mapping[str, str] = field(default_factory=dict)  # of the figures, by the names of the model's inputs
 
     @property
     def labels(self) -> Labels:

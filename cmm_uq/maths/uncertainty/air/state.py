@@ -160,7 +160,5 @@ def check_range(air: Air, equation: AirEquation) -> None:
         means = np.atleast_1d(inputs[name].mean)
         outside = means[(means < low) | (means > high)]
         if len(outside):
-            raise CmmUqError(
-                f"{name} = {outside[0]:g} is out of the range {low:g} to {high:g} of {equation.name}",
-                fix="Check its unit, or choose another equation",
-            )
+            problem = f"{name} = {outside[0]:g} is out of the range {low:g} to {high:g} of {equation.name}"
+            raise CmmUqError(problem, fix="Check its unit, or choose another equation")

@@ -117,10 +117,8 @@ def use_by_calibrated_workpiece(
     """
     readings = np.asarray(readings_mm, dtype=np.float64)
     if len(readings) < FEWEST_READINGS:
-        raise CmmUqError(
-            f"{len(readings)} readings of the calibrated workpiece",
-            fix=f"ISO 15530-3 asks for {FEWEST_READINGS} in ten cycles or more",
-        )
+        fix = f"ISO 15530-3 asks for {FEWEST_READINGS} in ten cycles or more"
+        raise CmmUqError(f"{len(readings)} readings of the calibrated workpiece", fix=fix)
     length_unit = unit("rad" if angle else "mm")
     length = calibrated_mm if expanding_mm is None else abs(expanding_mm)
     scatter, dof = float(readings.std(ddof=1)), len(readings) - 1.0

@@ -41,31 +41,18 @@ from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 
 @dataclass(frozen=True, eq=False)
 class BallbarPosition:
-    """One position of a ballbar.
+    """One position of a ballbar."""
 
-    Parameters
-    ----------
-    length_mm : distance of the centres.
-    direction : (3,) unit vector along the bar.
-    centre_covariance_mm2 : (3, 3) of one fitted centre, from the scatter of its points.
-    form_shift_mm : how far, at most, a ball's form moves its centre along the bar.
-    probe_mm : limits of what the probing system may shift a ball by, systematically.
-    probe_common : correlation of that shift between the two balls; one when both are seen the same way.
-    scale_mm : (3,) limits of the scale errors of x, y, z over the bar's full length.
-    u_squareness_rad : (3,) standard uncertainties of the squarenesses xy, yz, zx.
-    u_temperature_k, cte_per_k : of the bar, where its length at 20 °C is asked for.
-    """
-
-    length_mm: float
-    direction: Floats
-    centre_covariance_mm2: Floats
-    form_shift_mm: float = 0.0
-    probe_mm: float = 0.0
-    probe_common: float = 0.0
-    scale_mm: Sequence[float] = (0.0, 0.0, 0.0)
-    u_squareness_rad: Sequence[float] = (0.0, 0.0, 0.0)
-    u_temperature_k: float = 0.0
-    cte_per_k: float = 0.0
+    length_mm: float  # distance of the centres
+    direction: Floats  # (3,) unit vector along the bar
+    centre_covariance_mm2: Floats  # (3, 3) of one fitted centre, from the scatter of its points
+    form_shift_mm: float = 0.0  # how far, at most, a ball's form moves its centre along the bar
+    probe_mm: float = 0.0  # limits of what the probing system may shift a ball by, systematically
+    probe_common: float = 0.0  # correlation of that shift between the balls; one when both are seen the same way
+    scale_mm: Sequence[float] = (0.0, 0.0, 0.0)  # (3,) limits of the scale errors of x, y, z over the full length
+    u_squareness_rad: Sequence[float] = (0.0, 0.0, 0.0)  # (3,) standard uncertainties of the squarenesses xy, yz, zx
+    u_temperature_k: float = 0.0  # of the bar, where its length at 20 °C is asked for
+    cte_per_k: float = 0.0  # of the bar
     origins: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
