@@ -251,10 +251,8 @@ def associate(
         from it the least, as ISO 5459 asks of datums. Its direction is that of the minimum zone.
     outward : (d,) direction out of the material, roughly: needed for ``"tangent"``; gives the normal of any plane its sense.
 
-    Raises
-    ------
-    CmmUqError : an unknown feature or criterion, points that do not determine the feature, or a criterion that they, or no
-        such feature, can meet.
+    Raises :class:`CmmUqError` for an unknown feature or criterion, points that do not determine the feature, or a criterion
+    that neither they nor such a feature can meet.
     """
     if association not in ASSOCIATIONS:
         raise CmmUqError(f"{association!r} is no association", fix=f"Associations are {', '.join(ASSOCIATIONS)}")

@@ -15,13 +15,11 @@ from cmm_uq.base.points import Floats, Ints
 
 
 def points_with_known_fit(surface: Floats, normals: Floats, growth: Floats, form: float, seed: int) -> Floats:
-    """Points about a surface whose least-squares feature is that surface.
+    """Points (n, 3) about a surface whose least-squares feature is that surface, mm.
 
     ``surface``: (n, 3) points of the feature, mm. ``normals``: (n, m, 3) unit normals at each: m = 1 of a surface, 2 of a
     curve in space. ``growth``: (n, m, k) how far the feature moves along its normals per unit of each of its k sizes: 1 of a
     radius; of a plane or line k = 0. ``form``: largest deviation, mm; small against the feature.
-
-    Returns (n, 3) in mm.
     """
     n, m, _ = normals.shape
     ways = _ways(surface, normals, growth)
@@ -37,15 +35,13 @@ def points_with_known_fit(surface: Floats, normals: Floats, growth: Floats, form
 def points_with_known_zone(
     surface: Floats, normals: Floats, growth: Floats, width: float, seed: int, *, sides: tuple[float, ...] = (1.0, -1.0)
 ) -> tuple[Floats, Ints]:
-    """Points whose minimum zone is a surface with half the width to either side, and its contact points.
+    """Points (n, 3) whose minimum zone is a surface with half the width to either side, mm, and the rows of its contacts.
 
     The contacts are as many as hold a zone without any curvature, one more than the feature has freedoms.
 
     ``surface, normals, growth``: as for :func:`points_with_known_fit`, of a surface (m = 1). ``width``: of the zone, mm;
     small against the feature. ``sides``: on which contacts lie: ``(1.0,)`` outside only, so that without ``growth`` (k = 0)
     the feature grown by half the width is the smallest about the points; ``(-1.0,)`` inside only.
-
-    Returns (n, 3) points in mm, and the rows of the contacts.
     """
     from scipy.optimize import linprog
 

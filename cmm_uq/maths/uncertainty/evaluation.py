@@ -96,12 +96,7 @@ class Evaluation:
 
 
 def evaluate(model: MeasurementModel, request: Request | None = None, labels: Labels | None = None) -> Evaluation:
-    """Evaluate a measurement model at one point.
-
-    Raises
-    ------
-    CmmUqError : the method asked for is impossible here, or the input is.
-    """
+    """Evaluate a measurement model at one point; :class:`CmmUqError` where the method asked for, or the input, cannot be."""
     request, labels = request or Request(), labels or Labels()
     model.must_be_at_one_point()
     fix = "State the inputs in units in which their numbers are neither huge nor tiny"

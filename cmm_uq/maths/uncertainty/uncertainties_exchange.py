@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -15,13 +14,12 @@ from cmm_uq.maths.uncertainty.evaluation import Evaluation
 from cmm_uq.maths.uncertainty.type_a import JointInputs, multivariate_normal
 
 
-def _package() -> ModuleType:
+def _package() -> Any:
     try:
         import uncertainties
     except ImportError as error:
         raise CmmUqError("the package 'uncertainties' is not installed", fix="pip install uncertainties") from error
-    package: ModuleType = uncertainties
-    return package
+    return uncertainties
 
 
 def to_uncertainties(values: Floats, covariance: Floats) -> list[Any]:
@@ -32,9 +30,9 @@ def to_uncertainties(values: Floats, covariance: Floats) -> list[Any]:
 def evaluation_to_uncertainties(evaluation: Evaluation) -> dict[str, Any]:
     """The outputs of an evaluation as correlated numbers by name."""
     u = np.array([stated.u for stated in evaluation.stated.values()])
-    covariance = np.nan_to_num(evaluation.correlation) * np.outer(u, u)
     values = np.array([stated.value for stated in evaluation.stated.values()])
-    return dict(zip(evaluation.stated, to_uncertainties(values, covariance), strict=True))
+    numbers = to_uncertainties(values, np.nan_to_num(evaluation.correlation) * np.outer(u, u))
+    return dict(zip(evaluation.stated, numbers, strict=True))
 
 
 def from_uncertainties(numbers: Mapping[str, Any]) -> JointInputs:

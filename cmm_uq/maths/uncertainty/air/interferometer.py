@@ -49,10 +49,7 @@ def interferometer_model(setup: Interferometer, equation: str = "ciddor") -> Mea
     """Measurement model of the length, mm, at 20 °C where the material's temperature is given.
 
     The wavelength enters twice: through the count, as a relative error of V, and (hardly) through the dispersion of air.
-
-    Raises
-    ------
-    CmmUqError : an unknown equation, or air out of its range.
+    Raises :class:`CmmUqError` for an unknown equation, or air out of its range.
     """
     chosen = equation_by_name(equation)
     check_range(setup.air, chosen)

@@ -103,17 +103,12 @@ def use_by_calibrated_workpiece(
 
     Parameters
     ----------
-    readings_mm : of the calibrated workpiece, as workpieces are measured; 20 or more.
+    readings_mm : of the calibrated workpiece, as workpieces are measured; fewer than 20 are refused.
     temperature_c : mean temperature while reading.
-    u_cte_calibrated_per_k, u_cte_workpieces_per_k : of the expansion coefficients of the calibrated one and of the
-        others.
+    u_cte_calibrated_per_k, u_cte_workpieces_per_k : of the expansion coefficients of the calibrated one and the others.
     u_form_mm : by what differs between workpieces: form, roughness, elasticity.
     expanding_mm : length whose expansion counts, where it is not the calibrated value.
     angle : whether values and uncertainties are in rad.
-
-    Raises
-    ------
-    CmmUqError : fewer readings than the standard asks for.
     """
     readings = np.asarray(readings_mm, dtype=np.float64)
     if len(readings) < FEWEST_READINGS:

@@ -144,9 +144,7 @@ class ModelFile:
 def read_model_file(path: Path) -> ModelFile | ReadyBudget:
     """Read and check a model file, or one with a ready budget.
 
-    Raises
-    ------
-    CmmUqError : the file cannot be read, is no TOML, or a key is unknown, missing, of the wrong kind or contradicting.
+    Raises :class:`CmmUqError` where it cannot be read, is no TOML, or a key is unknown, missing, wrong or contradicting.
     """
     content = content_of(path, MODEL_BYTES, "Name the TOML file of the measurement model")
     text = text_of(content, str(path))
