@@ -47,7 +47,7 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Artefact, Indications, Size
 from cmm_uq.machine.model.artefact_doubt import temperature_of
-from cmm_uq.machine.model.recorded import check_length, expansion, stated_sd
+from cmm_uq.machine.model.recorded import expansion, length_of
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.budget import Budget, BudgetLine
 from cmm_uq.maths.uncertainty.budget_results import budget_data
@@ -77,21 +77,8 @@ class Ballbar(Artefact):
             line = points.lines[first[np.argmin(lengths)]] if len(points.lines) else 0
             raise CmmUqError("both ends of the bar lie in one place", where=f"{where or 'recording'} line {line}",
                              fix="Record the centres of two different balls")  # fmt: skip
-        mean = float(lengths.mean())
-        if facts.length_mm is None:
-            self.sizes = (Size("length_mm", say("Length of the bar"), unit("mm"), mean, np.inf, say("length")),)
-        else:
-            check_length(mean, facts.length_mm, "the recorded bars", where)
-            self.sizes = (
-                Size(
-                    "length_mm",
-                    say("Length of the bar"),
-                    unit("mm"),
-                    facts.length_mm,
-                    stated_sd(facts, facts.length_mm),
-                    say("length"),
-                ),
-            )
+        length, sd = length_of(facts, float(lengths.mean()), "the recorded bars", where)
+        self.sizes = (Size("length_mm", say("Length of the bar"), unit("mm"), length, sd, say("length")),)
 
     @property
     def set_up(self) -> Text:

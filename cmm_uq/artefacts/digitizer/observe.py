@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -36,26 +35,6 @@ from cmm_uq.machine.model.recorded import expansion
 from cmm_uq.machine.physics.digitizer import Alignment, MountOffset, mount_offset
 from cmm_uq.machine.physics.effects.probing import attitudes
 from cmm_uq.maths.inference.linear_model import Freedoms
-
-
-class Target(Protocol):
-    """Points (n, 3) of the sphere, or its centre seen n times, as an ``Artefact`` has them."""
-
-    sizes: tuple[Size, ...]
-    rows: Ints
-    noise_scale: Floats
-
-    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        """Points as near to ``true_xyz`` as the target lets them be."""
-
-    def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        """What observations show of a displacement."""
-
-    def size_change(self) -> Floats:
-        """Change of the observations for one mm of each size."""
-
-    def placing(self, xyz: Floats) -> Floats | Freedoms:
-        """Change of the observations for the three freedoms of its place."""
 
 
 class ScannedSphere(Radial):
@@ -131,7 +110,7 @@ class DigitizerArtefact(Artefact):
         # observations, sizes and place are all seen along the directions of the recorded points: taken anew at fitted
         # ones, they would differ by the noise, and what no recording determines would seem determined
         self._seen_at = points.xyz + carried
-        self.target: Target = (
+        self.target: ScannedSphere | Centre = (
             ScannedSphere(facts, points.at(self._seen_at), where) if self.scanned else Centre(len(points))
         )
         self.rows, self.noise_scale = self.target.rows, self.target.noise_scale

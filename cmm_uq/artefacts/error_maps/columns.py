@@ -297,9 +297,9 @@ def columns_of(maps: Sequence[ErrorMap]) -> tuple[list[MapColumn], list[Finding]
 def _looked_at(maps: Sequence[ErrorMap], axis: int, component: int, shared: Floats) -> _Looked:
     carriage, size = AXES[axis], MICROMETRE if component < 3 else ARCSECOND * METRE
     title, lever = title_of(carriage, component), 1.0 if component < 3 else METRE
-    values = np.array([
-        lever * m.axes[axis].errors[np.isin(m.axes[axis].positions, shared), component] for m in maps
-    ]).reshape(len(maps), -1)  # fmt: skip
+    values = np.array(
+        [lever * m.axes[axis].errors[np.isin(m.axes[axis].positions, shared), component] for m in maps]
+    ).reshape(len(maps), -1)
     measured = [k for k in range(len(maps)) if np.any(values[k])]
     copied = tuple(copies(values, size))
     again = {k for group in copied for k in (group if component == axis else group[1:])}

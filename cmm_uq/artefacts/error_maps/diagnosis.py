@@ -124,7 +124,7 @@ def expansion_shown(compared: ColumnComparison) -> OmittedEffect | None:
     probability = compared.combinations.of(compared.effect)
     return OmittedEffect(
         effect.name, effect.title, probability, parameters, (rest - left) / whole, probability, effect.points_to
-    )  # fmt: skip
+    )
 
 
 def _difference(compared: ColumnComparison, index: int, p_value: float) -> Difference:

@@ -149,16 +149,8 @@ class StepGauge(Artefact):
         longest = np.flatnonzero(self._lines.index == np.argmax(spans))
         first, last = (int(longest[pick(self.reference[longest])]) for pick in (np.argmin, np.argmax))
         self._ends_of_longest = first, last
-        self.sizes = (
-            Size(
-                "length_mm",
-                say("Length of the {title:small}", title=self.title),
-                unit("mm"),
-                length,
-                self.certificate.sd(length, first, last),
-                say("length"),
-            ),
-        )
+        title, sd = say("Length of the {title:small}", title=self.title), self.certificate.sd(length, first, last)
+        self.sizes = (Size("length_mm", title, unit("mm"), length, sd, say("length")),)
         self._together = self.reference / length
         if not self.certificate.plain and self.sizes[0].certified:
             self._together = self.certificate.together(

@@ -69,16 +69,9 @@ class Plate(Rigid):
         self._ends = from_first, farthest
         body = self.reference * self.expansion[:, None]
         self.body = body - self.placings.means(body)
-        self.sizes = (
-            Size(
-                "length_mm",
-                say("Length of the plate"),
-                unit("mm"),
-                facts.length_mm or longest,
-                self.certificate.sd(facts.length_mm or longest, from_first, farthest),
-                say("length"),
-            ),
-        )
+        length = facts.length_mm or longest
+        sd = self.certificate.sd(length, from_first, farthest)
+        self.sizes = (Size("length_mm", say("Length of the plate"), unit("mm"), length, sd, say("length")),)
         self._together = self.body / self.sizes[0].nominal
         if not self.certificate.plain and self.sizes[0].certified:
             about = self.reference - self.placings.means(self.reference)
@@ -145,7 +138,7 @@ class Plate(Rigid):
                 f"measurement {number} has no two different balls, so it tells no length of the plate",
                 where=place(points, points.measurement == number, where),
                 fix="Record at least three balls of different reference positions in each measurement, or leave it out",
-            )  # fmt: skip
+            )
         length = self.sizes[0].nominal
         check_length(float(found.sum() / nominal.sum()) * length, length, "the recorded plates", where)
         self.refuse_another_shape("Check the numbering of the balls and their reference positions", where)

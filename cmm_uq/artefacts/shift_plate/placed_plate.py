@@ -105,9 +105,7 @@ def rigid_motion(points: Floats, onto: Floats) -> tuple[float, Floats]:
     return angle, onto.mean(axis=0) - rotations(np.array([angle]))[0] @ points.mean(axis=0)
 
 
-def _laid_over(
-    flat: Floats, placing: Ints, ball: Ints, placings: Ints, where: str
-) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+def _laid_over(flat: Floats, placing: Ints, ball: Ints, placings: Ints, where: str) -> tuple[Floats, Floats, Floats]:
     """Balls, turns and shifts: placings join the first one by one through the balls they share, then all are refined."""
     count = len(placings)
     balls = np.full((ball.max() + 1, 2), np.nan)
@@ -197,7 +195,7 @@ def _check_placings(flat: Floats, placing: Ints, placings: Ints, turned: Floats,
                 where=where or None,
                 fix=f"Shift placing {placings[b]} by about the pitch of the balls, or turn it by 90°; the same place read "
                 "again is a repeat",
-            )  # fmt: skip
+            )
     low = np.array([flat[placing == s].min(axis=0) for s in range(len(placings))])
     high = np.array([flat[placing == s].max(axis=0) for s in range(len(placings))])
     for s, number in enumerate(placings):

@@ -130,7 +130,7 @@ class PlaneEstimate:
         turn = np.arctan2(
             np.sum(middle[:, 0] * centred[..., 1] - middle[:, 1] * centred[..., 0], axis=1),
             np.sum(middle * centred, axis=(1, 2)),
-        )  # fmt: skip
+        )
         size = np.ones(len(places))
         if not self.free.size_known:
             size = np.linalg.norm(middle) / np.linalg.norm(centred, axis=(1, 2))

@@ -18,6 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.artefacts.shift_axis.curve import Curve
 from cmm_uq.artefacts.shifting.kind import shift_facts
 from cmm_uq.base.messages import Text, Verbatim, day, number, say
 from cmm_uq.base.points import Floats
@@ -80,36 +81,17 @@ _STILL = 1e-9  # part of the largest spread in a list up to which an item does n
 
 
 class Estimated(Protocol):
-    """All that the readings say."""
+    """All that the readings say: chains, draws (N,) of u of one reading, mm, and what does not fit, mm.
+
+    The latter with no error of the machine but its scale, and with what was estimated.
+    """
 
     @property
-    def chains(self) -> Chains:
-        """Of which the draws were kept."""
-        ...
-
+    def chains(self) -> Chains: ...
     @property
-    def sigma(self) -> Floats:
-        """(N,) draws of the standard uncertainty of one reading, mm."""
-        ...
-
+    def sigma(self) -> Floats: ...
     @property
-    def residuals(self) -> tuple[Floats, Floats]:
-        """What does not fit, mm: with no error of the machine but its scale, and with what was estimated."""
-        ...
-
-
-class Along(Protocol):
-    """A curve over the positions of an axis."""
-
-    @property
-    def position(self) -> Floats:
-        """(m,) mm."""
-        ...
-
-    @property
-    def expanded(self) -> Floats:
-        """(m,) U as evaluated."""
-        ...
+    def residuals(self) -> tuple[Floats, Floats]: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +142,7 @@ class ShiftFound(ABC):
         """How quantities are stated: not below the laboratory's capability."""
         return StatedUncertainty.of(self.job)
 
-    def stated_along(self, curve: Along, size: float = MICROMETRE, symbol: str = "µm") -> Floats:
+    def stated_along(self, curve: Curve, size: float = MICROMETRE, symbol: str = "µm") -> Floats:
         """(m,) U of a curve by position, in its own unit, not below the laboratory's capability of that travel."""
         capability = self.stating.capability
         if capability is None:

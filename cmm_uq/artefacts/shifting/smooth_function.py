@@ -99,9 +99,7 @@ class SmoothMarginal(ABC):
     def _log_density(self, sd: Floats, growth: Floats, sigma: Floats) -> Floats: ...
 
     @abstractmethod
-    def draw(
-        self, sd: Floats, growth: Floats, sigma: Floats, random: np.random.Generator
-    ) -> tuple[Floats, Floats]:  # fmt: skip
+    def draw(self, sd: Floats, growth: Floats, sigma: Floats, random: np.random.Generator) -> tuple[Floats, Floats]:
         """One draw of w (N, J) and x (N, c) for each parameter vector, from their exact conditional distribution."""
 
 
@@ -124,9 +122,7 @@ class ByObservations(SmoothMarginal):
         factor, explained = _bordered(covariance, values, 1 + 2 * (self.observed @ self.observed) / sigma**2)
         return np.asarray(-0.5 * np.einsum("wi,wi->w", explained, explained) - np.log(factor).sum(axis=1))
 
-    def draw(
-        self, sd: Floats, growth: Floats, sigma: Floats, random: np.random.Generator
-    ) -> tuple[Floats, Floats]:  # fmt: skip
+    def draw(self, sd: Floats, growth: Floats, sigma: Floats, random: np.random.Generator) -> tuple[Floats, Floats]:
         design, covariance = self._covariance(sd, growth, sigma)
         w = sd * random.standard_normal(sd.shape)
         x = self.column_sd * random.standard_normal((len(sd), len(self.column_sd)))
@@ -169,13 +165,9 @@ class ByCoefficients(SmoothMarginal):
         total = self.observed @ self.observed / sigma**2
         factor, explained = _bordered(precision, right, 1 + 2 * total)
         fitted = np.einsum("wi,wi->w", explained, explained)
-        return np.asarray(
-            -0.5 * (total - fitted) - np.log(factor).sum(axis=1) - len(self.observed) * np.log(sigma)
-        )  # fmt: skip
+        return np.asarray(-0.5 * (total - fitted) - np.log(factor).sum(axis=1) - len(self.observed) * np.log(sigma))
 
-    def draw(
-        self, sd: Floats, growth: Floats, sigma: Floats, random: np.random.Generator
-    ) -> tuple[Floats, Floats]:  # fmt: skip
+    def draw(self, sd: Floats, growth: Floats, sigma: Floats, random: np.random.Generator) -> tuple[Floats, Floats]:
         every, precision, right = self._precision(sd, growth, sigma)
         factor = np.linalg.cholesky(precision)
         mean = np.linalg.solve(factor, right[:, :, None])

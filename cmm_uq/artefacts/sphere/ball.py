@@ -108,7 +108,7 @@ class SphereArtefact(Radial):
         size = probed.size if self.sizes[0].certified else None
         return Forms(
             probed.measurement, probed.repeat, probed.count, probed.form, self.form, directions, size, probed.centres
-        )  # fmt: skip
+        )
 
     def _take_normals(self, where: str | None) -> None:
         """Normals as recorded, brought to unit length: the probe's errors act along them, and so they are seen exactly."""
@@ -122,7 +122,7 @@ class SphereArtefact(Radial):
                 "nx, ny, nz point into the sphere" if inward else "nx, ny, nz does not point away from the centre",
                 where=place(self.points, rows, where),
                 fix="Give the outward normal at each probed point" + (": turn all signs round" if inward else ""),
-            )  # fmt: skip
+            )
         self._normals = normals / length[:, None]
         columns = {f"n{a}": self._normals[:, i] for i, a in enumerate(AXES)}
         self.points = replace(self.points, columns={**self.points.columns, **columns})

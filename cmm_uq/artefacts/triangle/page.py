@@ -15,13 +15,14 @@ from cmm_uq.artefacts.triangle.observe import DRAWS, Triangle
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, semicolons, signed
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
 from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.plots.residuals import length_plot
-from cmm_uq.certificate.result import AtLeast, Result
+from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import deviating, expanded, refusal
 from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.quantity import rounded
 from cmm_uq.maths.uncertainty.type_a import factor_of_noise
 
@@ -63,37 +64,13 @@ class Sides:
 
 @dataclass(frozen=True)
 class ByEquations:
-    """A parameter by the source's equations, in the unit of its effect: u, k for 95 %, and how U is stated."""
+    """A parameter of an effect by the source's equations, in its unit, with u, U and k for 95 % as stated."""
 
-    effect: str
+    effect: Effect
     value: float
     u: float
-    factor: float
-    at_least: AtLeast
-
-    @property
-    def expanded(self) -> float:
-        return self._stated[0]
-
-    @property
-    def coverage_factor(self) -> float:
-        return self._stated[1]
-
-    @property
-    def _stated(self) -> tuple[float, float]:
-        return self.at_least(f"equations.{self.effect}", self.factor * self.u, self.factor, self.unit)
-
-    @property
-    def title(self) -> Text:
-        return every()[self.effect].title
-
-    @property
-    def parameter(self) -> str:
-        return every()[self.effect].reported[0].name
-
-    @property
-    def unit(self) -> Unit:
-        return every()[self.effect].reported[0].unit
+    expanded: float
+    coverage_factor: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,16 +116,12 @@ class TriangleFigures:
         noise, dimensions = self.result.noise.coordinate, triangle.standard.u
         by_noise, known = solution.u(noise.value * MICROMETRE, 0 * dimensions), solution.u(0.0, dimensions)
         known = np.hypot(known, solution.per_dimension @ triangle.standard.dimensions * self.result.relative_doubt)
-        return tuple(
-            ByEquations(
-                name,
-                float(value),
-                float(np.hypot(one, other)),
-                factor_of_noise(noise, one, other),
-                self.result.at_least,
-            )
-            for name, value, one, other in zip(PARAMETERS, solution.values, by_noise, known, strict=True)
-        )
+        found = []
+        for name, value, one, other in zip(PARAMETERS, solution.values, by_noise, known, strict=True):
+            effect, u, k = every()[name], float(np.hypot(one, other)), factor_of_noise(noise, one, other)
+            stated = self.result.at_least(f"equations.{name}", k * u, k, effect.reported[0].unit)
+            found.append(ByEquations(effect, float(value), u, *stated))
+        return tuple(found)
 
     @cached_property
     def alike(self) -> tuple[tuple[str, str, float], ...]:
@@ -176,8 +149,8 @@ def results(result: Result) -> Mapping[str, Any]:
             )
         ],
         "equations": {"refused": equations} if isinstance(equations, str) else {
-            one.effect: {
-                one.parameter: {"value": one.value, "u": one.u, "U": one.expanded, "k": one.coverage_factor}
+            one.effect.name: {
+                one.effect.reported[0].name: {"value": one.value, "u": one.u, "U": one.expanded, "k": one.coverage_factor}
             }
             for one in equations
         },
@@ -260,10 +233,10 @@ def _two_ways(result: Result, equations: tuple[ByEquations, ...] | Text) -> list
     for one in equations:
         value, U = rounded(one.value, one.expanded)
         fitted: tuple[Text, ...] = (NOTHING, NOTHING)
-        if one.effect in result.parameters:
-            quantity = next(iter(result.parameters[one.effect].values()))
-            fitted = (say("not determined"), NOTHING) if one.effect in result.free else expanded(quantity)[:2]
-        rows.append((one.title, value, U, *fitted, one.unit))
+        if one.effect.name in result.parameters:
+            quantity = next(iter(result.parameters[one.effect.name].values()))
+            fitted = (say("not determined"), NOTHING) if one.effect.name in result.free else expanded(quantity)[:2]
+        rows.append((one.effect.title, value, U, *fitted, one.effect.reported[0].unit))
     columns: tuple[Column, ...] = (Column(say("Parameter"), numeric=False), Column(say("Equations")), Column(say("U")))
     columns += (Column(say("Fitted model")), Column(say("U")), Column(say("Unit"), numeric=False))
     notes = (

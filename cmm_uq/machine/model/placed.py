@@ -18,7 +18,7 @@ from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import unit
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size
-from cmm_uq.machine.model.recorded import check_length, place, stated_sd
+from cmm_uq.machine.model.recorded import length_of, place
 from cmm_uq.maths.geometry.feature import nearest_rotations
 from cmm_uq.maths.inference.linear_model import Freedoms
 
@@ -47,20 +47,8 @@ class Radial(Artefact):
         self._normals: Floats | None = None
         self._refuse_flat(where)
         mean = float(np.mean(self.distances(points.xyz, None) / expansion)) / self.per_size
-        if facts.length_mm is None:
-            self.sizes = (Size("length_mm", self.size_title, unit("mm"), mean, np.inf, self.size_what),)
-        else:
-            check_length(mean, facts.length_mm, self.plural, where)
-            self.sizes = (
-                Size(
-                    "length_mm",
-                    self.size_title,
-                    unit("mm"),
-                    facts.length_mm,
-                    stated_sd(facts, facts.length_mm),
-                    self.size_what,
-                ),
-            )
+        length, sd = length_of(facts, mean, self.plural, where)
+        self.sizes = (Size("length_mm", self.size_title, unit("mm"), length, sd, self.size_what),)
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         away = true_xyz - self.centres(true_xyz, sizes[0])[self.centred.index]

@@ -69,6 +69,14 @@ def check_length(measured: float, certified: float, what: str, where: str | None
         )  # fmt: skip
 
 
+def length_of(facts: ArtefactFacts, measured: float, what: str, where: str | None) -> tuple[float, float]:
+    """An artefact's length and its standard uncertainty, mm: as certified, or as measured and not known at all."""
+    if facts.length_mm is None:
+        return measured, np.inf
+    check_length(measured, facts.length_mm, what, where)
+    return facts.length_mm, stated_sd(facts, facts.length_mm)
+
+
 INCH = 25.4
 NANOMETRE = 1e-6  # mm
 _EXACT = 1e-5  # part of a step by which a coordinate on the grid may be off, as from a unit's conversion
