@@ -14,7 +14,7 @@ from cmm_uq.laboratory.schedule.progress import turn, turn_at, was_left
 HOLD = """
 import sys, time
 from pathlib import Path
-from cmm_uq.laboratory.schedule.locks import turn_at
+from cmm_uq.laboratory.schedule.progress import turn_at
 assert turn_at(Path(sys.argv[1])) is not None
 print("held", flush=True)
 time.sleep(60)
