@@ -97,8 +97,6 @@ STEP_UP = 0.1  # part by which an interval is lengthened at most
 
 @dataclass(frozen=True)
 class Staircase:
-    """Where the staircase has come to."""
-
     interval: float  # days
     up: int  # and kept, down: calibrations that lengthened it, left it, and shortened it
     kept: int

@@ -70,7 +70,6 @@ def common_part(u: float, u_artefact: float) -> float:
 
 
 def change(before: ComparedValue, now: ComparedValue) -> ValueChange:
-    """What a value changed by."""
     same = bool(before.artefact) and before.artefact == now.artefact
     common = common_part(before.u, before.u_artefact) * common_part(now.u, now.u_artefact) if same else 0.0
     return ValueChange(now.value - before.value, math.sqrt(max(before.u**2 + now.u**2 - 2 * common, 0.0)))

@@ -33,8 +33,6 @@ WARNING, ACTION = 2.0, 3.0  # limits of a chart of one value, in standard uncert
 
 @dataclass(frozen=True)
 class InterimCheck:
-    """What one interim check comes to."""
-
     certificate: RecordedCertificate
     standing: Standing  # by the rule
     worst: str  # the value that is furthest out, as it is called; empty where nothing could be compared

@@ -47,7 +47,6 @@ class Crossings:
 
     @staticmethod
     def joined(parts: Sequence[Crossings]) -> Crossings:
-        """Of the machines of all parts."""
         last, *rest = (
             np.concatenate([getattr(part, name) for part in parts])
             for name in ("last", "probability", "level", "u_level", "rate", "u_rate")
@@ -75,8 +74,6 @@ class Crossings:
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """When one machine crosses its limit."""
-
     last: date  # day of the last certificate, or of an adjustment after it: from here on is looked ahead
     days: Floats  # and probability: (G,) of having crossed until so many days after it
     probability: Floats

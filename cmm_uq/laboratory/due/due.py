@@ -32,8 +32,6 @@ METHOD_WORDS: Mapping[str, Text] = {
 
 @dataclass(frozen=True)
 class RecalibrationInterval:
-    """An interval, and why it is that long."""
-
     days: float | None  # ``None`` where it is a number of calendar months
     months: int | None  # that many; ``None`` where it is a number of days
     why: Text  # one sentence without a full stop

@@ -253,8 +253,6 @@ def belonging(p: Floats, false_discoveries: float = FALSE_DISCOVERIES) -> NDArra
 
 @dataclass(frozen=True, eq=False)
 class FleetValue:
-    """One error factor or figure of performance over the fleet."""
-
     name: str  # and quantity, unit: of the value; the unit as recorded
     quantity: str
     unit: str
@@ -292,8 +290,6 @@ class FleetValue:
 
 @dataclass(frozen=True, eq=False)
 class FleetResult:
-    """All values that were asked for."""
-
     values: tuple[FleetValue, ...]
     seed: int
 

@@ -53,7 +53,6 @@ class TrendLine:
 
     @property
     def u_slope(self) -> float:
-        """Standard uncertainty of the slope."""
         return float(np.sqrt(self.covariance[1, 1]))
 
 
@@ -95,8 +94,6 @@ def trend(series: Series) -> TrendLine | None:
 
 @dataclass(frozen=True)
 class ValueHistory:
-    """One value of a machine over time."""
-
     series: Series  # its values, none of them after the day asked about
     change: ValueChange | None  # since the recording before the last; ``None`` where there is one only
     adjusted: bool  # whether the machine was adjusted between the two

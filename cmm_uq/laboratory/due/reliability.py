@@ -23,8 +23,6 @@ _EXPONENT = 700.0  # of e, within a double's range
 
 
 class ReliabilityModel(NamedTuple):
-    """One model."""
-
     name: Text
     reliability: Callable[[Floats, Floats], Floats]  # of times (n,) since calibration, and parameters
     starts: tuple[tuple[float, ...], ...]  # parameters that a search begins with
@@ -122,8 +120,6 @@ class ReliabilityData:
 
 @dataclass(frozen=True)
 class ReliabilityFit:
-    """One model, fitted."""
-
     name: Text
     parameters: Floats  # that maximise the likelihood, for times in days / ``scale``
     scale: float  # the longest observed interval, days
@@ -147,7 +143,6 @@ class ReliabilityRegression:
 
     @property
     def best(self) -> ReliabilityFit:
-        """The model that the interval is taken from."""
         return self.models[0]
 
     @property

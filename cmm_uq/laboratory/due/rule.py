@@ -26,7 +26,6 @@ class IntervalBounds:
     longest_days: float = 1826.0
 
     def bounded(self, days: float) -> float:
-        """The interval within its bounds."""
         return min(max(days, self.shortest_days), self.longest_days)
 
 
@@ -62,7 +61,6 @@ class Rule:
 
     @property
     def days(self) -> float:
-        """The interval that it begins with."""
         return self.every_months * DAYS_A_MONTH
 
     @property
@@ -84,8 +82,6 @@ _DECIDED = {"pass": 0.0, "conditional pass": 1.0, "conditional fail": 2.0, "fail
 
 @dataclass(frozen=True)
 class CompletedInterval:
-    """An interval that a certificate ended."""
-
     days: int
     used: float  # largest part of a limit that was found used up at its end; more than 1 is out of tolerance
 

@@ -34,8 +34,6 @@ _UNTIMED: Mapping[str, bool] = MappingProxyType(
 
 
 class Conductor:
-    """A session."""
-
     def __init__(
         self,
         recorder: Recorder,
@@ -75,11 +73,9 @@ class Conductor:
 
     @property
     def reportable(self) -> bool:
-        """Whether the recording has a set-up in it."""
         return bool(rows_of(self.story, self.lead))
 
     def event(self, event: Event) -> None:
-        """Something that a source says."""
         probed = self.recorder.take(event)
         if isinstance(event, Reading) and event.status is None:
             for quantity, value in event.values.items():
@@ -92,7 +88,6 @@ class Conductor:
         self._listen()
 
     def line(self, line: str) -> None:
-        """A line of the operator."""
         try:
             typed = understood(line)
             if typed.word in ("take", "point"):
@@ -138,14 +133,12 @@ class Conductor:
         self._listen()
 
     def finish(self) -> None:
-        """Write the last of it."""
         self.recorder.finish()
         self.recorder.say("end")
         self.tick()
         self._table.finish(self.story, self.lead)
 
     def view(self) -> SessionView:
-        """What there is to be seen."""
         done, every = len(self.lead.complete(self.story)), len(self.lead.all_runs(self.story))
         step, head, again = self.step, say("{done} of {every} set-ups", done=done, every=every), self._judgement.again
         if self.recorder.stalled is not None:

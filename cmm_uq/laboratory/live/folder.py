@@ -24,8 +24,6 @@ _EVENTS = re.compile(r"(\d{4})-events\.jsonl")
 
 @dataclass
 class Journals:
-    """The journals of the session that is running."""
-
     folder: Path
     events: RecordingJournal  # of what happened: points, gaps, notes
     streams: RecordingJournal  # of the readings that come by themselves

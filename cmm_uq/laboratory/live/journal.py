@@ -33,7 +33,6 @@ class Record:
 
 
 def line_of(record: Record) -> bytes:
-    """A record as its line."""
     parts = [record.number, record.kind, record.moment.utc_ns, record.moment.monotonic_ns, record.data]
     text = json.dumps(parts, separators=(",", ":"), allow_nan=False).encode()
     return b"%08x %s\n" % (zlib.crc32(text), text)
@@ -52,8 +51,6 @@ def record_of(line: bytes) -> Record | None:
 
 
 class JournalLine(NamedTuple):
-    """A line of a file, read."""
-
     number: int  # in the file, from 1
     text: bytes  # only the last may lack its line feed
     record: Record | None  # ``None`` where it is damaged, or was never finished
@@ -68,8 +65,6 @@ def lines_in(path: Path) -> Iterator[JournalLine]:
 
 @dataclass(frozen=True)
 class JournalContent:
-    """What a journal holds."""
-
     records: tuple[Record, ...]  # all that are sound, in order
     torn: bytes  # bytes behind the last whole line, which nobody was told were kept
     damaged: tuple[int, ...]  # lines, from 1, whose checksum does not fit, or behind which a record is missing

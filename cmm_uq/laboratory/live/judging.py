@@ -98,8 +98,6 @@ def _sigma(linear: LinearModel) -> tuple[float | None, float]:
 
 @dataclass(frozen=True)
 class RepeatScatter:
-    """How the repeats of one measurement scatter."""
-
     measurement: int
     s: float  # standard deviation of a coordinate by its repeats, µm
     usual: float  # the same as stated, or of all others, µm
@@ -107,7 +105,6 @@ class RepeatScatter:
 
     @property
     def words(self) -> Text:
-        """Why a repeat is asked for."""
         return say(
             "the repeats of measurement {m} scatter by {s:.2g} µm a coordinate; {usual:.2g} µm is usual, and one set-up in a "
             "hundred goes beyond {limit:.2g} µm: measure it once more",
@@ -156,8 +153,6 @@ and by less than this part of that (squares) once they change places."""
 
 @dataclass(frozen=True)
 class PointJudgement:
-    """What is said."""
-
     shown: tuple[Text, ...] = ()
     warnings: tuple[Text, ...] = ()
     again: Text | None = None  # why the set-up should be measured once more; ``None``: nothing asks for it
@@ -165,8 +160,6 @@ class PointJudgement:
 
 @dataclass(frozen=True, eq=False)
 class Judge:
-    """Knows the artefact, the machine and the model of a job."""
-
     facts: ArtefactFacts
     screening: Screening | None
     observe: Observe | None

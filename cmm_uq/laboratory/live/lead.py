@@ -19,8 +19,6 @@ Run = tuple[int, int]  # measurement and repeat
 
 @dataclass(frozen=True, eq=False)
 class PlannedPoint:
-    """A point to be measured."""
-
     place: Place
     xyz: Floats  # (3,) where the plan has it, mm, in the coordinates that are recorded
     columns: Mapping[str, float]  # what the plan says of it besides: references, approach, normals

@@ -65,7 +65,6 @@ def _as_data(source: str, readings: list[Reading]) -> dict[str, Any]:
 
 
 def readings_of(data: Mapping[str, Any]) -> Iterable[Reading]:
-    """The readings of a record, as they came."""
     names, wrong, probed = data.get("names"), data.get("status", {}), data.get("point", {})
     rows = zip(data["utc_ns"], data["monotonic_ns"], data["raw"], data["values"], strict=True)
     for i, (utc_ns, monotonic_ns, raw, row) in enumerate(rows):
@@ -76,8 +75,6 @@ def readings_of(data: Mapping[str, Any]) -> Iterable[Reading]:
 
 
 class Recorder:
-    """One session of a recording."""
-
     def __init__(
         self, journals: Journals, sources: Sequence[DeclaredSource], *, max_gap_s: float, clock: Clock
     ) -> None:

@@ -33,8 +33,6 @@ _AT_ONCE = 2000  # events that are taken before the disk and the screen have the
 
 @dataclass(frozen=True)
 class DroppedFile:
-    """A file that stands still."""
-
     path: Path
     content: bytes
     utc_ns: int
@@ -100,8 +98,6 @@ class WatchedFolder:
 
 
 class Screen(Protocol):
-    """What shows a session."""
-
     def tell(self, text: Text) -> None: ...
 
     def show(self, view: SessionView) -> None: ...

@@ -39,8 +39,6 @@ WITH_TEXT = ("undo", "skip", "note")  # those that say nothing without a text
 
 @dataclass(frozen=True)
 class OperatorInput:
-    """A line, understood."""
-
     word: str  # of :data:`WORDS`, ``take``, or ``point``
     text: str = ""
     numbers: tuple[float, ...] = ()  # three coordinates, or one distance, mm
@@ -76,8 +74,6 @@ def _numbers(parts: list[str]) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class SessionView:
-    """What there is to be seen."""
-
     head: Text
     next: Text  # what comes next, with its coordinates
     picture: tuple[str, ...]  # of the set-up in the machine
@@ -89,7 +85,6 @@ class SessionView:
 
 
 def coming(step: PlannedPoint | None, lead: Lead) -> Text:
-    """What comes next, with its coordinates."""
     if step is None:
         return say("all of the plan is measured")
     at = commas(signed(value, ".1f") for value in step.xyz)

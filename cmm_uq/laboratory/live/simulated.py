@@ -60,8 +60,6 @@ class SimulatedThermometer:
 
 
 class SimulatedMachine:
-    """A machine that measures the point that it is asked for."""
-
     def __init__(self, name: str, *, clock: Clock, seed: int, noise_mm: float = NOISE_MM) -> None:
         self.name, self._clock, self._seed, self._noise_mm = name, clock, seed, noise_mm
         self._asked: queue.Queue[PlannedPoint] = queue.Queue()

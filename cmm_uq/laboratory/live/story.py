@@ -125,8 +125,6 @@ Place = tuple[int, int, int]  # measurement, point, repeat
 
 @dataclass(frozen=True)
 class Point:
-    """A point that was accepted."""
-
     record: int
     place: Place
     columns: Mapping[str, float]  # what was measured of it, by column
@@ -142,8 +140,6 @@ class Point:
 
 @dataclass
 class Session:
-    """One run of the program."""
-
     number: int
     start: Moment  # by both clocks
     offset_s: float  # time since the start of the job at its start

@@ -109,7 +109,6 @@ class LiveRecording:
             written_whole(self._beside, as_file(self._provenance(story, rows, [self._last])))
 
     def _provenance(self, story: Story, rows: Sequence[Row], hashes: Sequence[str]) -> dict[str, Any]:
-        """How the recording was taken."""
         return {
             "program": PROGRAM,
             "simulated": self._simulated,

@@ -35,8 +35,6 @@ BEGINNING = "0" * 64  # what the first entry carries in place of a hash before i
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One entry."""
-
     number: int  # 1, 2, … without a gap
     at: str  # moment of recording, UTC, ISO 8601
     kind: str
@@ -90,7 +88,6 @@ def moment_of(at: dt.datetime) -> str:
 
 
 def now() -> dt.datetime:
-    """The present moment, UTC."""
     return dt.datetime.now(dt.UTC)
 
 
@@ -174,8 +171,6 @@ class RecordedCertificate:
 
 @dataclass(frozen=True, slots=True)
 class ReleaseSignature:
-    """Who released, withdrew or replaced a certificate."""
-
     entry: int
     certificate: int
     what: str

@@ -65,7 +65,6 @@ def open_records(where: str | Path | None = None, *, create: bool = False, read_
 
 
 def engine_of(place: str | Path, *, create: bool = False, read_only: bool = False) -> Engine:
-    """Connections to a place."""
     return _server(str(place), read_only) if is_url(place) else _file(Path(place), create, read_only)
 
 

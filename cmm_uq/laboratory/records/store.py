@@ -148,8 +148,6 @@ class Records(RecordQueries):
 
 
 class Writing:
-    """One transaction of one writer."""
-
     def __init__(self, connection: Connection, clock: Callable[[], dt.datetime]) -> None:
         self.connection, self._clock = connection, clock
 

@@ -28,7 +28,6 @@ from cmm_uq.laboratory.schedule.settings import PORTS, EmailTable, ScheduleFile,
 
 
 def of_variable(name: str, key: str) -> str:
-    """A secret in the environment."""
     secret = os.environ.get(name, "")
     if not secret:
         fix = "Set it where the run is started, as in EnvironmentFile= of systemd"

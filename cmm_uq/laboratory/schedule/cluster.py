@@ -63,8 +63,6 @@ def _chunks(tasks: Iterable[tuple[int, Any]], count: int, threads: int) -> Itera
 
 
 class _Run:
-    """Portions under way at a cluster."""
-
     def __init__(self, client: Any, address: str, work: WorkerTask) -> None:
         self._client, self._address, self._work = client, address, work
         self._wait = import_module("distributed").wait

@@ -42,8 +42,6 @@ _HEAD = 200  # bytes of a recording that say whether it is a plan still to be me
 
 @dataclass(frozen=True)
 class JobFolder:
-    """A job folder."""
-
     folder: Path
     root: Path  # folder of the schedule that it lies in
     id: str = ""  # of the job; empty where job.toml cannot be read, which its report will say
@@ -131,8 +129,6 @@ REFUSED, FAILED, WOULD = "refused", "failed", "would report"  # what came of a j
 
 @dataclass(frozen=True)
 class JobOutcome:
-    """What came of a job, or of a folder."""
-
     job: JobFolder
     state: str  # one of the words above
     why: str = ""
@@ -178,8 +174,6 @@ class JobOutcome:
 
 @dataclass(frozen=True)
 class JobReporting:
-    """How jobs are reported."""
-
     out: Path  # folder with a folder for each job
     state: State  # what earlier runs have done
     report: Report

@@ -137,7 +137,6 @@ class OutgoingMessage:
     at: str  # moment at which it was found, UTC, ISO 8601
 
     def as_data(self) -> dict[str, str]:
-        """For a file, or a webhook."""
         return asdict(self)
 
     @classmethod
@@ -148,8 +147,6 @@ class OutgoingMessage:
 
 
 class Channel(Protocol):
-    """A way of sending messages."""
-
     name: str  # what tells it from others, without a secret
     events: frozenset[str]  # that it is told of
 
@@ -187,8 +184,6 @@ _ABANDONED_S = 3600.0  # age at which nobody writes a file any more that takes m
 
 @dataclass(frozen=True)
 class Delivery:
-    """What came of a message."""
-
     message: OutgoingMessage
     channel: str
     problem: str = ""  # why it did not go out; empty where it did
@@ -197,8 +192,6 @@ class Delivery:
 
 @dataclass(frozen=True)
 class Outbox:
-    """Messages of one folder of reports."""
-
     out: Path
     channels: Sequence[Channel]
     state: State
@@ -229,7 +222,6 @@ class Outbox:
         ]
 
     def waiting(self) -> int:
-        """How many messages have not gone out."""
         return sum(1 for _ in self.folder.glob(f"*{_WAITING}")) if self.folder.is_dir() else 0
 
     def deliver(self, patience_s: float) -> list[Delivery]:

@@ -31,7 +31,6 @@ def check_parquet(path: Path, *, force: bool) -> None:
 
 
 def write_parquet(path: Path, columns: Columns, rows: Iterable[Row], *, force: bool) -> None:
-    """Rows as a new file."""
     module, parquet, left = arrow("pyarrow"), arrow("pyarrow.parquet"), iter(rows)
     schema = module.schema(
         [module.field(name, _type(module, kind), metadata={"meaning": told}) for name, kind, told in columns]
@@ -49,7 +48,6 @@ def write_parquet(path: Path, columns: Columns, rows: Iterable[Row], *, force: b
 
 
 def arrow(module: str) -> ModuleType:
-    """A module of pyarrow."""
     try:
         return import_module(module)
     except ModuleNotFoundError:

@@ -38,8 +38,6 @@ BEGINNING_S = 300.0
 
 @dataclass(frozen=True)
 class WorkerTask:
-    """What processes are begun for."""
-
     program: str  # module that a process runs; see :func:`serve`
     setting: Any  # what every process is told first
     seconds: float | None = None  # that one task may take; without one, as long as it takes
@@ -48,8 +46,6 @@ class WorkerTask:
 
 @dataclass(frozen=True)
 class TaskAnswer:
-    """What came of a task."""
-
     number: int
     value: Any = None
     failure: CmmUqError | None = None

@@ -128,7 +128,6 @@ def pace(rate: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """In the two largest units."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"
@@ -142,8 +141,6 @@ _PATIENCE_S = 2.0  # how long to wait for another run that writes its line
 
 @dataclass(frozen=True)
 class Log:
-    """A file of lines."""
-
     path: Path | None  # of the file; ``None`` for no log
     largest: int  # bytes at which a new one is begun
     kept: int

@@ -41,8 +41,6 @@ _PATIENCE_S = 60.0  # how long to wait for another run that sends messages
 
 @dataclass(frozen=True)
 class RunClock:
-    """Time, as a run knows it."""
-
     now: Callable[[], dt.datetime]  # the moment, UTC; it may jump
     passed: Callable[[], float]  # seconds from some moment on; they do not
     sleep: Callable[[float], None]  # waits so many seconds
@@ -54,8 +52,6 @@ class RunClock:
 
 @dataclass(frozen=True)
 class ScheduledRun:
-    """What a scheduled run goes by."""
-
     folders: Sequence[Path]  # with job folders in them
     settings: RunTable
     work: JobReporting  # how a job is reported

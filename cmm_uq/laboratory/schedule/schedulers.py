@@ -19,8 +19,6 @@ _NAMESPACE = "http://schemas.microsoft.com/windows/2004/02/mit/task"
 
 @dataclass(frozen=True)
 class ScheduledCall:
-    """A scheduled run, as a scheduler starts it."""
-
     program: tuple[str, ...]  # that runs the command, and what comes before the subcommand
     folders: tuple[PurePath, ...]  # with job folders in them; absolute
     schedule: PurePath | None  # the file schedule.toml; ``None`` where there is none

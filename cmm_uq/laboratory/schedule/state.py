@@ -41,13 +41,9 @@ class State(Protocol):
         """Whether a person has released the newest certificate of a job, so that it must not be replaced."""
         ...
 
-    def sent(self, key: str) -> bool:
-        """Whether a message was sent."""
-        ...
+    def sent(self, key: str) -> bool: ...
 
-    def add_sent(self, key: str, content: Mapping[str, Any]) -> None:
-        """Remember that a message was sent."""
-        ...
+    def add_sent(self, key: str, content: Mapping[str, Any]) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -128,8 +124,6 @@ def inputs_in(folder: Path) -> dict[str, str] | None:
 
 
 class Problems:
-    """Problems of jobs and folders, a small file each."""
-
     def __init__(self, out: Path) -> None:
         self.folder = out / PRIVATE / "problems"
         try:

@@ -76,8 +76,6 @@ class Conversation:
 
 
 class Introduction:
-    """The lines that follow the question who it is."""
-
     def __init__(self, wanted: Identify) -> None:
         self._pattern = re.compile(wanted.pattern)
         self._lines: list[str] = []

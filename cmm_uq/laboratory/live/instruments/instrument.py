@@ -114,7 +114,6 @@ class LiveInstrument:
     def _returned(
         self, framed: FramedMessage, understood: Understood, stamp: source.Moment, port: source.Port | None
     ) -> Iterator[source.Event]:
-        """The first that an instrument says after a gap."""
         gap, self._gap_at = self._gap_at, -1
         try:
             further = [] if self._known or port is None else list(self._introduced(port, INTRODUCED_WITHIN_S))
@@ -143,7 +142,6 @@ class LiveInstrument:
         )  # fmt: skip
 
     def _rest(self) -> Iterator[source.Event]:
-        """A message whose end did not come."""
         rest = self._framer.rest()
         if rest is not None:
             yield self._reading(rest, self._parser.read(rest), source.Moment.now(self._clock))
@@ -170,7 +168,6 @@ class LiveInstrument:
             yield source.Gap(self.name, stamp.utc_ns, stamp.monotonic_ns, why)
 
     def _lost(self, why: Text) -> Iterator[source.Event]:
-        """Give up the port; what waited for its end is said first."""
         yield from self._rest()
         self._close_port()
         yield from self._silent(why)
@@ -261,7 +258,6 @@ def open_source(
 def instrument(
     identity: source.Identity, profile: ProfileFile, port: str, clock: source.Clock, folder: Path
 ) -> LiveInstrument:
-    """An instrument that speaks as a profile says."""
     if port.startswith(ports.FILE):
         return LiveInstrument(identity, profile, partial(ports.ReplayedFile, port, folder, clock), clock)
     far = port.startswith((*ports.NETWORK, ports.RFC2217))

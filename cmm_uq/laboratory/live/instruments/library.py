@@ -22,7 +22,6 @@ ENDING = ".toml"
 
 
 def ready() -> tuple[str, ...]:
-    """Names of the profiles that come with the program."""
     return tuple(sorted(path.name.removesuffix(ENDING) for path in _folder().iterdir() if path.name.endswith(ENDING)))
 
 
@@ -39,7 +38,6 @@ def _ready(name: str) -> ProfileFile:
 
 
 def read_profile(path: Path) -> ProfileFile:
-    """A profile of a user's own."""
     content = content_of(path, JOB_BYTES, "Name a profile: cmm-uq instruments list shows those that are ready")
     return profile_of(content, path)
 
@@ -76,12 +74,10 @@ class ProfileDraft:
 
 
 def numbers_in(line: str) -> list[str]:
-    """The numbers of an example line, in turn."""
     return [found[0] for found in _FOUND.finditer(without_end(line))]
 
 
 def without_end(text: str) -> str:
-    """An example without its end."""
     return re.sub(r"(?:<CR>|<LF>|\r|\n)+$", "", text)
 
 
@@ -104,7 +100,6 @@ def range_of(text: str, name: str) -> tuple[float, float]:
 
 
 def drafted(wanted: ProfileDraft) -> bytes:
-    """The profile's file."""
     line = without_end(wanted.line)
     found = list(_FOUND.finditer(line))
     for place, name in wanted.quantities.items():

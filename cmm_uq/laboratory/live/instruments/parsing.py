@@ -44,7 +44,6 @@ class Framer:
         self._looked = 0
 
     def feed(self, received: bytes) -> list[FramedMessage]:
-        """Messages that are complete with these bytes."""
         self._waiting += received
         return list(iter(self._next, None))
 
@@ -54,7 +53,6 @@ class Framer:
 
     @property
     def waiting(self) -> bool:
-        """Whether a message has begun."""
         return bool(self._waiting)
 
     def _next(self) -> FramedMessage | None:
@@ -119,7 +117,6 @@ def number_of(text: str, decimal: str) -> float:
 
 
 def value_of(name: str, raw: float, quantity: ProfileQuantity, said: str = "") -> float:
-    """The value of a quantity."""
     unit = quantity.units.get(said) if quantity.unit_group else quantity.unit
     if unit is None:
         raise NoValueError(say("{name} comes in {unit}, which the profile does not know", name=Verbatim(name),
@@ -159,16 +156,12 @@ _NOTHING = Parse(pattern="(?!)")  # understands nothing
 
 @dataclass(frozen=True)
 class Understood:
-    """What a message says."""
-
     values: Mapping[str, float] = field(default_factory=dict)  # by quantity; empty where it says none
     status: Text | None = None  # what is wrong; ``None``: nothing
     answers: bool = False  # whether it is an answer: it has values, or says that something is wrong with the instrument
 
 
 class Parser:
-    """The messages of one instrument."""
-
     def __init__(self, profile: ProfileFile) -> None:
         self._profile, self._parse = profile, profile.parse or _NOTHING
         self._ignored = [re.compile(pattern) for pattern in self._parse.ignore]
@@ -178,7 +171,6 @@ class Parser:
         self._patterns = [None if text is None else re.compile(text) for text in texts]
 
     def read(self, message: FramedMessage, answers: int = 0) -> Understood:
-        """What it says."""
         text = message.body.decode("latin-1")
         if any(pattern.fullmatch(text) for pattern in self._ignored):
             return Understood()

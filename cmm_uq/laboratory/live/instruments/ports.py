@@ -38,8 +38,6 @@ def _lost_on(failures: tuple[type[Exception], ...]) -> Iterator[None]:
 
 
 class VisaPort:
-    """An instrument by VISA."""
-
     def __init__(self, port: str, library: str = "") -> None:
         try:
             import pyvisa
@@ -95,7 +93,6 @@ PortOpener = Callable[[], Port]  # opens a port, again and again
 
 
 def opener(port: str, connection: Connection, *, tcp_port: int | None = None) -> PortOpener:
-    """How a port is opened."""
     if port.startswith("visa://"):
         return lambda: VisaPort(port)
     if "://" not in port:
@@ -155,8 +152,6 @@ class SerialPort:
 
 
 class TcpPort:
-    """A connection by TCP."""
-
     def __init__(self, host: str, port: int, name: str) -> None:
         try:
             self._socket = socket.create_connection((host, port), timeout=CONNECT_WITHIN_S)
@@ -210,7 +205,6 @@ _REFUSALS: tuple[tuple[tuple[int, ...], tuple[type[Exception], ...], tuple[str, 
 
 
 def _refused(port: str, error: Exception) -> CmmUqError:
-    """Why a port cannot be opened."""
     code, text = getattr(error, "errno", None), str(error)
     for codes, kinds, words, problem, fix in _REFUSALS:
         if code in codes or isinstance(error, kinds) or any(word in text for word in words):

@@ -41,8 +41,6 @@ class Mischief:
 
 
 class _Wire(Protocol):
-    """One connection of the instrument's side."""
-
     def receive(self) -> bytes:
         """What came, after a short while at most; raises ``OSError`` where the other side is gone."""
         ...
@@ -162,8 +160,6 @@ class _Pty:
 
 
 class _Tcp:
-    """A connection that was accepted."""
-
     def __init__(self, connection: socket.socket) -> None:
         self._connection = connection
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -51,8 +51,6 @@ class Identity:
 
 @dataclass(frozen=True)
 class Gap:
-    """A source went silent or was lost."""
-
     source: str
     utc_ns: int
     monotonic_ns: int
@@ -61,8 +59,6 @@ class Gap:
 
 @dataclass(frozen=True)
 class Returned:
-    """A source that was lost is there again."""
-
     source: str
     utc_ns: int
     monotonic_ns: int
@@ -99,8 +95,6 @@ class Clock(Protocol):
 
 
 class SystemClock:
-    """The system's clocks."""
-
     def utc_ns(self) -> int:
         return time.time_ns()
 

@@ -23,7 +23,6 @@ class Speaker:
         self._waiting = b""
 
     def hear(self, received: bytes) -> bytes:
-        """Answers to what came."""
         self._waiting += received
         *commands, self._waiting = re.split(rb"[\r\n]", self._waiting)
         return b"".join(self.answer(command.decode("latin-1").strip()) for command in commands if command)

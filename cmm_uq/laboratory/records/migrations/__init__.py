@@ -43,7 +43,6 @@ def upgrade(connection: Connection, to: str = REVISION) -> None:
 
 
 def configuration(connection: Connection) -> Config:
-    """Of Alembic, for a connection."""
     from alembic.config import Config
 
     made = Config()

@@ -158,7 +158,6 @@ class Client:
         return self.sent[-1].partition(" ")[0]
 
     def stop_daemon(self, tag: str) -> None:
-        """End reports."""
         self.call(f"StopDaemon({tag})")
 
     def enable_user(self) -> None:
@@ -168,11 +167,9 @@ class Client:
     # --- tools and temperatures ------------------------------------------------------------
 
     def tools(self) -> list[str]:
-        """Names of the tools that may be chosen."""
         return [str(protocol.arguments_of(_rest(answer))[0]) for answer in self.call("EnumTools()")]
 
     def tool(self) -> str:
-        """Name of the active tool."""
         (answer,) = self.call("GetProp(Tool.Name())")
         return str(_first(answer, "Tool.Name"))
 

@@ -34,7 +34,6 @@ _REPORTED = ("X", "Y", "Z")
 
 
 def open_machine(identity: Identity, profile: ProfileFile, port: str, clock: Clock) -> IppMachine:
-    """A CMM at a port."""
     if not port.startswith(NETWORK):
         fix = f'Give port = "tcp://host:{PORT}"'
         raise CmmUqError("a CMM by I++ DME is reached over the network", where=port or identity.name, fix=fix)

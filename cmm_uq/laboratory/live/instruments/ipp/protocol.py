@@ -41,8 +41,6 @@ Argument = float | str | Term  # A number, a text or a bare name, or a term
 
 @dataclass(frozen=True)
 class ServerLine:
-    """A line of the server."""
-
     tag: str
     sign: Sign
     rest: str = ""
