@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -23,7 +23,6 @@ from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.output import interruption
 from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.plugins import naming_package
-from cmm_uq.base.points import Points
 from cmm_uq.certificate.outcome import Outcome, OwnAnalysis
 from cmm_uq.certificate.proof.words import DiagnosisProof
 from cmm_uq.jobs.job import Job
@@ -47,11 +46,7 @@ Sealed = Callable[[str], None]  # told the SHA-256 of the truth, before anything
 
 @dataclass(frozen=True)
 class ProofOptions:
-    """What was asked for.
-
-    ``cases``, ``workers``, ``seed``, ``alpha`` how many cases, processes, seed of the cases, rate of false alarms of
-    the diagnosis.
-    """
+    """How many cases, processes at once, seed of the cases, rate of false alarms of the diagnosis."""
 
     cases: int = CASES
     workers: int = 1
@@ -59,57 +54,52 @@ class ProofOptions:
     alpha: float = 0.01
 
     def __post_init__(self) -> None:
-        if not FEWEST <= self.cases <= MOST:
-            raise CmmUqError(
-                f"{self.cases} cases", where="--cases", fix=f"Give from {FEWEST} to {MOST}; {CASES} are usual"
-            )
+        for sound, problem, where, fix in (
+            (FEWEST <= self.cases <= MOST, f"{self.cases} cases", "--cases",
+             f"Give from {FEWEST} to {MOST}; {CASES} are usual"),
+            (1e-6 <= self.alpha <= 0.5, f"a false-alarm rate of {self.alpha:g}", "--alpha",
+             "Give one between 0.000001 and 0.5; 0.01 is usual"),
+            (self.seed >= 0, f"a seed of {self.seed}", "--seed", "Give 0 or more"),
+        ):  # fmt: skip
+            if not sound:
+                raise CmmUqError(problem, where=where, fix=fix)
         check_workers(self.workers)
-        if not 1e-6 <= self.alpha <= 0.5:
-            raise CmmUqError(
-                f"a false-alarm rate of {self.alpha:g}",
-                where="--alpha",
-                fix="Give one between 0.000001 and 0.5; 0.01 is usual",
-            )
-        if self.seed < 0:
-            raise CmmUqError(f"a seed of {self.seed}", where="--seed", fix="Give 0 or more")
 
 
 def prove_job(
     job: Job, options: ProofOptions, *, folder: Path | None = None, stage: Stage = silent, sealed: Sealed | None = None
 ) -> tuple[DiagnosisProof, AnswersFolder | None]:
-    """Prove the diagnosis on the set-ups of a job.
-
-    Gives what was found, and what was kept of it, still open.
-    """
+    """The diagnosis proved on the set-ups of a job, and the folder of answers, still open."""
     stage("Finding the noise of the job", 0.0)
     with refusing_overflow(job.recording_path, OVERFLOW_FIX):
         job, design = design_of(job)
         stage(f"Drawing {options.cases} cases", 0.02)
         cases = tuple(design.case(options.seed, number) for number in range(options.cases))
     named = true_values(design)
-    truth = truth_file(cases, _common(job, options, named))
-    kept = None if folder is None else AnswersFolder(folder, truth)
+    common = {  # a run is the same where all of it is
+        "program": f"cmm-uq {__version__}", "plugins": plugins(), "job": job.facts.job.id, "inputs_sha256": sha256(job.inputs),
+        "seed": options.seed, "alpha": options.alpha, "count": options.cases, "accepted_by": job.facts.prove.model_dump(),
+        "named": named,
+    }  # fmt: skip
+    truth = truth_file(cases, common)
+    answers = None if folder is None else AnswersFolder(folder, truth)
     try:
         if sealed is not None:
             sealed(sha256_of(truth))
-        records = _records(job, design, cases, options, kept, stage)
+        records = _records(job, design, cases, options, answers, stage)
     except BaseException:
-        if kept is not None:
-            kept.close()
+        if answers is not None:
+            answers.close()
         raise
     of_artefact = {name for name, effect in every().items() if effect.mechanism == _OF_ARTEFACT}
     judged = tuple(judge(case, records[case.number], named, of_artefact.__contains__) for case in cases)
     ordered = tuple(records[case.number] for case in cases)
-    return DiagnosisProof(job, design, options.seed, options.alpha, truth, ordered, ProofJudgement(judged)), kept
+    proof = DiagnosisProof(job, design, options.seed, options.alpha, truth, ordered, ProofJudgement(judged))
+    return proof, answers
 
 
 def _records(
-    job: Job,
-    design: Design,
-    cases: tuple[Case, ...],
-    options: ProofOptions,
-    answers: AnswersFolder | None,
-    stage: Stage,
+    job: Job, design: Design, cases: tuple[Case, ...], options: ProofOptions, answers: AnswersFolder | None, stage: Stage
 ) -> dict[int, Record]:
     records = {} if answers is None else answers.records
     if answers is not None and any(REFUSED not in one and not one.keys() >= ANSWER for one in records.values()):
@@ -117,7 +107,7 @@ def _records(
                          fix="Remove the folder and begin again")  # fmt: skip
     todo = {case.number: case for case in cases if case.number not in records}
 
-    def told() -> None:
+    def tell() -> None:
         stage(f"Diagnosing cases: {len(records)} of {len(cases)}", 0.03 + 0.9 * len(records) / len(cases))
 
     def keep(record: Record) -> None:
@@ -125,35 +115,20 @@ def _records(
             records[record["number"]] = record
         else:
             answers.keep(record)
-        told()
+        tell()
 
     points = design.model.artefact.points
     points = replace(points, columns=dict(points.columns))  # without what it remembers, which cannot be sent
     setting = CaseSetting(
-        dict(job.inputs),
-        points,
-        design.values,
-        design.noise,
-        design.cte_per_k,
-        design.dates,
-        options.seed,
-        options.alpha,
+        dict(job.inputs), points, design.values, design.noise, design.cte_per_k, design.dates, options.seed, options.alpha
     )
-    told()
-    with _saying(answers, records, len(cases)):
+    tell()
+    with contextlib.ExitStack() as stack:
+        if answers is not None:
+            kept = f"cases are kept in {answers.folder}: the same command goes on"
+            stack.enter_context(interruption.keeping(lambda: f"{len(records)} of {len(cases)} {kept}"))
         answer_tasks(_PROGRAM, setting, todo, options.workers, keep=keep)
     return records
-
-
-@contextlib.contextmanager
-def _saying(answers: AnswersFolder | None, records: dict[int, Record], count: int) -> Iterator[None]:
-    if answers is None:
-        yield
-        return
-    with interruption.keeping(
-        lambda: f"{len(records)} of {count} cases are kept in {answers.folder}: the same command goes on"
-    ):
-        yield
 
 
 def design_of(job: Job) -> tuple[Job, Design]:
@@ -163,9 +138,8 @@ def design_of(job: Job) -> tuple[Job, Design]:
     if kind.observe is None or (offered is not None and offered.diagnose is not None):
         raise CmmUqError(
             f"a job of kind {facts.artefact.kind!r} has an analysis of its own, which is not proved by cases of effects",
-            where="job.toml [artefact] kind",
-            fix="Prove a job whose recording is explained by effects",
-        )
+            where="job.toml [artefact] kind", fix="Prove a job whose recording is explained by effects",
+        )  # fmt: skip
     if facts.simulation is not None:
         raise CmmUqError("the diagnosis against a simulation is not proved: cases are drawn by the job's own model",
                          where=f"job.toml {KEY}", fix="Leave the simulation out")  # fmt: skip
@@ -173,24 +147,21 @@ def design_of(job: Job) -> tuple[Job, Design]:
     if len(job.points) and not job.planned:
         model, _ = recorded_model(job)
         used, _ = without_outliers(model)
-        design = Design(
-            model, used.estimate().about, _noise_found(used), cte, 1 if facts.recording.earlier is None else 2
-        )
+        dates = 1 if facts.recording.earlier is None else 2
+        design = Design(model, used.estimate().about, _recorded_noise(used), cte, dates)
         return replace(job, points=model.artefact.points), design
-    return _planned(job, cte)
-
-
-def _planned(job: Job, cte: float) -> tuple[Job, Design]:
-    """Of a job still to be measured: the set-ups of its plan, and the noise that it states."""
-    plan = job.facts.plan
-    if job.facts.recording.u_coordinate_um is None and plan.noise_from is None:
+    if facts.recording.u_coordinate_um is None and facts.plan.noise_from is None:
         raise CmmUqError(
             "nothing is measured and no noise is stated, so that there is nothing to draw cases with",
             where="job.toml [recording] u_coordinate_um",
             fix="State the standard uncertainty of a coordinate, or name an earlier recording in [plan] noise_from",
-        )
-    points = job.points if len(job.points) else _placings(job)
-    noise = Setting.of(replace(job, points=points), kind_of(job)).noise
+        )  # fmt: skip
+    points = job.points
+    if not len(points):
+        from cmm_uq.app.commands.plans.planning import make_plan
+
+        points = make_plan(job, power=False).outlook.points
+    noise = Setting.of(replace(job, points=points), kind).noise
     if noise is None:
         raise CmmUqError("a plan of this kind states no noise", where="job.toml [plan]", fix="Record it first")
     job = replace(job, points=points, planned=False)
@@ -198,13 +169,7 @@ def _planned(job: Job, cte: float) -> tuple[Job, Design]:
     return job, Design(model, np.array([unknown.prior_mean for unknown in model.unknowns]), noise.drawn, cte)
 
 
-def _placings(job: Job) -> Points:
-    from cmm_uq.app.commands.plans.planning import make_plan
-
-    return make_plan(job, power=False).outlook.points
-
-
-def _noise_found(model: RecordingModel) -> Noise:
+def _recorded_noise(model: RecordingModel) -> Noise:
     """What a recording shows of its noise: each component in its median size, absent where it is more probably so."""
     estimate, components = model.estimate(), noise_of(model)
     posterior = sample_with_noise(estimate.linear, components, estimate.least_squares, 0)
@@ -222,45 +187,34 @@ def _noise_found(model: RecordingModel) -> Noise:
 
 def true_values(design: Design) -> dict[str, float]:
     """True values of what the job names, ``effect.parameter``."""
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     first = 0
     for effect in design.model.effects:
         own = design.coefficients[first : first + len(effect.coefficients)]
         first += len(effect.coefficients)
-        told = effect.to_reported(own, np.zeros(0))
-        found |= {f"{effect.name}.{name}": float(value) for name, value in told.items()}
-    return found
-
-
-def _common(job: Job, options: ProofOptions, named: dict[str, float]) -> dict[str, object]:
-    """What the sealed file says of all cases: a run is the same where all of it is."""
-    return {
-        "program": f"cmm-uq {__version__}", "plugins": plugins(), "job": job.facts.job.id, "inputs_sha256": sha256(job.inputs),
-        "seed": options.seed, "alpha": options.alpha, "count": options.cases, "accepted_by": job.facts.prove.model_dump(),
-        "named": named,
-    }  # fmt: skip
+        reported = effect.to_reported(own, np.zeros(0))
+        values |= {f"{effect.name}.{name}": float(value) for name, value in reported.items()}
+    return values
 
 
 PROVE = Form("prove", ("validation.html", "validation.pdf"), "prove", ("truth.json", "cases.jsonl"))
-
-UNFINISHED = "cases.unfinished"
-"""Folder, inside that of the files, with the truth and the answers of a run that is under way."""
+UNFINISHED = "cases.unfinished"  # folder, beside the files, with truth and answers of a run that is under way
 
 
 @naming_package()
-def prove_outcome(job: Job, options: ProofOptions, *, stage: Stage = silent) -> Outcome:
-    """Prove the diagnosis on the set-ups of a job that was read; nothing is written."""
-    return _outcome(job, options, stage)[0]
-
-
-def _outcome(
-    job: Job, options: ProofOptions, stage: Stage, folder: Path | None = None, sealed: Sealed | None = None
-) -> tuple[Outcome, AnswersFolder | None]:
+def prove_outcome(
+    job: Job, options: ProofOptions, *, stage: Stage = silent, folder: Path | None = None, sealed: Sealed | None = None,
+    kept: list[AnswersFolder] | None = None,
+) -> Outcome:  # fmt: skip
+    """Prove the diagnosis on the set-ups of a job that was read; nothing is written but the answers that are ``kept``."""
     from cmm_uq.certificate.proof.results import proof_outcome
 
-    proof, kept = prove_job(job, options, folder=folder, stage=stage, sealed=sealed)
+    proof, answers = prove_job(job, options, folder=folder, stage=stage, sealed=sealed)
     stage("Composing the page", 0.94)
-    return proof_outcome(proof), kept
+    outcome = proof_outcome(proof)
+    if answers is not None and kept is not None:
+        kept.append(answers)
+    return outcome
 
 
 def write_proof(
@@ -276,21 +230,16 @@ def write_proof(
     tell("Reading the job", 0.0)
     read = in_language(read_job(job, recorded=False), language)
     folder = (out or REPORTS / read.facts.job.id / PROVE.below) / UNFINISHED
-    open_: list[AnswersFolder] = []
-
-    @naming_package()
-    def outcome() -> Outcome:
-        found, kept = _outcome(read, options, tell, folder, sealed)
-        if kept is not None:
-            open_.append(kept)
-        return found
-
+    kept: list[AnswersFolder] = []
     try:
-        written = PROVE.write(read, outcome, out, force=force, stage=tell)
+        written = PROVE.write(
+            read, lambda: prove_outcome(read, options, stage=tell, folder=folder, sealed=sealed, kept=kept), out,
+            force=force, stage=tell,
+        )  # fmt: skip
     except BaseException:
-        for kept in open_:
-            kept.close()
+        for answers in kept:
+            answers.close()
         raise
-    for kept in open_:
-        kept.remove()
+    for answers in kept:
+        answers.remove()
     return written

@@ -81,15 +81,10 @@ def diagnosed_case(job: Job, design: Design, case: Case, setting: CaseSetting) -
                          fix="Prove a job whose recording is explained by effects")  # fmt: skip
     d = found.diagnosis
     return {
-        "number": case.number,
-        "verdict": d.verdict,
-        "p_value": _rounded(d.p_value),
+        "number": case.number, "verdict": d.verdict, "p_value": _rounded(d.p_value),
         "effects": [
-            {
-                "effect": str.__str__(each.effect), "probability": _rounded(each.probability),
-                "together": _rounded(each.together),
-                "parameters": _intervals(each.parameters),
-            }
+            {"effect": str.__str__(each.effect), "probability": _rounded(each.probability),
+             "together": _rounded(each.together), "parameters": _intervals(each.parameters)}
             for each in d.effects
         ],
         "groups": [[str.__str__(name) for name in group] for group in d.indistinguishable],

@@ -1,10 +1,7 @@
 """Pages that check: a dropped file against the records, and the records against their chain.
 
-Whether the records know a file: by its SHA-256 alone, and where that is unknown by what the file says it is.
-
-This is all that is said of a dropped file: whether its bytes are those that were recorded, and how their certificate
-stands. It checks no signature and computes nothing anew; a check that does takes the place of :func:`look_up` and gives a
-:class:`Known` too.
+A file is known by its SHA-256 alone, and where that is unknown by what it says it is. No signature is checked, and nothing
+computed anew.
 """
 
 from __future__ import annotations
@@ -16,26 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from cmm_uq.app.serve import page as p
 from cmm_uq.app.serve.exchange import LARGEST, UploadedFile, WebRequest, read_dropped
-from cmm_uq.app.serve.page import (
-    NOT_MEASURED,
-    Block,
-    Cell,
-    Drop,
-    Links,
-    PageFacts,
-    PageNotice,
-    PageParagraph,
-    PageSection,
-    PageTable,
-    Press,
-    WebPage,
-    address,
-    columns,
-    moment,
-)
+from cmm_uq.app.serve.page import Block, Cell, PageFacts, PageNotice, PageParagraph, PageSection, WebPage
 from cmm_uq.app.serve.recorded_files import files_of
-from cmm_uq.app.serve.view import MOST, ChainComparison, SiteView, machine_cell
+from cmm_uq.app.serve.view import MOST, SiteView, machine_cell
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, number, plural, say
 from cmm_uq.certificate.document import Standing
 from cmm_uq.laboratory.records.facts import RecordedCertificate
@@ -43,7 +25,8 @@ from cmm_uq.laboratory.records.listing import entry_of
 from cmm_uq.laboratory.records.place import shown as shown_place
 from cmm_uq.laboratory.records.store import Records
 
-MOST_CERTIFICATES = 50  # certificates of one number that are compared: it is issued once, and drafted a few times
+MOST_CERTIFICATES = 50  # of one number that are compared: it is issued once, and drafted a few times
+
 _OF_PAGE = re.compile(rb'class="number">[^<]{0,40}<bdi>([^<]{1,300})</bdi>')
 _OF_PDF = re.compile(rb"<pdf:Keywords>([^<]{1,300})</pdf:Keywords>")
 
@@ -65,15 +48,14 @@ class FileMatch:
 
 def look_up(records: Records, dropped: UploadedFile) -> FileMatch:
     """Look a file up."""
-    entry = records.has_results(dropped.sha256)
-    if entry is not None:
-        return FileMatch("recorded", records.certificate(entry), "results.json")
+    if (results := records.has_results(dropped.sha256)) is not None:
+        return FileMatch("recorded", records.certificate(results), "results.json")
     says = number_in(dropped.content or b"")
     candidates = records.named(says)[-MOST_CERTIFICATES:] if says else []
     for certificate in reversed(candidates):
-        found = entry_of(records, certificate.entry)
+        entry = entry_of(records, certificate.entry)
         folder, signed = Path(certificate.folder), records.signed(certificate.entry)
-        known = (*files_of(found, folder), *files_of(found, folder, signed)) if found is not None else ()
+        known = (*files_of(entry, folder), *files_of(entry, folder, signed)) if entry is not None else ()
         for file in known:  # as it was written, and as it was signed since
             if file.sha256 == dropped.sha256:
                 return FileMatch("recorded", certificate, file.name, says)
@@ -84,23 +66,14 @@ def look_up(records: Records, dropped: UploadedFile) -> FileMatch:
 
 def number_in(content: bytes) -> str:
     """The number that a certificate (PDF or HTML) or a results.json says it has; empty where none can be read."""
-    if content.startswith(b"%PDF"):
-        found = _OF_PDF.search(content)
-    elif content.lstrip()[:1] == b"{":
-        return _of_results(content)
-    else:
-        found = _OF_PAGE.search(content)
+    if not content.startswith(b"%PDF") and content.lstrip()[:1] == b"{":
+        try:
+            data = json.loads(content)
+            return str(data["job"]["id"]) if str(data["schema"]).startswith("cmm-uq/results/") else ""
+        except (ValueError, KeyError, TypeError, RecursionError):
+            return ""
+    found = (_OF_PDF if content.startswith(b"%PDF") else _OF_PAGE).search(content)
     return html.unescape(found[1].decode("utf-8", "replace")).strip() if found else ""
-
-
-def _of_results(content: bytes) -> str:
-    try:
-        data = json.loads(content)
-        if str(data["schema"]).startswith("cmm-uq/results/"):
-            return str(data["job"]["id"])
-    except (ValueError, KeyError, TypeError, RecursionError):
-        pass
-    return ""
 
 
 _SCOPE = say(
@@ -109,21 +82,31 @@ _SCOPE = say(
 )
 
 
-def file_page(view: SiteView, asked: WebRequest) -> WebPage:
+def file_page(view: SiteView, request: WebRequest) -> WebPage:
     """The form."""
-    asked.only(())
-    return WebPage(say("Check a file"), "/file",
-                lead=say("Is this certificate the one that was issued, and does it still hold?"), blocks=_form())  # fmt: skip
+    request.only(())
+    lead = say("Is this certificate the one that was issued, and does it still hold?")
+    return WebPage(say("Check a file"), "/file", lead=lead, blocks=_form())
 
 
-def dropped_page(view: SiteView, asked: WebRequest) -> WebPage:
+def dropped_page(view: SiteView, request: WebRequest) -> WebPage:
     """What the records know of the file in the request."""
-    asked.only(())
-    dropped = read_dropped(asked)
+    request.only(())
+    dropped = read_dropped(request)
     known = look_up(view.records, dropped)
+    rows: list[tuple[Text, Cell]] = []
+    if (one := known.certificate) is not None:
+        name = say("recorded as {name}", name=Verbatim(known.name)) if known.name else NOTHING
+        rows = [
+            (say("Certificate"), Cell(Verbatim(one.number), p.address("/certificate", entry=one.entry), note=name)),
+            (say("Machine"), machine_cell(one.machine)),
+            (say("Measured on"), Cell(day(one.day))),
+        ]
+    size = say("{bytes} bytes", bytes=number(dropped.size, ",d"))
+    rows += [(say("Size"), Cell(size)), (say("SHA-256"), Cell(Verbatim(dropped.sha256)))]
     return WebPage(
         say("Check a file"), "/file", lead=Verbatim(dropped.name),
-        blocks=(verdict(known), _facts(known, dropped), PageParagraph(_SCOPE, "note")),
+        blocks=(verdict(known), PageFacts(tuple(rows), wide=True), PageParagraph(_SCOPE, "note")),
         sections=(PageSection(say("Another file"), _form()),),
     )  # fmt: skip
 
@@ -133,24 +116,27 @@ def _form() -> tuple[Block, ...]:
         "A certificate as PDF or HTML, or its results.json; at most {most} MB. It is read once and not kept.",
         most=number(LARGEST // 2**20),
     )
-    return (Drop("/file", say("Drop a file here, or choose one"), hint, say("Check it")),)
+    return (p.Drop("/file", say("Drop a file here, or choose one"), hint, say("Check it")),)
 
 
 def verdict(known: FileMatch) -> PageNotice:
     """What is said first of a file."""
-    if known.certificate is None:
-        return PageNotice(say("Unknown: no certificate of these records"), "open", _unknown(known))
+    lines: list[Text]
+    if (one := known.certificate) is None:
+        lines = [
+            say("Its bytes are not in the records."),
+            say("It says that it is {number}, which is not in them either.", number=Verbatim(known.says)) if known.says else
+            say("It says no number by which it could be found: it may be of another program, a file beside a "
+                "certificate, or damaged."),
+        ]  # fmt: skip
+        return _notice(say("Unknown: no certificate of these records"), "open", lines)
     if known.how == "altered":
-        told = (
+        lines = [
             say("It says that it is {number}, which is in the records, but its bytes are none of those that were recorded.",
                 number=Verbatim(known.says)),
             say("It was changed after it was made, or made again without being recorded here. Do not rely on it."),
-        )  # fmt: skip
-        return PageNotice(say("Altered: not the file that was recorded"), "bad", tuple(Cell(line) for line in told))
-    return _of_state(known.certificate)
-
-
-def _of_state(one: RecordedCertificate) -> PageNotice:
+        ]  # fmt: skip
+        return _notice(say("Altered: not the file that was recorded"), "bad", lines)
     heads: dict[str, tuple[Text, Standing]] = {
         "released": (say("Known and released"), "good"),
         "draft": (say("Known, but a draft: nobody has released it"), "open"),
@@ -160,33 +146,14 @@ def _of_state(one: RecordedCertificate) -> PageNotice:
     head, standing = heads.get(one.state, (say("Known; its state is {state}", state=Verbatim(one.state)), "open"))
     if one.command != "report":
         head, standing = say("Known: a diagnosis, which is no certificate"), "open"
-    lines: list[Text] = [say("Its bytes are those that were recorded.")]
-    if (warning := NOT_MEASURED.get(one.origin)) is not None:
+    lines = [say("Its bytes are those that were recorded.")]
+    if (warning := p.NOT_MEASURED.get(one.origin)) is not None:
         lines, standing = [*lines, warning], "bad" if standing == "bad" else "open"
-    return PageNotice(head, standing, tuple(Cell(line) for line in lines))
+    return _notice(head, standing, lines)
 
 
-def _unknown(known: FileMatch) -> tuple[Cell, ...]:
-    lines = [say("Its bytes are not in the records.")]
-    if known.says:
-        lines.append(say("It says that it is {number}, which is not in them either.", number=Verbatim(known.says)))
-    else:
-        lines.append(say("It says no number by which it could be found: it may be of another program, a file beside a "
-                         "certificate, or damaged."))  # fmt: skip
-    return tuple(Cell(line) for line in lines)
-
-
-def _facts(known: FileMatch, dropped: UploadedFile) -> PageFacts:
-    rows: list[tuple[Text, Cell]] = []
-    if (one := known.certificate) is not None:
-        name = say("recorded as {name}", name=Verbatim(known.name)) if known.name else NOTHING
-        rows = [
-            (say("Certificate"), Cell(Verbatim(one.number), address("/certificate", entry=one.entry), note=name)),
-            (say("Machine"), machine_cell(one.machine)),
-            (say("Measured on"), Cell(day(one.day))),
-        ]
-    size = say("{bytes} bytes", bytes=number(dropped.size, ",d"))
-    return PageFacts((*rows, (say("Size"), Cell(size)), (say("SHA-256"), Cell(Verbatim(dropped.sha256)))), wide=True)
+def _notice(head: Text, standing: Standing, lines: list[Text]) -> PageNotice:
+    return PageNotice(head, standing, tuple(map(Cell, lines)))
 
 
 _WHAT = say(
@@ -196,51 +163,42 @@ _WHAT = say(
 )
 
 
-def integrity_page(view: SiteView, asked: WebRequest) -> WebPage:
+def integrity_page(view: SiteView, request: WebRequest) -> WebPage:
     """The head of the records, and what the last comparison found."""
-    asked.only(())
+    request.only(())
     count, head = view.records.head()
     rows = (
         (say("Entries"), Cell(number(count, ",d"))),
         (say("Head"), Cell(Verbatim(head) if count else say("none yet"))),
         (say("Records"), Cell(Verbatim(shown_place(view.records.place)))),
     )
+    forms: tuple[Block, ...] = (
+        PageParagraph(_WHAT), p.Press("/integrity/chain", say("Compare entries and tables")),
+        p.Press("/integrity/files", say("Compare entries, tables and all files")),
+    )  # fmt: skip
+    if (since := view.checking.since) is not None:
+        under_way = say("A comparison is under way since {moment}.", moment=p.moment(since))
+        forms = (PageParagraph(under_way), p.Links((Cell(say("Look again"), "/integrity"),)))
     return WebPage(
         say("Integrity"), "/integrity", lead=NOTHING,
-        blocks=(*_found(view, (count, head)), PageFacts(rows, wide=True)),
-        sections=(PageSection(say("Compare the records with their chain"), _forms(view)),),
+        blocks=(*_comparison(view, (count, head)), PageFacts(rows, wide=True)),
+        sections=(PageSection(say("Compare the records with their chain"), forms),),
     )  # fmt: skip
 
 
-def _forms(view: SiteView) -> tuple[Block, ...]:
-    if (since := view.checking.since) is not None:
-        told = say("A comparison is under way since {moment}.", moment=moment(since))
-        return (PageParagraph(told), Links((Cell(say("Look again"), "/integrity"),)))
-    return (
-        PageParagraph(_WHAT),
-        Press("/integrity/chain", say("Compare entries and tables")),
-        Press("/integrity/files", say("Compare entries, tables and all files")),
-    )
-
-
-def _found(view: SiteView, head: tuple[int, str]) -> tuple[Block, ...]:
+def _comparison(view: SiteView, head: tuple[int, str]) -> tuple[Block, ...]:
     last = view.checking.last
     if last is None:
         return (PageNotice(say("Not compared since cmm-uq serve was started"), "open"),)
-    at = say("Compared on {moment}, {what}, up to entry {number}.", moment=moment(last.at), number=number(last.head[0]),
+    at = say("Compared on {moment}, {what}, up to entry {number}.", moment=p.moment(last.at), number=number(last.head[0]),
              what=say("with all files") if last.files else say("without files"))  # fmt: skip
-    later = (Cell(say("Entries were added since.")),) if last.head != head else ()
+    later = [say("Entries were added since.")] if last.head != head else []
     if last.failed:
-        failed = Cell(Verbatim(last.failed))
-        return (PageNotice(say("The records could not be compared"), "bad", (failed, Cell(at))),)
+        return (_notice(say("The records could not be compared"), "bad", [Verbatim(last.failed), at]),)
     if not last.count:
-        return (PageNotice(say("The records agree with their chain"), "good", (Cell(at), *later)),)
-    head_text = plural(last.count, one=say("One thing is not as it was recorded"),
-                       many=say("{count} things are not as they were recorded", count=number(last.count, ",d")))  # fmt: skip
-    return (PageNotice(head_text, "bad", (Cell(at), *later)), _table(last))
-
-
-def _table(last: ChainComparison) -> PageTable:
+        return (_notice(say("The records agree with their chain"), "good", [at, *later]),)
+    found = plural(last.count, one=say("One thing is not as it was recorded"),
+                   many=say("{count} things are not as they were recorded", count=number(last.count, ",d")))  # fmt: skip
     kinds = {"chain": say("Entry"), "index": say("Table"), "file": say("File"), "missing": say("Missing file")}
     rows = tuple(
         (Cell(say("Entry {number}", number=number(one.entry)) if one.entry is not None else say("Records")),
@@ -248,5 +206,6 @@ def _table(last: ChainComparison) -> PageTable:
         for one in last.findings
     )  # fmt: skip
     more = (say("Shown are the first {most}.", most=number(MOST)),) if last.count > len(rows) else ()
-    return PageTable(say("What is not as it was recorded"), columns(say("Where"), say("What"), say("Finding")),
-                 rows, notes=more)  # fmt: skip
+    headings = p.columns(say("Where"), say("What"), say("Finding"))
+    table = p.PageTable(say("What is not as it was recorded"), headings, rows, notes=more)
+    return (_notice(found, "bad", [at, *later]), table)

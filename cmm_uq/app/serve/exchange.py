@@ -1,13 +1,8 @@
 """What a browser asks, read and checked, and what it is answered: the only place that knows HTTP's words.
 
-What a browser asks, read and checked, and what it is answered: the only place that knows HTTP's words.
-
-An address that cannot be read is refused in words (:class:`Refused`), never guessed at.
-
-A dropped file as it comes from a form: read through once, its SHA-256 taken, nothing of it kept on the disk.
-
-The form has one field, so that its parts (RFC 7578) need no parser: the file is what stands between the first empty line
-and the last boundary. Only a file small enough to be a certificate is held in memory, to be asked what it says it is.
+An address that cannot be read is refused in words, never guessed at. A dropped file is read through once, its SHA-256
+taken, nothing of it kept on the disk. Its form has one field, so that its parts (RFC 7578) need no parser: the file is what
+stands between the first empty line and the last boundary.
 """
 
 from __future__ import annotations
@@ -86,10 +81,8 @@ class WebRequest:
         try:
             return dt.date.fromisoformat(value)
         except ValueError:
-            problem = say(
-                "{name} is a date such as 2026-03-31, not {value!r}", name=Verbatim(name), value=_short(value)
-            )
-            raise bad(problem) from None
+            raise bad(say("{name} is a date such as 2026-03-31, not {value!r}", name=Verbatim(name),
+                          value=_short(value))) from None  # fmt: skip
 
 
 def read_address(target: str) -> tuple[str, dict[str, str]]:
@@ -122,15 +115,11 @@ def _short(text: str) -> Verbatim:
     return Verbatim(printable(shortened(text, 60)))
 
 
-SECURITY = {
-    "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
-    "Cross-Origin-Opener-Policy": "same-origin",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
+SECURITY = {  # sent with every answer
+    "X-Content-Type-Options": "nosniff", "X-Frame-Options": "DENY", "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin", "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
     "Cache-Control": "no-store",
-}
-"""Sent with every answer."""
+}  # fmt: skip
 
 OWN = (
     "default-src 'none'; style-src 'self'; img-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
@@ -204,11 +193,19 @@ def read_dropped(asked: WebRequest) -> UploadedFile:
 
 def _read(body: BinaryIO, length: int, boundary: bytes) -> UploadedFile:
     """Hash all but the end mark as it comes, and keep the beginning as far as it may be held."""
-    end = b"\r\n--" + boundary + b"--"
-    pending, left = b"", length
+    left = length
+
+    def some() -> bytes:
+        nonlocal left
+        block = body.read(min(left, _BLOCK))
+        if not block:
+            raise bad(say("the file did not come whole"), say("Drop it again"))
+        left -= len(block)
+        return block
+
+    end, pending = b"\r\n--" + boundary + b"--", b""
     while b"\r\n\r\n" not in pending and left and len(pending) < _HEAD:
-        block = _some(body, min(left, _BLOCK))
-        pending, left = pending + block, left - len(block)
+        pending += some()
     head, parted, pending = pending.partition(b"\r\n\r\n")
     named = _NAMED.search(head)
     if not parted or len(head) > _HEAD or not head.startswith(b"--" + boundary + b"\r\n") or named is None:
@@ -228,18 +225,9 @@ def _read(body: BinaryIO, length: int, boundary: bytes) -> UploadedFile:
 
     while left:
         take(pending[:-reserve])
-        pending = pending[-reserve:]
-        block = _some(body, min(left, _BLOCK))
-        pending, left = pending + block, left - len(block)
+        pending = pending[-reserve:] + some()
     content, closed, rest = pending.rpartition(end)
     if not closed or rest not in (b"", b"\r\n"):
         raise bad(say("the file did not come whole"), say("Drop it again"))
     take(content)
     return UploadedFile(name, size, sha256.hexdigest(), bytes(held) if len(held) == size else None)
-
-
-def _some(body: BinaryIO, most: int) -> bytes:
-    block = body.read(most)
-    if not block:
-        raise bad(say("the file did not come whole"), say("Drop it again"))
-    return block

@@ -1,9 +1,4 @@
-"""How every machine stands: overdue, due soon, not conforming, not released; the most urgent first.
-
-How every machine stands: overdue, due soon, not conforming, not released; the most urgent first.
-
-Worked out once for each head of the records and day, since nothing else changes it.
-"""
+"""How every machine stands: overdue, due soon, not conforming, not released; the most urgent first."""
 
 from __future__ import annotations
 
@@ -24,10 +19,9 @@ SOON = dt.timedelta(days=60)  # what is due within it is shown before it is late
 
 
 class DueDate(NamedTuple):
-    """When a machine is due.
+    """On which ``day`` a machine is due, ``None`` where no rule gives one, and why.
 
-    ``day``: on which; ``None`` where no rule gives one; ``beyond``: whether its last certificate finds it beyond its
-    limits: it is overdue from that day on.
+    ``beyond``: whether its last certificate finds it beyond its limits: it is overdue from that day on.
     """
 
     day: dt.date | None
@@ -35,8 +29,7 @@ class DueDate(NamedTuple):
     beyond: bool = False
 
 
-DueDates = Callable[[Records, dt.date], Mapping[str, DueDate]]
-"""Due dates on a day, by serial; a machine that is not among them has none."""
+DueDates = Callable[[Records, dt.date], Mapping[str, DueDate]]  # on a day, by serial, of machines that have one
 
 
 def by_rule(records: Records, today: dt.date) -> dict[str, DueDate]:
@@ -47,17 +40,14 @@ def by_rule(records: Records, today: dt.date) -> dict[str, DueDate]:
 
 @dataclass(frozen=True)
 class MachineGroup:
-    """Machines of which the same is true.
-
-    ``count``: what a number of them is called; ``standing``: how it is to be taken.
-    """
+    """Machines of which the same is true, what a number of them is called, and how that is to be taken."""
 
     word: Text
     count: Text
     standing: Standing
 
 
-GROUPS: Mapping[str, MachineGroup] = {
+GROUPS: Mapping[str, MachineGroup] = {  # the most urgent first; by the words of an address
     "overdue": MachineGroup(say("Overdue"), say("overdue"), "bad"),
     "failing": MachineGroup(say("Does not conform"), say("not conforming"), "bad"),
     "due": MachineGroup(say("Due soon"), say("due within {days} days", days=SOON.days), "open"),
@@ -67,17 +57,11 @@ GROUPS: Mapping[str, MachineGroup] = {
     "never": MachineGroup(say("No certificate"), say("without certificate"), "open"),
     "order": MachineGroup(say("In order"), say("in order"), "good"),
 }
-"""The most urgent first; by the words of an address."""
-
 _URGENCY = {name: place for place, name in enumerate(GROUPS)}
 
 
 class MachineStanding(NamedTuple):
-    """How one machine stands.
-
-    ``newest``: machine, with its newest certificate; ``due``: when it is due, and why; ``groups``: to which it
-    belongs, the most urgent first.
-    """
+    """A machine with its newest certificate, when it is due, and its groups, the most urgent first."""
 
     newest: Newest
     due: DueDate | None
@@ -85,20 +69,14 @@ class MachineStanding(NamedTuple):
 
     @property
     def serial(self) -> str:
-        """By which the machine is asked for."""
         return self.newest.machine.serial
 
 
 def overview(records: Records, due: DueDates, today: dt.date) -> tuple[MachineStanding, ...]:
     """Every machine, the most urgent first, then by due date."""
-    newest = standing_of_all(records)
-    days = due(records, today)
-    return in_order(
-        [
-            MachineStanding(one, days.get(one.machine.serial), groups(one, days.get(one.machine.serial), today))
-            for one in newest
-        ]
-    )
+    newest, days = standing_of_all(records), due(records, today)
+    dated = ((one, days.get(one.machine.serial)) for one in newest)
+    return in_order([MachineStanding(one, date, groups(one, date, today)) for one, date in dated])
 
 
 def in_order(machines: Sequence[MachineStanding]) -> tuple[MachineStanding, ...]:
@@ -126,7 +104,6 @@ def groups(newest: Newest, due: DueDate | None, today: dt.date) -> tuple[str, ..
 
 @lru_cache(1000)
 def _of_certificate(decision: str, diagnosis: str, state: str) -> tuple[str, ...]:
-    """To which groups a machine belongs by what its newest certificate says."""
     conforms = DECISIONS.get(decision, (None, "open"))[1]
     found = ["failing"] if conforms == "bad" else ["open"] if conforms == "open" else []
     if diagnosis and VERDICTS.get(diagnosis, (None, "open"))[1] != "good":

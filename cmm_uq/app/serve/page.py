@@ -1,15 +1,13 @@
-"""A page as data: what it says, before anyone decides what it looks like; and the records' words as a reader sees them.
+"""A page as data, before anyone decides what it looks like; and the records' words as a reader sees them.
 
-A page as data: what it says, before anyone decides what it looks like.
-
-As a document's, a page's blocks are small frozen classes with texts already rounded and worded; one template
-(``templates/serve/page.html``) shows every page, and has no words of its own. An address is a path of this site with its
-query, already quoted.
+One template (``templates/serve/page.html``) shows every page, and has no words of its own. Texts are rounded and worded
+already; an address is a path of this site with its query, quoted.
 """
 
 from __future__ import annotations
 
 import datetime as dt
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from http import HTTPStatus
@@ -23,18 +21,20 @@ from cmm_uq.certificate.document import Standing
 def address(path: str, **query: object) -> str:
     """A path with its query; what is ``None`` or empty is left out.
 
-    >>> address("/machine", serial="A/7 <b>", page=None) '/machine?serial=A%2F7+%3Cb%3E'
+    Examples
+    --------
+    >>> address("/machine", serial="A/7 <b>", page=None)
+    '/machine?serial=A%2F7+%3Cb%3E'
     """
-    given = {name.rstrip("_"): value for name, value in query.items() if value not in (None, "")}
-    return f"{path}?{urlencode(given)}" if given else path
+    stated = {name: value for name, value in query.items() if value not in (None, "")}
+    return f"{path}?{urlencode(stated)}" if stated else path
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A text in a table or a list of facts.
+    """A text in a table or a list of facts, where it leads, and how it is to be taken: by a sign and a colour beside it.
 
-    ``address``: where it leads, if anywhere; ``standing``: how it is to be taken: shown by a sign and a colour beside
-    the words; ``download``: whether the address gives a file to keep rather than to look at.
+    ``download``: whether the address gives a file to keep rather than to look at.
     """
 
     text: Text
@@ -42,6 +42,15 @@ class Cell:
     standing: Standing | None = None
     note: Text = NOTHING
     download: bool = False
+
+
+class Block:
+    """Part of a page; ``kind`` names its macro in the template."""
+
+    kind: ClassVar[str]
+
+    def __init_subclass__(cls) -> None:
+        cls.kind = re.sub("^Page(?=[A-Z])", "", cls.__name__).lower()
 
 
 @dataclass(frozen=True)
@@ -58,7 +67,7 @@ def columns(*headings: Text | tuple[Text, Literal["number", "day"]]) -> tuple[Pa
 
 
 @dataclass(frozen=True)
-class PageTable:
+class PageTable(Block):
     """Rows under headings; the first cell names its row. Where there is no row, ``empty`` says so.
 
     A caption that would only say the title of its section again is for those who hear the page (``heard``).
@@ -70,16 +79,14 @@ class PageTable:
     empty: Text = NOTHING
     notes: tuple[Text, ...] = ()
     heard: bool = False
-    kind: ClassVar[str] = "table"
 
 
 @dataclass(frozen=True)
-class PageFacts:
+class PageFacts(Block):
     """Labels and values; in one column where values are long (``wide``)."""
 
     rows: tuple[tuple[Text, Cell], ...]
     wide: bool = False
-    kind: ClassVar[str] = "facts"
 
 
 @dataclass(frozen=True)
@@ -94,31 +101,28 @@ class Count:
 
 
 @dataclass(frozen=True)
-class Tally:
+class Tally(Block):
     """Counts side by side: what a reader with five seconds sees."""
 
     title: Text
     counts: tuple[Count, ...]
-    kind: ClassVar[str] = "tally"
 
 
 @dataclass(frozen=True)
-class PageNotice:
+class PageNotice(Block):
     """A verdict, or what must not be overlooked, with what belongs to it."""
 
     head: Text
     standing: Standing
     lines: tuple[Cell, ...] = ()
-    kind: ClassVar[str] = "notice"
 
 
 @dataclass(frozen=True)
-class PageParagraph:
+class PageParagraph(Block):
     """Running text; a note is set smaller."""
 
     text: Text
     tone: Literal["plain", "note"] = "plain"
-    kind: ClassVar[str] = "paragraph"
 
 
 @dataclass(frozen=True)
@@ -133,7 +137,7 @@ class FormField:
 
 
 @dataclass(frozen=True)
-class Chooser:
+class Chooser(Block):
     """A form that narrows a list; ``kept`` is what else of the query stays as it is."""
 
     title: Text
@@ -142,18 +146,16 @@ class Chooser:
     button: Text
     clear: Cell | None = None
     kept: tuple[tuple[str, str], ...] = ()
-    kind: ClassVar[str] = "chooser"
 
 
 @dataclass(frozen=True)
-class Pager:
-    """Where in a long list the reader is; addresses of its neighbours, empty where there are none."""
+class Pager(Block):
+    """Where in a long list the reader is, and its neighbours."""
 
     title: Text
     told: Text
     before: Cell | None = None
     after: Cell | None = None
-    kind: ClassVar[str] = "pager"
 
 
 @dataclass(frozen=True)
@@ -168,43 +170,36 @@ class Chart:
 
 
 @dataclass(frozen=True)
-class Charts:
+class Charts(Block):
     """Pictures side by side."""
 
     charts: tuple[Chart, ...]
     notes: tuple[Text, ...] = ()
-    kind: ClassVar[str] = "charts"
 
 
 @dataclass(frozen=True)
-class Drop:
+class Drop(Block):
     """The form that takes a file, dropped or chosen."""
 
     path: str
     label: Text
     hint: Text
     button: Text
-    kind: ClassVar[str] = "drop"
 
 
 @dataclass(frozen=True)
-class Links:
+class Links(Block):
     """Where to go from here."""
 
     cells: tuple[Cell, ...]
-    kind: ClassVar[str] = "links"
 
 
 @dataclass(frozen=True)
-class Press:
+class Press(Block):
     """A form with nothing but a button."""
 
     path: str
     button: Text
-    kind: ClassVar[str] = "press"
-
-
-Block = PageTable | PageFacts | Tally | PageNotice | PageParagraph | Chooser | Pager | Charts | Drop | Links | Press
 
 
 @dataclass(frozen=True)
@@ -217,11 +212,7 @@ class PageSection:
 
 @dataclass(frozen=True)
 class WebPage:
-    """What a reader gets.
-
-    ``place``: path of the entry of the contents that it belongs to; ``lead``: one line below the title; ``above``:
-    the pages that it stands below.
-    """
+    """What a reader gets: below one line of ``lead``, under an entry (``place``) of the contents and the pages ``above``."""
 
     title: Text
     place: str
@@ -255,26 +246,22 @@ ORIGINS: Mapping[str, Text] = {
     "measured": say("Measured"), "simulated": say("Simulated"), "compensated": say("Compensated"),
 }  # fmt: skip
 
-NOT_MEASURED: Mapping[str, Text] = {
+NOT_MEASURED: Mapping[str, Text] = {  # what must not be overlooked
     "simulated": say("Nothing was measured: the recording was simulated"),
     "compensated": say("The recording was corrected by an error map, not measured so"),
 }
-"""What must not be overlooked of a recording that was not measured."""
 
 
-def cell_of(words: Mapping[str, Word], word: str, *, address: str = "") -> Cell:
+def cell_of(words: Mapping[str, Word], word: str) -> Cell:
     """A word of the records in a cell; one that is not known, as it stands."""
     if not word:
         return Cell(DASH)
     text, standing = words.get(word, (Verbatim(word), "open"))
-    return Cell(text, address, standing)
+    return Cell(text, standing=standing)
 
 
-def day_cell(date: dt.date | None, *, before: dt.date | None = None, note: Text = NOTHING) -> Cell:
-    """A date; one that lies before another is marked."""
-    if date is None:
-        return Cell(DASH, note=note)
-    return Cell(day(date), standing="bad" if before is not None and date < before else None, note=note)
+def day_cell(date: dt.date | None) -> Cell:
+    return Cell(DASH if date is None else day(date))
 
 
 def moment(at: dt.datetime) -> Text:

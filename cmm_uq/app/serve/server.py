@@ -154,21 +154,13 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(self.server.answer(RefusedRequest(status, told)))
 
     def do_GET(self) -> None:
-        self._answer(lambda: self._asked())
-
-    def do_HEAD(self) -> None:
-        self._answer(lambda: self._asked())
-
-    def do_POST(self) -> None:
-        """A form of this site."""
-        self._answer(self._posted)
-
-    def _answer(self, ask: Callable[[], WebRequest]) -> None:
         try:
-            asked: WebRequest | RefusedRequest = ask()
+            request: WebRequest | RefusedRequest = self._posted() if self.command == "POST" else self._asked()
         except RefusedRequest as refused:
-            asked = refused
-        self._send(self.server.answer(asked))
+            request = refused
+        self._send(self.server.answer(request))
+
+    do_HEAD = do_POST = do_GET  # noqa: N815 - names of the standard library
 
     def _asked(self) -> WebRequest:
         hosts = self.headers.get_all("Host", [])

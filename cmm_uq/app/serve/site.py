@@ -1,7 +1,5 @@
 """The site: which address gives which page, as HTML, and a page in words for whatever goes wrong.
 
-The site: which address gives which page, and a page in words for whatever goes wrong.
-
 Records are opened for each request and closed after it, so that a page shows what is there now, and not a file that was
 moved, restored or migrated meanwhile.
 """
@@ -43,19 +41,15 @@ CONTENTS: tuple[tuple[str, Text], ...] = (
     ("/", say("Machines")), ("/certificates", say("Certificates")), ("/diagnoses", say("Diagnoses")),
     ("/artefacts", say("Artefacts")), ("/file", say("Check a file")), ("/integrity", say("Integrity")),
 )  # fmt: skip
-"""What every page leads to."""
-
-WORDS: dict[str, Text] = {
+WORDS: dict[str, Text] = {  # what stands around every page
     "site": say("Calibration records"), "skip": say("To the content"), "contents": say("Contents"),
     "above": say("Belongs to"),
 }  # fmt: skip
-"""What stands around every page."""
 
 
 def render_page(page: WebPage, foot: Sequence[Text]) -> bytes:
-    """A whole page."""
-    made = _environment().get_template("page.html").render(page=page, foot=foot, contents=CONTENTS, words=WORDS)
-    return made.encode()
+    template = _environment().get_template("page.html")
+    return template.render(page=page, foot=foot, contents=CONTENTS, words=WORDS).encode()
 
 
 @cache
@@ -63,12 +57,6 @@ def style() -> bytes:
     """The style sheet, in the colours of the documents."""
     colours = {**plot_style.COLOURS, "band": plot_style.BAND}
     return _environment().get_template("style.css").render(colour=colours).encode()
-
-
-@cache
-def icon() -> bytes:
-    """The picture in the browser's tab."""
-    return (template_folder() / "serve" / "icon.svg").read_bytes()
 
 
 @cache
@@ -96,40 +84,29 @@ def _picture(chart: Chart) -> Markup:
     return Markup(f'<svg viewBox="{size}" role="img" aria-label="{label}">{chart.svg}</svg>')  # noqa: S704 - nothing in it is from elsewhere
 
 
-Made = Callable[[SiteView, WebRequest], WebPage | WebResponse]
-
-PAGES: Mapping[str, Made] = {
+PAGES: Mapping[str, Callable[[SiteView, WebRequest], WebPage | WebResponse]] = {  # what is looked at, by path
     "/": machines_page, "/machine": machine_page, "/certificates": certificates_page, "/certificate": certificate_page,
     "/diagnoses": diagnoses_page, "/artefacts": artefacts_page, "/recorded": recorded_file, "/file": file_page,
     "/integrity": integrity_page,
 }  # fmt: skip
-"""What is looked at, by path."""
 
+# pages with a form that is sent: a browser must say where it comes from, which it does to this site alone
 WITH_FORM = ("/file", "/integrity")
-"""Pages with a form that is sent: a browser must say where it comes from, which it does to this site alone."""
 
 
 class Site:
-    """Answers requests.
-
-    ``where``: file or URL of the records, as :func:`~cmm_uq.laboratory.records.opening.open_records` takes it;
-    ``today``: the day; this machine's own by default.
-    """
+    """Answers requests; ``where`` as :func:`~cmm_uq.laboratory.records.opening.open_records` takes it."""
 
     def __init__(
         self, where: str | Path | None = None, *, due: DueDates = by_rule, today: Callable[[], dt.date] = dt.date.today
     ) -> None:
         with open_records(where, read_only=True) as records:  # what is wrong with them is told before anybody looks
             self._where = records.place
+        self.place = shown(self._where)  # without a password
         self._due, self._today = due, today
         self._lock = threading.Lock()
         self._kept: tuple[tuple[int, str, dt.date], Sequence[MachineStanding]] | None = None
         self.checking = ChainComparing(self.opened)
-
-    @property
-    def place(self) -> str:
-        """Of the records, without a password."""
-        return shown(self._where)
 
     def opened(self) -> Records:
         """The records, to be read."""
@@ -140,53 +117,52 @@ class Site:
         with contextlib.suppress(CmmUqError):  # whoever looks is told
             self.machines()
 
-    def answer(self, asked: WebRequest | RefusedRequest) -> WebResponse:
+    def answer(self, request: WebRequest | RefusedRequest) -> WebResponse:
         """The answer to a request, whatever happens."""
+        title = None
         try:
-            if isinstance(asked, RefusedRequest):
-                raise asked
-            return self._answer(asked)
-        except RefusedRequest as refused:
-            return self._shown(_refusal(refused))
+            if isinstance(request, RefusedRequest):
+                raise request
+            return self._answer(request)
+        except RefusedRequest as error:
+            refused = error
         except CmmUqError as error:
-            problem, fix = problem_of(error)
-            return self._shown(
-                _refusal(
-                    RefusedRequest(HTTPStatus.SERVICE_UNAVAILABLE, problem, fix), say("The records cannot be read")
-                )
-            )
+            title = say("The records cannot be read")
+            refused = RefusedRequest(HTTPStatus.SERVICE_UNAVAILABLE, *problem_of(error))
         except TimeoutError:
-            return self._shown(
-                _refusal(RefusedRequest(HTTPStatus.REQUEST_TIMEOUT, say("the request took too long to come")))
-            )
+            refused = RefusedRequest(HTTPStatus.REQUEST_TIMEOUT, say("the request took too long to come"))
         except Exception as error:  # a fault is told on its page; the others go on
             told = say("a fault of the program: {what}", what=Verbatim(f"{type(error).__name__}: {error}"))
-            return self._shown(
-                _refusal(RefusedRequest(HTTPStatus.INTERNAL_SERVER_ERROR, told, say("Please report it")))
-            )
+            refused = RefusedRequest(HTTPStatus.INTERNAL_SERVER_ERROR, told, say("Please report it"))
+        titles = {HTTPStatus.NOT_FOUND: say("Not found"), HTTPStatus.INTERNAL_SERVER_ERROR: say("A fault")}
+        head = title or titles.get(refused.status, say("This cannot be shown"))
+        problem = say("{problem:capital}.", problem=refused.problem)
+        lines = (Cell(say("{fix}.", fix=refused.fix)),) if refused.fix else ()
+        notice = PageNotice(problem, "bad", lines)
+        return self._rendered(WebPage(head, "", lead=NOTHING, blocks=(notice,), status=refused.status))
 
-    def _answer(self, asked: WebRequest) -> WebResponse:
-        if asked.method == "POST":
-            return self._posted(asked)
-        if asked.path in ("/style.css", "/icon.svg"):
-            css = asked.path.endswith("css")
-            return WebResponse(style() if css else icon(), "text/css; charset=utf-8" if css else "image/svg+xml")
-        make = PAGES.get(asked.path)
-        if make is None:
+    def _answer(self, request: WebRequest) -> WebResponse:
+        if request.method == "POST":
+            return self._posted(request)
+        if request.path == "/style.css":
+            return WebResponse(style(), "text/css; charset=utf-8")
+        if request.path == "/icon.svg":
+            return WebResponse((template_folder() / "serve" / "icon.svg").read_bytes(), "image/svg+xml")
+        if request.path not in PAGES:
             raise RefusedRequest(HTTPStatus.NOT_FOUND, say("there is no page of that address"))
         with self.opened() as records:
-            made = make(self._view(records), asked)
-        return made if isinstance(made, WebResponse) else self._shown(made)
+            page = PAGES[request.path](self._view(records), request)
+        return page if isinstance(page, WebResponse) else self._rendered(page)
 
-    def _posted(self, asked: WebRequest) -> WebResponse:
-        if asked.path in ("/integrity/chain", "/integrity/files"):
-            asked.only(())
-            self.checking.begin(files=asked.path.endswith("files"))
+    def _posted(self, request: WebRequest) -> WebResponse:
+        if request.path in ("/integrity/chain", "/integrity/files"):
+            request.only(())
+            self.checking.begin(files=request.path.endswith("files"))
             return WebResponse(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": "/integrity"})
-        if asked.path != "/file":
+        if request.path != "/file":
             raise RefusedRequest(HTTPStatus.METHOD_NOT_ALLOWED, say("this page can only be looked at"))
         with self.opened() as records:
-            return self._shown(dropped_page(self._view(records), asked))
+            return self._rendered(dropped_page(self._view(records), request))
 
     def _view(self, records: Records) -> SiteView:
         today = self._today()
@@ -209,18 +185,10 @@ class Site:
         with self._lock:
             self._kept = None
 
-    def _shown(self, page: WebPage) -> WebResponse:
+    def _rendered(self, page: WebPage) -> WebResponse:
         foot = (
             say("Records: {place}. To be looked at only: nothing here can be changed.", place=Verbatim(self.place)),
             say("cmm-uq {version}", version=Verbatim(__version__)),
         )
         referrer = "same-origin" if page.place in WITH_FORM else "no-referrer"
         return WebResponse(render_page(page, foot), status=page.status, referrer=referrer)
-
-
-def _refusal(refused: RefusedRequest, title: Text | None = None) -> WebPage:
-    titles = {HTTPStatus.NOT_FOUND: say("Not found"), HTTPStatus.INTERNAL_SERVER_ERROR: say("A fault")}
-    head = title or titles.get(refused.status, say("This cannot be shown"))
-    problem = say("{problem:capital}.", problem=refused.problem)
-    lines = (Cell(say("{fix}.", fix=refused.fix)),) if refused.fix else ()
-    return WebPage(head, "", lead=NOTHING, blocks=(PageNotice(problem, "bad", lines),), status=refused.status)

@@ -1,6 +1,4 @@
-"""How each value of a machine went, as a small picture of SVG lines in the page's own colours, or as a row of a table.
-
-A trend as a small picture: SVG lines in the page's own colours, drawn here so that no page waits for a plotting library.
+"""How each value of a machine went: a small picture of SVG lines, so that no page waits for a plotting library, or a row.
 
 Colours, weights and lettering are the style sheet's (``templates/serve/style.css``), by class; so a picture is dark on a dark
 screen and black on paper. Points are joined by a line between two adjustments, never across one.
@@ -34,10 +32,7 @@ _STEPS = (1.0, 2.0, 5.0, 10.0, 20.0)
 
 @dataclass(frozen=True)
 class PlotFrame:
-    """Where days and values lie in the picture.
-
-    ``first, last``: days at its ends.
-    """
+    """Where days (``first`` and ``last`` at its ends) and values lie in the picture."""
 
     first: float
     last: float

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.planning.expected import RepeatsRow
-from cmm_uq.analysis.planning.identifiability import Identifiability
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.app.commands.files import Form, Stage, Written, silent
 from cmm_uq.app.commands.plans.page import placing_rows, to_measure_words
@@ -26,7 +23,6 @@ from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.results.contents import head
 from cmm_uq.certificate.wording import Figure, Headline, Summary
 from cmm_uq.jobs.job import Job
-from cmm_uq.maths.inference.linear_model import Unknown
 
 TO_FILL_IN = "plan.csv"
 PLAN = Form("plan", ("plan.html",), "plan", (TO_FILL_IN,))
@@ -96,13 +92,8 @@ def plan_results(plan: MeasurementPlan) -> dict[str, Any]:
         **head(plan.job, SCHEMA),
         "noise": noise_data(plan),
         "start": {"name": plan.name, "placings": len(plan.start.placings), **_outlook_data(plan.start)},
-        "better": better,
-        "repeats": worth_data(plan),
-        "free": list(plan.free),
-        "conditions": [
-            {"what": condition.what, "met": condition.met, "missing": list(condition.missing)}
-            for condition in plan.conditions
-        ],
+        "better": better, "repeats": worth_data(plan), "free": list(plan.free),
+        "conditions": [{"what": each.what, "met": each.met, "missing": list(each.missing)} for each in plan.conditions],
         "placings": [
             {"measurement": number, "title": placing.title, "minutes": time,
              "middle_mm": placing.middle.tolist(), "points": len(placing.points)}
@@ -118,22 +109,12 @@ def _outlook_data(outlook: Outlook) -> dict[str, Any]:
         return {}
     return {
         "determined": [
-            {
-                "effect": p.unknown.key[0],
-                "parameter": p.unknown.key[1],
-                "unit": p.unknown.unit,
-                "u": p.u,
-                "u_with_prior": p.u_with_prior,
-                "u_white": p.u_white,
-                "status": p.status,
-            }
+            {"effect": p.unknown.key[0], "parameter": p.unknown.key[1], "unit": p.unknown.unit, "u": p.u,
+             "u_with_prior": p.u_with_prior, "u_white": p.u_white, "status": p.status}
             for p in found.parameters
         ],
         "undetermined": [
-            {
-                "parameters": {f"{owner}.{name}": part for (owner, name), part in parts.items()},
-                "words": combination(parts),
-            }
+            {"parameters": {f"{owner}.{name}": part for (owner, name), part in parts.items()}, "words": combination(parts)}
             for parts in found.free
         ],
         "singular_values": found.singular_values.tolist(),
@@ -141,16 +122,11 @@ def _outlook_data(outlook: Outlook) -> dict[str, Any]:
         "absorbed": [{"effect": name, "as": list(others)} for name, others in found.absorbed],
         "unseen": list(found.unseen),
         "smallest": [
-            {
-                "effect": power.effect,
-                "parameter": power.parameter,
-                "unit": power.unit,
-                "detected": power.detectable,
-                "named": power.identifiable,
-            }
+            {"effect": power.effect, "parameter": power.parameter, "unit": power.unit, "detected": power.detectable,
+             "named": power.identifiable}
             for power in outlook.powers
         ],
-    }
+    }  # fmt: skip
 
 
 def noise_data(plan: MeasurementPlan) -> dict[str, Any]:
@@ -171,50 +147,39 @@ def worth_data(plan: MeasurementPlan) -> dict[str, Any] | None:
     """For results.json: uncertainties in the unit of each parameter, ``null`` where it stays free."""
     if plan.worth is None:
         return None
+    keys = [".".join(one.key) for one in plan.worth.unknowns]
 
-    return {"from_repeats": plan.worth.enough, "rows": [_row_data(plan.worth.unknowns, row) for row in plan.worth.rows]}
+    def by_name(u: Floats) -> dict[str, float | None]:
+        return {key: float(each) if np.isfinite(each) else None for key, each in zip(keys, u, strict=True)}
 
-
-def _row_data(unknowns: Sequence[Unknown], row: RepeatsRow) -> dict[str, Any]:
-    more = {"readings": row.readings_more, "minutes": row.minutes_more, "u": _by_name(unknowns, row.u_more)}
-    return {
-        "repeats": row.repeats, "readings": row.readings, "minutes": row.minutes, "u": _by_name(unknowns, row.u),
-        "one_placing_more": more,
-    }  # fmt: skip
-
-
-def _by_name(unknowns: Sequence[Unknown], u: Floats) -> dict[str, float | None]:
-    return {
-        ".".join(one.key): float(each) if np.isfinite(each) else None for one, each in zip(unknowns, u, strict=True)
-    }
+    rows = [
+        {"repeats": row.repeats, "readings": row.readings, "minutes": row.minutes, "u": by_name(row.u),
+         "one_placing_more": {"readings": row.readings_more, "minutes": row.minutes_more, "u": by_name(row.u_more)}}
+        for row in plan.worth.rows
+    ]  # fmt: skip
+    return {"from_repeats": plan.worth.enough, "rows": rows}
 
 
 def plan_summary(plan: MeasurementPlan) -> Summary:
     """For the end of the command; its details are the placings, below their headings."""
     found = plan.outlook.identifiability
     met = tuple(
-        Headline("MET", "good", one.what, ()) if one.met else Headline("NOT MET", "open", one.what, ())
+        Headline("MET" if one.met else "NOT MET", "good" if one.met else "open", one.what, ())
         for one in plan.conditions
     )
-    free = tuple(say("No reading shows: {what}.", what=text) for text in plan.free)
     heads = (say("No."), say("Set up"), say("From → to / mm"), say("Points"), say("min"))
     placings = tuple(placing_rows(plan))
+    figures: tuple[Figure, ...] = ()
+    remarks: list[Text] = [say("No reading shows: {what}.", what=text) for text in plan.free]
+    if found is not None:
+        figures = tuple(
+            (named(p), say("u = {u} {unit}", u=expected(p), unit=unit_of(p)), STATUS[p.status])
+            for p in found.parameters
+        )
+        remarks += [say("Stays free: {what}.", what=combination(parts)) for parts in found.free]
+        remarks += [say("Could not be told apart: {effects}.", effects=text) for text in pairs(found)]
+        remarks += [say("Would be taken for what the job names: {effects}.", effects=text) for text in absorbed(found)]
     return Summary(
-        to_measure_words(plan), verdicts=met, figures=() if found is None else _figures(found),
-        remarks=free if found is None else (*free, *_open(found)), details=(heads, *placings) if placings else (),
+        to_measure_words(plan), verdicts=met, figures=figures, remarks=tuple(remarks),
+        details=(heads, *placings) if placings else (),
     )  # fmt: skip
-
-
-def _figures(found: Identifiability) -> tuple[Figure, ...]:
-    return tuple(
-        (named(p), say("u = {u} {unit}", u=expected(p), unit=unit_of(p)), STATUS[p.status]) for p in found.parameters
-    )
-
-
-def _open(found: Identifiability) -> list[Text]:
-    """What the placings leave open."""
-    return [
-        *(say("Stays free: {what}.", what=combination(parts)) for parts in found.free),
-        *(say("Could not be told apart: {effects}.", effects=text) for text in pairs(found)),
-        *(say("Would be taken for what the job names: {effects}.", effects=text) for text in absorbed(found)),
-    ]

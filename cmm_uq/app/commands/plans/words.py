@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from cmm_uq.analysis.planning.identifiability import Determination, Identifiability
-from cmm_uq.app.commands.plans.planning import RECORDED, MeasurementPlan
 from cmm_uq.base.messages import DASH, Message, Text, Verbatim, listed, number, say
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.model.measurement import ARTEFACT
@@ -43,11 +42,9 @@ def combination(parts: Mapping[tuple[str, str], float]) -> Text:
         own = say("the artefact's own length") if one else say("the artefact's own dimensions")
         together = say("{effects} together", effects=words) if len(effects) > 1 else words
         return say("{effects}, with {own}", effects=together, own=own)
-    return (
-        say("{effects} together", effects=words)
-        if len(effects) > 1
-        else say("{effect}: nothing shows of it", effect=words)
-    )
+    if len(effects) > 1:
+        return say("{effects} together", effects=words)
+    return say("{effect}: nothing shows of it", effect=words)
 
 
 def _families(titles: Sequence[Text]) -> list[Text]:
@@ -58,17 +55,16 @@ def _families(titles: Sequence[Text]) -> list[Text]:
         if isinstance(title, Message) and title.pattern.endswith("}"):
             key = (title.pattern, *list(title.arguments.values())[:-1])
         families.setdefault(key, []).append(title)
-    return [_family(members) for members in families.values()]
-
-
-def _family(members: Sequence[Text]) -> Text:
-    first = members[0]
-    if len(members) == 1 or not isinstance(first, Message):
-        return first
-    name = first.pattern.rpartition("{")[2].removesuffix("}")
-    last = [member.arguments[name] for member in members if isinstance(member, Message)]
-    merged = listed([one for one in last if isinstance(one, Text)])
-    return Message(first.pattern, {**first.arguments, name: merged})
+    words: list[Text] = []
+    for first, *others in families.values():
+        if others and isinstance(first, Message):
+            name = first.pattern.rpartition("{")[2].removesuffix("}")
+            last = [member.arguments[name] for member in (first, *others) if isinstance(member, Message)]
+            merged = listed([one for one in last if isinstance(one, Text)])
+            words.append(Message(first.pattern, {**first.arguments, name: merged}))
+        else:
+            words.append(first)
+    return words
 
 
 def expected(parameter: Determination) -> Text:
@@ -119,11 +115,9 @@ def parameter_name(unknown: Unknown) -> Text:
     if owner == ARTEFACT:
         return say("Artefact, {size}", size=_size_words(name))
     effect = every()[owner]
-    return (
-        effect.title
-        if len(effect.coefficients) == 1
-        else say("{title}, {name}", title=effect.title, name=Verbatim(name))
-    )
+    if len(effect.coefficients) == 1:
+        return effect.title
+    return say("{title}, {name}", title=effect.title, name=Verbatim(name))
 
 
 def pairs(found: Identifiability) -> list[Text]:
@@ -139,24 +133,12 @@ def pairs(found: Identifiability) -> list[Text]:
 def absorbed(found: Identifiability) -> list[Text]:
     """Effects that would be taken for others: ``sag of the artefact for scale error of X and scale error of Y``."""
     own = say("the artefact's own size")
-    return [
-        say(
-            "{effect} for {others}",
-            effect=title_of(name),
-            others=listed([own if other == ARTEFACT else title_of(other) for other in others]),
-        )
+    each = (
+        (name, listed([own if other == ARTEFACT else title_of(other) for other in others]))
         for name, others in found.absorbed
         if others
-    ]
-
-
-def base_name(plan: MeasurementPlan) -> Text:
-    count = len(plan.start.placings)
-    return (
-        say("the recording ({count} placings)", count=count)
-        if plan.name == RECORDED
-        else say("{name} ({count} placings)", name=plan.name, count=count)
     )
+    return [say("{effect} for {others}", effect=title_of(name), others=others) for name, others in each]
 
 
 def smallest(amplitude: float | None) -> Text:
