@@ -202,9 +202,9 @@ def time_of(text: str | None) -> dt.timedelta | None:
 
 def open_key(key: str, server: str | None, level: str | None, trust: list[Path] | None) -> Signing:
     """The key, opened."""
-    from cmm_uq.app.commands.certificates.signing import Wanted, signing
+    from cmm_uq.app.commands.certificates.signing import SigningOptions, signing
 
-    return signing(Wanted(key, level, server, tuple(trust or ())), ask_secret)
+    return signing(SigningOptions(key, level, server, tuple(trust or ())), ask_secret)
 
 
 def ask_secret(question: str, *, twice: bool = False) -> str:

@@ -99,7 +99,12 @@ def prove_job(
 
 
 def _records(
-    job: Job, design: Design, cases: tuple[Case, ...], options: ProofOptions, answers: AnswersFolder | None, stage: Stage
+    job: Job,
+    design: Design,
+    cases: tuple[Case, ...],
+    options: ProofOptions,
+    answers: AnswersFolder | None,
+    stage: Stage,
 ) -> dict[int, Record]:
     records = {} if answers is None else answers.records
     if answers is not None and any(REFUSED not in one and not one.keys() >= ANSWER for one in records.values()):
@@ -120,7 +125,14 @@ def _records(
     points = design.model.artefact.points
     points = replace(points, columns=dict(points.columns))  # without what it remembers, which cannot be sent
     setting = CaseSetting(
-        dict(job.inputs), points, design.values, design.noise, design.cte_per_k, design.dates, options.seed, options.alpha
+        dict(job.inputs),
+        points,
+        design.values,
+        design.noise,
+        design.cte_per_k,
+        design.dates,
+        options.seed,
+        options.alpha,
     )
     tell()
     with contextlib.ExitStack() as stack:

@@ -10,7 +10,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from hashlib import sha256
 from importlib.resources import files as package_files
 from itertools import takewhile
@@ -245,13 +245,8 @@ def _again(
         data = json.loads(as_json(outcome.results))
         values = [RecordedValue(*row) for row in contents.values(data, called)]
         verdict = str((data.get("diagnosis") or {}).get("verdict") or "")
-        again = AffectedCertificate(
-            certificate,
-            touching,
-            tuple(_changes(certificate.values, values)),
-            Verdicts.of_results(data).overall,
-            verdict,
-        )
+        changes, decision = tuple(_changes(certificate.values, values)), Verdicts.of_results(data).overall
+        again = AffectedCertificate(certificate, touching, changes, decision, verdict)
         if folder is None or not again.changed:
             return again
         form, folder = (REPORT, folder) if report else (DIAGNOSE, folder / DIAGNOSE.below)
@@ -266,15 +261,10 @@ def _changes(before: tuple[RecordedValue, ...], after: list[RecordedValue]) -> I
     old, new = ({value.name: value for value in values} for values in (before, after))
     for name in old | new:
         a, b = old.get(name), new.get(name)
-        if a is None or b is None or a.unit != b.unit or not _same(a, b):
-            either = b or old[name]
-            yield FigureChange(name, either.quantity, either.unit, _figures(a), _figures(b))
-
-
-def _same(a: RecordedValue, b: RecordedValue) -> bool:
-    pairs = zip(_figures(a) or (), _figures(b) or (), strict=True)
-    return all(isclose(x, y, rel_tol=SAME, abs_tol=SAME * max(a.u, b.u)) for x, y in pairs)
-
-
-def _figures(value: RecordedValue | None) -> Figures | None:
-    return None if value is None else (value.value, value.u, value.lower, value.upper)
+        pair = tuple(None if one is None else (one.value, one.u, one.lower, one.upper) for one in (a, b))
+        if a is not None and b is not None and a.unit == b.unit:
+            same = partial(isclose, rel_tol=SAME, abs_tol=SAME * max(a.u, b.u))
+            if all(map(same, pair[0] or (), pair[1] or ())):
+                continue
+        either = b or old[name]
+        yield FigureChange(name, either.quantity, either.unit, *pair)

@@ -30,18 +30,30 @@ Asking = Callable[[str], str]  # asks whoever is at the keyboard for a secret; a
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """How it is to be signed.
+class SigningOptions:
+    """Key (PKCS#12 file, or URI ``pkcs11:…`` on a token), level of PAdES, time stamp server, and trusted certificates.
 
-    ``key`` PKCS#12 file, or URI ``pkcs11:…`` of a key on a token; ``level`` of PAdES; ``None`` for B-T with a time
-    stamp server, else B-B; ``server`` address of a time stamp server; ``trust`` files or folders of certificates that
-    chains must lead to.
+    ``level`` is B-T with a time stamp server, else B-B, where it is ``None``.
     """
 
     key: str
     level: str | None = None
     server: str | None = None
     trust: tuple[Path, ...] = ()
+
+    @property
+    def stamping(self) -> Stamping | None:
+        """What lifts a signature above B-B."""
+        known = (level for level in LEVELS if (self.level or "").upper() in (level, level.removeprefix("B-")))
+        level: Level | None = next(known, None) if self.level is not None else "B-T" if self.server else "B-B"
+        if level is None:
+            fix = f"One of {', '.join(LEVELS)}"
+            raise CmmUqError(f"{self.level!r} is no level of a signature", where="--level", fix=fix)
+        if level == "B-B":
+            return None
+        if not self.server:
+            raise CmmUqError(f"level {level} needs a time stamp server", where="--level", fix="Add --time-server URL")
+        return Stamping(self.server, level, trust_of(self.trust))
 
 
 @dataclass(frozen=True)
@@ -74,14 +86,14 @@ class Signing:
         return signed
 
 
-def signing(wanted: Wanted, asking: Asking) -> Signing:
+def signing(options: SigningOptions, asking: Asking) -> Signing:
     """Open the key, before anything is computed."""
-    stamping = _stamping(wanted)
+    stamping = options.stamping
     at = signing_time()
-    if wanted.key.startswith(SCHEME):
-        signer = signer_of_token(wanted.key, secret("PIN of the token: ", asking))
+    if options.key.startswith(SCHEME):
+        signer = signer_of_token(options.key, secret("PIN of the token: ", asking))
     else:
-        signer = signer_of_file(Path(wanted.key), secret("Passphrase of the key: ", asking))
+        signer = signer_of_file(Path(options.key), secret("Passphrase of the key: ", asking))
     signer.check(at)
     return Signing(signer, at, stamping)
 
@@ -91,21 +103,3 @@ def secret(question: str, asking: Asking) -> str:
     if named := os.environ.get(PASSPHRASE_FILE, ""):
         return credentials.of_file(Path(named), PASSPHRASE_FILE)
     return os.environ.get(PASSPHRASE, "") or asking(question)
-
-
-def _stamping(wanted: Wanted) -> Stamping | None:
-    level: Level = _level(wanted.level, server=bool(wanted.server))
-    if level == "B-B":
-        return None
-    if not wanted.server:
-        raise CmmUqError(f"level {level} needs a time stamp server", where="--level", fix="Add --time-server URL")
-    return Stamping(wanted.server, level, trust_of(wanted.trust))
-
-
-def _level(asked: str | None, *, server: bool) -> Level:
-    if asked is None:
-        return "B-T" if server else "B-B"
-    for level in LEVELS:
-        if asked.upper() in (level, level.removeprefix("B-")):
-            return level
-    raise CmmUqError(f"{asked!r} is no level of a signature", where="--level", fix=f"One of {', '.join(LEVELS)}")

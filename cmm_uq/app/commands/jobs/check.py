@@ -1,14 +1,11 @@
-"""All that is wrong with a job, without computing.
-
-All that is wrong with a job, without computing.
-
-All that is wrong with a job, without computing: what its readers and its model refuse, and what an assessor would miss.
+"""All that is wrong with a job, without computing: what its readers and its model refuse, and what an assessor would miss.
 
 The rules are those of the commands: the same readers are asked, and go on behind a problem where they can.
 """
 
 from __future__ import annotations
 
+import contextlib
 import re
 import tomllib
 from collections.abc import Iterable
@@ -47,13 +44,9 @@ _TABLE_KEY = re.compile(r"\[+([^\]]+)\]+ ?([\w.]*)")
 
 @dataclass(frozen=True)
 class Problem:
-    """Something that is wrong with a job, or that should be known.
+    """What is wrong with a job or should be known, where it stands, and how to mend it.
 
-    problem : what it is.
-    file : where it stands, if in a file.
-    line : of the file, from 1.
-    key : of job.toml, as ``[artefact] u_um``, or column of a recording.
-    fix : how to mend it.
+    ``line``: of the file, from 1; ``key``: of job.toml, as ``[artefact] u_um``, or column of a recording.
     """
 
     problem: str
@@ -66,11 +59,10 @@ class Problem:
     def of(cls, error: CmmUqError) -> Problem:
         """What an error says."""
         where = error.where or ""
-        found = _KEY_BEHIND.fullmatch(where) or _PLACE.fullmatch(where)
-        told = {} if found is None else {name: value or "" for name, value in found.groupdict().items()}
-        line = told.get("line", "")
-        key = told.get("key", "") or told.get("column", "")
-        return cls(error.problem, told.get("file", where), int(line) if line else None, key, error.fix or "")
+        match = _KEY_BEHIND.fullmatch(where) or _PLACE.fullmatch(where)
+        parts = {} if match is None else {name: value or "" for name, value in match.groupdict().items()}
+        line, key = parts.get("line"), parts.get("key") or parts.get("column", "")
+        return cls(error.problem, parts.get("file", where), int(line) if line else None, key, error.fix or "")
 
     def __str__(self) -> str:
         line = f" line {self.line}" if self.line else ""
@@ -78,7 +70,6 @@ class Problem:
         return f"{place}. {self.fix}" if self.fix else place
 
     def as_data(self) -> dict[str, Any]:
-        """For results in JSON."""
         return {"file": self.file, "line": self.line, "key": self.key, "problem": self.problem, "fix": self.fix}
 
 
@@ -86,11 +77,8 @@ class Problem:
 class JobCheck:
     """What there is to say of a job before it is computed.
 
-    job : its folder, or its job.toml.
-    problems : that would stop the command.
-    warnings : that the certificate would state, or that what stands there is not a measurement.
-    clauses : of ISO/IEC 17025:2017, 7.8, with what of each the certificate will state; none where there will be none.
-    command : that the job is for.
+    ``problems``: that would stop the command that it is for; ``warnings``: that the certificate would state; ``clauses``: of
+    ISO/IEC 17025:2017, 7.8, with what of each the certificate will state; none where there will be none.
     """
 
     job: str
@@ -105,7 +93,6 @@ class JobCheck:
         return not self.problems
 
     def as_data(self) -> dict[str, Any]:
-        """For results in JSON."""
         return {
             "job": self.job, "sound": self.sound, "problems": [one.as_data() for one in self.problems],
             "warnings": [one.as_data() for one in self.warnings], "iso17025": [one.data for one in self.clauses],
@@ -115,35 +102,41 @@ class JobCheck:
         return f"<Checked {self.job}: {len(self.problems)} problems, {len(self.warnings)} warnings>"
 
     def _repr_html_(self) -> str:
-        rows = [
-            (what, str(one)) for what, each in (("problem", self.problems), ("warning", self.warnings)) for one in each
-        ]
-        return html_table("Check", (), rows or [("", "nothing is wrong")])
+        each = (*(("problem", str(one)) for one in self.problems), *(("warning", str(one)) for one in self.warnings))
+        return html_table("Check", (), each or [("", "nothing is wrong")])
 
 
 @naming_package()
 def check_job(folder: Path) -> JobCheck:
     """Check a job."""
     wrong, path = Gathered(), folder if folder.suffix == ".toml" else folder / "job.toml"
-    job: Job | None = None
-    warnings: list[Problem] = []
-    if _of_a_part(path):
+    job, of_part = None, False
+    with contextlib.suppress(CmmUqError):
+        of_part = is_part(content_of(path, JOB_BYTES, ""))
+    if of_part:
         return _check_part(folder, path)
     with wrong.going_on():
         job = read_job(folder)
     if job is None:
         _parts_by_themselves(path, wrong)
-    else:
-        warnings = _of_a_job(job, path, wrong)
+    return _checked(str(folder), job, path, wrong)
+
+
+@naming_package()
+def check_read(job: Job) -> JobCheck:
+    """Check a job that was read."""
+    return _checked(job.facts.job.id, job, job.folder / "job.toml", Gathered())
+
+
+def _checked(name: str, job: Job | None, path: Path, wrong: Gathered) -> JobCheck:
+    warnings: list[Problem] = []
+    if job is not None:
+        with wrong.going_on():
+            warnings += _unfit(job, wrong)
+        warnings += _to_be_known(job, path)
+    requirements = clauses(job) if job is not None and certifies(job) else ()
     problems = _once(Problem.of(_placed(error, path)) for error in wrong.problems)
-    return JobCheck(str(folder), problems, _once(warnings), _clauses(job))
-
-
-def _of_a_part(path: Path) -> bool:
-    try:
-        return is_part(content_of(path, JOB_BYTES, ""))
-    except CmmUqError:
-        return False
+    return JobCheck(name, problems, _once(warnings), requirements)
 
 
 def _check_part(folder: Path, path: Path) -> JobCheck:
@@ -157,37 +150,16 @@ def _check_part(folder: Path, path: Path) -> JobCheck:
         job = read_part(folder, machine=False)
         refuse_unfit(job)
         warnings += [
-            Problem(str.__str__(said), str(path), key=f"[{table}]", fix=fix) for table, said, fix in lacking(job)
+            Problem(str.__str__(text), str(path), key=f"[{table}]", fix=fix) for table, text, fix in lacking(job)
         ]
     if job is not None:
         with wrong.going_on():
             whole = read_part(folder)  # with the files that state the machine
             refuse_machine(whole, partial(refuse_out_of_reach, whole))
         if (origin := job.facts.job.origin) != MEASURED:
-            said = f"the figures are {origin}, and all that is made of them says so"
-            warnings.append(Problem(said, str(path), key="[job] origin", fix="Put in your own, and take origin away"))
+            text = f"the figures are {origin}, and all that is made of them says so"
+            warnings.append(Problem(text, str(path), key="[job] origin", fix="Put in your own, and take origin away"))
     return JobCheck(str(folder), _once(Problem.of(error) for error in wrong.problems), tuple(warnings), command=PART)
-
-
-@naming_package()
-def check_read(job: Job) -> JobCheck:
-    """Check a job that was read."""
-    wrong, path = Gathered(), job.folder / "job.toml"
-    warnings = _of_a_job(job, path, wrong)
-    problems = _once(Problem.of(_placed(error, path)) for error in wrong.problems)
-    return JobCheck(job.facts.job.id, problems, _once(warnings), _clauses(job))
-
-
-def _clauses(job: Job | None) -> tuple[Requirement, ...]:
-    return clauses(job) if job is not None and certifies(job) else ()
-
-
-def _of_a_job(job: Job, path: Path, wrong: Gathered) -> list[Problem]:
-    """Gather what is wrong with a job that was read; what should be known of it."""
-    found: list[Problem] = []
-    with wrong.going_on():
-        found += _unfit(job, wrong)
-    return found + _to_be_known(job, path)
 
 
 def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
@@ -227,17 +199,11 @@ def _to_be_known(job: Job, path: Path) -> list[Problem]:
         said = f"the recording is {job.origin}, and all that is made of it says so"
         return [Problem(said, str(path), key="[job] origin", fix="Put in your own readings for a certificate")]
     content = job.inputs["job.toml"].decode("utf-8-sig")
-    unstated = [
-        Problem(
-            f"not stated: {one.asks} ({one.clause}), which ISO/IEC 17025:2017 asks for",
-            str(path),
-            _line_of(one.key, content),
-            one.key,
-            f"Give {one.key}",
-        )
-        for one in (missing(job) if certifies(job) else ())
-    ]
-    return [*(Problem(str(text), str(path)) for text in contradictions(job)), *unstated]
+    problems = [Problem(str(text), str(path)) for text in contradictions(job)]
+    for one in missing(job) if certifies(job) else ():
+        text = f"not stated: {one.asks} ({one.clause}), which ISO/IEC 17025:2017 asks for"
+        problems.append(Problem(text, str(path), _line_of(one.key, content), one.key, f"Give {one.key}"))
+    return problems
 
 
 def _parts_by_themselves(path: Path, wrong: Gathered) -> None:
@@ -246,7 +212,10 @@ def _parts_by_themselves(path: Path, wrong: Gathered) -> None:
         data = tomllib.loads(content_of(path, JOB_BYTES, "").decode("utf-8-sig"))
     except (CmmUqError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
         return
-    named, name = _value(data, "model", "effects"), _value(data, "recording", "file")
+    named, name = (
+        table.get(key) if isinstance(table := data.get(title), dict) else None
+        for title, key in (("model", "effects"), ("recording", "file"))
+    )
     if isinstance(named, list):
         with wrong.going_on():
             effects([name for name in named if isinstance(name, str)], where="job.toml [model] effects")
@@ -255,11 +224,6 @@ def _parts_by_themselves(path: Path, wrong: Gathered) -> None:
             found = inside(path.parent, name, str(path))
             content = content_of(found, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {path}")
             read_recording(content, str(path.parent / name), Machine())
-
-
-def _value(data: dict[str, Any], table: str, key: str) -> object:
-    found = data.get(table)
-    return found.get(key) if isinstance(found, dict) else None
 
 
 def _placed(error: CmmUqError, path: Path) -> CmmUqError:

@@ -1,7 +1,5 @@
 """Many jobs to their reports: found, sent to processes or a cluster, and written here, one after the other as they come.
 
-Many jobs to their reports: found, sent to processes or a cluster, and written here, one after the other as they come.
-
 Whoever computes is sent bytes and answers with bytes; one process writes. So the files are the same whatever computes them,
 nothing is half-written where a process is killed, and a cluster needs no disk in common.
 """
@@ -31,7 +29,7 @@ from cmm_uq.app.commands.laboratory.batch_jobs import (
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import REPORT
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.output import Ledger, Owner, interruption, staged
+from cmm_uq.base.output import interruption, staged
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.place import NONE
 from cmm_uq.laboratory.schedule.parquet import check_parquet
@@ -42,6 +40,11 @@ if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
 
 TIME_LIMIT_S, TRIES, MOST_TRIES = 1800.0, 3, 100
+WRITERS = 4  # threads that write: most of the time each waits until the disk has what it was given
+_AHEAD = 2  # reports for each of them that may wait
+
+# what the system says where no other job could be written either
+_NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO})
 
 
 @dataclass(frozen=True)
@@ -76,11 +79,6 @@ class BatchOptions:
         if self.seed < 0:
             raise CmmUqError(f"a seed of {self.seed}", where="--seed", fix="Give 0 or more")
 
-    @property
-    def work(self) -> WorkerTask:
-        """What processes are begun for."""
-        return WorkerTask(PROGRAM, (self.seed, self.results_only), self.seconds, self.tries)
-
 
 @dataclass(frozen=True)
 class FailedJob:
@@ -95,18 +93,18 @@ class FailedJob:
         return {"job": self.id, "folder": self.folder, "problem": error.problem, "where": error.where, "fix": error.fix}
 
     def __str__(self) -> str:
-        told = str(self.error)
-        return told if self.folder in told else f"{self.folder}: {told}"
+        text = str(self.error)
+        return text if self.folder in text else f"{self.folder}: {text}"
 
 
 @dataclass
 class Batch:
     """What came of a batch.
 
-    ``planned``: further ones that are still to be measured; ``not_conforming``: of both, those with a statement that
-    is no pass, or a recording that contradicts its model; ``ended``: processes that ended over a job, which was then
-    given to another; ``failed``: the others, in the order of the jobs; ``parquet``: file with a row for each value,
-    if one was asked for; ``records``: what they were recorded in, as it is shown; empty where they were not.
+    ``planned``: further jobs that are still to be measured; ``not_conforming``: of those that are there, with a statement
+    that is no pass, or a recording that contradicts its model; ``ended``: processes that ended over a job, which was then
+    given to another; ``failed``: in the order of the jobs; ``parquet``: file with a row for each value, if one was asked
+    for; ``records``: what they were recorded in, as it is shown; empty where they were not.
     """
 
     out: Path
@@ -131,79 +129,67 @@ class Batch:
         }  # fmt: skip
 
 
-WRITERS = 4  # threads that write: most of the time each waits until the disk has what it was given
-_AHEAD = 2  # reports for each of them that may wait
-
-_NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO})
-"""What the system says where no other job could be written either."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Place:
-    """Where a report is written, by whom, and of which job."""
-
-    folder: Path
-    owner: Owner
-    job: Job
-
-
 class BatchRun:
-    """One batch on its way.
-
-    ``asked, wanted``: how, and what is written of each; ``batch``: what came of it so far; ``records``: that each
-    report is recorded in with its files.
-    """
+    """One batch on its way: what came of it so far, with the ``records`` that each report is recorded in."""
 
     def __init__(
-        self, listed: list[BatchJob], asked: BatchOptions, wanted: BatchOutput, batch: Batch, records: Records | None
-    ) -> None:
-        self.listed, self.asked, self.wanted, self.batch, self.records = listed, asked, wanted, batch, records
+        self, listed: list[BatchJob], options: BatchOptions, output: BatchOutput, batch: Batch, records: Records | None,
+        tell: Stage,
+    ) -> None:  # fmt: skip
+        self.listed, self.options, self.output, self.batch, self.records = listed, options, output, batch, records
         self.there = bytearray(len(listed))
-        self._under_way: dict[int, _Place] = {}
+        self._under_way: dict[int, Job] = {}
         self._writing: dict[Future[dict[str, Any]], int] = {}
         self._failed: dict[int, FailedJob] = {}
-        self._pace = Pace(len(listed))
+        self._pace, self._tell = Pace(len(listed)), tell
 
     def kept(self) -> str:
-        done, out = sum(self.there), shlex.quote(str(self.wanted.out))
+        done, out = sum(self.there), shlex.quote(str(self.output.out))
         return f"{done} of {len(self.listed)} jobs are written in {out}: the same command with --resume goes on"
 
     def folders(self) -> Iterator[Path]:
         """Of the reports that are there, in the order of the jobs."""
-        return (self.wanted.out / one.id for one, there in zip(self.listed, self.there, strict=True) if there)
+        return (self.output.out / one.id for one, there in zip(self.listed, self.there, strict=True) if there)
 
-    def through(self, tell: Stage) -> None:
-        """Have every job that is not there computed, and write it."""
+    def _progress(self) -> None:
+        self._tell(f"Reporting jobs: {self._pace}", self._pace.part)
 
-        def told() -> None:
-            tell(f"Reporting jobs: {self._pace}", self._pace.part)
-
-        self._told = told
-        told()
+    def through(self) -> None:
+        """Have every job that is not there computed, and write it; who computes waits where the disk does not follow."""
+        self._progress()
         with closing(self._answers()) as found, ThreadPoolExecutor(WRITERS) as writers:
             for answer in found:
-                self._take(answer, writers)
+                job = self._under_way.pop(answer.number)
+                self.batch.ended += len(answer.ended)
+                if answer.failure is not None:
+                    self._fail(answer.number, answer.failure)
+                else:
+                    self._writing[writers.submit(self._write, answer.number, job, answer.value)] = answer.number
+                while len(self._writing) > _AHEAD * WRITERS:
+                    self._settle()
+                self._settle(timeout=0.0)
             while self._writing:
-                self._settle(FIRST_COMPLETED)
+                self._settle()
         self.batch.failed = [self._failed[number] for number in sorted(self._failed)]
         self.batch.seconds = self._pace.seconds
 
     def _answers(self) -> Generator[TaskAnswer, None, None]:
-        if self.asked.scheduler is None:
-            workers = processes() if self.asked.workers is None else self.asked.workers
-            return answers(self.asked.work, self._tasks(), workers)
+        options = self.options
+        work = WorkerTask(PROGRAM, (options.seed, options.results_only), options.seconds, options.tries)
+        if options.scheduler is None:
+            return answers(work, self._tasks(), processes() if options.workers is None else options.workers)
         from cmm_uq.laboratory.schedule.cluster import cluster_answers
 
-        return cluster_answers(self.asked.scheduler, self.asked.work, self._tasks(), len(self.listed))
+        return cluster_answers(options.scheduler, work, self._tasks(), len(self.listed))
 
     def _tasks(self) -> Iterator[tuple[int, Task]]:
         """Jobs to be computed; what is there already, or cannot be, is counted."""
         for number, one in enumerate(self.listed):
             try:
                 job = read_job(Path(one.folder))
-                results = self.wanted.done(job) if self.asked.resume else None
+                results = self.output.done(job) if self.options.resume else None
                 if results is None:
-                    self.wanted.check(job)
+                    self.output.check(job)
             except CmmUqError as error:
                 self._fail(number, error, computed=False)
                 continue
@@ -212,67 +198,48 @@ class BatchRun:
                 self.there[number] = 1
                 self._count(results, computed=False)
                 continue
-            self._under_way[number] = _Place(self.wanted.folder(job), REPORT.owner(job), job)
+            self._under_way[number] = job
             yield number, (one.folder, dict(job.inputs))
 
-    def _take(self, answer: TaskAnswer, writers: ThreadPoolExecutor) -> None:
-        """Begin to write what came, and see what is written; whoever computes waits where the disk does not follow."""
-        where = self._under_way.pop(answer.number)
-        self.batch.ended += len(answer.ended)
-        if answer.failure is not None:
-            self._fail(answer.number, answer.failure)
-        else:
-            self._writing[writers.submit(self._write, answer.number, where, answer.value)] = answer.number
-        while len(self._writing) > _AHEAD * WRITERS:
-            self._settle(FIRST_COMPLETED)
-        self._settle(FIRST_COMPLETED, timeout=0.0)
-
-    def _write(self, number: int, where: _Place, files: dict[str, bytes]) -> dict[str, Any]:
+    def _write(self, number: int, job: Job, files: dict[str, bytes]) -> dict[str, Any]:
         """Contents of results.json, once all is in place."""
-        with staged(where.folder, where.owner, inputs=where.job.paths, force=self.wanted.force) as place:
-            place.write(files, ledger=self._ledger(where, files))
+        folder, owner, records = self.output.folder(job), REPORT.owner(job), self.records
+        with staged(folder, owner, inputs=job.paths, force=self.output.force) as place:
+            ledger = None if records is None else ledger_of(records, job, REPORT.command, folder, files, RESULTS)
+            place.write(files, ledger=ledger)
         self.there[number] = 1
         results: dict[str, Any] = json.loads(files[RESULTS])
         return results
 
-    def _settle(self, until: str, timeout: float | None = None) -> None:
-        """Count what is written, or why it is not."""
-        for one in wait(self._writing, timeout, until).done:
+    def _settle(self, timeout: float | None = None) -> None:
+        """Count what is written, or why it is not; no other job could be if the disk is full, or the records are gone."""
+        for one in wait(self._writing, timeout, FIRST_COMPLETED).done:
             number = self._writing.pop(one)
             try:
                 results = one.result()
             except CmmUqError as error:
-                if isinstance(error, OutputError) and self._for_all(error):
+                lost = self.records is not None and error.where == self.records.shown
+                no_room = getattr(error.__cause__, "errno", None) in _NO_ROOM
+                if isinstance(error, OutputError) and (lost or no_room):
                     raise OutputError(error.problem, where=error.where, fix=f"Free the disk; {self.kept()}") from error
                 self._fail(number, error)
             else:
                 self.batch.written += 1
                 self._count(results)
 
-    def _for_all(self, error: OutputError) -> bool:
-        """Whether no other job could be written either: the disk is full, or the records are gone."""
-        lost = self.records is not None and error.where == self.records.shown
-        return lost or getattr(error.__cause__, "errno", None) in _NO_ROOM
-
-    def _ledger(self, where: _Place, files: dict[str, bytes]) -> Ledger | None:
-        if self.records is None:
-            return None
-        return ledger_of(self.records, where.job, REPORT.command, where.folder, files, RESULTS)
-
     def _count(self, results: dict[str, Any], *, computed: bool = True) -> None:
         self.batch.not_conforming += not conforming(results)
         self._pace.add(computed=computed)
-        self._told()
+        self._progress()
 
     def _fail(self, number: int, error: CmmUqError, *, computed: bool = True) -> None:
-        one = self.listed[number]
-        self._failed[number] = FailedJob(one.folder, one.id, error)
+        self._failed[number] = FailedJob(*self.listed[number], error)
         self._pace.add(computed=computed, failed=True)
-        self._told()
+        self._progress()
 
 
 def write_batch(
-    folders: Sequence[Path], out: Path | None = None, asked: BatchOptions | None = None, *, parquet: Path | None = None,
+    folders: Sequence[Path], out: Path | None = None, options: BatchOptions | None = None, *, parquet: Path | None = None,
     stage: Stage | None = None, records: str | Path | None = NONE,
 ) -> Batch:  # fmt: skip
     """Report every job in folders and below them, as :func:`~cmm_uq.app.commands.report.write_report` reports one.
@@ -280,19 +247,20 @@ def write_batch(
     ``records``: that reports are recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside
     them. Gives what came of it; a job that fails never stops the others.
     """
-    how, tell, place = asked or BatchOptions(), stage or silent, out or REPORTS
+    options, tell, place = options or BatchOptions(), stage or silent, out or REPORTS
     if parquet is not None:
-        check_parquet(parquet, force=how.force)
+        check_parquet(parquet, force=options.force)
     tell("Looking for jobs", 0.0)
     listed, planned = jobs_in(folders, place)
     batch = Batch(place, len(listed), planned)
     with opened(records, None if out is None else out / "job") as history:
-        run = BatchRun(listed, how, BatchOutput(place, how.seed, how.results_only, how.force), batch, history)
+        output = BatchOutput(place, options.seed, options.results_only, options.force)
+        run = BatchRun(listed, options, output, batch, history, tell)
         batch.records = "" if history is None else history.shown
         with interruption.keeping(run.kept):
-            run.through(tell)
+            run.through()
             if parquet is not None:
                 tell("Writing the table", 1.0)
-                write_table(parquet, filter(None, map(results_of, run.folders())), force=how.force)
+                write_table(parquet, filter(None, map(results_of, run.folders())), force=options.force)
                 batch.parquet = parquet
     return batch

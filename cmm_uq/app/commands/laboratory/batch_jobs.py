@@ -7,14 +7,14 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from cmm_uq import __version__
 from cmm_uq.app.commands.files import RESULTS, called
 from cmm_uq.app.commands.report import REPORT
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import ENGLISH
-from cmm_uq.base.output import Manifest, read_manifest, sha256_of
+from cmm_uq.base.output import read_manifest, sha256_of
 from cmm_uq.base.output.placing import journal_for
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
@@ -24,12 +24,8 @@ from cmm_uq.laboratory.schedule.jobs import job_folders
 from cmm_uq.laboratory.schedule.parquet import Row, write_parquet
 
 
-@dataclass(frozen=True, slots=True)
-class BatchJob:
-    """A job of a batch.
-
-    ``id``: of the job; empty where job.toml cannot be read, which its report will say.
-    """
+class BatchJob(NamedTuple):
+    """Folder and id of a job; an id is empty where job.toml cannot be read, which its report will say."""
 
     folder: str
     id: str
@@ -37,41 +33,31 @@ class BatchJob:
 
 def jobs_in(folders: Iterable[Path], out: Path) -> tuple[list[BatchJob], int]:
     """Every job in folders and below them, and how many more are still to be measured."""
-    given = list(folders)
-    found: dict[str, BatchJob] = {}
+    roots = list(folders)
+    jobs: dict[str, BatchJob] = {}
     planned: set[str] = set()
-    for root in given:
+    for root in roots:
         for one in job_folders(root.parent if root.name == "job.toml" else root, leave_out=out):
             key = str(one.folder.resolve())
             if one.planned:
                 planned.add(key)
             else:
-                found.setdefault(key, BatchJob(str(one.folder), one.id))
-    if not found:
+                jobs.setdefault(key, BatchJob(str(one.folder), one.id))
+    if not jobs:
         more = f"; {len(planned)} still to be measured" if planned else ""
-        raise CmmUqError(f"no job was found{more}", where=", ".join(map(str, given)),
+        raise CmmUqError(f"no job was found{more}", where=", ".join(map(str, roots)),
                          fix="A job is a folder with a job.toml and the recording that it names")  # fmt: skip
-    listed = list(found.values())
-    _refuse_two_alike(listed)
-    return listed, len(planned)
-
-
-def _refuse_two_alike(listed: Iterable[BatchJob]) -> None:
-    """Also such as differ in case alone: for some systems these are one folder."""
     first: dict[str, BatchJob] = {}
-    for one in listed:
-        if one.id and (other := first.setdefault(one.id.casefold(), one)) is not one:
-            raise CmmUqError(f"has the id {one.id!r}, as {other.folder} has {other.id!r}", where=one.folder,
+    for job in jobs.values():  # ids that differ in case alone are one folder for some systems
+        if job.id and (other := first.setdefault(job.id.casefold(), job)) is not job:
+            raise CmmUqError(f"has the id {job.id!r}, as {other.folder} has {other.id!r}", where=job.folder,
                              fix="Give each job an id of its own: its report goes to a folder of that name")  # fmt: skip
+    return list(jobs.values()), len(planned)
 
 
 @dataclass(frozen=True)
 class BatchOutput:
-    """What is to be written of each job.
-
-    ``out``: a folder a job is made in it; ``results_only``: whether figures alone are wanted; ``force``: keep what
-    stands in the way as ``NAME.previous`` instead of refusing.
-    """
+    """What is written of each job, in a folder of ``out``; ``results_only``: figures alone; ``force``: over what is there."""
 
     out: Path
     seed: int = 0
@@ -82,17 +68,18 @@ class BatchOutput:
         return self.out / job.facts.job.id
 
     def names(self, job: Job) -> list[str]:
+        """Of the files that are certain to be written."""
         return [RESULTS] if self.results_only else [*REPORT.names(job), RESULTS]
 
     def check(self, job: Job) -> None:
         """Make sure, before a job is computed, that it can be written."""
         folder = self.folder(job)
         there = read_manifest(folder)
-        if self.results_only and there is not None and there.owner == REPORT.owner(job):
-            documents = [name for name in REPORT.names(job) if name in there.files]
-            if documents:
-                raise CmmUqError("would be lost where figures alone are written again", where=str(folder / documents[0]),
-                                 fix="Leave --results-only out, or choose another --out")  # fmt: skip
+        own = there is not None and there.owner == REPORT.owner(job)
+        documents = [name for name in REPORT.names(job) if there is not None and name in there.files]
+        if self.results_only and own and documents:
+            raise CmmUqError("would be lost where figures alone are written again", where=str(folder / documents[0]),
+                             fix="Leave --results-only out, or choose another --out")  # fmt: skip
         names = dict.fromkeys(self.names(job), "")
         journal_for(folder, REPORT.owner(job), names, inputs=job.paths, force=self.force)
 
@@ -102,7 +89,7 @@ class BatchOutput:
         there = read_manifest(folder)
         if there is None or there.owner != REPORT.owner(job) or not there.files.keys() >= set(self.names(job)):
             return None
-        if not _whole(folder, there):
+        if any(sha256_of(folder / name) != digest for name, digest in there.files.items()):
             return None
         data = results_of(folder)
         same = (
@@ -113,10 +100,6 @@ class BatchOutput:
             and data.get("sampling", {}).get("seed", self.seed) == self.seed
         )
         return data if same else None
-
-
-def _whole(folder: Path, manifest: Manifest) -> bool:
-    return all(sha256_of(folder / name) == digest for name, digest in manifest.files.items())
 
 
 def results_of(folder: Path) -> dict[str, Any] | None:
@@ -138,7 +121,7 @@ def verdict(results: Mapping[str, Any]) -> str:
     return str((results.get("diagnosis") or {}).get("verdict") or "")
 
 
-COLUMNS = (
+COLUMNS = (  # name, type and meaning of each
     ("job", "string", "Id of the job."),
     ("origin", "word", "Where the recording comes from: measured, simulated or compensated."),
     ("machine", "word", "Name of the machine."),
@@ -157,7 +140,6 @@ COLUMNS = (
     ("diagnosis", "word", "Verdict of the job's diagnosis; empty where there is none."),
     ("version", "word", "Of cmm-uq, which made it."),
 )
-"""Name, type and meaning of each column."""
 
 
 def write_table(path: Path, results: Iterable[Mapping[str, Any]], *, force: bool) -> None:
