@@ -87,7 +87,11 @@ def diagnose_model(
     progress: Progress | None = None, known: NoisyPosterior | None = None, show: bool = False,
     against: Against | None = None,
 ) -> JobDiagnosis:  # fmt: skip
-    """Diagnose the screened model of a job, or what a simulation leaves of its recording."""
+    """Diagnose the screened model of a job, or what a simulation leaves of its recording.
+
+    ``known`` is its posterior where it was sampled already; ``show``: what to measure next shall also show what this recording
+    could not. Against a simulation, figures and decisions are the recording's own: none is corrected.
+    """
     facts, kind = job.facts, kind_of(job)
     observe = kind.observing("diagnosed") if against is None else against.observe
     stated_um = facts.recording.u_coordinate_um if against is None else against.stated_um
@@ -161,24 +165,15 @@ def diagnosis_outcome(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, s
 
 
 def write_diagnosis(
-    job: Path,
-    out: Path | None = None,
-    *,
-    seed: int = 0,
-    alpha: float = FALSE_ALARMS,
-    against: Path | None = None,
-    force: bool = False,
-    stage: Stage | None = None,
-    told: Told | None = None,
-    records: str | Path | None = NONE,
+    job: Path, out: Path | None = None, *, seed: int = 0, alpha: float = FALSE_ALARMS, against: Path | None = None,
+    force: bool = False, stage: Stage | None = None, told: Told | None = None, records: str | Path | None = NONE,
     language: Code | None = None,
-) -> Written:
+) -> Written:  # fmt: skip
     """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf`` and ``results.json``, all or none.
 
-    Where further set-ups would tell more, ``next_plan.csv`` comes with them.
-
-    ``records`` that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the
-    folder.
+    Where further set-ups would tell more, ``next_plan.csv`` comes with them. ``against``: file of a simulation's prediction
+    that the recording is compared with, whatever the job names; ``records``: file, URL, ``none``, or ``None`` for those of
+    the environment, else beside the folder.
     """
     read, tell = in_language(read_job(job), language), stage or silent
     if against is not None:

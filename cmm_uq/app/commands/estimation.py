@@ -18,7 +18,6 @@ from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, PPM, unit
 from cmm_uq.certificate.result import LACK_OF_FIT, Contradiction, NoiseComponent, RecordingNoise
 from cmm_uq.machine.model import Estimate, RecordingModel
-from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.artefact_doubt import growth
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.model.noise import noise_of
@@ -27,7 +26,7 @@ from cmm_uq.maths.inference.doubt import Cause, Doubt, gain
 from cmm_uq.maths.inference.draws import Draws, by_chain, by_ensemble, evenly, uncertainty_of_sum
 from cmm_uq.maths.inference.linear_model import Freedoms
 from cmm_uq.maths.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
-from cmm_uq.maths.inference.posterior import NoisyPosterior, Posterior
+from cmm_uq.maths.inference.posterior import NoisyPosterior
 from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of
 
 _LINES = 2000  # draws of the sizes of the noise, over which a line's uncertainty is taken
@@ -46,33 +45,27 @@ def without_outliers(model: RecordingModel) -> tuple[RecordingModel, list[Findin
     recurring = recurring_points(artefact.points, outlying)
     kept = {row for each in recurring for row in each.tolist()}  # what is so each time is no gross error
     used[[i for i in times_off if rows[i] not in kept]] = False
-    return replace(model, used=used), list(_told(artefact, times_off, rows, recurring))
-
-
-def _told(
-    artefact: Artefact, times_off: Mapping[int, float], rows: Mapping[int, int], recurring: Sequence[Ints]
-) -> Iterator[Finding]:
-    """Outliers one by one, but those of one cause together, where the worst of them stands."""
-    points, untold = artefact.points, dict(times_off)
-    outliers = np.array(sorted(set(rows.values())), dtype=np.int64)
+    # one by one, but those of one cause together, where the worst of them stands
+    points, left, findings = artefact.points, dict(times_off), list[Finding]()
     causes = [
         *((each, point_words, False) for each in recurring),
-        *((each, stretch_words, True) for each in moved_stretches(points, outliers)),
+        *((each, stretch_words, True) for each in moved_stretches(points, outlying)),
     ]
     for i, times in times_off.items():
-        if i not in untold:
+        if i not in left:
             continue
-        for together, words, aside in causes:
-            if rows[i] in together:
-                off = [untold.pop(j) for j in tuple(untold) if rows[j] in together]
-                yield replace(finding("outlier", points, together, words(points, together, off)), set_aside=aside)
-                break
-        else:
+        cause = next((each for each in causes if rows[i] in each[0]), None)
+        if cause is None:
+            what = artefact.words_of(i)
             why = say(
-                "{what} is {times:.1f} of its standard deviations off what the others say",
-                what=artefact.words_of(i), times=times,
-            )  # fmt: skip
-            yield replace(finding("outlier", points, artefact.rows[i], why), set_aside=True)
+                "{what} is {times:.1f} of its standard deviations off what the others say", what=what, times=times
+            )
+            findings.append(replace(finding("outlier", points, artefact.rows[i], why), set_aside=True))
+            continue
+        together, words, aside = cause
+        off = [left.pop(j) for j in tuple(left) if rows[j] in together]
+        findings.append(replace(finding("outlier", points, together, words(points, together, off)), set_aside=aside))
+    return replace(model, used=used), findings
 
 
 def with_noise(model: RecordingModel) -> tuple[RecordingModel, Estimate, float | None]:
@@ -100,7 +93,8 @@ def named_draws(
 ) -> Draws:  # fmt: skip
     """Draws of all that is reported: of each effect, of the artefact's sizes, and of the noise.
 
-    values : (N, k) of the model's unknowns.
+    ``values`` (N, k) of the model's unknowns are the posterior's, row by row, or a ``mixture``'s, row after row independent:
+    these go with no size of the noise, which are then taken evenly from the posterior, and an ensemble is a chain.
     """
     units, columns, steps = {}, [], posterior.steps // posterior.every
     for (owner, name), (draws, own) in model.reported(values).items():
@@ -155,16 +149,12 @@ def noise(
     }
     coordinate = found.pop("coordinate").size
     apart = float(np.mean(np.ptp(posterior.sizes.reading, axis=1) > 0))
-    step = components.display / MICROMETRE
-    return RecordingNoise(coordinate, found, apart, _wider(estimate, posterior), stated_um, p_value, step)
-
-
-def _wider(estimate: Estimate, posterior: Posterior) -> float:
-    """Largest ratio of an uncertainty to what it would be under white noise; 1 where nothing is determined."""
-    ls = estimate.least_squares
+    step, ls = components.display / MICROMETRE, estimate.least_squares
     free = ls.determined & ~np.array([u.known for u in ls.unknowns], dtype=bool)
     white = np.sqrt(np.diag(ls.covariance)[free])
-    return float(np.max(posterior.draws.std(axis=0)[free] / white, initial=1.0, where=white > 0))
+    # largest ratio of an uncertainty to what it would be under white noise; 1 where nothing is determined
+    wider = float(np.max(posterior.draws.std(axis=0)[free] / white, initial=1.0, where=white > 0))
+    return RecordingNoise(coordinate, found, apart, wider, stated_um, p_value, step)
 
 
 def with_doubt(
@@ -192,11 +182,8 @@ def contradictions(
     linear, along = estimate.linear, growth(model.artefact)
     if along is None:
         return ()
-    components, sizes, mean = (
-        noise_of(model),
-        posterior.sizes.at(evenly(len(posterior.draws), _LINES)),
-        averaged.mean(axis=0),
-    )
+    components, mean = noise_of(model), averaged.mean(axis=0)
+    sizes = posterior.sizes.at(evenly(len(posterior.draws), _LINES))
     lines: dict[int, list[tuple[float, float, Contradiction]]] = {}
     along_axis = (1 - 2 * ALIGNED**2) * PPM
     for number, weights in _lines(model, along[model.used], linear.freedoms):

@@ -16,7 +16,7 @@ import pytest
 
 from cmm_uq.app.commands.laboratory import batch as batch_run, batch as module, batch_jobs
 from cmm_uq.app.commands.laboratory.batch import Batch, BatchOptions, write_batch
-from cmm_uq.app.commands.laboratory.batch_job import reported
+from cmm_uq.app.commands.laboratory.batch_job import begin
 from cmm_uq.app.commands.laboratory.batch_jobs import conforming
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
@@ -63,7 +63,7 @@ def test_figures_alone_are_the_same_and_nothing_is_drawn(tmp_path: Path, monkeyp
     monkeypatch.setattr(
         "cmm_uq.certificate.plots.style.new_figure", lambda height_mm: pytest.fail("a picture is drawn")
     )
-    found = reported((str(job), dict(read_job(job).inputs)), (0, True))
+    found = begin((0, True))(0, (str(job), dict(read_job(job).inputs)))
     assert list(found) == ["results.json"]
 
 

@@ -17,12 +17,7 @@ PRIVATE, PUBLIC = 0o600, 0o644
 
 @dataclass(frozen=True)
 class KeyFiles:
-    """What was made.
-
-    key : PKCS#12 file.
-    certificate : PEM file of its certificate.
-    until : last day of the certificate.
-    """
+    """PKCS#12 file, PEM file of its certificate, and the last day of that."""
 
     key: Path
     certificate: Path

@@ -1,7 +1,5 @@
 """A certificate that replaces another: both results compared, figure by figure as printed, and what differs said.
 
-A certificate that replaces another: both results compared, figure by figure as printed, and what differs said.
-
 The results of the replaced one are an input of the job: a file that it names, or what the records have of it.
 """
 
@@ -90,9 +88,8 @@ def results_of(records: Records, certificate: Certificate) -> bytes:
     if file.is_file() and sha256_of(file) == certificate.results_sha256:
         return content_of(file, TABLE_BYTES, "")
     entry = next(records.entries(certificate.entry)).data
-    kept = {
-        key: entry[key] for key in ("job", "number", "decision", "verdicts", "values", "results_sha256") if key in entry
-    }
+    keys = ("job", "number", "decision", "verdicts", "values", "results_sha256")
+    kept = {key: entry[key] for key in keys if key in entry}
     return (json.dumps({"schema": _ENTRY, **kept}, indent=2, ensure_ascii=False, sort_keys=True) + "\n").encode()
 
 
@@ -125,11 +122,8 @@ def compared(number: str, before: Mapping[str, Any], after: Mapping[str, Any]) -
             for name, (what, printed, unit) in then.items() if name not in now or str(now[name][1]) != str(printed)
         ]  # fmt: skip
         if before["schema"] != _ENTRY:
-            added += [
-                ChangedFigure(what, NOTHING, printed, unit)
-                for name, (what, printed, unit) in now.items()
-                if name not in then
-            ]
+            new = [each for name, each in now.items() if name not in then]
+            added += [ChangedFigure(what, NOTHING, printed, unit) for what, printed, unit in new]
     return Reissue(number, count, tuple(differences), tuple(added))
 
 
@@ -197,10 +191,10 @@ def _decisions(results: Mapping[str, Any]) -> dict[str, Shown]:
     found: dict[str, Shown] = {}
     verdicts = Verdicts.of_results(results)
     overall = str(results["decision"]) if "decision" in results else verdicts.overall
-    found["overall"] = (say("conformity"), _outcome(overall), NOTHING)
+    found["overall"] = (say("conformity"), OUTCOME_WORDS.get(overall, Verbatim(overall)), NOTHING)
     for one in verdicts:
         name = _free(found, one.called)
-        found[name] = (Verbatim(one.called), _outcome(one.outcome), NOTHING)
+        found[name] = (Verbatim(one.called), OUTCOME_WORDS.get(one.outcome, Verbatim(one.outcome)), NOTHING)
         if one.limit is not None:
             what = say("{what}, limit", what=Verbatim(one.called))
             found[f"{name}\nlimit"] = (what, number(one.limit, ".6g"), foreign(one.unit))
@@ -218,11 +212,8 @@ def _figures(results: Mapping[str, Any]) -> dict[str, Shown]:
             found[_free(found, name)] = (Verbatim(title), printed, foreign(str(UNITS.get(unit, unit))))
     for key in sorted(results.keys() - _ELSEWHERE):
         for name, printed in _walked(results[key], key):
-            found[name] = (
-                Verbatim(name),
-                printed,
-                printed_unit(name.rpartition("[")[0] if name.endswith("]") else name),
-            )
+            unit = printed_unit(name.rpartition("[")[0] if name.endswith("]") else name)
+            found[name] = (Verbatim(name), printed, unit)
     for one in results.get("conformity") or ():
         title = f"{one.get('standard')} {one.get('characteristic') or ''}".strip()
         for error in one.get("errors") or ():
@@ -258,10 +249,6 @@ def _walked(node: Any, name: str) -> Iterator[tuple[str, Text]]:
 
 def _printed(value: float, u: float, ends: tuple[float, float]) -> Text:
     return with_uncertainty(Quantity(value, u, ends, UNITS["µm"])) if u > 0 else rounded(value, 0.0)[0]
-
-
-def _outcome(outcome: str) -> Text:
-    return OUTCOME_WORDS.get(outcome, Verbatim(outcome))
 
 
 def _number(value: Any) -> bool:

@@ -15,16 +15,13 @@ if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
 
 TWO_EYES, FOUR_EYES = 1, 2  # how many persons release a certificate
+_NONE_YET = "No certificate is recorded yet"
 _TOLD, _NEWEST = 4, 2000  # entries that a message names, and certificates that an unknown name is compared with
 
 
 @dataclass(frozen=True)
 class Release:
-    """What a signature did.
-
-    certificate : as it is now.
-    waiting : how many persons more must release it.
-    """
+    """A certificate as it is now, and how many persons more must release it."""
 
     certificate: RecordedCertificate
     waiting: int = 0
@@ -34,7 +31,11 @@ def certificate_named(records: Records, name: str, states: Collection[str]) -> R
     """The certificate of a number, entry, job, folder or hash of results.json; where none is in these states, the newest."""
     found = [one for one in records.named(name) if one.command == "report"]
     if not found:
-        raise CmmUqError(f"no certificate {name!r} is recorded", where=records.shown, fix=_near(records, name))
+        known = records.certificates(origin=None, values=False, limit=_NEWEST)
+        near = suggestion(name, {word for one in known for word in (one.number, one.job) if word}) if known else ""
+        if not near.startswith("Did you mean"):
+            near = "Give its number, the id of its job, or the number of its entry" if known else _NONE_YET
+        raise CmmUqError(f"no certificate {name!r} is recorded", where=records.shown, fix=near)
     asked = [one for one in found if one.state in states]
     if len(asked) > 1:
         entries = ", ".join(f"{one.entry} ({one.machine}, {one.day}, {one.state})" for one in asked[:_TOLD])
@@ -42,15 +43,6 @@ def certificate_named(records: Records, name: str, states: Collection[str]) -> R
         raise CmmUqError(f"{len(asked)} certificates are called {name!r}", where=records.shown,
                          fix=f"Give the number of the entry: {entries}{more}")  # fmt: skip
     return (asked or found)[-1]
-
-
-def _near(records: Records, name: str) -> str:
-    """What the one who asked for a certificate may have meant."""
-    known = records.certificates(origin=None, values=False, limit=_NEWEST)
-    if not known:
-        return "No certificate is recorded yet"
-    near = suggestion(name, {word for one in known for word in (one.number, one.job) if word})
-    return near if near.startswith("Did you mean") else "Give its number, the id of its job, or the number of its entry"
 
 
 def release(

@@ -15,7 +15,7 @@ from cmm_uq.app.commands.certificates.signing import Signing
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import SIGNED_BYTES
-from cmm_uq.base.output import Ledger, Manifest, Owner, finish_interrupted, read_manifest, staged
+from cmm_uq.base.output import Owner, finish_interrupted, read_manifest, staged
 from cmm_uq.laboratory.records.place import beside, place_of
 
 if TYPE_CHECKING:
@@ -26,10 +26,7 @@ RESULTS, SUFFIXES = "results.json", (".pdf", ".xml")
 
 @dataclass(frozen=True)
 class Signed:
-    """What was signed.
-
-    ``files`` that have a signature now; ``records`` that know of it, as they are shown; empty where none do.
-    """
+    """Files that have a signature now, and the records that know of it, as they are shown; empty where none do."""
 
     files: tuple[Path, ...]
     records: str = ""
@@ -38,7 +35,7 @@ class Signed:
 def sign_files(
     paths: Sequence[Path], signing: Signing, *, out: Path | None = None, records: str | Path | None = None
 ) -> Signed:  # fmt: skip
-    """Sign certificates where they are, or copies of them elsewhere.
+    """Sign PDF and XML files of one folder in the set that they are of, or copies of them in the folder ``out``.
 
     ``records`` that are told of it where the certificate is recorded in them: file, URL, ``none``, or ``None`` for those
     of the environment, else beside the folder.
@@ -50,16 +47,27 @@ def sign_files(
         return Signed(tuple(written[path.name] for path in paths))
     finish_interrupted(folder)
     manifest = read_manifest(folder)
-    names = [path.name for path in paths]
     for path in paths:
         if manifest is None or path.name not in manifest.files:
             raise CmmUqError("is of no set that cmm-uq wrote", where=str(path),
                              fix="Give --out DIR for a signed copy")  # fmt: skip
     assert manifest is not None  # noqa: S101 - there is at least one path
-    with _told(records, folder) as history:
-        contents = _whole(folder, manifest)
-        signed = {name: _signed(folder / name, signing, contents[name]) for name in names}
-        ledger, where = _ledger(history, contents, signed, signing)
+    with _opened(records, folder) as history:
+        contents = {}
+        for name, digest in manifest.files.items():
+            file = folder / name
+            contents[name] = content_of(file, SIGNED_BYTES, "Only a set as it was written is signed")
+            if file.is_symlink() or sha256(contents[name]).hexdigest() != digest:
+                raise CmmUqError("was altered after it was written", where=str(file),
+                                 fix="Write it anew, or give --out DIR for a signed copy")  # fmt: skip
+        signed = {path.name: _signed(path, signing, contents[path.name]) for path in paths}
+        results, ledger, where = contents.get(RESULTS), None, ""
+        if history is not None and results is not None:
+            entry = history.has_results(sha256(results).hexdigest())
+            if entry is not None:
+                files = {name: sha256(data).hexdigest() for name, data in signed.items()}
+                by = {"by": signing.signer.name, "test_key": signing.signer.test_key}
+                ledger, where = history.ledger("signed", {"certificate": entry, **by, "files": files}), history.shown
         with staged(folder, manifest.owner, expected=[*manifest.files]) as place:
             place.write({**contents, **signed}, ledger=ledger)
     return Signed(tuple(paths), where)
@@ -97,26 +105,14 @@ def _laboratory(pdf: bytes) -> Mapping[str, Any]:
 
     try:
         attached = PdfReader(io.BytesIO(pdf)).attachments.get("job.toml", [b""])[0]
-        found = tomllib.loads(attached.decode()).get("laboratory", {})
+        laboratory = tomllib.loads(attached.decode()).get("laboratory", {})
     except (PyPdfError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return {}
-    return found if isinstance(found, Mapping) else {}
-
-
-def _whole(folder: Path, manifest: Manifest) -> dict[str, bytes]:
-    """The files of a set, as they were written."""
-    contents = {}
-    for name, digest in manifest.files.items():
-        path = folder / name
-        contents[name] = content_of(path, SIGNED_BYTES, "Only a set as it was written is signed")
-        if path.is_symlink() or sha256(contents[name]).hexdigest() != digest:
-            raise CmmUqError("was altered after it was written", where=str(path),
-                             fix="Write it anew, or give --out DIR for a signed copy")  # fmt: skip
-    return contents
+    return laboratory if isinstance(laboratory, Mapping) else {}
 
 
 @contextlib.contextmanager
-def _told(where: str | Path | None, folder: Path) -> Iterator[Records | None]:
+def _opened(where: str | Path | None, folder: Path) -> Iterator[Records | None]:
     """The records, where there are any."""
     place = place_of(where, beside(folder.absolute()))
     if place is None or (isinstance(place, Path) and not place.exists()):
@@ -126,16 +122,3 @@ def _told(where: str | Path | None, folder: Path) -> Iterator[Records | None]:
 
     with open_records(place) as records:
         yield records
-
-
-def _ledger(
-    history: Records | None, contents: Mapping[str, bytes], signed: Mapping[str, bytes], signing: Signing
-) -> tuple[Ledger | None, str]:
-    """What records the signed files, where the records know the certificate, and how those are shown."""
-    results = contents.get(RESULTS)
-    entry = history.has_results(sha256(results).hexdigest()) if history is not None and results is not None else None
-    if history is None or entry is None:
-        return None, ""
-    files = {name: sha256(data).hexdigest() for name, data in signed.items()}
-    content = {"certificate": entry, "by": signing.signer.name, "test_key": signing.signer.test_key, "files": files}
-    return history.ledger("signed", content), history.shown
