@@ -28,10 +28,7 @@ from cmm_uq.machine.physics.catalogue import effects
 _FAR = 1.0  # mm from a recorded point to the predicted one, from which on it is said
 _NO_NOISE = 1e-7  # mm: residuals below it are digits of the files
 _LEAST_WEIGHT = 0.05  # least noise of a point over that of all together: nothing is known without limit
-
-
-_STEP = 0.05
-"""Of the logarithm of that ratio: points that are about as uncertain are taken as equally so, and are sampled together."""
+_STEP = 0.05  # of the logarithm of that ratio: points that are about as uncertain are sampled together
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +53,14 @@ def against_simulation(job: Job, facts: SimulationFacts) -> Against:
     """Join what the simulation leaves of a recording with the model of what it could lack."""
     recorded, findings = recorded_model(job)
     artefact, where = recorded.artefact, job.recording_path
-    found = _of_maps(job, facts, artefact.points) if facts.map else _of_a_file(job, facts, artefact)
+    if facts.map:
+        found = _of_maps(job, facts, artefact.points)
+    elif job.prediction is not None:
+        found = predicted_errors(artefact, job.prediction, where, length_mm=facts.length_mm)
+    else:
+        raise CmmUqError(
+            "the prediction was not read", where=f"job.toml {KEY} file", fix="Read the job with its recording"
+        )
     points = artefact.points.at(artefact.points.xyz - found.errors)
     named = effects(facts.effects, where=f"job.toml {KEY} effects")
     observe = kind_of(job).observing("compared with a simulation")
@@ -75,9 +79,8 @@ def against_simulation(job: Job, facts: SimulationFacts) -> Against:
     ratio = _ratios(plain, every, u, stated)
     weighed = _weighing(observe, points, ratio, facts.u_common_um * MICROMETRE)
     # repeats share what is predicted wrongly: their mean is no better known
-    least = u * float(
-        np.sqrt(len(points) / len(np.unique(np.column_stack([points.measurement, points.point]), axis=0)))
-    )
+    places = np.unique(np.column_stack([points.measurement, points.point]), axis=0)
+    least = u * float(np.sqrt(len(points) / len(places)))
     together = None if stated is None else float(np.hypot(stated, least / MICROMETRE))
     model = replace(
         plain, artefact=weighed(job.facts.artefact, points, where=where), least_noise=least,
@@ -85,14 +88,6 @@ def against_simulation(job: Job, facts: SimulationFacts) -> Against:
     )  # fmt: skip
     simulated = SimulatedTwin.of(facts, job, found, named, recorded)
     return Against(model, (*findings, *_odd(found)), weighed, together, simulated)
-
-
-def _of_a_file(job: Job, facts: SimulationFacts, artefact: Artefact) -> PredictedErrors:
-    if job.prediction is None:
-        raise CmmUqError(
-            "the prediction was not read", where=f"job.toml {KEY} file", fix="Read the job with its recording"
-        )
-    return predicted_errors(artefact, job.prediction, job.recording_path, length_mm=facts.length_mm)
 
 
 def _of_maps(job: Job, facts: SimulationFacts, points: Points) -> PredictedErrors:

@@ -45,9 +45,8 @@ def ledger_of(
     records: Records, job: Job, command: str, folder: Path, files: Mapping[str, bytes], results: str
 ) -> Ledger:
     """For the files of an outcome, that are recorded as they are put in place."""
-    content = content_of(
-        records, files[results], job, command, folder, {name: sha256(data).hexdigest() for name, data in files.items()}
-    )
+    hashes = {name: sha256(data).hexdigest() for name, data in files.items()}
+    content = content_of(records, files[results], job, command, folder, hashes)
     return records.ledger(kind_of_entry(content), content)
 
 
@@ -79,13 +78,10 @@ def called(name: str) -> str:
     return f"{title}, {what}" if what else title
 
 
+# told what is being done, after a colon what of it is counted, and the part of the whole that is done
 Stage = Callable[[str, float], None]
-"""Told what is being done, after a colon what of it is counted, and the part of the whole that is done."""
-
 Told = Callable[[Job], None]  # told of the job as it was read, before anything is computed of it
 REPORTS, RESULTS = Path("reports"), "results.json"
-
-
 Finished = Callable[[str, bytes], bytes]  # what becomes of a document that was made, by its name
 
 
@@ -100,13 +96,7 @@ def silent(what: str, part: float) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """What a command found and wrote.
-
-    outcome : what was found.
-    results : contents of results.json.
-    files : what was written, by name.
-    records : what it was recorded in, as it is shown; empty where it was not.
-    """
+    """What a command found, contents of results.json, its files by name, and the records that have it; empty for none."""
 
     outcome: Outcome
     results: bytes
@@ -115,17 +105,14 @@ class Written:
 
     @property
     def found(self) -> AnalysisResult:
-        """In the kind's own terms."""
         return self.outcome.found
 
     @property
     def name(self) -> str:
-        """Id of the job."""
         return self.found.job.facts.job.id
 
     @property
     def origin(self) -> str:
-        """Of the recording, and what became of it."""
         return self.found.job.origin
 
     @property
@@ -139,7 +126,6 @@ class Written:
 
     @property
     def summary(self) -> Summary:
-        """For the end of the command."""
         return self.outcome.summary
 
     @property
@@ -151,7 +137,6 @@ class Written:
 class Form:
     """In which files a command writes an outcome, and where.
 
-    command : of ``cmm-uq``.
     documents : their names, in the order in which they are made: a digital certificate (``.xml``) carries the page before it,
         and is attached to the PDF after it; those of a recording that was not measured carry its origin.
     below : folder in ``reports/<job id>`` that is written to by default.
@@ -166,20 +151,12 @@ class Form:
     recorded: bool = False
 
     def write(
-        self,
-        job: Job,
-        outcome: Callable[[], Outcome],
-        out: Path | None = None,
-        *,
-        force: bool = False,
-        stage: Stage = silent,
-        records: str | Path | None = NONE,
-        signing: Signing | None = None,
-    ) -> Written:
+        self, job: Job, outcome: Callable[[], Outcome], out: Path | None = None, *, force: bool = False,
+        stage: Stage = silent, records: str | Path | None = NONE, signing: Signing | None = None,
+    ) -> Written:  # fmt: skip
         """Make sure of the folder, then compute, render and write, all or none, and record it with that.
 
-        records : file or URL of the records; ``none`` for none, ``None`` for those of the environment, else beside the
-        folder; signing : who signs the documents; ``None`` for nobody.
+        ``records``: file or URL; ``none`` for none, ``None`` for those of the environment, else beside the folder.
         """
         fonts_of(job.facts.job.language)  # refused before anything is computed
         owner = self.owner(job)
@@ -190,7 +167,11 @@ class Form:
             staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
         ):
             found = outcome()
-            finished = unchanged if signing is None else _signed_by(signing, job)
+            language = job.facts.job.language
+            finished: Finished = unchanged
+            if signing is not None:
+                laboratory = job.facts.laboratory.model_dump()
+                finished = signing.finished(laboratory, language=language, said=lambda text: said_in(text, language))
             contents = self.contents(found, stage, finished=finished)
             stage(f"Writing: {len(contents)} files to {folder}", 0.95)
             ledger = None if history is None else ledger_of(history, job, self.command, folder, contents, RESULTS)
@@ -200,7 +181,6 @@ class Form:
         return Written(found, contents[RESULTS], files, where)
 
     def owner(self, job: Job) -> Owner:
-        """Of what is written for a job."""
         return Owner(self.command, job.facts.job.id, job.origin)
 
     def contents(
@@ -251,11 +231,3 @@ def _digital(job: Job, results: bytes, rendered: Mapping[str, bytes]) -> bytes:
 
     page = next((content for name, content in rendered.items() if name.endswith(".html")), None)
     return written(digital_certificate(json.loads(results), job, html=page, file=results))
-
-
-def _signed_by(signing: Signing, job: Job) -> Finished:
-    """What signs the documents of a job, in its language."""
-    language = job.facts.job.language
-    return signing.finished(
-        job.facts.laboratory.model_dump(), language=language, said=lambda text: said_in(text, language)
-    )

@@ -16,27 +16,24 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.truth import Truth
 from cmm_uq.laboratory.live.instruments.profile import ProfileFile
 from cmm_uq.laboratory.schedule.settings import ScheduleFile
-from cmm_uq.machine.physics.effect import Effect
 
 
 def tables() -> dict[str, type[ArtefactFacts]]:
     """Table of ``[artefact]`` of each kind."""
-    found = {kind: table_of(kind) for kind in names()}
-    return {kind: table for kind, table in found.items() if table is not None}
+    return {kind: table for kind in names() if (table := table_of(kind)) is not None}
 
 
 def job() -> Schema:
-    """Of job.toml, ``[plan]`` with it."""
+    """Of job.toml, ``[plan]`` with it: what an effect is, its formula, and the columns that it needs."""
     from cmm_uq.analysis.conformity.standards import names as standard_names
     from cmm_uq.machine.physics.catalogue import every
 
-    effects = {name: _told(effect) for name, effect in every().items()}
+    effects = {
+        name: f"{effect.title}: {effect.formula}"
+        + (f"; needs the columns {', '.join(effect.columns)}." if effect.columns else ".")
+        for name, effect in every().items()
+    }
     return job_schema(tables(), effects, standard_names())
-
-
-def truth() -> Schema:
-    """Of truth.toml."""
-    return schema_of(Truth, "truth.toml of cmm-uq")
 
 
 def budget() -> Schema:
@@ -60,25 +57,11 @@ def part() -> Schema:
     return schema_of(PartFile, "job.toml of a part, for cmm-uq")
 
 
-def instrument() -> Schema:
-    return schema_of(ProfileFile, "instrument profile of cmm-uq")
-
-
-def schedule() -> Schema:
-    """Of what a scheduled run goes by."""
-    return schema_of(ScheduleFile, "schedule.toml of cmm-uq")
-
-
-def _told(effect: Effect) -> str:
-    """What it is, its formula, and the columns that it needs."""
-    needs = f"; needs the columns {', '.join(effect.columns)}" if effect.columns else ""
-    return f"{effect.title}: {effect.formula}{needs}."
-
-
 SCHEMAS: Mapping[str, Callable[[], Schema]] = MappingProxyType({
-    "job": job, "part": part, "budget": budget, "truth": truth, "instrument": instrument, "schedule": schedule,
+    "job": job, "part": part, "budget": budget, "truth": lambda: schema_of(Truth, "truth.toml of cmm-uq"),
+    "instrument": lambda: schema_of(ProfileFile, "instrument profile of cmm-uq"),
+    "schedule": lambda: schema_of(ScheduleFile, "schedule.toml of cmm-uq"),
 })  # fmt: skip
-"""By name."""
 
 
 @naming_package()

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -32,7 +33,6 @@ from cmm_uq.jobs.truth import NoiseFacts, Truth
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import effects
-from cmm_uq.machine.physics.effect import Effect
 
 TRUTH = "truth.toml"  # name of the truth in the folder of a simulated job
 _TRUTH_GIVES = "It gives the effects, the noise and the seed"
@@ -51,47 +51,37 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
         refuse_unfit(job)
     artefact = observe(job.facts.artefact, points, where=job.recording_path)
     where = f"{truth_path} [effects]"
-    acting = tuple(_acting(artefact, effect, where) for effect in effects(tuple(truth.effects), where=where))
-    _refuse_unrecorded(points, acting, truth, truth_path)
-    given = [_given(effect, truth, truth_path) for effect in acting]
-    model = RecordingModel(
-        artefact, acting, shapes={effect.name: shape for effect, (_, shape) in zip(acting, given, strict=True)}
-    )
-    noise = _noise(truth.noise)
+    named = effects(tuple(truth.effects), where=where)
+    with _placed(where, always=True):
+        acting = tuple(map(artefact.acting, named))
+    needed = [(f"[effects.{effect.name}]", effect.name, column) for effect in acting for column in effect.columns]
+    needed += [("[noise] slow_um", "slow noise", "time_s")] if truth.noise.slow_um else []
+    for key, what, column in needed:
+        if column not in points.columns:
+            raise CmmUqError(f"{what} needs the column {column}, which the recording has not", where=f"{truth_path} {key}",
+                             fix=f"Record {column}, give it in [columns], or leave this out")  # fmt: skip
+    coefficients, shapes = [np.zeros(0)], {}
+    for effect in acting:
+        with _placed(f"{truth_path} [effects.{effect.name}]"):
+            values, shapes[effect.name] = effect.from_reported(truth.effects[effect.name])
+        coefficients.append(values)
+    model = RecordingModel(artefact, acting, shapes=shapes)
     random = np.random.default_rng(truth.seed if seed is None else seed)
-    coefficients = np.concatenate([np.zeros(0), *(values for values, _ in given)])
+    sizes = _sizes(artefact, truth, truth_path)
     with refusing_overflow(truth_path, _FIX):
-        drawn = model.simulate(coefficients, _sizes(artefact, truth, truth_path), noise, random)
+        drawn = model.simulate(np.concatenate(coefficients), sizes, _noise(truth.noise), random)
     if not np.all(np.abs(drawn) <= LONGEST_MM):
         raise CmmUqError(f"the coordinates would go beyond {LONGEST_MM:g} mm", where=truth_path, fix=_FIX)
     return points.at(drawn)
 
 
-def _acting(artefact: Artefact, effect: Effect, where: str) -> Effect:
-    """An effect as it acts on this artefact."""
+@contextlib.contextmanager
+def _placed(where: str, *, always: bool = False) -> Iterator[None]:
+    """What is refused of the truth, with where it stands in its file."""
     try:
-        return artefact.acting(effect)
+        yield
     except CmmUqError as error:
-        raise CmmUqError(error.problem, where=where, fix=error.fix) from None
-
-
-def _given(effect: Effect, truth: Truth, truth_path: str) -> tuple[Floats, tuple[float, ...]]:
-    """Coefficients and shape of an effect that acts."""
-    try:
-        return effect.from_reported(truth.effects[effect.name])
-    except CmmUqError as error:
-        where = f"{truth_path} [effects.{effect.name}]"
-        raise CmmUqError(error.problem, where=error.where or where, fix=error.fix) from None
-
-
-def _refuse_unrecorded(points: Points, acting: Sequence[Effect], truth: Truth, truth_path: str) -> None:
-    """Refuse effects and slow noise that go by columns which neither the recording nor the truth has."""
-    asked = [(f"[effects.{effect.name}]", effect.name, column) for effect in acting for column in effect.columns]
-    asked += [("[noise] slow_um", "slow noise", "time_s")] if truth.noise.slow_um else []
-    for key, what, column in asked:
-        if column not in points.columns:
-            raise CmmUqError(f"{what} needs the column {column}, which the recording has not", where=f"{truth_path} {key}",
-                             fix=f"Record {column}, give it in [columns], or leave this out")  # fmt: skip
+        raise CmmUqError(error.problem, where=where if always else error.where or where, fix=error.fix) from None
 
 
 def write_simulation(
