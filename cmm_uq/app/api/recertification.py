@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.commands.laboratory.due import WhatIsDue, what_is_due, write_due
-from cmm_uq.app.commands.laboratory.history import history_of, write_history
+from cmm_uq.app.commands.laboratory.due import WhatIsDue, history_of, what_is_due, write_due, write_history
 from cmm_uq.base.messages import html_table
 from cmm_uq.laboratory.due.drift import PARTS
 from cmm_uq.laboratory.due.history import MachineHistory

@@ -94,7 +94,7 @@ def sign(
     The set in their folder is written anew, all or none, and records that know the certificate are told.
     """
     signing = opt.open_key(key, time_server, level, trust)
-    from cmm_uq.app.commands.certificates.sign import sign_files
+    from cmm_uq.app.commands.certificates.signing import sign_files
 
     done = sign_files(files, signing, out=out, records=records)
     if json:
@@ -324,7 +324,7 @@ def new_key(
     The passphrase is asked for, or read from CMM_UQ_SIGN_PASSPHRASE_FILE or CMM_UQ_SIGN_PASSPHRASE. Whatever is signed with
     it says that it is a test key.
     """
-    from cmm_uq.app.commands.certificates.keys import new_test_key
+    from cmm_uq.app.commands.certificates.signing import new_test_key
     from cmm_uq.certificate.sign import TEST_NOTE
 
     made = new_test_key(file, name, lambda question: opt.ask_secret(question, twice=True))

@@ -64,7 +64,7 @@ def report(
             raise CmmUqError(f"goes {'without' if scheduled else 'with'} --scheduled", where=name, fix=fix)
     if scheduled:
         from cmm_uq.app.cli.schedule import STANDARD_OUTPUT, run
-        from cmm_uq.app.commands.laboratory.scheduled import ScheduledOptions
+        from cmm_uq.app.commands.laboratory.schedule import ScheduledOptions
 
         options = ScheduledOptions(tuple(job), out, schedule, records, seed or None, dry_run)
         raise typer.Exit(run(options, None if quiet and lines is None else lines or STANDARD_OUTPUT))

@@ -211,7 +211,7 @@ def history(
     json: opt.Json = False,
 ) -> None:
     """Say how every error factor and figure of a machine has gone, what changed last, and when a limit will be crossed."""
-    from cmm_uq.app.commands.laboratory.history import history_of, write_history
+    from cmm_uq.app.commands.laboratory.due import history_of, write_history
     from cmm_uq.certificate.pages.history import history_data, summary_row, terminal_note
 
     found = history_of(machine, records, on=opt.day_of(on), fleet=fleet)

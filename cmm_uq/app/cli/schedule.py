@@ -15,7 +15,7 @@ from cmm_uq.app.cli.terminal import NEEDS_A_PERSON, closed, put, put_data, put_j
 from cmm_uq.base.errors import OutputError, printable
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.laboratory.scheduled import ScheduledOptions
+    from cmm_uq.app.commands.laboratory.schedule import ScheduledOptions
 
 STANDARD_OUTPUT = Path("-")  # in place of a file for the lines
 
@@ -85,7 +85,7 @@ def run(options: ScheduledOptions, lines: Path | None) -> int:
 
     ``lines``: file that they are added to, :data:`STANDARD_OUTPUT`, or ``None`` for nowhere.
     """
-    from cmm_uq.app.commands.laboratory.scheduled import run_scheduled
+    from cmm_uq.app.commands.laboratory.schedule import run_scheduled
 
     failed: list[OutputError] = []
     descriptor = -1

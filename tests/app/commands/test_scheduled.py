@@ -18,7 +18,7 @@ from unittest import mock
 
 import pytest
 
-from cmm_uq.app.commands.laboratory.scheduled import drift_notices, due_notices
+from cmm_uq.app.commands.laboratory.schedule import drift_notices, due_notices
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import read_manifest, sha256_of
 from cmm_uq.laboratory.records import open_records

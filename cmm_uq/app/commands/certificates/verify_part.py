@@ -11,8 +11,7 @@ from typing import Any
 from cmm_uq import __version__
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import plan_of
-from cmm_uq.app.commands.certificates.verification import Recomputation
-from cmm_uq.app.commands.certificates.verify_again import as_attached, plugins_missing, recomputed
+from cmm_uq.app.commands.certificates.verification import Recomputation, as_attached, plugins_missing, recomputed
 from cmm_uq.app.commands.files import Finished, Stage
 from cmm_uq.app.commands.parts.documents import contents_of, in_language
 from cmm_uq.app.commands.parts.drift import FILE as HISTORY

@@ -1,4 +1,4 @@
-"""What is due for calibration: from the records to a sorted list, and to written files where a folder is asked for."""
+"""What is due for calibration, and the history of a machine: from the records to written files."""
 
 from __future__ import annotations
 
@@ -15,9 +15,12 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, in_order, machine_due
-from cmm_uq.laboratory.due.rule import CompletedInterval, Pool, Rule, calibrations, ended_intervals, part_used
+from cmm_uq.laboratory.due.history import MachineHistory, machine_history
+from cmm_uq.laboratory.due.observed import CompletedInterval, Pool, calibrations, ended_intervals, part_used
+from cmm_uq.laboratory.due.rule import Rule
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, RecordedMachine
+from cmm_uq.laboratory.records.listing import outcomes_of
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.due.drift import DriftPrior as Prior
@@ -194,3 +197,33 @@ def write_due(found: WhatIsDue, folder: Path, *, force: bool = False) -> dict[st
 
 def _iso(day: dt.date | None) -> str | None:
     return None if day is None else day.isoformat()
+
+
+HISTORY_FILES = ("history.html", "history.json")
+
+
+def history_of(
+    machine: str, where: str | Path | None = None, *, on: dt.date | None = None, fleet: Path | None = None
+) -> MachineHistory:
+    """The history of a machine."""
+    day = on or dt.datetime.now().astimezone().date()
+    learnt = read_fleet(fleet)
+    with open_records(where, read_only=True) as records:
+        found = records.machine(machine)
+        certificates = records.certificates(found.serial, values=False)
+        series = records.series(found.serial)
+        entries = (one.entry[one.day <= day.toordinal()] for one in series.values())
+        stated = outcomes_of(records, {int(until[-1]) for until in entries if len(until)})
+        return machine_history(found, certificates, series, day, learnt.of(found), stated)
+
+
+def write_history(found: MachineHistory, folder: Path, *, force: bool = False) -> dict[str, Path]:
+    """Write ``history.html`` and ``history.json``, all or none."""
+    from cmm_uq.base.output import Owner, staged
+    from cmm_uq.certificate.pages.history import history_data, history_document
+    from cmm_uq.certificate.render.html import render_html
+    from cmm_uq.certificate.results.plain import as_json
+
+    with staged(folder, Owner("history", found.machine.serial), force=force, expected=HISTORY_FILES) as place:
+        page = render_html(history_document(found)).encode()
+        return place.write({"history.html": page, "history.json": as_json(history_data(found))})

@@ -1,29 +1,50 @@
-"""``schedule.toml``: read, begun, its messages tried, and what starts the runs that go by it."""
+"""Scheduled runs: what they go by, whom they tell, what starts them, and the run itself."""
 
 from __future__ import annotations
 
+import contextlib
 import datetime as dt
 import getpass
 import json
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cmm_uq.app.commands.files import REPORTS
 from cmm_uq.app.commands.jobs.schemas import shipped
-from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.messages import say
+from cmm_uq.app.commands.laboratory.due import due_in
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.base.errors import CmmUqError, OutputError, suggestion
+from cmm_uq.base.messages import Verbatim, plural, say
+from cmm_uq.base.output.interruption import keeping
 from cmm_uq.base.output.new_file import write_new
+from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.schema import commented
-from cmm_uq.laboratory.records.place import NONE, is_url
+from cmm_uq.laboratory.due.history import machine_history
+from cmm_uq.laboratory.records.place import NONE, beside, is_url, place_of
 from cmm_uq.laboratory.schedule.channels import channels
-from cmm_uq.laboratory.schedule.notices import Channel, Notice, OutgoingMessage, UndeliveredError
-from cmm_uq.laboratory.schedule.run import RunClock
+from cmm_uq.laboratory.schedule.jobs import REPORTED, JobFolder, JobReporting
+from cmm_uq.laboratory.schedule.notices import (
+    Channel,
+    Notice,
+    OutgoingMessage,
+    UndeliveredError,
+    of_drift,
+    of_due,
+    of_error,
+)
+from cmm_uq.laboratory.schedule.outbox import Outbox
+from cmm_uq.laboratory.schedule.progress import Log
+from cmm_uq.laboratory.schedule.run import RunClock, ScheduledRun
 from cmm_uq.laboratory.schedule.schedulers import DAYS, READY, ScheduledCall, encoded
 from cmm_uq.laboratory.schedule.settings import FILE, ScheduleFile, read_schedule
+from cmm_uq.laboratory.schedule.state import FolderState, Problems, RecordsState
+
+if TYPE_CHECKING:
+    from cmm_uq.laboratory.records.store import Records
 
 CLOCK = RunClock(lambda: dt.datetime.now(dt.UTC), time.monotonic, time.sleep)
 
@@ -144,3 +165,153 @@ def _days_of(text: str) -> tuple[str, ...]:
         if day not in DAYS:
             raise CmmUqError(f"{day!r} is no day of the week", where="--days", fix=f"Known: {', '.join(DAYS)}")
     return tuple(day for day in DAYS if day in given)
+
+
+_AHEAD = dt.timedelta(days=1)
+"""By how much the newest entry may be of the future: clocks of two computers differ, and so do their zones."""
+
+
+@contextlib.contextmanager
+def opened(place: str | Path | None, *, dry: bool) -> Iterator[Records | None]:
+    """The records, made where there are none; ``None`` where there are to be none, or a dry run would make them."""
+    if place is None or (dry and not is_url(place) and not Path(place).exists()):
+        yield None
+        return
+    from cmm_uq.laboratory.records.opening import open_records
+
+    with open_records(place, create=not dry, read_only=dry) as records:
+        if not dry:
+            with records.writing():
+                pass
+        yield records
+
+
+def due_notices(records: Records | None, on: dt.date, within: dt.timedelta) -> Iterable[Notice]:
+    """What is to be calibrated soon, or should have been."""
+    if records is None:
+        return
+    _check_clock(records, on)
+    if not records.head()[0]:
+        return
+    for one in due_in(records, (), on):
+        if one.due is not None and one.due <= on + within:
+            yield of_due(one.item, one.serial, one.due, on, one.why, beyond=one.beyond)
+
+
+def drift_notices(records: Records | None, job: str, on: dt.date) -> Iterable[Notice]:
+    """Whether a machine changed by more than chance since the recording before that of a job."""
+    newest = [] if records is None else records.certificates(job=job, limit=1, values=False)
+    if records is None or not newest:
+        return
+    machine = records.machine(newest[-1].machine)
+    history = machine_history(
+        machine, records.certificates(machine.serial, values=False), records.series(machine.serial), on
+    )
+    changed = [Verbatim(one.series.quantity) for one in history.values if history.significant(one)
+               and int(one.series.entry[-1]) == newest[-1].entry]  # fmt: skip
+    if changed:
+        yield of_drift(machine.serial, changed, newest[-1].entry)
+
+
+def _check_clock(records: Records, on: dt.date) -> None:
+    number, _ = records.head()
+    if not number:
+        return
+    newest = dt.datetime.fromisoformat(next(records.entries(number)).at).date()
+    if newest > on + _AHEAD:
+        raise CmmUqError(f"the newest entry is of {newest}, and the clock says {on}: what is due is not said", where="records",
+                         fix="Set the clock")  # fmt: skip
+
+
+Tell = Callable[[dict[str, Any]], None]
+_RUN = "the run"  # what an error is about that ends all of it
+
+
+@dataclass(frozen=True)
+class ScheduledOptions:
+    """A scheduled run, as it is asked for.
+
+    ``folders``: job folders, or folders with job folders in them; ``out``: folder of the reports; by default what the
+    schedule says; ``schedule``: the file; by default ``schedule.toml`` in the first folder; ``records``: file, URL,
+    or ``none``; by default what the schedule says, else ``records.db`` beside the reports; ``seed``: of everything
+    random; by default what the schedule says; ``dry``: say what would happen, and do nothing.
+    """
+
+    folders: tuple[Path, ...]
+    out: Path | None = None
+    schedule: Path | None = None
+    records: str | None = None
+    seed: int | None = None
+    dry: bool = False
+
+
+def run_scheduled(asked: ScheduledOptions, tell: Tell = lambda told: None, clock: RunClock = CLOCK) -> int:
+    """Report every job in folders that is new or changed, send what a person must hear of; the exit code.
+
+    Gives 0 all is well, 1 something needs a person, 2 bad input, 3 output impossible.
+    """
+    found = schedule_of(asked.folders, asked.schedule)
+    facts, reports = found.facts, (asked.out or found.out).absolute()  # a message is read elsewhere
+    place = place_of(asked.records or found.records, beside(reports / "x"))
+    log = Log(reports / facts.log.file if facts.log.file else None, facts.log.largest_bytes, facts.log.kept)
+    ways = found.channels()
+    try:
+        with opened(place, dry=asked.dry) as records:
+            if not asked.dry:
+                Problems(reports).mended(_RUN)
+            state = FolderState(reports) if records is None else RecordsState(records, reports)
+            outbox = Outbox(reports, ways, state, clock.moment)
+            seed = facts.run.seed if asked.seed is None else asked.seed
+            work = JobReporting(reports, state, lambda job: _reported(job, reports, seed, place or NONE), outbox.add,
+                        lambda job: drift_notices(records, job.id, clock.now().date()))  # fmt: skip
+            within = dt.timedelta(days=facts.run.due_within_days)
+            roots = [folder.absolute() for folder in asked.folders]
+            run = ScheduledRun(
+                roots,
+                facts.run,
+                work,
+                outbox,
+                lambda on: due_notices(records, on, within),
+                tell,
+                log.write,
+                clock,
+                asked.dry,
+            )
+            with keeping(lambda: _kept(run)):
+                return run.through()
+    except CmmUqError as error:  # of the records: without them nothing is made, and somebody has to hear of that too
+        if not asked.dry:
+            _send_alone(error, Outbox(reports, ways, FolderState(reports), clock.moment), log, clock)
+        raise
+
+
+def _kept(run: ScheduledRun) -> str:
+    count = run.counted.get(REPORTED, 0)
+    return str(plural(count, one=say("1 report was written"), many=say("{count} reports were written", count=count)))
+
+
+def _send_alone(error: CmmUqError, outbox: Outbox, log: Log, clock: RunClock) -> None:
+    """Tell of an error that ended the whole run."""
+    log.write(f"{clock.moment()} nothing was done: {error}")
+    notice = of_error(error, _RUN, Problems(outbox.out).since(_RUN, str(error), clock.moment()))
+    try:
+        outbox.add([notice])
+        outbox.deliver(patience_s=0.0)
+    except OutputError:
+        outbox.sent_at_once([notice])
+
+
+def _reported(job: JobFolder, out: Path, seed: int, records: str | Path) -> bytes:
+    """Contents of results.json of a job, once its certificate is written."""
+    from cmm_uq.app.commands.report import write_report
+
+    if not job.id:
+        read_job(job.folder)
+        return b"{}"
+
+    def same(read: Job) -> None:
+        if read.facts.job.id != job.id:
+            raise CmmUqError(f"its id {job.id!r} was changed while it was read", where=str(job.folder),
+                             fix="The next run takes it")  # fmt: skip
+
+    return write_report(job.folder, out / job.id, seed=seed, told=same, records=records).results

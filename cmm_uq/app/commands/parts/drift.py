@@ -114,7 +114,7 @@ def with_drift(
         found = aged(state, on)
         return AgedMachine(found, _not_known(found))
     if kept is None:
-        from cmm_uq.app.commands.laboratory.history import history_of
+        from cmm_uq.app.commands.laboratory.due import history_of
 
         kept = attached_history(history_of(serial, records, on=on), since)
     known = known_of(kept)
