@@ -169,7 +169,7 @@ def diagnosis_section(diagnosis: Mapping[str, Any]) -> tuple[PageSection, ...]:
         blocks.append(PageTable(say("What the model leaves out"), headings, rows))
     for group in _list(diagnosis.get("indistinguishable")):
         if isinstance(group, list):
-            names = commas(title_of(str(name)) for name in group)
+            names = commas(effect_title(str(name)) for name in group)
             blocks.append(PageParagraph(say("This recording cannot tell apart: {names}.", names=names)))
     further = [one.get("what") for one in _list(diagnosis.get("suggested_measurements")) if isinstance(one, Mapping)]
     blocks += [PageParagraph(say("Measure next: {what}", what=Verbatim(str(what)))) for what in further if what]
@@ -189,7 +189,7 @@ def _effect(one: Any) -> tuple[Cell, ...]:
             continue
     size = size_of(effect_of(name), sizes, factors=False) if sizes else NOTHING
     chance_text = probability(float(chance)) if isinstance(chance, (int, float)) else DASH
-    return Cell(title_of(name)), Cell(chance_text), Cell(size)
+    return Cell(effect_title(name)), Cell(chance_text), Cell(size)
 
 
 def _list(value: Any) -> list[Any]:

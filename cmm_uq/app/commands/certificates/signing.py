@@ -30,7 +30,7 @@ from cmm_uq.certificate.sign import (
     trial_key,
     trust_of,
 )
-from cmm_uq.certificate.sign.token import SCHEME, signer_of_token
+from cmm_uq.certificate.sign.signer import SCHEME, signer_of_token
 from cmm_uq.laboratory.records.place import beside, place_of
 from cmm_uq.laboratory.schedule import channels as credentials
 
