@@ -23,7 +23,7 @@ from cmm_uq.jobs.tables.origin import COMPENSATED, SIMULATED
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.document import Standing
-    from cmm_uq.certificate.wording import Headline as Verdict, Summary
+    from cmm_uq.certificate.wording import Summary
 
 FILES = {
     "certificate.html": "the certificate",
@@ -66,13 +66,7 @@ _GAP, _MORE = "  ", " …"
 
 @dataclass(frozen=True)
 class Layout:
-    """How much is shown, and on what.
-
-    Parameters
-    ----------
-    width : cells of a line; ``None`` where lines are as long as they are.
-    verbose : whether everything is shown, whole.
-    """
+    """How much is shown, and on what: cells of a line (``None``: as long as it is), and whether all, whole."""
 
     width: int | None = None
     verbose: bool = False
@@ -86,36 +80,23 @@ class Layout:
         files: Sequence[tuple[str, str]] = (),
         folder: str = "",
     ) -> list[Line]:
-        """All that is shown at the end of a command.
-
-        Parameters
-        ----------
-        summary : what was found.
-        name : of the job.
-        banner : what the reader must not overlook.
-        files : that were written to ``folder``, each with what it is.
-        """
+        """All that is shown at the end of a command on a job; ``banner``: what the reader must not overlook."""
+        subject = ": ".join(filter(None, (name, ", ".join(filter(None, (summary.subject, summary.date))))))
+        room = max((len(each.word) for each in summary.verdicts), default=0)
+        verdicts: list[Line] = []
+        for each in summary.verdicts:
+            text = ": ".join(filter(None, (each.subject, "; ".join(each.remarks))))
+            verdicts += self._hung((each.word.ljust(room), COLOURS[each.standing]), text)
         parts: list[list[Line]] = [
-            [((text, COLOURS["open"]),) for text in self._folded(banner)] if banner else [],
-            [*self._verdicts(summary.verdicts), *self._subject(name, summary)],
+            [((text, COLOURS["open"]),) for text in folded(banner, self.width)] if banner else [],
+            [*verdicts, *(((line, ""),) for line in (folded(subject, self.width) if subject else ()))],
             list(self.table(summary.figures)),
             list(self._items(summary.remarks)),
             list(self.table(summary.details)) if self.verbose else [],
             list(self._warnings(summary.warnings)),
-            list(self._files(files, folder)),
+            [(("Written to ", HEADING), (printable(folder), "")), *self.table(files)] if files else [],
         ]
         return [line for i, part in enumerate(filter(None, parts)) for line in ([()] if i else []) + part]
-
-    def _subject(self, name: str, summary: Summary) -> Iterator[Line]:
-        told = ", ".join(filter(None, (summary.subject, summary.date)))
-        told = ": ".join(filter(None, (name, told)))
-        return (((line, ""),) for line in self._folded(told)) if told else iter(())
-
-    def _verdicts(self, verdicts: Sequence[Verdict]) -> Iterator[Line]:
-        room = max((len(each.word) for each in verdicts), default=0)
-        for each in verdicts:
-            told = ": ".join(filter(None, (each.subject, "; ".join(each.remarks))))
-            yield from self._hung((each.word.ljust(room), COLOURS[each.standing]), told)
 
     def table(self, rows: Iterable[Sequence[str]]) -> Iterator[Line]:
         """Columns, of which the widest are folded until all fit."""
@@ -156,14 +137,6 @@ class Layout:
             yield from self._hung((_GAP + head.rjust(room), style), text, gap=1, most=most)
         if len(shown) < len(texts):
             yield ((f"{_GAP}{_MORE.strip()} and {len(texts) - len(shown)} more: --verbose, or the document", FAINT),)
-
-    def _files(self, files: Sequence[tuple[str, str]], folder: str) -> Iterator[Line]:
-        if files:
-            yield (("Written to ", HEADING), (printable(folder), ""))
-            yield from self.table(files)
-
-    def _folded(self, text: str) -> list[str]:
-        return folded(text, self.width)
 
     def _hung(self, head: tuple[str, str], text: str, gap: int = 2, most: int = LINES) -> Iterator[Line]:
         """A text behind its head, all its lines under each other; shortened unless all is to be shown."""

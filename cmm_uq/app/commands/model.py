@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cmm_uq.analysis.screening.finding import Finding, finding
 from cmm_uq.analysis.screening.screening import counted_with, screen_recording
@@ -28,7 +27,12 @@ from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.least_squares import RANK_TOLERANCE
 from cmm_uq.maths.inference.linear_model import Freedoms
 
-FEWEST_LEFT = 3  # observations that the noise is estimated from, beside those that sizes and set-ups could explain
+# observations that the noise is estimated from, beside those that sizes and set-ups could explain
+FEWEST_LEFT = 3
+
+OVERFLOW_FIX = (  # where figures leave the range of numbers
+    "Look for a number that no measurement gives: in the columns of the recording, u_coordinate_um, u_um or travel_mm"
+)
 
 
 def model_of(job: Job, artefact: Artefact) -> RecordingModel:
@@ -47,7 +51,9 @@ def model_of(job: Job, artefact: Artefact) -> RecordingModel:
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
                          fix="Name measurements that the recording has")  # fmt: skip
-    used = ~(np.isin(artefact.measurement, aside) | _copies(artefact, aside) | artefact.unread())
+    group, rows = artefact.points.group, artefact.rows[:, 0]
+    copies = group[counted_with(artefact.points, aside)[rows]] != group[rows]
+    used = ~(np.isin(artefact.measurement, aside) | copies | artefact.unread())
     if not used.any():
         raise CmmUqError(
             "no observation is left to estimate from", where="job.toml [recording] set_aside" if aside else job.recording_path,
@@ -60,12 +66,6 @@ def model_of(job: Job, artefact: Artefact) -> RecordingModel:
     _refuse_open_sizes(model, job.recording_path)
     _refuse_hidden_noise(model, job.recording_path)
     return model
-
-
-def _copies(artefact: Artefact, aside: Sequence[int]) -> NDArray[np.bool_]:
-    """(m,) which observations are copies of others."""
-    group, rows = artefact.points.group, artefact.rows[:, 0]
-    return np.asarray(group[counted_with(artefact.points, aside)[rows]] != group[rows])
 
 
 def _refuse_open_sizes(model: RecordingModel, where: str) -> None:
@@ -113,22 +113,18 @@ def recorded_model(job: Job, *, placings: bool = False) -> tuple[RecordingModel,
     )  # fmt: skip
     artefact = observe(job.facts.artefact, recording.points, where=where)
     model = model_of(job, artefact)
-    if not placings:
-        _refuse_exact(job, model)
-    return model, (*recording.findings, *_unread(artefact))
-
-
-def _refuse_exact(job: Job, model: RecordingModel) -> None:
-    """Refuse what is said to be measured and fits to the last digit, though its digits would show a nanometre."""
+    if placings or job.origin != MEASURED:
+        return model, (*recording.findings, *_unread(artefact))
     found = model.estimate().least_squares
-    if job.origin != MEASURED or found.degrees_of_freedom < FEWEST_LEFT:
-        return
-    if found.sigma_of_residuals < NANOMETRE and display_step(job.points.xyz, found.sigma_of_residuals) < NANOMETRE:
+    scatter = found.sigma_of_residuals
+    # what is said to be measured fits to the last digit, though its digits would show a nanometre
+    if found.degrees_of_freedom >= FEWEST_LEFT and max(scatter, display_step(job.points.xyz, scatter)) < NANOMETRE:
         raise CmmUqError(
             "the readings have no scatter at all: they agree with each other to below a nanometre, as computed or nominal "
             "values do, and no machine's", where=job.recording_path,
             fix='Record what the machine indicated; or, of a simulation, state origin = "simulated" in job.toml [job]',
         )  # fmt: skip
+    return model, (*recording.findings, *_unread(artefact))
 
 
 def _unread(artefact: Artefact) -> list[Finding]:
@@ -153,12 +149,6 @@ def refuse_unfit(job: Job) -> None:
     """Refuse a damaged recording; one that holds planned coordinates, or none, is let through, and so are nominal ones."""
     if len(job.points) and not job.planned and kind_of(job).observe is not None:
         recorded_model(job, placings=True)
-
-
-OVERFLOW_FIX = (
-    "Look for a number that no measurement gives: in the columns of the recording, u_coordinate_um, u_um or travel_mm"
-)
-"""Where figures leave the range of numbers."""
 
 
 def refuse_planned(job: Job) -> None:

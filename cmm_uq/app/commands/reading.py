@@ -16,7 +16,7 @@ from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.plugins import naming_package
-from cmm_uq.jobs import derived_job as predicted, reading
+from cmm_uq.jobs import reading
 from cmm_uq.jobs.derived_job import against
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import Nameable
@@ -58,7 +58,7 @@ def in_language(job: Job, language: Code | None) -> Job:
 def compared_with(job: Job, prediction: Path) -> Job:
     """A job that was read, to be compared with a simulation's prediction in a file that may lie anywhere."""
     content = content_of(prediction, TABLE_BYTES, "Give the file that the simulation wrote")
-    return predicted.against(job, content, prediction.name, prediction)
+    return against(job, content, prediction.name, prediction)
 
 
 RECORDING, PREDICTION = "recording.csv", "predicted.csv"

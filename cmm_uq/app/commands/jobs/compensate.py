@@ -20,7 +20,7 @@ from cmm_uq.jobs.derived_job import IN_THE_RECORDING, PROGRAM, derived_toml, is_
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.jobs.recording.digitizer import DescribedDigitizer, digitizer_of
-from cmm_uq.jobs.recording.temperature_log import TemperatureLog, log_of
+from cmm_uq.jobs.recording.temperature_log import log_of
 from cmm_uq.jobs.tables.origin import first_line
 from cmm_uq.machine.model.machine_maps import maps_of
 from cmm_uq.machine.physics.compensation import Compensation, compensate_points, machine_compensation
@@ -35,20 +35,30 @@ PROVENANCE = "compensation.json"  # how the coordinates were corrected, in the f
 
 
 def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict[str, object]]:
-    """The recording of a job at the coordinates that its error maps make of it, and how it came about."""
+    """The recording of a job at the coordinates that its error maps make of it, and how it came about.
+
+    ``beyond``: ``refuse`` points outside the maps, or extrapolate and flag them.
+    """
     maps = maps_of(job)
     refuse_planned(job)
     if not job.facts.artefact.with_recording:
         raise kind_of(job).refused("compensated")
     log = log_of(job.facts.machine, job.inputs, job.folder)
     compensation = machine_compensation(job.points, ErrorMaps(maps), beyond=beyond)
+    provenance = compensation.provenance()
     try:
-        return compensate_points(_with_probe(job), compensation), compensation.provenance() | _of_the_log(
-            job.points, log
-        )
+        points = compensate_points(_with_probe(job), compensation)
+        if log is not None:  # which gave the temperatures of the scales
+            times = job.points.columns["time_s"]
+            provenance |= {"temperature_log": {
+                "file": log.source, "rule": "mean of the thermocouples of each scale, linear in time",
+                "largest_u_interpolation_k": round(float(log.u_at(times).max()), 6),
+                "largest_spread_k": round(float(log.spread_at(times).max()), 6),
+            }}  # fmt: skip
     except CmmUqError as error:
         where = ", ".join(part for part in (job.recording_path, error.where) if part)
         raise CmmUqError(error.problem, where=where, fix=error.fix) from error
+    return points, provenance
 
 
 def write_compensated(
@@ -119,33 +129,13 @@ def _with_probe(job: Job) -> Points:
     return replace(job.points, columns={**job.points.columns, **tips})
 
 
-def _of_the_log(points: Points, log: TemperatureLog | None) -> dict[str, object]:
-    """How the temperatures of the scales came about, where a log gave them."""
-    if log is None:
-        return {}
-    times = points.columns["time_s"]
-    return {
-        "temperature_log": {
-            "file": log.source,
-            "rule": "mean of the thermocouples of each scale, linear in time",
-            "largest_u_interpolation_k": round(float(log.u_at(times).max()), 6),
-            "largest_spread_k": round(float(log.spread_at(times).max()), 6),
-        }
-    }
-
-
 FORMS = (".csv", ".npy", ".parquet")  # endings of what is read and written; a folder of ``.npy`` files becomes one
 
 
 def write_compensated_cloud(
-    job: Path,
-    cloud: Path,
-    out: Path,
-    *,
-    beyond: Beyond = "refuse",
-    force: bool = False,
+    job: Path, cloud: Path, out: Path, *, beyond: Beyond = "refuse", force: bool = False,
     progress: Callable[[float], None] | None = None,
-) -> dict[str, Path]:
+) -> dict[str, Path]:  # fmt: skip
     """Write the coordinates of a cloud, x, y, z in mm in the frame of the scales, and how they came about.
 
     job : of which ``[machine]`` names the error maps and describes the digitizer; its recording is not read.
@@ -171,8 +161,7 @@ def write_compensated_cloud(
         told = {
             "software": PROGRAM, "origin": "compensated", "points": count,
             "inputs_sha256": sha256(read.inputs) | {file.name: sha256_of(file) for file in files},
-            "columns": list(chain.columns), **compensation.provenance(),
-            "digitizer": digitizer.as_data(),
+            "columns": list(chain.columns), **compensation.provenance(), "digitizer": digitizer.as_data(),
             "temperature_log": machine.temperature_log.file if machine.temperature_log is not None else None,
         }  # fmt: skip
         return place.write({PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode()}, [name])

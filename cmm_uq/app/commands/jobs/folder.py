@@ -69,12 +69,9 @@ def _job_text(kind: Kind, begin: Beginning, tables: Tables, examples: Collection
     out = {"job.derived_from", *(f"job.{key}" for key in ("as_found",) if SIMULATED in tables["job"].values())}
     if not kind.tested:
         out |= {"conformity", "short_gauge", "test_uncertainty", "rated_conditions"} - set(tables)
-    if kind.plan is None:
-        out |= {"plan"}
-    if not kind.table.with_recording:
-        out |= {"recording"}
-    if not kind.table.with_earlier:
-        out |= {"recording.earlier", "recording.earlier_date"}
+    out |= set() if kind.plan else {"plan"}
+    out |= set() if kind.table.with_recording else {"recording"}
+    out |= set() if kind.table.with_earlier else {"recording.earlier", "recording.earlier_date"}
     head = [
         f"#:schema ./{SCHEMA}",
         f"# {begin.title}. What stands behind # is the default, or what may be said besides.",

@@ -1,7 +1,5 @@
 """A new job: a folder that can be reported at once, with a simulated recording to be replaced by the laboratory's own.
 
-A new job: a folder that can be reported at once, with a simulated recording to be replaced by the laboratory's own.
-
 The set-ups are those of the kind's usual plan in the machine's volume, the readings are drawn from the model that the job
 names, and everything that is made of them says that they are simulated.
 """
@@ -54,12 +52,8 @@ SEED = 1  # of the simulated readings
 
 def known() -> dict[str, str]:
     """The kind of each name that a new job can be asked for by."""
-    found: dict[str, str] = {}
-    for name in names():
-        kind = kind_named(name)
-        if kind is not None:
-            found |= {name: name, **dict.fromkeys(kind.begin_also, name)}
-    return found
+    kinds = ((name, kind) for name in names() if (kind := kind_named(name)) is not None)
+    return {one: name for name, kind in kinds for one in (name, *kind.begin_also)}
 
 
 def titles() -> dict[str, str]:
@@ -156,7 +150,8 @@ def _part(given: Tables, drawing: Path | None, answers: Answers | None, id: str)
 
 def job_id(folder: Path, given: Tables, otherwise: str = "job") -> str:
     """Id of a new job: as given, or by its folder's name."""
-    return str(given.get("job", {}).get("id", "")) or _id_of(folder.resolve().name or otherwise)
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", folder.resolve().name or otherwise).strip("-.")[:100]
+    return str(given.get("job", {}).get("id", "")) or plain or "job"
 
 
 def check_empty(folder: Path, but: str = "") -> None:
@@ -185,13 +180,9 @@ def _begun(name: str) -> tuple[Kind, Beginning]:
 
 def _tables(kind: Kind, begin: Beginning, given: Tables, id: str, origin: Origin = SIMULATED) -> dict[str, Any]:  # noqa: A002
     """What job.toml says: what the kind begins with, and over it what is given."""
-    recorded = kind.table.with_recording
+    recorded, today = kind.table.with_recording, dt.datetime.now(tz=dt.UTC).date()
     whole: dict[str, Any] = {
-        "job": {
-            "id": id,
-            "date": dt.datetime.now(tz=dt.UTC).date(),
-            **({} if origin == MEASURED else {"origin": origin}),
-        },
+        "job": {"id": id, "date": today, **({} if origin == MEASURED else {"origin": origin})},
         "machine": {**MACHINE, **begin.machine},
         "artefact": {"kind": kind.name, **begin.artefact},
         **({"recording": {"file": RECORDING}} if recorded else {}),
@@ -234,9 +225,3 @@ def _drawn(job: Job, kind: Kind, begin: Beginning) -> Points:
 
     truth = Truth.model_validate({"seed": SEED, "noise": {"coordinate_um": begin.noise_um}})
     return simulate(replace(job, points=points, planned=True), truth)
-
-
-def _id_of(name: str) -> str:
-    """A job's id from the name of a folder."""
-    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.")[:100]
-    return plain or "job"

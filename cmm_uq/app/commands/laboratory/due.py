@@ -69,10 +69,7 @@ FILES = ("due.html", "due.json")
 
 @dataclass(frozen=True)
 class WhatIsDue:
-    """Machines and artefacts, by the day on which they are due.
-
-    ``on``: the day asked about; ``within``: how far ahead is due; ``items``: all that was asked about.
-    """
+    """Machines and artefacts that were asked about, by the day on which they are due, and how far ahead is due."""
 
     on: dt.date
     within: dt.timedelta

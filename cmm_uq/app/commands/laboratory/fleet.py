@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.laboratory.due.drift import history
-from cmm_uq.laboratory.due.fleet import Fleet, FleetMember, FleetResult, fit_fleet, judged
+from cmm_uq.laboratory.due.fleet import FleetMember, FleetResult, fit_fleet, judged
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.listing import outcomes_of
 
@@ -47,18 +47,12 @@ def fleet(
         def told(part: float, i: int = i, quantity: str = quantity) -> None:
             stage(f"Sampling: {quantity}", (i + part) / len(wanted))
 
-        learnt.append((name, quantity, unit, members, _learnt(members, name, seed, told), len(rows) - len(usable)))
+        if not members:
+            fix = "Choose another --name"
+            raise CmmUqError("no certificate states this value with an uncertainty", where=name, fix=fix)
+        learnt.append((name, quantity, unit, members, fit_fleet(members, seed, told), len(rows) - len(usable)))
     stage("Done", 1.0)
     return judged(learnt, seed)
-
-
-def _learnt(members: tuple[FleetMember, ...], name: str, seed: int, told: Any) -> Fleet:
-    """The fleet of one value."""
-    if not members:
-        raise CmmUqError(
-            "no certificate states this value with an uncertainty", where=name, fix="Choose another --name"
-        )
-    return fit_fleet(members, seed, told)
 
 
 def _wanted(frame: pd.DataFrame, names: Collection[str], known: Collection[str]) -> list[str]:

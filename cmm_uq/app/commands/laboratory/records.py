@@ -29,12 +29,7 @@ COMMANDS = ("report", "diagnose")
 
 @dataclass(frozen=True)
 class ImportedReports:
-    """What an import did.
-
-    ``added``: folders whose reports were recorded; ``known``: folders whose reports were recorded before;
-    ``refused``: folders that were not recorded, and why; ``bare``: folders of which only results.json was left to go
-    by.
-    """
+    """Folders whose reports were recorded, or were before, or were not, and why; ``bare``: only results.json was left."""
 
     added: tuple[Path, ...]
     known: tuple[Path, ...]
@@ -53,7 +48,9 @@ def import_reports(records: Records, folders: Iterable[Path]) -> ImportedReports
             if digest in contents or records.has_results(digest) is not None:
                 known.append(path)
                 continue
-            job = job_inside(path)
+            job: Job | None = None
+            with contextlib.suppress(CmmUqError):  # its PDF is gone, or its inputs are not read any more
+                job = job_of(inputs_of(path))
             contents[digest] = path, _content(records, path, job)
             if job is None:
                 bare.append(path)
@@ -86,13 +83,6 @@ def report_folders(folder: Path) -> Iterator[Path]:
         written = read_manifest(manifest.parent)
         if written is not None and written.owner.command in COMMANDS and RESULTS in written.files:
             yield manifest.parent
-
-
-def job_inside(folder: Path) -> Job | None:
-    """The job of a report, from the inputs that its PDF carries; ``None`` where they are not there or not read any more."""
-    with contextlib.suppress(CmmUqError):
-        return job_of(inputs_of(folder))
-    return None
 
 
 def inputs_of(folder: Path) -> dict[str, bytes]:
@@ -139,10 +129,7 @@ def _results(folder: Path) -> Mapping[str, Any]:
 
 @dataclass(frozen=True)
 class Retained:
-    """What a retention removes.
-
-    ``certificates``: that are older, and in whose folders nothing newer is.
-    """
+    """What a retention removes: certificates that are older, in whose folders nothing newer is, and their files."""
 
     certificates: tuple[RecordedCertificate, ...]
     files: tuple[Path, ...]
