@@ -20,8 +20,7 @@ from cmm_uq.certificate.document import Standing
 from cmm_uq.certificate.wording import effect_of, effect_title, probability, size_of
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.content import unit_of
-from cmm_uq.laboratory.records.entries import Entry
-from cmm_uq.laboratory.records.facts import RecordedCertificate
+from cmm_uq.laboratory.records.facts import Entry, RecordedCertificate
 from cmm_uq.laboratory.records.listing import entry_of
 from cmm_uq.maths.uncertainty.quantity import Quantity
 

@@ -16,8 +16,7 @@ from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, in_order, machine_due
 from cmm_uq.laboratory.due.history import MachineHistory, machine_history
-from cmm_uq.laboratory.due.observed import CompletedInterval, Pool, calibrations, ended_intervals, part_used
-from cmm_uq.laboratory.due.rule import Rule
+from cmm_uq.laboratory.due.rule import CompletedInterval, Pool, Rule, calibrations, ended_intervals, part_used
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, RecordedMachine
 from cmm_uq.laboratory.records.listing import outcomes_of

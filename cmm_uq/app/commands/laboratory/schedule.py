@@ -30,13 +30,13 @@ from cmm_uq.laboratory.schedule.jobs import REPORTED, JobFolder, JobReporting
 from cmm_uq.laboratory.schedule.notices import (
     Channel,
     Notice,
+    Outbox,
     OutgoingMessage,
     UndeliveredError,
     of_drift,
     of_due,
     of_error,
 )
-from cmm_uq.laboratory.schedule.outbox import Outbox
 from cmm_uq.laboratory.schedule.progress import Log
 from cmm_uq.laboratory.schedule.run import RunClock, ScheduledRun
 from cmm_uq.laboratory.schedule.schedulers import DAYS, READY, ScheduledCall, encoded
