@@ -25,18 +25,7 @@ _ERASE = ("\x7f", "\b")
 
 
 def operated(acquisition: Acquisition, *, plain: bool, quiet: bool) -> None:
-    """Run a session before its operator.
-
-    Parameters
-    ----------
-    acquisition : that is ready.
-    plain : lines, although there is a terminal.
-    quiet : say nothing but errors.
-
-    Raises
-    ------
-    OutputError : the disk fails, or nobody takes what is said.
-    """
+    """Run a session before its operator; ``plain``: lines, although there is a terminal; ``quiet``: nothing but errors."""
     from cmm_uq.laboratory.live.running import OperatorLine as Line
 
     def typed(text: str | None) -> None:
@@ -60,12 +49,10 @@ class Plain:
         self._quiet, self._last = quiet, ""
 
     def tell(self, text: Text) -> None:
-        """See :class:`~cmm_uq.laboratory.live.running.Screen`."""
         if not self._quiet:
             say_now(str(text))
 
     def show(self, view: View) -> None:
-        """See :class:`~cmm_uq.laboratory.live.running.Screen`."""
         now = f"{view.head}; next: {view.next}"
         if now != self._last and not self._quiet:
             self._last = now
@@ -73,12 +60,7 @@ class Plain:
 
 
 class Whole:
-    """A screen that stands still.
-
-    Parameters
-    ----------
-    live : of rich.
-    """
+    """A screen of rich that stands still."""
 
     def __init__(self, live: Any) -> None:
         self._live, self._typed = live, ""
@@ -108,7 +90,6 @@ class Whole:
         """See :class:`~cmm_uq.laboratory.live.running.Screen`: it stands on the screen."""
 
     def show(self, view: View) -> None:
-        """See :class:`~cmm_uq.laboratory.live.running.Screen`."""
         self._view = view
         self._live.update(_page(view, self._typed, self._live.console.size.height), refresh=True)
 
@@ -150,18 +131,9 @@ def _page(view: View, typed: str, height: int) -> RenderableType:
     rows += [Styled(str(text), style="red" if "NOT within" in text else "") for text in view.temperatures]
     rows += [Styled(str(text), style="dim") for text in view.instruments]
     room = max(1, min(_LINES, height - len(rows) - 3))
-    rows += [
-        Styled(str(text), style="yellow" if text.startswith(("WARNING", "REPEAT")) else "")
-        for text in view.said[-room:]
-    ]
-    rows.append(Styled(f"{PROMPT}{typed}▏", style="reverse"))
-    rows.append(
-        Styled(
-            "Enter takes the point · x y z · undo REASON · repeat · skip · go N · note · clear · pause · help · quit",
-            style="dim",
-        )
-    )
-    return Group(*rows)
+    rows += [Styled(str(text), style="yellow" * text.startswith(("WARNING", "REPEAT"))) for text in view.said[-room:]]
+    keys = "Enter takes the point · x y z · undo REASON · repeat · skip · go N · note · clear · pause · help · quit"
+    return Group(*rows, Styled(f"{PROMPT}{typed}▏", style="reverse"), Styled(keys, style="dim"))
 
 
 def _lines(typed: Callable[[str | None], None]) -> None:

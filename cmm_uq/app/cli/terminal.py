@@ -23,26 +23,20 @@ if TYPE_CHECKING:
 NEEDS_A_PERSON = 1  # exit code of a scheduled run after which a person has to look at something, and was told of it
 BAD_INPUT = 2  # exit code of everything that the user can mend
 
-NO_OUTPUT = 3
-"""Exit code where the input is sound and the output is impossible: disk, permissions, a closed pipe, a fault in here."""
-
-NOT_CONFORMING = 4
-"""Exit code of a strict run that found a machine not conforming, or a recording that contradicts its model."""
-
-NOT_VERIFIED, NOT_WHOLLY_CHECKED = 1, 3
-"""Exit codes of a verification that found something wrong, and of one that could not check everything."""
+NO_OUTPUT = 3  # exit code where the input is sound and the output impossible: disk, permissions, a closed pipe, a fault
+NOT_CONFORMING = 4  # exit code of a strict run: a machine does not conform, or a recording contradicts its model
+NOT_VERIFIED, NOT_WHOLLY_CHECKED = 1, 3  # exit codes of a verification: something is wrong, or could not be checked
 
 NAME = "cmm-uq:"
 WIDEST, NARROWEST = 120, 40  # columns that are used: longer lines are hard to read, and fewer are not enough
 Line = tuple[tuple[str, str], ...]  # parts of a line, each with its style in the words of rich; none for the usual one
 
-NEAREST = {
+NEAREST = {  # what this program prints beyond ASCII
     "±": "+/-", "−": "-", "–": "-", "—": "-", "·": "*", "×": "x", "→": "->", "…": "...", "″": '"', "′": "'", "µ": "u",
     "μ": "u", "°": "deg", "α": "alpha", "β": "beta", "γ": "gamma", "ε": "epsilon", "λ": "lambda", "ν": "nu", "σ": "sigma",
     "φ": "phi", "√": "sqrt", "≤": "<=", "≥": ">=", "⁻": "^-", "²": "2", "³": "3", "⁶": "6", "\u00a0": " ", "\u202f": " ",
     "✓": "yes", "✗": "no", "“": '"', "”": '"', "„": '"', "’": "'", "━": "-", "╸": "-", "╺": "-", "⠋": "-", "▏": "|",
 }  # fmt: skip
-"""What this program prints beyond ASCII."""
 
 HANDLER = "cmm_uq.nearest"
 

@@ -55,12 +55,6 @@ def in_language(job: Job, language: Code | None) -> Job:
     return replace(job, facts=job.facts.model_copy(update={"job": told}))
 
 
-def compared_with(job: Job, prediction: Path) -> Job:
-    """A job that was read, to be compared with a simulation's prediction in a file that may lie anywhere."""
-    content = content_of(prediction, TABLE_BYTES, "Give the file that the simulation wrote")
-    return against(job, content, prediction.name, prediction)
-
-
 RECORDING, PREDICTION = "recording.csv", "predicted.csv"
 NO_DATE = dt.date(1970, 1, 1)  # of a job that says none: the clock is never read
 NO_DATE_REMARK = "The date of the measurement was not given."
@@ -90,6 +84,12 @@ def job_from_frames(
     if recording:
         whole["recording"] = recording
     return job_of({"job.toml": as_toml(whole, "job.toml"), **contents}, recorded=points is not None)
+
+
+def compared_with(job: Job, prediction: Path) -> Job:
+    """A job that was read, to be compared with a simulation's prediction in a file that may lie anywhere."""
+    content = content_of(prediction, TABLE_BYTES, "Give the file that the simulation wrote")
+    return against(job, content, prediction.name, prediction)
 
 
 def compared_with_frame(job: Job, prediction: pd.DataFrame) -> Job:

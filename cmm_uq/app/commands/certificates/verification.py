@@ -33,10 +33,7 @@ Compute = Callable[["Given", "Job"], "Again"]  # the second computation: of the 
 
 
 def compute_again(inquiry: Inquiry, given: Given, job: Job, compute: Compute) -> bool:
-    """Compute everything from the inputs, by this version, and keep what differs.
-
-    Gives whether the documents are the same to the byte.
-    """
+    """Compute everything from the inputs, by this version, and keep what differs: whether the documents are the same."""
     if given.results is None:
         return False
     data = given.results[1]
@@ -62,11 +59,15 @@ def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Aga
     from cmm_uq.app.commands.report import REPORT, report_outcome
 
     data = given.results[1] if given.results else {}
-    seed = _seed(data)
+    seed = (data.get("sampling") or {}).get("seed") or 0
+    if not isinstance(seed, int) or seed < 0:
+        raise CmmUqError(f"{seed!r} is no seed", where=f"{RESULTS}: sampling.seed")
     if "estimates" in data:
         form, outcome = REPORT, report_outcome(job, seed=seed, stage=stage)
     else:
-        alpha = _alpha(data, FALSE_ALARMS)
+        alpha = (data.get("diagnosis") or {}).get("false_alarms", FALSE_ALARMS)
+        if not isinstance(alpha, float) or not 0.0 < alpha < 1.0:
+            raise CmmUqError(f"{alpha!r} is no rate of false alarms", where=f"{RESULTS}: diagnosis.false_alarms")
         form, outcome = DIAGNOSE, diagnosis_outcome(job, seed=seed, alpha=alpha, stage=stage)
     kept: list[str] = []
     written = form.contents(outcome, stage, finished=partial(as_attached, given, kept))
@@ -82,7 +83,8 @@ def recomputed(given: Given, written: Mapping[str, bytes], kept: Sequence[str], 
     found = Again(files, None, kept=tuple(kept), beside=tuple(beside))
     if given.pdf is None or pdf is None:
         return found
-    made, here = given.pdf[1].information.get("/Creator", ""), _creator(pdf)
+    creator = re.search(rb"/Creator ?\(([^()]*)\)", pdf)
+    made, here = given.pdf[1].information.get("/Creator", ""), creator[1].decode("latin-1") if creator else ""
     if made != here:
         return replace(found, why_no_pdf=f"they were set by {made or 'another program'}, and here is {here}")
     return replace(found, pdf=pdf)
@@ -105,25 +107,6 @@ def as_attached(given: Given, kept: list[str], name: str, content: bytes) -> byt
         return content
     kept.append(name)
     return attached
-
-
-def _seed(data: Mapping[str, Any]) -> int:
-    seed = (data.get("sampling") or {}).get("seed") or 0
-    if not isinstance(seed, int) or seed < 0:
-        raise CmmUqError(f"{seed!r} is no seed", where=f"{RESULTS}: sampling.seed")
-    return seed
-
-
-def _alpha(data: Mapping[str, Any], usual: float) -> float:
-    alpha = (data.get("diagnosis") or {}).get("false_alarms", usual)
-    if not isinstance(alpha, float) or not 0.0 < alpha < 1.0:
-        raise CmmUqError(f"{alpha!r} is no rate of false alarms", where=f"{RESULTS}: diagnosis.false_alarms")
-    return alpha
-
-
-def _creator(pdf: bytes) -> str:
-    found = re.search(rb"/Creator ?\(([^()]*)\)", pdf)
-    return found[1].decode("latin-1") if found else ""
 
 
 def plugins_missing(inquiry: Inquiry, data: Mapping[str, Any]) -> bool:
@@ -160,11 +143,7 @@ def _by_another_version(inquiry: Inquiry, given: Given, job: Job, made: str) -> 
 
 @dataclass(frozen=True)
 class Verification:
-    """What was verified, and what came out.
-
-    ``given`` the forms of the certificate; ``inquiry`` what was found; ``job`` of the inputs, where they are there and
-    sound; of a part's report none.
-    """
+    """The forms of a certificate, what was found, and the job of the inputs where these are sound; of a part's report none."""
 
     given: Given
     inquiry: Inquiry
@@ -188,18 +167,15 @@ class Recomputation:
     job: Job | None = None
 
 
+# compares figures, decisions and inputs; ``None`` where the inputs are not there, or not sound
 Examine = Callable[[Inquiry, Given], "Recomputation | None"]
-"""Compares figures, decisions and inputs; ``None`` where the inputs are not there, or not sound."""
 
 
 def verify_given(
     given: Given, examine: Examine, *, rerun: bool = True, trust: Iterable[Path] | None = None,
     schema: Path | None = None, stage: Stage = lambda what, part: None,
 ) -> Verification:  # fmt: skip
-    """Verify files that were read.
-
-    ``None`` for nobody, and then nothing need be signed. ``schema``: folder with PTB's schemas.
-    """
+    """Verify files that were read; ``trust``: ``None`` for nobody, and then nothing need be signed."""
     inquiry = Inquiry()
     _check_schema(inquiry, given)
     open_digital(inquiry, given)

@@ -19,10 +19,7 @@ def verify(
     paths: Iterable[Path], *, rerun: bool = True, trust: Iterable[Path] | None = None, schema: Path | None = None,
     compute: Compute | None = None, stage: Stage = lambda what, part: None,
 ) -> Verification:  # fmt: skip
-    """Verify the files of one certificate.
-
-    ``None`` for nobody, and then nothing need be signed.
-    """
+    """Verify the files of one certificate; ``trust``: ``None`` for nobody, and then nothing need be signed."""
     trusted = None if trust is None else tuple(trust)
 
     def examine(inquiry: Inquiry, given: Given) -> Recomputation | None:

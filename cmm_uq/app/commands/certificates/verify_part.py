@@ -65,10 +65,7 @@ def _compute_again(inquiry: Inquiry, given: Given, job: PartJob, trust: Iterable
 
 
 def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable[Path] | None) -> PartJob | None:
-    """Figures, decisions, inputs and the machine's certificate of a part's report; its job, where the inputs are sound.
-
-    ``None`` for nobody.
-    """
+    """Figures, decisions, inputs and the machine's certificate of a part's report; its job, where the inputs are sound."""
     if given.results is None:
         return None
     name, data, _ = given.results
@@ -77,7 +74,7 @@ def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable
         check_part_figures(inquiry, data, name)
         check_part_decisions(inquiry, data, name)
         check_verdicts(inquiry, data, name)
-        _check_stated(inquiry, given)
+        _check_stated(inquiry, given, data, name)
     inputs = inputs_of(inquiry, given)
     if inputs is None:
         inquiry.left(f"the machine's certificate and {AGAIN}", "the inputs are not there as results.json names them")
@@ -96,24 +93,15 @@ def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable
     return job
 
 
-def _check_stated(inquiry: Inquiry, given: Given) -> None:
+def _check_stated(inquiry: Inquiry, given: Given, data: Mapping[str, Any], name: str) -> None:
     """What page and PDF state; their words are compared with each other besides, where both are there."""
-    if given.results is None:
-        return
-    name, data, _ = given.results
     if given.html is not None:
         check_part_stated(inquiry, data, given.html[1].text, files=(given.html[0], name))
     if given.pdf is not None:
-        check_part_stated(inquiry, data, _without_feet(given), files=(given.pdf[0], name))
-
-
-def _without_feet(given: Given) -> str:
-    if given.pdf is None:
-        return ""
-    pdf = given.pdf[1]
-    title = squashed(pdf.information.get("/Title", ""))
-    pages = enumerate(pdf.pages, 1)
-    return "".join(without_foot(squashed(text), title, number, len(pdf.pages))[0] for number, text in pages)
+        pdf = given.pdf[1]
+        title, pages = squashed(pdf.information.get("/Title", "")), enumerate(pdf.pages, 1)
+        text = "".join(without_foot(squashed(text), title, number, len(pdf.pages))[0] for number, text in pages)
+        check_part_stated(inquiry, data, text, files=(given.pdf[0], name))
 
 
 def part_job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> PartJob:
@@ -152,14 +140,8 @@ def _check_machine(
         inquiry.looked("inputs")
         hashes = sha256(attached_calibration(job))
         if said["inputs_sha256"] != hashes:
-            inquiry.wrong(
-                "inputs",
-                file,
-                "machine.inputs_sha256",
-                "are not the machine's job inside",
-                said["inputs_sha256"],
-                hashes,
-            )
+            inquiry.wrong("inputs", file, "machine.inputs_sha256", "are not the machine's job inside",
+                          said["inputs_sha256"], hashes)  # fmt: skip
         inquiry.notes.append("No certificate states the machine: its job was analysed, and is inside.")
         return
     held = bool(said["signatures_held_to_trusted"])
@@ -184,22 +166,16 @@ def _check_machine(
 
 
 def _merge(inquiry: Inquiry, inner: Inquiry, where: str) -> None:
-    """What was found of the certificate inside, named as such."""
+    """What was found of the certificate inside, named as such; itself by the name that it has among the inputs."""
     for one in inner.findings:
-        inquiry.findings.append(
-            VerificationFinding(one.check, _within(where, one.file), one.place, one.problem, one.stands, one.should)
-        )
+        file = where if where.rpartition("/")[2] == one.file else f"{where}: {one.file}"
+        inquiry.findings.append(VerificationFinding(one.check, file, one.place, one.problem, one.stands, one.should))
     for left in inner.unchecked:
         if (left.what, left.why) != (AGAIN, NOT_ASKED):
             inquiry.left(f"{where}: {left.what}", left.why)
     inquiry.notes += [f"{where}: {note}" for note in inner.notes]
     for check, count in inner.done.items():
         inquiry.looked(check, count)
-
-
-def _within(where: str, file: str) -> str:
-    """A file of the certificate inside; the certificate itself by the name that it has among the inputs."""
-    return where if where.rpartition("/")[2] == file else f"{where}: {file}"
 
 
 def part_again(
@@ -219,17 +195,13 @@ def part_again(
         inquiry.notes.append(
             "The machine's changes since its calibration follow from its history inside, as records had it."
         )
+    again = {"what": AGAIN, "why": NOT_ASKED} not in said["not_checked"]  # with --rerun; perhaps by another version
     asked = PartOptions(
         _whole(simulation["seed"], "seed"), _whole(simulation["asked"], "asked"), simulation["digits"],
-        _asked_again(said), tuple(trust or ()) if held else None, None, history,
+        again, tuple(trust or ()) if held else None, None, history,
     )  # fmt: skip
     found = evaluate_part(job, asked, stage)
     return contents_of(found, stage, finished=finished), tuple(found.files)
-
-
-def _asked_again(said: Mapping[str, Any]) -> bool:
-    """Whether the machine's certificate was to be computed again, with ``--rerun``; another version may have made it."""
-    return {"what": AGAIN, "why": NOT_ASKED} not in said["not_checked"]
 
 
 def _whole(value: Any, key: str) -> int:

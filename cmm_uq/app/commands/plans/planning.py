@@ -17,7 +17,7 @@ from cmm_uq.analysis.planning.exchange import choose, score_of
 from cmm_uq.analysis.planning.expected import RepeatsComparison, compare_repeats
 from cmm_uq.analysis.planning.identifiability import Identifiability, identifiability
 from cmm_uq.analysis.planning.information import recording_information, set_up_information
-from cmm_uq.analysis.planning.noise import PlannedNoise, white_noise
+from cmm_uq.analysis.planning.noise import white_noise
 from cmm_uq.analysis.planning.set_up import SetUp, append, join, split
 from cmm_uq.analysis.planning.setting import Setting, Start
 from cmm_uq.app.commands.model import OVERFLOW_FIX, refuse_planned, refuse_unfit
@@ -25,10 +25,9 @@ from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.overflow import refusing_overflow
-from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.job import Job
-from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.effect import Effect
 
 _NANOMETRE = 1e-6
@@ -38,7 +37,10 @@ def of_standards(job: Job, setting: Setting, name: str, points: Points, recorded
     """Conditions of the standard that a ready plan is named after, and of all that the job wishes to be decided."""
     if setting.observe is None:
         return ()
-    points = _no_copies(points, recorded)
+    # with planned repeats a nanometre apart, as no two readings of a place will be the same
+    xyz = points.xyz.copy()
+    xyz[recorded:] += _NANOMETRE * points.repeat[recorded:, None]
+    points = points.at(xyz)
     # where the lengths lie counts, not yet what certifies them
     facts = setting.artefact.model_copy(update={"nominal": False})
     artefact = setting.observe(facts, points, where=None)
@@ -79,13 +81,6 @@ def completing(
     return tuple(added)
 
 
-def _no_copies(points: Points, recorded: int) -> Points:
-    """With planned repeats a nanometre apart, as no two readings of a place will be the same."""
-    xyz = points.xyz.copy()
-    xyz[recorded:] += _NANOMETRE * points.repeat[recorded:, None]
-    return points.at(xyz)
-
-
 RECORDED = say("recording")  # name of the placings of a recording that is there already
 
 SPREAD = say("an even spread of candidates")
@@ -96,10 +91,8 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, eq=False)
 class Outlook:
-    """What some placings tell.
+    """What some placings tell; ``points`` are the same as one recording.
 
-    placings : of them all.
-    points : the same as one recording.
     identifiability : of the effects named; ``None`` for a kind that names none.
     powers : how large each effect that the job does not name must be for the diagnosis to find it; empty when not asked for,
         and for placings that give way to others by a criterion which does not part effects.
@@ -115,7 +108,6 @@ class Outlook:
 class MeasurementPlan:
     """What to measure, and what it will tell.
 
-    job, setting : what was asked.
     name : of the placings to start from, a ready plan or the recording.
     start : what these tell.
     better : what the placings tell that were searched for, or that complete a standard's test, with those kept; ``None``
@@ -265,19 +257,18 @@ def _outlook(
         stated = setting.stated
         noise = setting.noise or white_noise(model)
         quiet = without_fault(setting.observed, model, noise.drawn, seed)
-        asked = powers(
-            quiet, rivals, stated=stated, sigma=setting.sigma, alpha=FALSE_ALARMS, seed=seed,
-            noise=None if setting.noise is None else _drawn(model, setting.noise),
-        )  # fmt: skip
-        for i, each in enumerate(asked):
+        drawn = None
+        if setting.noise is not None:
+            values = np.array([unknown.prior_mean for unknown in model.unknowns])
+            components = setting.noise.components(model, values)
+            drawn = DrawnNoise(components, setting.noise.typical, model.artefact.noise_scale)
+        predictions = powers(
+            quiet, rivals, stated=stated, sigma=setting.sigma, alpha=FALSE_ALARMS, seed=seed, noise=drawn
+        )
+        for i, each in enumerate(predictions):
             predicted.append(each)
             tell(i + 1, len(rivals))
     return Outlook(placings, points, found, tuple(predicted))
-
-
-def _drawn(model: RecordingModel, noise: PlannedNoise) -> DrawnNoise:
-    values = np.array([unknown.prior_mean for unknown in model.unknowns])
-    return DrawnNoise(noise.components(model, values), noise.typical, model.artefact.noise_scale)
 
 
 def _searched(
@@ -289,11 +280,14 @@ def _searched(
         return None, 0, None
     keep = plan.more is not None or name == RECORDED
     kept = start.placings if keep else ()
-    possible = _possible(setting, start, name)
+    # candidates, of a recording those of its first placing
+    first = start.placings[0] if name == RECORDED else None
+    possible = candidates(setting, Start(setting.model(start.points).artefact, first))
     known = set_up_information(setting, possible, rivals)
     existing = known.prior + recording_information(setting, start.points, rivals)
+    size = np.diag(known.each.sum(axis=0) + existing)  # only effects of which something could show anywhere
     wanted = known.where(rivals) if plan.criterion == "separation" else known.where(setting.named)
-    wanted = _seen(wanted, known.each.sum(axis=0) + existing)
+    wanted = [i for i in wanted if size[i] > 1e-12 * size.max()]
     if not wanted:
         raise CmmUqError("no candidate placing shows any of these effects", where="job.toml [model] effects",
                          fix="Name effects that this artefact can show, or use another artefact")  # fmt: skip
@@ -303,18 +297,6 @@ def _searched(
     chosen = choose(known, existing if keep else known.prior, score, count)
     added = tuple(possible[i] for i in chosen.indices)
     return (*kept, *added), len(kept), (float(score(existing[None])[0]), chosen.after)
-
-
-def _seen(rows: list[int], information: Floats) -> list[int]:
-    """Only effects of which something could show anywhere."""
-    size = np.diag(information)
-    return [i for i in rows if size[i] > 1e-12 * size.max()]
-
-
-def _possible(setting: Setting, start: Outlook, name: str) -> tuple[SetUp, ...]:
-    """Candidates, of a recording those of its first placing."""
-    artefact = setting.model(start.points).artefact
-    return candidates(setting, Start(artefact, start.placings[0] if name == RECORDED else None))
 
 
 def _affordable(setting: Setting, count: int, possible: Sequence[SetUp], kept: Sequence[SetUp]) -> int:
