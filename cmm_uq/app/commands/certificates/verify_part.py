@@ -195,13 +195,17 @@ def part_again(
         inquiry.notes.append(
             "The machine's changes since its calibration follow from its history inside, as records had it."
         )
-    again = {"what": AGAIN, "why": NOT_ASKED} not in said["not_checked"]  # with --rerun; perhaps by another version
     asked = PartOptions(
         _whole(simulation["seed"], "seed"), _whole(simulation["asked"], "asked"), simulation["digits"],
-        again, tuple(trust or ()) if held else None, None, history,
+        _asked_again(said), tuple(trust or ()) if held else None, None, history,
     )  # fmt: skip
     found = evaluate_part(job, asked, stage)
     return contents_of(found, stage, finished=finished), tuple(found.files)
+
+
+def _asked_again(said: Mapping[str, Any]) -> bool:
+    """Whether the machine's certificate was to be computed again, with ``--rerun``; another version may have made it."""
+    return {"what": AGAIN, "why": NOT_ASKED} not in said["not_checked"]
 
 
 def _whole(value: Any, key: str) -> int:
