@@ -73,11 +73,8 @@ class Machine:
         """
         low, high = self.travel_mm[self.axes.index(axis)]
         if np.isnan(low) or np.isnan(high):
-            raise CmmUqError(
-                f"the travel of axis {axis} is needed",
-                where="job.toml [machine] travel_mm",
-                fix=f"Give travel_mm = {{ {axis} = [lowest, highest] }} in mm",
-            )
+            fix = f"Give travel_mm = {{ {axis} = [lowest, highest] }} in mm"
+            raise CmmUqError(f"the travel of axis {axis} is needed", where="job.toml [machine] travel_mm", fix=fix)
         return float(low), float(high)
 
 
@@ -161,7 +158,10 @@ class Points:
         The order of their points is no matter.
         """
         same: dict[bytes, list[int]] = {}
-        for group in np.unique(self.group[self._somewhere_again]).tolist():
+        order = np.lexsort(self.xyz.T)
+        alike = np.all(self.xyz[order[1:]] == self.xyz[order[:-1]], axis=1)
+        again = np.concatenate([order[1:][alike], order[:-1][alike]])
+        for group in np.unique(self.group[again]).tolist():
             rows = self.rows_of_groups[group]
             figures = self.xyz[rows] + 0.0  # −0 is 0
             same.setdefault(figures[np.lexsort(figures.T)].tobytes(), []).append(group)
@@ -169,16 +169,6 @@ class Points:
         for groups in same.values():
             original, *later = sorted(groups, key=self.run_of)
             found |= dict.fromkeys(later, original)
-        return found
-
-    @property
-    def _somewhere_again(self) -> NDArray[np.bool_]:
-        """(n,) whether another point has the same coordinates to the last digit."""
-        order = np.lexsort(self.xyz.T)
-        alike = np.all(self.xyz[order[1:]] == self.xyz[order[:-1]], axis=1)
-        found = np.zeros(len(self), dtype=bool)
-        found[order[1:]] |= alike
-        found[order[:-1]] |= alike
         return found
 
     def run_of(self, group: int) -> tuple[int, int]:
@@ -194,11 +184,8 @@ class Points:
         CmmUqError : the recording has no such column.
         """
         if name not in self.columns:
-            raise CmmUqError(
-                f"the recording has no column {name!r}, which the model needs",
-                where="job.toml [model] effects",
-                fix=f"Record {name}, or leave out the effect",
-            )
+            problem = f"the recording has no column {name!r}, which the model needs"
+            raise CmmUqError(problem, where="job.toml [model] effects", fix=f"Record {name}, or leave out the effect")
         return self.columns[name]
 
     @cached_property
@@ -226,11 +213,7 @@ class Points:
     def select(self, rows: NDArray[np.bool_] | Ints) -> Points:
         """Some of the points, by mask or index."""
         return Points(
-            self.xyz[rows],
-            self.measurement[rows],
-            self.point[rows],
-            self.repeat[rows],
-            self.machine,
+            *(self.xyz[rows], self.measurement[rows], self.point[rows], self.repeat[rows], self.machine),
             {name: values[rows] for name, values in self.columns.items()},
             self.lines[rows] if len(self.lines) else self.lines,
             self.directions if self.directions is None or self.directions.ndim == 2 else self.directions[rows],

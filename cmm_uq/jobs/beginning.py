@@ -9,8 +9,8 @@ from typing import Any
 
 from cmm_uq.base.points import Machine, Points
 
+# effects that a length standard in many places determines
 SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
-"""Effects that a length standard in many places determines."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,7 @@ MACHINE: Mapping[str, Any] = MappingProxyType({
 })  # fmt: skip
 """``[machine]`` of a new job of any kind."""
 
-AT_20_C: Mapping[str, float] = MappingProxyType({"temp_artefact_c": 20.0})
-"""The artefact's temperature in a first recording."""
+AT_20_C: Mapping[str, float] = MappingProxyType({"temp_artefact_c": 20.0})  # in a first recording
 
 
 def circumstances(**uncertainty: float) -> Mapping[str, Mapping[str, Any]]:

@@ -19,21 +19,14 @@ GRAVEST = ("fail", "conditional fail", "remeasure", "undecided", "incomplete", "
 NONE = "none"  # in place of an outcome where nothing is stated
 BEYOND = frozenset({"fail", "conditional fail"})  # outcomes that find a machine beyond a limit
 
-STANDS: Mapping[str, Literal["good", "bad"]] = MappingProxyType(
-    {"pass": "good", "fail": "bad", "conditional fail": "bad"}
-)
-"""What an outcome means for who is to act; all others leave something open."""
-
+# by the word that results.json has beside a tolerance, and the rule by which parameters are held to it
 TOLERANCE_OUTCOMES: Mapping[str, str] = MappingProxyType({"in": "pass", "out": "fail", "open": "undecided"})
-"""By the word that results.json has beside a tolerance."""
-
 TOLERANCE_RULE = "the whole 95 % interval within the tolerance: pass; beyond it: fail; otherwise undecided"
-"""By which parameters are held to their tolerances."""
 
 
 def standing_of(outcome: str) -> Literal["good", "open", "bad"]:
     """Whether an outcome leaves nothing to do, something open, or finds something beyond its limit."""
-    return STANDS.get(outcome, "open")
+    return "good" if outcome == "pass" else "bad" if outcome in BEYOND else "open"
 
 
 def gravest(outcomes: Iterable[str]) -> str:

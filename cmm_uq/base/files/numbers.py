@@ -1,8 +1,7 @@
 """Numbers of text files: an optional sign, digits with an optional point, an optional exponent, and nothing else.
 
-Python's own reading takes underscores, digits of every script, ``nan`` and ``infinity`` besides.
-
-Keys and columns in a unit that is not read, refused by name with the conversion to the one that is.
+Python's own reading takes underscores, digits of every script, ``nan`` and ``infinity`` besides. Keys and columns in a unit
+that is not read are refused by name with the conversion to the one that is.
 """
 
 from __future__ import annotations
@@ -38,23 +37,19 @@ def number_problem(cell: str, fix: str = GIVE) -> tuple[str, str] | None:
         if "," in cell:
             fix = "Write it without groups of digits" if "." in cell else "Write decimals with a point"
         return f"{shown} is not a number", fix
-    if _plain(cell):
-        return _size_problem(cell, value, shown)
-    if not isfinite(value):
-        return f"{shown} is not a finite number", fix
-    return f"{shown} is not a number", "Write it with digits 0 to 9 alone, a point and an exponent, as in 1.5e-3"
-
-
-def _plain(text: str) -> bool:
-    return text.isascii() and not text.encode().translate(None, _CHARACTERS)
-
-
-def _size_problem(cell: str, value: float, shown: str) -> tuple[str, str] | None:
+    if not _plain(cell):
+        if not isfinite(value):
+            return f"{shown} is not a finite number", fix
+        return f"{shown} is not a number", "Write it with digits 0 to 9 alone, a point and an exponent, as in 1.5e-3"
     if abs(value) > LARGEST:
         return f"{shown} is too large for a number here", f"{LARGEST:g} is the most: check its unit and its exponent"
     if abs(value) < SMALLEST and any(digit in cell.lower().partition("e")[0] for digit in "123456789"):
         return f"{shown} is too small for a number here", f"Write 0, or {SMALLEST:g} or more"
     return None
+
+
+def _plain(text: str) -> bool:
+    return text.isascii() and not text.encode().translate(None, _CHARACTERS)
 
 
 def numbers(cells: Sequence[str], where: Callable[[int], str], fix: str = GIVE) -> Floats:

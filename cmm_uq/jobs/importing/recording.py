@@ -83,9 +83,8 @@ def points_of(
             most = largest(column)
             refuse(np.abs(values) > most, "{:g} is more than anything that is measured".format,
                    f"{most:g} is the most: check its unit and its exponent", column, values)  # fmt: skip
-    if all(
-        f"n{axis}" in table for axis in "xyz"
-    ):  # brought to unit length where they are used: a direction must be meant
+    # normals are brought to unit length where they are used: a direction must be meant
+    if all(f"n{axis}" in table for axis in "xyz"):
         length = np.sqrt(sum(table[f"n{axis}"] ** 2 for axis in "xyz"))
         refuse((length != 0) & ((length < SHORTEST_NORMAL) | (length > LONGEST_NORMAL)),
                "the normal nx, ny, nz has the length {:.3g}".format, "Give outward unit normals", "", length)  # fmt: skip

@@ -68,12 +68,10 @@ class DescribedDigitizer:
 
     def as_data(self) -> dict[str, Any]:
         """For the provenance of what was compensated with it."""
-        told: dict[str, Any] = {
-            "offset_mm": list(self.offset_mm), "poses": [pose.model_dump() for pose in self.poses],
-        }  # fmt: skip
+        data = {"offset_mm": list(self.offset_mm), "poses": [pose.model_dump() for pose in self.poses]}
         if self.file is None or self.covariance_mm2 is None:
-            return told
-        return told | {
+            return data
+        return data | {
             "calibration": self.file, "calibration_job": self.job,
             "offset_covariance_mm2": [list(row) for row in self.covariance_mm2],
         }  # fmt: skip
@@ -93,14 +91,14 @@ def digitizer_of(
     name = calibration_file(facts)
     if name is None or facts.offset_mm is not None:
         return DescribedDigitizer(_three(facts.offset_mm or []), tuple(facts.poses))
-    found = read_results(_Results, inputs[name], str(folder / name), "is no calibration of a digitizer", _FIX)
-    if found.job.origin == SIMULATED and origin != SIMULATED:
-        raise CmmUqError(f"is of a simulated recording, job {found.job.id!r}", where=str(folder / name),
+    results = read_results(_Results, inputs[name], str(folder / name), "is no calibration of a digitizer", _FIX)
+    if results.job.origin == SIMULATED and origin != SIMULATED:
+        raise CmmUqError(f"is of a simulated recording, job {results.job.id!r}", where=str(folder / name),
                          fix="Measure the digitizer: a simulated calibration serves simulated jobs only")  # fmt: skip
-    given = found.digitizer
-    offset = [component.value for component in (given.offset_mm.U1, given.offset_mm.V1, given.offset_mm.W1)]
-    poses = tuple(facts.poses) or tuple(Pose(**pose.model_dump()) for pose in given.poses)
-    return DescribedDigitizer(_three(offset), poses, tuple(map(_three, given.covariance_mm2)), name, found.job.id)
+    calibrated, offset = results.digitizer, results.digitizer.offset_mm
+    poses = tuple(facts.poses) or tuple(Pose(**pose.model_dump()) for pose in calibrated.poses)
+    return DescribedDigitizer((offset.U1.value, offset.V1.value, offset.W1.value), poses,
+                              tuple(map(_three, calibrated.covariance_mm2)), name, results.job.id)  # fmt: skip
 
 
 def _three(values: Sequence[float]) -> Three:

@@ -100,20 +100,15 @@ def short_gauge_of(facts: ShortGaugeFacts, content: bytes, where: str, machine: 
                              fix="Record the middle of either face of the short gauge as points 1 and 2")  # fmt: skip
     ordered = sorted(points.rows_of_groups, key=lambda own: (points.measurement[own[0]], points.repeat[own[0]]))
     gauge = ShortGauge(facts, points, np.array([own[np.argsort(points.point[own])] for own in ordered], dtype=np.int64))
-    _refuse_another(gauge, where)
-    _refuse_another_place(gauge, where)
-    _refuse_one_side(gauge, where)
-    return gauge
-
-
-def _refuse_another(gauge: ShortGauge, where: str) -> None:
     errors = gauge.errors_mm
     off = int(np.argmax(np.abs(errors)))
     if abs(errors[off]) > FARTHEST_MM:
-        length = errors[off] + gauge.facts.length_mm
-        raise CmmUqError(f"a length of {length:.5g} mm, where {KEY} length_mm is {gauge.facts.length_mm:g}",
-                         where=f"{where} line {gauge.points.lines[gauge.rows[off, 0]]}",
+        problem = f"a length of {errors[off] + facts.length_mm:.5g} mm, where {KEY} length_mm is {facts.length_mm:g}"
+        raise CmmUqError(problem, where=f"{where} line {points.lines[gauge.rows[off, 0]]}",
                          fix="Give the length of the gauge that was recorded, in mm")  # fmt: skip
+    _refuse_another_place(gauge, where)
+    _refuse_one_side(gauge, where)
+    return gauge
 
 
 def _refuse_another_place(gauge: ShortGauge, where: str) -> None:
