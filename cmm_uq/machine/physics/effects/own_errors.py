@@ -134,10 +134,14 @@ class OwnFault(Effect):
         return PRIOR_WEIGHT[OWN] if self.owner is None else self.owner.weight
 
     def made(self, owner: FaultyArtefact) -> OwnFault:
-        found = copy(self)
-        found.owner, found.mostly = owner, owner.mostly
-        found.coefficients = found.sized(owner)
-        return found
+        fault = copy(self)
+        fault.owner, fault.mostly = owner, owner.mostly
+        fault.fit(owner)
+        fault.coefficients = fault.sized(owner)
+        return fault
+
+    def fit(self, owner: FaultyArtefact) -> None:
+        """Take from its artefact what follows from that alone."""
 
     def sized(self, owner: FaultyArtefact) -> tuple[Parameter, ...]:
         return tuple(Parameter(c.name, c.unit, owner.size) for c in self.coefficients)
@@ -183,13 +187,6 @@ class OwnGeometry(OwnFault):
         sd = min(c.prior_sd, owner.size / largest) if largest > 0 else c.prior_sd
         return (Parameter(c.name, c.unit, sd),)
 
-    def made(self, owner: FaultyArtefact) -> OwnFault:
-        found = copy(self)
-        found.owner, found.mostly = owner, owner.mostly
-        found._lies(owner)
-        found.coefficients = found.sized(owner)
-        return found
-
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         poses = self.whose().body.poses(points)
         field = self.effect.basis(self._there(points))
@@ -199,7 +196,8 @@ class OwnGeometry(OwnFault):
     def course(self, points: Points) -> Floats | None:
         return self.effect.course(self._there(points))
 
-    def _lies(self, owner: FaultyArtefact) -> None:
+    def fit(self, owner: FaultyArtefact) -> None:
+        # where it is like the machine's error: in the set-up least turned against its own axes, however numbered
         poses = owner.body.poses(owner.points)
         middle = owner.body.places.mean(axis=0)
         _, first = np.unique(owner.points.measurement, return_index=True)
@@ -235,12 +233,8 @@ class OwnPattern(OwnFault, CommonSize):
     def sized(self, owner: FaultyArtefact) -> tuple[Parameter, ...]:
         return tuple(Parameter(f"c{i + 1}_um", unit("µm"), owner.size) for i in range(deformations(owner).shape[1]))
 
-    def made(self, owner: FaultyArtefact) -> OwnFault:
-        found = copy(self)
-        found.owner, found.coefficients, found.mostly = owner, self.sized(owner), owner.mostly
-        found._shown = deformations(owner)
-        found.size = Parameter("rms_um", unit("µm"), owner.size)
-        return found
+    def fit(self, owner: FaultyArtefact) -> None:
+        self._shown, self.size = deformations(owner), Parameter("rms_um", unit("µm"), owner.size)
 
     def shown_in(self, points: Points) -> bool:
         node = self.whose().body.nodes(points)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 
 import numpy as np
 from scipy import linalg, special
@@ -53,11 +52,8 @@ class OfSetUps(OwnFault, CommonSize):
     def numbered(self, owner: FaultyArtefact) -> Ints:
         return np.unique(owner.points.measurement)
 
-    def made(self, owner: FaultyArtefact) -> OwnFault:
-        found = copy(self)
-        found.owner, found.coefficients, found.mostly = owner, self.sized(owner), owner.mostly
-        found.size = Parameter(self.size.name, self.size.unit, owner.size)
-        return found
+    def fit(self, owner: FaultyArtefact) -> None:
+        self.size = Parameter(self.size.name, self.size.unit, owner.size)
 
     def shown_in(self, points: Points) -> bool:
         return len(np.unique(points.measurement)) > 1
