@@ -19,8 +19,8 @@ from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, model_comp
 from cmm_uq.analysis.diagnosis.power import DrawnNoise, powers, without_fault
 from cmm_uq.analysis.diagnosis.smallest import POWER, smallest_effects
 from cmm_uq.analysis.planning.candidates import ready_plan
-from cmm_uq.analysis.planning.noise import PlannedNoise
 from cmm_uq.analysis.planning.set_up import join
+from cmm_uq.analysis.planning.setting import PlannedNoise
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.physics.catalogue import effects
 from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, GAUGE, setting

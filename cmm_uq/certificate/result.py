@@ -15,7 +15,7 @@ from cmm_uq.analysis.conformity.statement import Statement, by_standard, by_tole
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
 from cmm_uq.analysis.planning.advice import NextPlan, Suggestion
-from cmm_uq.analysis.screening.finding import Finding
+from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.messages import Text, at_key, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE

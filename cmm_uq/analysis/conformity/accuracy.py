@@ -1,9 +1,7 @@
 """Figures of performance of a set of lengths, each with its uncertainty.
 
-The measurand is the figure that the machine would show on average if the recording were repeated; the figure of this one
-recording estimates it. The error of that estimate is drawn from the posterior: repetitions of the recording, with the model
-and the noise of each draw, scatter about their own mean. (The figures of the drawn models themselves would not do: a range
-or a standard deviation grows with every uncertainty that is drawn, JCGM 101:2008 9.4 shows the like.)
+The measurand is the figure on average over repeated recordings. Its error is drawn from the posterior: repetitions
+with the model and the noise of each draw, about their own mean (JCGM 101:2008, 9.4).
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""What this program takes each clause of a standard to ask, where that comes from, and whether anyone read the text.
-
-The one table of it: the forms that a laboratory fills in beside its own copy, what a certificate says of clauses that nobody
-read, and the table of docs/standards.md follow from it.
-"""
+"""What this program takes each clause of a standard to ask, where that comes from, and whether anyone read the text."""
 
 from __future__ import annotations
 

@@ -1,13 +1,8 @@
 """Decision rules: what follows from a measured value, its uncertainty and a limit, and the risks of being wrong.
 
-A prior is a normal distribution; of a quantity that is never negative the part above zero. JCGM 106:2012: clause 7.2 for the
-posterior distribution, clause 9.5 for the consumer's and the producer's global risk. All integrals are Gauss–Legendre sums
-over panels that are narrow where the integrand bends.
-
-A quantity with a sign, as an error of indication, is limited on both sides (−limit to +limit); a range or a form, which is
-never negative, on one. Without a prior the probability of conforming is that of a normal distribution about the value, with
-nothing known of the quantity beforehand (JCGM 106:2012, 7.2): what the measurement alone says, which is too sure of itself
-where the limit is near; with a prior it is that of the posterior distribution.
+A prior is a normal distribution, of what is never negative the part above zero (JCGM 106:2012, 7.2 and 9.5); without one the
+probability of conforming is what the measurement alone says. A quantity with a sign is limited on both sides of zero, a range
+or a form on one. Integrals are Gauss–Legendre sums over panels that are narrow where the integrand bends.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""Tests on calibrated lengths: errors of indication, and the range of their repeats.
-
-Every length is decided with its own test uncertainty (ISO/TS 23165) against its own limit; the machine's own scatter is part
-of what is tested. Copies are no measurements and are not decided.
-"""
+"""Tests on calibrated lengths: errors of indication, and the range of their repeats."""
 
 from __future__ import annotations
 
@@ -11,10 +7,10 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.conformity.length_conditions import nominals, with_offset
+from cmm_uq.analysis.conformity.as_recorded import added_in_words
+from cmm_uq.analysis.conformity.plan_conditions import nominals, with_offset
 from cmm_uq.analysis.conformity.plans import Condition, position_on
 from cmm_uq.analysis.conformity.shared_causes import Causes, causes_of_lengths, length_budget, temperatures
-from cmm_uq.analysis.conformity.short_gauge import added_in_words
 from cmm_uq.analysis.conformity.standard import NOT_STATED, Test
 from cmm_uq.analysis.conformity.statement import Decided, Remeasurement, Statement, least_favourable, with_standing
 from cmm_uq.analysis.conformity.uncertainty_lines import LENGTH_LINES, WARM, away_from_20, u_of_repeats

@@ -1,21 +1,235 @@
-"""Whether a plan or a recording is a complete test with bars and test spheres.
-
-A plan and a recording are held to the same conditions. Of a recording alone, what repeats another measurement to the last
-digit does not count: that is a copy, where in a plan it is a wish.
-"""
+"""Whether a plan or a recording is a complete test with lengths, bars and test spheres; copies count in a plan alone."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from itertools import groupby
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby, product
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cmm_uq.analysis.conformity.length_conditions import lengths_measured
-from cmm_uq.analysis.conformity.plans import PARALLELS, BarPlan, Condition, LengthPlan, Plan, SpherePlan, position_of
-from cmm_uq.base.messages import Text, at_key, commas, number, plural, say
-from cmm_uq.base.points import Floats, Points
+from cmm_uq.analysis.conformity.plans import (
+    OFFSET_TOLERANCE_MM,
+    PARALLELS,
+    SPACE_DIAGONALS,
+    BarPlan,
+    Condition,
+    LengthPlan,
+    Plan,
+    SpherePlan,
+    crossed_travel,
+    position_of,
+    position_on,
+)
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, commas, number, plural, say, semicolons
+from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.maths.uncertainty.quantity import nominal
+
+SAME_LENGTH_MM = 1.0  # Lengths no farther from each other than this are one nominal length
+# Of the distance between equally spaced lengths, how far each may lie from its place: gauges have the lengths that they
+# have. This project's figure.
+SPACING = 0.75
+
+
+def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> tuple[Condition, ...]:
+    """Positions, longest, different and shortest lengths, and repeats; ``copies`` are groups that do not count."""
+    measured: _Places = {}
+    for found in _lines(plan, artefact, copies):
+        measured.setdefault(found.position, []).append(found)
+    absent = tuple(line for line in plan.positions if line not in measured)
+    asked = commas(plan.positions)
+    if set(plan.positions) == {*SPACE_DIAGONALS, *PARALLELS}:
+        asked = say("four space diagonals and three axes")
+    wanted, counts = plan.lengths, {line: len(found) for line, found in measured.items()}
+    missing = tuple(
+        say("{lengths} different lengths ({line}: {count})", lengths=wanted, line=line, count=count)
+        for line, count in counts.items() if count < wanted
+    )  # fmt: skip
+    every = list(counts.values())
+    span = say("{low:.0f} to {high:.0f}", low=min(every), high=max(every)) if every else say("none")
+    return (
+        Condition(say("{asked}; missing: {absent}", asked=asked, absent=commas(absent)) if absent else asked, absent),
+        _long_enough(plan, artefact.points.machine, measured),
+        Condition(say("{lengths} lengths on each line: {span}", lengths=wanted, span=span), missing),
+        _spread(plan, measured),
+        _shortest(plan, measured),
+        _repeated(plan, measured),
+        *_both_sides(plan, measured),
+        *_offset(plan, artefact),
+    )
+
+
+def with_offset(points: Points, rows: Ints, offset_mm: float | None) -> NDArray[np.bool_]:
+    """Lengths (m,) with the tip so far across the ram at both ends; none recorded is none, ``None`` asks for no offset."""
+    if offset_mm is None or (tips := tip_offsets(points)) is None:
+        return np.full(len(rows), not offset_mm)
+    across = np.linalg.norm(tips, axis=1)[rows]
+    return np.asarray(np.all(np.abs(across - offset_mm) <= OFFSET_TOLERANCE_MM, axis=1))
+
+
+def tip_offsets(points: Points) -> Floats | None:
+    """Stylus tip offset across the ram, (n, 3) mm, zero along it; ``None`` where none is recorded."""
+    if not all(f"tip_{a}_mm" in points.columns for a in AXES):
+        return None
+    tips = np.column_stack([points.columns[f"tip_{a}_mm"] for a in AXES])
+    tips[:, AXES.index(points.machine.chain.replace("F", "")[-1].lower())] = 0.0
+    return np.asarray(tips, dtype=np.float64)
+
+
+def _offset(plan: LengthPlan, artefact: Artefact) -> tuple[Condition, ...]:
+    if not plan.offset_mm:
+        return ()
+    found, key = artefact.indications(), at_key("tip_x_mm, tip_y_mm, tip_z_mm")
+    what = say("stylus tip {offset_mm:g} mm across the ram{key}", key=key, offset_mm=plan.offset_mm)
+    there = found is not None and with_offset(artefact.points, found.rows, plan.offset_mm).any()
+    return (Condition(what, () if there else (what,)),)
+
+
+def _both_sides(plan: LengthPlan, places: _Places) -> tuple[Condition, ...]:
+    if not plan.bidirectional or not places:
+        return ()
+    what, remedy = say("ends of each length reached from opposite sides"), NOTHING
+    known = [one.bidirectional for found in places.values() for one in found if one.bidirectional is not None]
+    counts = {line: sum(bool(one.bidirectional) for one in found) for line, found in places.items()}
+    missing = tuple(
+        say("{lengths} bidirectional lengths ({line}: {count})", lengths=plan.lengths, line=line, count=count)
+        for line, count in counts.items() if count < min(plan.lengths, len(places[line]))
+    )  # fmt: skip
+    if not known:
+        missing = (say("bidirectional lengths: from which side each end was reached is not recorded"),)
+        remedy = Verbatim("columns approach_x, approach_y, approach_z")
+    elif not any(known):
+        missing = (
+            say(
+                "bidirectional lengths: these are not, and no short gauge reached from both sides was measured beside them"
+            ),
+        )
+    return (Condition(what, missing, remedy),)
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """All that was measured of one nominal length in one position."""
+
+    position: Text
+    nominal: int
+    length: float
+    share: float | None
+    repeats: int
+    bidirectional: bool | None = None
+
+
+def _lines(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> Iterator[_Measured]:
+    found = artefact.indications()
+    if found is None:
+        return
+    points = artefact.points
+    group = points.group[found.rows[:, 0]]
+    original = ~np.isin(group, list(copies)) & with_offset(points, found.rows, plan.offset_mm)
+    both = artefact.bidirectional(found.rows)
+    nominal = nominals(found.lengths)
+    middles, along = artefact.lines_of(found.rows)
+    positions = np.array([position_on(points.machine, m, d) for m, d in zip(middles, along, strict=True)], dtype=object)
+    for position in plan.positions:
+        for length in np.unique(nominal):
+            at = np.flatnonzero(original & (positions == position) & (nominal == length))
+            if not len(at):
+                continue
+            travel = [crossed_travel(points.machine, middles[i], along[i]) for i in at]
+            shares = [
+                float(found.lengths[i] / t) if t else 0.0 for i, t in zip(at, travel, strict=True) if t is not None
+            ]
+            yield _Measured(position, int(length), float(found.lengths[at].mean()), max(shares, default=None),
+                            len(np.unique(group[at])), None if both is None else bool(both[at].any()))  # fmt: skip
+
+
+def nominals(lengths: Floats) -> Ints:
+    """Which nominal length each of some lengths (m,), mm, is of, counted from the shortest, (m,)."""
+    order = np.argsort(lengths, kind="stable")
+    found = np.empty(len(lengths), dtype=np.int64)
+    found[order] = np.cumsum(np.diff(lengths[order], prepend=lengths[order][:1]) > SAME_LENGTH_MM)
+    return found
+
+
+_Places = dict[Text, list[_Measured]]
+
+
+def _long_enough(plan: LengthPlan, machine: Machine, places: _Places) -> Condition:
+    least = say("{least_share:.0f} %", least_share=100 * plan.least_share)
+    what = say("longest length at least {least} of the travel along each line", least=least)
+    if not np.all(np.isfinite(machine.travel_mm)):
+        travel = say("the travel of all three axes{key}, without which no length's share of it is known",
+                     key=at_key("[machine] travel_mm"))  # fmt: skip
+        return Condition(say("{what}: not known", what=what), (travel,))
+    shares = {line: 100 * max((m.share or 0.0 for m in found), default=0.0) for line, found in places.items()}
+    missing = tuple(
+        say("length of at least {least} of the travel ({line}: {share:.0f} %)", least=least, line=line, share=share)
+        for line, share in shares.items() if share < 100 * plan.least_share
+    )  # fmt: skip
+    every = list(shares.values())
+    span = say("{low:.0f} % to {high:.0f} %", low=min(every), high=max(every)) if every else say("none")
+    return Condition(say("{what}: {span}", what=what, span=span), missing)
+
+
+def _spread(plan: LengthPlan, places: _Places) -> Condition:
+    """That lengths of each line are spaced equally as nearly as their gauge allows; fewer of them are missing otherwise."""
+    missing = tuple(
+        say("lengths spread over the range ({line}: {lengths} mm)", line=line,
+            lengths=semicolons(number(length, ".4g") for length in sorted(one.length for one in found)))
+        for line, found in places.items() if len(found) >= plan.lengths and not _any_spread(plan, found)
+    )  # fmt: skip
+    return Condition(say("{lengths} lengths spread over the range on each line", lengths=plan.lengths), missing)
+
+
+def _any_spread(plan: LengthPlan, found: Sequence[_Measured]) -> bool:
+    lengths = np.sort([one.length for one in found])
+    starts = lengths[lengths <= plan.shortest_mm]
+    ends = np.array([one.length for one in found if one.share is not None and one.share >= plan.least_share])
+    pairs = product(starts if len(starts) else lengths[:1], ends if len(ends) else lengths[-1:])
+    return any(_spaced(lengths, np.linspace(start, end, plan.lengths)) for start, end in pairs if end > start)
+
+
+def _spaced(lengths: Floats, equally: Floats) -> bool:
+    """Whether each of some equally spaced lengths has one of its own (sorted) near it."""
+    reach = SPACING * float(equally[1] - equally[0])
+    at = -1
+    for wanted in equally:
+        near = np.flatnonzero((np.abs(lengths - wanted) <= reach) & (np.arange(len(lengths)) > at))
+        if not len(near):
+            return False
+        at = int(near[0])
+    return True
+
+
+def _shortest(plan: LengthPlan, places: _Places) -> Condition:
+    most, shortest = plan.shortest_mm, {line: min(m.length for m in found) for line, found in places.items()}
+    missing = tuple(
+        say("length of at most {shortest_mm:g} mm ({line}: {length} mm)", shortest_mm=most, line=line, length=nominal(length))
+        for line, length in shortest.items() if length > most
+    )  # fmt: skip
+    longest = say("{shortest} mm", shortest=nominal(max(shortest.values()))) if shortest else say("none")
+    return Condition(
+        say("shortest length at most {shortest_mm:g} mm: {longest}", shortest_mm=most, longest=longest), missing
+    )
+
+
+def _repeated(plan: LengthPlan, places: _Places) -> Condition:
+    """Of the lengths in a position, as many as the plan asks for must be repeated as often as it asks; more do not help."""
+    wanted = plan.repeats
+    repeats = {line: sorted((m.repeats for m in found), reverse=True)[: plan.lengths] for line, found in places.items()}
+    total = sum(min(count, wanted) for counts in repeats.values() for count in counts)
+    missing: list[Text] = [
+        say("{repeats} repetitions of each length ({line}: {counts})", repeats=wanted, line=line, counts=counts[-1])
+        for line, counts in repeats.items() if counts[-1] < wanted
+    ]  # fmt: skip
+    if total < plan.total:
+        missing.append(say("{lack} of {total} lengths", lack=plan.total - total, total=plan.total))
+    what = say("{repeats} repetitions of each, {wanted} lengths in all: {total}",
+               repeats=wanted, wanted=plan.total, total=total)  # fmt: skip
+    return Condition(what, tuple(missing))
+
 
 _SEARCHED = 60  # Bars that hang together, each near another of them
 _DIRECTIONS = 400  # On a hemisphere, at which the reach of its points is looked at

@@ -1,8 +1,4 @@
-"""What standards ask of a complete test, and where in the volume a length lies.
-
-None of these standards is public. Where a figure comes from second hand, or was chosen here, it says so; docs/standards.md
-gathers it.
-"""
+"""What standards ask of a complete test, and where in the volume a length lies."""
 
 from __future__ import annotations
 

@@ -1,9 +1,7 @@
 """Uncertainty of test values, cause by cause, and the probability that all of them conform together.
 
-A test value is uncertain by what the artefact leaves open: its calibration, its expansion and temperature, which all values of
-a test share, its alignment and fixturing, which those of one set-up share (ISO/TS 23165). The machine's own errors and scatter
-are what is tested and are no part of it. What is shared makes values err together: the probability that all conform is not
-the product of their own.
+Calibration, expansion and temperature of the artefact are shared by all values of a test, alignment and fixturing by those of
+one set-up (ISO/TS 23165): the probability that all conform is not the product of their own.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""What a standard is: what it tests, on which observations, what a complete test consists of, and what is decided.
-
-A standard decides one characteristic or several (E0, R0, P_FTU). Each goes by observations that a kind of measurement offers
-(``Kind.tested``), not by the kind's name: a standard of another package can be stated of every kind that offers them.
-"""
+"""What a standard is: what it tests, on which observations, what a complete test consists of, and what is decided."""
 
 from __future__ import annotations
 
@@ -26,12 +22,14 @@ from cmm_uq.analysis.conformity.decision import (
     rule_words,
 )
 from cmm_uq.analysis.conformity.plans import Condition
-from cmm_uq.analysis.conformity.rated import copies_in_words, rated_conditions, rated_in_words
 from cmm_uq.analysis.conformity.shared_causes import Causes, probability_of_all
 from cmm_uq.analysis.conformity.statement import Decided, Statement, counted, least_favourable
 from cmm_uq.analysis.conformity.uncertainty_lines import (
     FORM_LINES,
+    copies_in_words,
     declared_in_words,
+    rated_conditions,
+    rated_in_words,
     u_of_unstated,
     uncertainty_conditions,
     with_declared,

@@ -1,8 +1,4 @@
-"""The standards that a job may name, each with what is decided on it.
-
-Another package offers one as an entry point of the group ``cmm_uq.standards``, of the standard's own name. What of each is
-tested, from which columns, and what is not: docs/standards.md.
-"""
+"""The standards that a job may name, each with what is decided on it."""
 
 from __future__ import annotations
 
@@ -13,8 +9,19 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
-from cmm_uq.analysis.conformity.bars_decided import offset_positions, offset_probe, volumetric_performance
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings, repeats_of_gauge, supplemented
+from cmm_uq.analysis.conformity.bars_and_spheres import (
+    diameter_allowed,
+    form_error,
+    form_unstated,
+    offset_positions,
+    offset_probe,
+    range_of_centres,
+    repeats_of_sphere,
+    sensing_stated,
+    size_error,
+    volumetric_performance,
+)
 from cmm_uq.analysis.conformity.clauses import CLAUSES
 from cmm_uq.analysis.conformity.lengths_decided import (
     at_offset,
@@ -40,16 +47,6 @@ from cmm_uq.analysis.conformity.plans import (
     Condition,
     ShortLengthPlan,
     SpherePlan,
-)
-from cmm_uq.analysis.conformity.short_gauge import repeats_of_gauge, supplemented
-from cmm_uq.analysis.conformity.spheres_decided import (
-    diameter_allowed,
-    form_error,
-    form_unstated,
-    range_of_centres,
-    repeats_of_sphere,
-    sensing_stated,
-    size_error,
 )
 from cmm_uq.analysis.conformity.standard import Characteristic, Standard, Test, characteristic_of
 from cmm_uq.analysis.conformity.statement import Remeasurement, Statement

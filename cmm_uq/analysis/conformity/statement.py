@@ -1,11 +1,7 @@
 """Statements of conformity: every error with its limit and decision, and what they come to together.
 
-A pass needs a finding, which every quantity decided by itself makes, and completeness. A finding that is worse than a
-conditional pass is the outcome whatever is missing beside it.
-
-ISO 10360-2:2009 lets at most five of the 35 lengths have one of their three values outside, and each of these is measured ten
-times more at its place; all ten must lie inside (the clause is known here from others, see docs/standards.md). Two of three,
-or a sixth length, fail. Further repeats of the same measurement are those ten.
+A pass needs a finding and completeness; a finding worse than a conditional pass is the outcome whatever is missing. Of ISO
+10360-2:2009 at most five lengths may have one of three values outside, each measured ten times more, all inside.
 """
 
 from __future__ import annotations

@@ -8,21 +8,23 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import special
 
-from cmm_uq.analysis.diagnosis.assertion import (
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, withhold
+from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement, thin_out
+from cmm_uq.analysis.diagnosis.joint import (
+    JointPosterior,
+    Mode,
     WithheldEffect,
     effects_without_size,
     group_of,
+    joint_posterior,
+    period_modes,
     period_settled,
     withhold_unpredicted,
     withhold_unresolved,
 )
-from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, withhold
-from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement
-from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, joint_posterior, period_modes
 from cmm_uq.analysis.diagnosis.location import Place, locate
 from cmm_uq.analysis.diagnosis.model_average import ModelAverage, average_models
 from cmm_uq.analysis.diagnosis.noise import has_heavy_tails, probability_by_name
-from cmm_uq.analysis.diagnosis.observations import thin_out
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit

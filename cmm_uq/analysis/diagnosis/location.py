@@ -1,13 +1,7 @@
 """Where a mismatch lives: covariate, region and direction that carry the evidence, and the function that shows it.
 
-Many covariates show one mismatch: what grows along X also grows with the order in which X was gone through. So the place with
-most evidence is named, those that fit as well are named with it, and another place only where it carries evidence beside the
-first.
-
-The residuals of a model as a field of vectors in the machine's volume: what each observation shows of it, and no more.
-
-A length between two points shows how far they are apart: half of its residual at either end, along the line. An observation of
-one point shows the displacement along its own direction; those of one point together, in as many directions as they have.
+What grows along X also grows with the order in which X was gone through: places that fit as well are named together, another
+only where it carries evidence beside the first. A length shows half of its residual at either end, along its line.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
 """What each explanation that remains makes of the effects that a job names, and their average over all of them.
 
-Where one combination of explanations is not well enough known to be the right one, an estimate under it alone is too sure: the
-next may put another value on a scale. Of every combination that remains the posterior of all that is linear is exact, given
-the noise; the average is the mixture of these, weighted by the probabilities of the combinations. It is kept as draws, so that
-estimates, how they vary together, and what is computed from them are of one distribution.
+Of every combination that remains the posterior of all that is linear is exact, given the noise; the average is their mixture,
+weighted by their probabilities and kept as draws, for an estimate under one alone is too sure.
 """
 
 from __future__ import annotations

@@ -1,13 +1,8 @@
 """How large an effect must be for the diagnosis to find it, and to call it by its name.
 
-Nothing is approximated but slow noise and tails, of which there are none: recordings are drawn on the plan's own design, and
-the search's own statistic, with its own candidates, priors and false-alarm rate, decides on each. What it sees of a draw is a
-quadratic form, so that a recording costs some milliseconds. *Detected*: the lack-of-fit test rejects. *Named*: besides, the
-true effect alone is more probable than any other known effect alone and than none, and so much that no other is said to be as
-possible (``NOT_TOLD_APART``): with twins that nothing tells apart, a lucky guess is no
-name.
-
-(Baarda 1968 and Teunissen 2018 call these sizes minimal detectable and minimal identifiable bias.)
+Recordings are drawn on the plan's design, without slow noise and tails, and the search's own statistic decides. *Detected*:
+the lack-of-fit test rejects. *Named*: besides, the true effect alone is so much more probable than any other and than none
+that no other is said to be as possible. (Baarda 1968, Teunissen 2018: minimal detectable and identifiable bias.)
 """
 
 from __future__ import annotations
@@ -19,10 +14,9 @@ from functools import cached_property
 import numpy as np
 from scipy import special
 
-from cmm_uq.analysis.diagnosis.comparison.draws import draw_nothing
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
-from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import DRAWS, statistic_of
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import DRAWS, draw_nothing, statistic_of
 from cmm_uq.analysis.diagnosis.comparison.prior import CombinationPrior
 from cmm_uq.analysis.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
 from cmm_uq.base.points import Floats

@@ -1,9 +1,7 @@
 """What a recording would not have shown: of each effect the smallest amplitude that its diagnosis would have found.
 
-On the recording's own design, with the noise that was found, beside what was asserted. *Detected* and *named* are those of
-``power``, but here probabilities are a closed form (``visibility``): the statistic is computed on the bare effect at a few
-sizes, and where it passes the threshold of the recording's own null distribution is interpolated; no recording is drawn. How
-far the two differ is in docs/diagnosis.md.
+On the recording's own design and noise, beside what was asserted, in closed form (``visibility``) and not drawn as in
+``power``; how far the two differ is in docs/diagnosis.md.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from cmm_uq.analysis.planning.expected import repeat_points
+from cmm_uq.analysis.planning.identifiability import repeat_points
 from cmm_uq.analysis.planning.set_up import SetUp, join
 from cmm_uq.base.messages import Text, Verbatim, number, plural, say, semicolons
 from cmm_uq.base.points import Floats, Points

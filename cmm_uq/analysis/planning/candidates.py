@@ -9,8 +9,7 @@ from itertools import product
 import numpy as np
 
 from cmm_uq.analysis.planning.set_up import PLANES, Pattern, SetUp, attitudes_of_lines, direction_words
-from cmm_uq.analysis.planning.setting import Setting, Start
-from cmm_uq.analysis.planning.volume import Volume
+from cmm_uq.analysis.planning.setting import Setting, Start, Volume
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats

@@ -1,8 +1,4 @@
-"""A set-up: the artefact in one place, and all points that are then measured; its pattern, and directions in words.
-
-A pattern holds the points about the artefact's own middle and along its own axes. Set up somewhere, some way, it becomes a
-set-up in the machine's scale readings.
-"""
+"""A set-up: the artefact in one place, and all points that are then measured; its pattern, and directions in words."""
 
 from __future__ import annotations
 

@@ -1,11 +1,7 @@
 """What to measure next: the fewest set-ups that part all effects which a recording cannot tell apart.
 
-The artefact is set up as it was recorded, elsewhere, in other attitudes, and turned about its own axes. What each such set-up
-would add to the recording is known before it is measured. The odds of two effects are those that the diagnosis found; by how
-much more of them is to be expected follows from the size at which each explains the recording, with everything else fitted
-anew. Which of the two is true is not known: what counts is the worse case.
-
-Where it is asked for, the set-ups also show effects that the recording would not have shown.
+Odds are those of the diagnosis; what they become follows from the size at which each explains the recording, all
+else fitted anew. Which of the two is true is not known: what counts is the worse case.
 """
 
 from __future__ import annotations
@@ -20,11 +16,19 @@ import numpy as np
 from cmm_uq.analysis.diagnosis.comparison.explanations import shapes
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.planning.advice import ODDS, DetectionChange, DetectionGoal, NextPlan, Separation
-from cmm_uq.analysis.planning.exchange import Selection, choose
-from cmm_uq.analysis.planning.information import Information, by_measurement, certified, gram, left_of, scales, shared
+from cmm_uq.analysis.planning.information import (
+    Information,
+    Selection,
+    by_measurement,
+    certified,
+    choose,
+    gram,
+    left_of,
+    scales,
+    shared,
+)
 from cmm_uq.analysis.planning.set_up import SetUp, append
-from cmm_uq.analysis.planning.setting import Planning
-from cmm_uq.analysis.planning.volume import Volume, turned_set_ups
+from cmm_uq.analysis.planning.setting import Planning, Volume, turned_set_ups
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.tables.artefact import ArtefactFacts

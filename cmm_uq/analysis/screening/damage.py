@@ -1,8 +1,4 @@
-"""Which coordinates of a recording are damaged, and how: found against the artefact's own shape, before anything is fitted.
-
-What makes the whole recording wrong is refused. Single rows, bars or set-ups are reported with what undoes the damage, and
-left out; nothing is repaired in silence.
-"""
+"""Which coordinates of a recording are damaged, and how: found against the artefact's own shape, before anything is fitted."""
 
 from __future__ import annotations
 
@@ -13,9 +9,8 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.screening.finding import Finding, at_lines, finding
-from cmm_uq.analysis.screening.mistakes import Mistake, block_mistakes, row_mistakes
-from cmm_uq.analysis.screening.shape import ArtefactShape
+from cmm_uq.analysis.screening.columns import Finding, at_lines, finding
+from cmm_uq.analysis.screening.shape import ArtefactShape, Mistake, block_mistakes, row_mistakes
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, plural, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.analysis.screening.finding import Finding
+from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError

@@ -15,7 +15,7 @@ from cmm_uq.analysis.diagnosis.smallest import USUAL_LENGTH, SmallestEffect, sma
 from cmm_uq.analysis.planning.advice import DetectionGoal, suggestions
 from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.planning.suggestion import next_plan
-from cmm_uq.analysis.screening.finding import Finding
+from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.app.commands.against import Against, against_simulation
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.files import Form, Stage, Told, Written, silent

@@ -10,9 +10,15 @@ from scipy import special
 
 from cmm_uq.analysis.conformity.accuracy import repeated_draws, with_uncertainty
 from cmm_uq.analysis.conformity.plans import ALIGNED
-from cmm_uq.analysis.screening.finding import Finding, finding
-from cmm_uq.analysis.screening.outliers import moved_stretches, point_words, recurring_points, stretch_words
-from cmm_uq.analysis.screening.screening import counted_with, gross_outliers
+from cmm_uq.analysis.screening.columns import Finding, finding
+from cmm_uq.analysis.screening.screening import (
+    counted_with,
+    gross_outliers,
+    moved_stretches,
+    point_words,
+    recurring_points,
+    stretch_words,
+)
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, PPM, unit

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.analysis.screening.finding import Finding, finding
+from cmm_uq.analysis.screening.columns import Finding, finding
 from cmm_uq.analysis.screening.screening import counted_with, screen_recording
 from cmm_uq.analysis.screening.shape import Screening
 from cmm_uq.artefacts import kind_of

@@ -24,7 +24,7 @@ from cmm_uq.base.output import interruption
 from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.outcome import Outcome, OwnAnalysis
-from cmm_uq.certificate.proof.words import DiagnosisProof
+from cmm_uq.certificate.proof.sections import DiagnosisProof
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.jobs.recording.prediction import KEY

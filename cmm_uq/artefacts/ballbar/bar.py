@@ -27,8 +27,7 @@ from cmm_uq.analysis.planning.candidates import (
     check_allowed,
 )
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, direction_words, planned_length
-from cmm_uq.analysis.planning.setting import Planning, Setting
-from cmm_uq.analysis.planning.volume import Volume
+from cmm_uq.analysis.planning.setting import Planning, Setting, Volume
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, bar_misfit, common_length, no_references, rows_by
 from cmm_uq.artefacts.distances import adjustment as adjustment_section
 from cmm_uq.artefacts.distances.adjustment import Lengths, lengths_of, settings

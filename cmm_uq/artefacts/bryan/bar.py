@@ -13,8 +13,7 @@ from typing import Any, cast
 import numpy as np
 
 from cmm_uq.analysis.planning.set_up import SetUp, direction_words, planned_length
-from cmm_uq.analysis.planning.setting import Planning, Setting, Start
-from cmm_uq.analysis.planning.volume import Volume
+from cmm_uq.analysis.planning.setting import Planning, Setting, Start, Volume
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, ball_misfit, no_references
 from cmm_uq.artefacts.distances import adjustment as adjustment_section
 from cmm_uq.artefacts.distances.adjustment import Lengths, lengths_of, settings

@@ -16,7 +16,7 @@ from scipy import linalg, special
 
 from cmm_uq.analysis.diagnosis.comparison.conditional import Version
 from cmm_uq.analysis.diagnosis.noise import NoiseKind
-from cmm_uq.analysis.screening.finding import Finding
+from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.artefacts.error_maps.search import ColumnComparison
 from cmm_uq.base.messages import Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.points import Floats

@@ -19,8 +19,7 @@ from scipy import linalg, sparse
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key, explore
 from cmm_uq.analysis.diagnosis.comparison.conditional import Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
-from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
-from cmm_uq.analysis.diagnosis.comparison.functions import smooth_functions
+from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member, smooth_functions
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import lack_of_fit
 from cmm_uq.analysis.diagnosis.noise import TAILS, NoiseKind, heavy_tails
 from cmm_uq.artefacts.error_maps.columns import MapColumn, roughness

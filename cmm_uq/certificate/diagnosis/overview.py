@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from cmm_uq.analysis.diagnosis.comparison.search import ASSERTED
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
-from cmm_uq.analysis.screening.finding import Finding
+from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, day, lines, say, semicolons
 from cmm_uq.certificate.diagnosis.sections import explanation, next_sentence, without_power
 from cmm_uq.certificate.document import Overview, Standing

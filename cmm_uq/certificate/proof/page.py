@@ -6,19 +6,22 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, plural
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
 from cmm_uq.certificate.origin import program
-from cmm_uq.certificate.proof.sections import effects_section, said_plot, strength_plot, unseen_section
-from cmm_uq.certificate.proof.words import (
+from cmm_uq.certificate.proof.sections import (
     ANSWER_WORDS,
     INTERVAL_WORDS,
     KIND_WORDS,
     NOISE_WORDS,
     DiagnosisProof,
     counted,
+    effects_section,
     in_words,
     interval,
     limits,
     percent,
+    said_plot,
     standing,
+    strength_plot,
+    unseen_section,
 )
 from cmm_uq.certificate.wording import titles
 from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH

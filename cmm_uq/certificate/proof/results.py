@@ -11,7 +11,7 @@ from cmm_uq.base.messages import NOTHING, Verbatim, say
 from cmm_uq.certificate.document import Standing
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.proof.page import conclusion_of, often_words, proof_document, warnings_of
-from cmm_uq.certificate.proof.words import DiagnosisProof, in_words, limits, standing
+from cmm_uq.certificate.proof.sections import DiagnosisProof, in_words, limits, standing
 from cmm_uq.certificate.results.contents import head
 from cmm_uq.certificate.wording import Headline, Summary
 from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH

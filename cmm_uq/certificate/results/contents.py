@@ -11,7 +11,7 @@ from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Statement
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
-from cmm_uq.analysis.screening.finding import Finding
+from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.diagnosis.overview import sentence

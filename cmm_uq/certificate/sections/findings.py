@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.diagnosis.assertion import WithheldEffect
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
-from cmm_uq.analysis.diagnosis.joint import Mode
+from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
 from cmm_uq.analysis.diagnosis.location import Place, residual_field
 from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, after, alternatives, commas, number, say, signed
 from cmm_uq.base.points import AXES

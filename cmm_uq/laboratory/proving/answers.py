@@ -1,8 +1,4 @@
-"""What processes answer, kept in a file as soon as it is there.
-
-Answers are appended a line each and are on the disk before the next is awaited: what a kill
-leaves is a prefix of whole lines, and perhaps a torn one, which is dropped.
-"""
+"""What processes answer, kept in a file as soon as it is there."""
 
 from __future__ import annotations
 

@@ -1,27 +1,199 @@
-"""What is true of a case: what it hides, how large, in which noise; written down and hashed before it is diagnosed.
-
-Kinds of cases follow each other in a fixed cycle: of every ten three hide nothing, three one effect, two two effects, one a
-function that no effect has, one a fault of the artefact.
-
-The file is JSON in one canonical form, so that its SHA-256 is that of what it says: ``sha256sum truth.json`` gives it
-again.
-"""
+"""What is true of a case, causes of no catalogue included, written down and hashed before it is diagnosed."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from cmm_uq.base.points import AXES
-from cmm_uq.base.units import MICROMETRE
-from cmm_uq.laboratory.proving.unknown_causes import FunctionForm
-from cmm_uq.machine.model import Noise
+from cmm_uq.base import messages
+from cmm_uq.base.messages import Text, say
+from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.machine.model import Noise, RecordingModel
+from cmm_uq.machine.physics.effect import Effect, Parameter
+
+FUNCTIONS = ("step", "cubic", "bump", "wave", "jump", "load")
+FAULTS = ("length", "nodes", "warm", "warming")
+_SAME_MM = 0.05  # up to which nodes of two set-ups are the same node
+_FLAT = 1e-4  # second over first extent of a set-up from which on its nodes do not lie along one line
+_NO_RATE = 11.5e-6  # 1/K, expansion of steel, for an artefact whose own is not stated
+
+
+class ForeignEffect(Effect):
+    """An error whose place and form are given, one unit of which is a micrometre at its largest."""
+
+    mechanism = "outside the catalogue"
+    title: Text = say("A cause outside the catalogue")
+    formula = "e = size · form"
+    points_to: Text = messages.NOTHING
+    coefficients = (Parameter("size_um", unit("µm"), 1.0),)
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+
+@dataclass(frozen=True)
+class FunctionForm:
+    """A function that no effect has."""
+
+    what: str
+    over: str  # over, along: axis whose reading it is a function of, and along which it displaces points
+    along: str
+    low: float  # low, high: readings, mm, between which that axis was read; of a jump, times in s
+    high: float
+    at: float  # at, width: where it is and how wide, on a scale from −1 to 1; of a wave its phase, and its half turns
+    width: float
+    measurement: int = 0  # the set-up that a load stands on
+
+    def displacement(self, points: Points) -> Floats:
+        """(n, 3, 1), mm, for a size of one micrometre."""
+        u = self._scaled(points.carriages[:, AXES.index(self.over)])
+        along = points.carriages[:, AXES.index(self.along)]
+        match self.what:
+            case "step":
+                value = np.asarray(u > self.at, dtype=np.float64)
+            case "cubic":
+                value = np.asarray(0.5 * (5 * u**3 - 3 * u))
+            case "bump":
+                value = np.asarray(np.exp(-0.5 * ((u - self.at) / self.width) ** 2))
+            case "wave":
+                value = np.asarray(np.sin(np.pi * self.width * u + self.at))
+            case "jump":
+                value = (self._scaled(points.column("time_s")) > self.at) * (
+                    along / max(float(np.abs(along).max()), 1e-9)
+                )
+            case _:
+                value = np.asarray((points.measurement == self.measurement) * u**2)
+        found = np.zeros((len(points), 3, 1))
+        found[:, AXES.index(self.along), 0] = MICROMETRE * value
+        return found
+
+    def _scaled(self, value: Floats) -> Floats:
+        return np.asarray((2 * value - self.low - self.high) / max(self.high - self.low, 1e-9))
+
+
+class FormEffect(ForeignEffect):
+    """An error of such a form."""
+
+    def __init__(self, form: FunctionForm) -> None:
+        super().__init__(f"outside: {form.what}")
+        self.form = form
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return self.form.displacement(points)
+
+
+class UnknownArtefactFault(ForeignEffect):
+    """An error given point by point, (n, 3, 1) mm for a size of one micrometre."""
+
+    def __init__(self, name: str, displacement: Floats) -> None:
+        super().__init__(name)
+        self.displacement_of_rows = displacement
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return self.displacement_of_rows
+
+
+def drawn_form(points: Points, what: str, random: np.random.Generator) -> FunctionForm | None:
+    """A function at random; ``None`` where the recording has nothing that it could be one of."""
+    moved = [axis for axis in AXES if float(np.ptp(points.readings[axis])) > 1.0]
+    if not moved or (what == "jump" and float(np.ptp(points.columns.get("time_s", np.zeros(1)))) == 0):
+        return None
+    over = str(random.choice(moved))
+    along = str(random.choice([axis for axis in AXES if what != "wave" or axis != over]))
+    values = points.columns["time_s"] if what == "jump" else points.readings[over]
+    at, width = float(random.uniform(-0.5, 0.5)), float(random.uniform(0.12, 0.3))
+    if what == "wave":
+        at, width = float(random.uniform(-np.pi, np.pi)), float(random.uniform(1.5, 4.0))
+    number = int(random.choice(np.unique(points.measurement))) if what == "load" else 0
+    return FunctionForm(what, over, along, float(values.min()), float(values.max()), at, width, number)
+
+
+def possible_faults(model: RecordingModel) -> Iterator[str]:
+    if any(size.certified and size.role == "dimension" for size in model.artefact.sizes):
+        yield "length"
+    yield "nodes"
+    yield "warm"
+    if len(np.unique(model.artefact.points.measurement)) > 1:
+        yield "warming"
+
+
+def artefact_fault(
+    model: RecordingModel, values: Floats, what: str, cte_per_k: float, errors: Sequence[Sequence[float]] = ()
+) -> UnknownArtefactFault:
+    """A fault of the artefact as an error of its points. ``model``, ``values`` with the artefact, and its parameters (k,)."""
+    xyz, points = model.placed(values), model.artefact.points
+    if what == "length":
+        sizes = values[len(values) - len(model.artefact.sizes) :].copy()
+        first = next(i for i, s in enumerate(model.artefact.sizes) if s.certified and s.role == "dimension")
+        sizes[first] += MICROMETRE
+        moved = model.artefact.fit(xyz, sizes) - xyz
+    elif what == "nodes":
+        number, frames = nodes(xyz, points)
+        moved = MICROMETRE * np.einsum("nij,nj->ni", frames, np.asarray(errors, dtype=np.float64)[number])
+    else:
+        index = np.unique(points.measurement, return_inverse=True)[1].ravel()
+        sums = np.zeros((int(index.max()) + 1, 3))
+        np.add.at(sums, index, xyz)
+        from_middle = xyz - np.asarray((sums / np.bincount(index)[:, None])[index])
+        warm = index / max(int(index.max()), 1) if what == "warming" else np.ones(len(xyz))
+        moved = (cte_per_k or _NO_RATE) * warm[:, None] * from_middle
+        moved = np.asarray(MICROMETRE * moved / max(float(np.linalg.norm(moved, axis=1).max()), 1e-12))
+    return UnknownArtefactFault(f"artefact: {what}", -moved[:, :, None])
+
+
+def nodes(xyz: Floats, points: Points) -> tuple[Ints, Floats]:
+    """Node of the artefact of each point (n,), and its axes there (n, 3, a); those whose points lie otherwise have others."""
+    known: list[Floats] = []
+    number = np.zeros(len(xyz), dtype=np.int64)
+    lines = all(_is_line(xyz[points.measurement == m]) for m in np.unique(points.measurement))
+    frames = np.zeros((len(xyz), 3, 1 if lines else 3))
+    first: tuple[Ints, Floats] | None = None
+    for m in np.unique(points.measurement):
+        rows = np.flatnonzero(points.measurement == m)
+        own = xyz[rows]
+        if lines:
+            start = own[points.point[rows].argmin()]
+            away = own - start
+            farthest = away[np.linalg.norm(away, axis=1).argmax()]
+            direction = farthest / max(float(np.linalg.norm(farthest)), 1e-12)
+            frame, place = direction[:, None], np.column_stack([away @ direction, np.zeros((len(rows), 2))])
+        else:
+            frame, place = _turned(own, points.point[rows], first)
+            first = first or (points.point[rows], place)
+        frames[rows] = frame
+        for row, here in zip(rows, place, strict=True):
+            near = [i for i, there in enumerate(known) if float(np.linalg.norm(here - there)) < _SAME_MM]
+            if not near:
+                known.append(here)
+            number[row] = near[0] if near else len(known) - 1
+    return number, frames
+
+
+def _is_line(xyz: Floats) -> bool:
+    s = np.linalg.svd(xyz - xyz.mean(axis=0), compute_uv=False)
+    return bool(len(s) < 2 or s[1] <= _FLAT * max(float(s[0]), 1e-12))
+
+
+def _turned(xyz: Floats, numbers: Ints, first: tuple[Ints, Floats] | None) -> tuple[Floats, Floats]:
+    """Axes (3, 3) of an artefact in one set-up, as those of the first one turned, and where its points lie in them."""
+    if first is None:
+        return np.eye(3), xyz - xyz.mean(axis=0)
+    common = [(i, int(np.flatnonzero(first[0] == n)[0])) for i, n in enumerate(numbers) if n in first[0]]
+    if len(common) < 3:
+        return np.eye(3), xyz
+    here, there = xyz[[i for i, _ in common]], first[1][[j for _, j in common]]
+    middle, other = here.mean(axis=0), there.mean(axis=0)
+    U, _, Vt = np.linalg.svd((here - middle).T @ (there - other))
+    turn = U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt  # Kabsch 1976
+    return turn, (xyz - middle) @ turn + other
+
 
 NOTHING, ONE, TWO, OUTSIDE, ARTEFACT = "nothing", "one effect", "two effects", "outside", "artefact"
 KINDS = (NOTHING, ONE, TWO, OUTSIDE, ARTEFACT)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.conformity.length_conditions import lengths_measured, nominals
+from cmm_uq.analysis.conformity.plan_conditions import lengths_measured, nominals
 from cmm_uq.analysis.conformity.plans import LengthPlan
 from cmm_uq.artefacts.ballbar.bar import Ballbar
 from cmm_uq.artefacts.gauge_lines.observe import StepGauge

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.conformity.short_gauge import supplemented
+from cmm_uq.analysis.conformity.as_recorded import supplemented
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.artefacts import artefact_facts

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.diagnosis import diagnosis
-from cmm_uq.analysis.diagnosis.assertion import HOLDS_ZERO, WithheldEffect, _holds_zero, _phase_known, group_of
 from cmm_uq.analysis.diagnosis.comparison import search
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.search import ModelComparison, SearchResult, effects_to_assert, substitute
 from cmm_uq.analysis.diagnosis.diagnosis import OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
+from cmm_uq.analysis.diagnosis.joint import HOLDS_ZERO, WithheldEffect, _holds_zero, _phase_known, group_of
 from cmm_uq.base.messages import say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.diagnosis.overview import sentence

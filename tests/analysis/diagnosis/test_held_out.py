@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy import linalg, stats
 
-from cmm_uq.analysis.diagnosis.held_out import FOLDS, improvement
-from cmm_uq.analysis.diagnosis.observations import numbered_by_place
+from cmm_uq.analysis.diagnosis.held_out import FOLDS, improvement, numbered_by_place
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar.bar import Ballbar

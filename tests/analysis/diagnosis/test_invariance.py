@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings, strategies as st
 
-from cmm_uq.analysis.diagnosis.comparison.functions import covariates
+from cmm_uq.analysis.diagnosis.comparison.explanations import covariates
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.artefacts.ballbar.bar import Ballbar
 from cmm_uq.base.points import Machine, Points

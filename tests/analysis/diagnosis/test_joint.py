@@ -8,12 +8,11 @@ from typing import cast
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.assertion import UNRESOLVED, _too_little, period_settled
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
-from cmm_uq.analysis.diagnosis.joint import Mode, _peaks
+from cmm_uq.analysis.diagnosis.joint import UNRESOLVED, Mode, _peaks, _too_little, period_settled
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.plate.observe import Plate
 from cmm_uq.base.messages import say

@@ -12,16 +12,10 @@ import numpy as np
 import pytest
 
 from benchmarks.second.cases import case, write
-from cmm_uq.analysis.diagnosis import noise_shapes as shapes
-from cmm_uq.analysis.diagnosis.comparison.functions import unknown_functions
+from cmm_uq.analysis.diagnosis import noise as shapes
+from cmm_uq.analysis.diagnosis.comparison.explanations import unknown_functions
 from cmm_uq.analysis.diagnosis.comparison.search import comparison_of
-from cmm_uq.analysis.diagnosis.noise_shapes import (
-    _beside,
-    _Density,
-    _determined,
-    drawn_shapes,
-    noise_kinds,
-)
+from cmm_uq.analysis.diagnosis.noise import _beside, _Density, _determined, drawn_shapes, noise_kinds
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.units import unit

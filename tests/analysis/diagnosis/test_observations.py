@@ -9,8 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.held_out import improvement
-from cmm_uq.analysis.diagnosis.observations import LEAST_OF_SET_UP, MOST, thin_out
+from cmm_uq.analysis.diagnosis.held_out import LEAST_OF_SET_UP, MOST, improvement, thin_out
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, kind_of
 from cmm_uq.artefacts.ballbar.bar import Ballbar

@@ -14,8 +14,8 @@ from scipy import stats
 from cmm_uq.analysis.diagnosis.comparison.search import model_comparison
 from cmm_uq.analysis.diagnosis.power import POWER, DrawnNoise, Power, powers, without_fault
 from cmm_uq.analysis.planning.candidates import ready_plan
-from cmm_uq.analysis.planning.noise import PlannedNoise
 from cmm_uq.analysis.planning.set_up import join
+from cmm_uq.analysis.planning.setting import PlannedNoise
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects

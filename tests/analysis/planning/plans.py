@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.analysis.planning.setting import Planning, Setting
-from cmm_uq.analysis.planning.volume import Volume
+from cmm_uq.analysis.planning.setting import Planning, Setting, Volume
 from cmm_uq.artefacts import artefact_facts, kind_named
 from cmm_uq.base.points import Machine
 from cmm_uq.jobs.tables.artefact import ArtefactFacts

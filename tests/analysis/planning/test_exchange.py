@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.planning.candidates import candidates
-from cmm_uq.analysis.planning.exchange import choose, score_of
-from cmm_uq.analysis.planning.information import Information, set_up_information
+from cmm_uq.analysis.planning.information import Information, choose, score_of, set_up_information
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model.measurement import ARTEFACT

@@ -9,12 +9,10 @@ import pytest
 from scipy import stats
 
 from cmm_uq.analysis.planning.candidates import ready_plan
-from cmm_uq.analysis.planning.expected import expected_uncertainty
-from cmm_uq.analysis.planning.identifiability import identifiability
+from cmm_uq.analysis.planning.identifiability import expected_uncertainty, identifiability
 from cmm_uq.analysis.planning.information import gram, recording_information, set_up_information
-from cmm_uq.analysis.planning.noise import PlannedNoise
 from cmm_uq.analysis.planning.set_up import attitude_along, join
-from cmm_uq.analysis.planning.setting import Setting
+from cmm_uq.analysis.planning.setting import PlannedNoise, Setting
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar.bar import ballbar
 from cmm_uq.base.messages import say

@@ -15,9 +15,8 @@ from cmm_uq.analysis.planning import suggestion
 from cmm_uq.analysis.planning.advice import NextPlan
 from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.set_up import attitude_along
-from cmm_uq.analysis.planning.setting import Planning
+from cmm_uq.analysis.planning.setting import Planning, Volume, turned_set_ups
 from cmm_uq.analysis.planning.suggestion import next_plan
-from cmm_uq.analysis.planning.volume import Volume, turned_set_ups
 from cmm_uq.artefacts import kind_named
 from cmm_uq.artefacts.ballbar.bar import ballbar
 from cmm_uq.base.errors import CmmUqError

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from cmm_uq.analysis.screening.finding import Finding
-from cmm_uq.analysis.screening.outliers import moved_stretches, point_words, recurring_points
+from cmm_uq.analysis.screening.columns import Finding
+from cmm_uq.analysis.screening.screening import moved_stretches, point_words, recurring_points
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.reading import read_job

@@ -22,7 +22,7 @@ from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.proof.page import proof_document
 from cmm_uq.certificate.proof.results import KEYS, RATE, proof_outcome, proof_results
-from cmm_uq.certificate.proof.words import DiagnosisProof
+from cmm_uq.certificate.proof.sections import DiagnosisProof
 from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH
 from cmm_uq.machine.physics.catalogue import every
 from tests.app.cli.process import run

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import cmm_uq
-from cmm_uq.analysis.screening.finding import Finding
+from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.job import Job

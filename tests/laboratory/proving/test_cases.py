@@ -24,11 +24,12 @@ from cmm_uq.laboratory.proving.cases import (
     STRONGEST,
     WEAKEST,
     Case,
+    artefact_fault,
+    nodes,
     sha256_of,
     truth_file,
 )
 from cmm_uq.laboratory.proving.design import Design
-from cmm_uq.laboratory.proving.unknown_causes import artefact_fault, nodes
 from cmm_uq.machine.model import Noise
 from cmm_uq.machine.physics.catalogue import every
 from tests.conftest import ROOT

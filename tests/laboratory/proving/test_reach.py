@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.laboratory.proving.cases import OWN
-from cmm_uq.laboratory.proving.reach import DRAWN, TAKEN, UNRECORDED, fault_reaches, reaches
+from cmm_uq.laboratory.proving.design import DRAWN, TAKEN, UNRECORDED, fault_reaches, reaches
 from cmm_uq.machine.physics.catalogue import every
 from tests.laboratory.proving.test_cases import cases, design
 

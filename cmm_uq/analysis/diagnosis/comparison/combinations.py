@@ -1,8 +1,4 @@
-"""Which explanations hold together: the posterior over combinations of them, found best first.
-
-Each combination has its marginal likelihood, the sizes of its members integrated one at a time about their joint best; each
-known effect has its posterior probability by summing over the combinations that contain it.
-"""
+"""Which explanations hold together: the posterior over combinations of them, found best first."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Columns of all candidates side by side, and data conditional on some of them under each kind of noise.
-
-A search gives the same few members again and again, in other company and at other sizes. What follows from a member alone is
-therefore kept: its columns weighed by each kind of noise, and their inner products with the columns of all candidates.
-"""
+"""Columns of all candidates side by side, and data conditional on some of them under each kind of noise."""
 
 from __future__ import annotations
 

@@ -1,11 +1,7 @@
 """Marginal likelihoods of candidate explanations, alone and together, in closed form.
 
-Everything enters linearly with a normal prior whose standard deviation is a multiple of the noise, so that the evidence of
-explanations depends on the data through one quadratic form; its integral over the noise is tabulated once, and the multiples
-are summed over a grid. What the job's model could absorb is projected out.
-
-Explanations that the evidence is conditional on join the covariance of the noise, each at a fixed size. So
-the evidence of one more explanation beside them needs nothing but the inner products of all columns, which are computed once.
+Everything enters linearly with a normal prior whose standard deviation is a multiple of the noise; what the model could absorb
+is projected out. What the evidence is conditional on joins the covariance of the noise, each at a fixed size.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""Candidate explanations of what a model leaves, and those of them that are effects of the catalogue.
-
-Each is a set of columns that the observations would show, scaled so that coefficients of one are as large as physics (or,
-for a nonparametric term, plausibility) allows; how much smaller they may be is left to the comparison.
-"""
+"""Candidate explanations of what a model leaves: known effects, and nonparametric terms, smooth or with one jump."""
 
 from __future__ import annotations
 
@@ -10,11 +6,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy import linalg
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.plugins import BrokenPluginError
 from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.jobs.columns import in_words
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import every
@@ -202,3 +200,193 @@ def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
 def _seen(model: RecordingModel, effect: Effect, points: Points, shape: tuple[float, ...], values: Floats) -> Floats:
     scale = np.array([c.prior_sd for c in effect.coefficients])
     return model.seen(model.columns(effect, shape, values) * scale, values)
+
+
+LENGTH_SCALES = (0.6, 0.25, 0.1)  # of smooth functions, in parts of the covariate's range
+_SPACE_LENGTHS = (0.5, 0.25)
+# In parts of the diameter of a sphere of directions; the shortest lets neighbouring directions differ at will
+_DIRECTION_LENGTHS = (0.5, 0.25, 0.08)
+_LOBES = (2, 4, 5, 6, 7, 8, 9, 10)  # undulations in a turn; three are an effect of the catalogue
+_SPACE_PLACES, _SPACE_RANK = 120, 40
+# Jumps that are tried. A reading on the wrong side of one is off by all of it: few between many readings find none
+_MOST_STEPS = 200
+_MANY_DIRECTIONS, _SEEN = 12, 1e-6
+# Beginnings of columns that belong to a point's place, or have functions of their own
+_PLACED = ("approach_", "nx", "ny", "nz", "tip_", "reference_", "time_s")
+# mm: no jump is sought between readings nearer than this, which are one place read again; what parts these is their noise
+_SAME_PLACE = 0.1
+_SUDDEN = ("time_s", "order")  # covariates of an observation at which an error may jump
+_KEPT = 1e-3
+_GRID = 60
+
+
+def unknown_functions(model: RecordingModel, values: Floats) -> list[Explanation]:
+    """Nonparametric terms, smooth or with one jump."""
+    points = model.artefact.points.at(model.where(values))
+    found = [*_of_readings(model, points, values), *_of_place(model, points, values), *_of_time(model, points, values)]
+    found += [*_of_direction(model), *_of_all_scales(model, points, values)]
+    for key, covariate in covariates(model).items():
+        functions = _functions(covariate) if key in _SUDDEN else ((f, 1.0) for f in smooth_functions(covariate))
+        members = tuple(Member(f, weight=weight, values=f) for f, weight in functions)
+        name = say("error as a function of {name}", name=in_words(key))
+        found.append(Explanation(name, UNKNOWN, members, covariate, key, Nonparametric(key)))
+    return found
+
+
+def _of_readings(model: RecordingModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    for axis, readings in points.readings.items():
+        if np.ptp(readings) < 1.0:
+            continue
+        functions = list(_functions(readings, _SAME_PLACE))
+        for j, direction in enumerate(AXES):
+            members = tuple(Member(model.seen(_along(j, f), values), weight=w, values=f) for f, w in functions)
+            name = say(
+                "error along {direction} as a function of {axis}",
+                direction=Verbatim(direction.upper()),
+                axis=Verbatim(axis.upper()),
+            )
+            term = Nonparametric(f"{axis}_mm", direction)
+            yield Explanation(name, UNKNOWN, members, readings, term.of, term)
+
+
+def _of_place(model: RecordingModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    if np.sum(np.ptp(points.machine_xyz, axis=0) > 1.0) < 2:
+        return
+    factors = list(_smooth_in_space(points.machine_xyz))
+    for j, direction in enumerate(AXES):
+        members = tuple(Member(model.seen(_along(j, factor), values)) for factor in factors)
+        name = say("error along {direction} as a function of the place", direction=Verbatim(direction.upper()))
+        yield Explanation(name, UNKNOWN, members)
+
+
+def _of_time(model: RecordingModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    time = points.columns.get("time_s")
+    if time is None or len(np.unique(time)) < 3:
+        return
+    for i, axis in enumerate(AXES):
+        readings = points.readings[axis]
+        if (half := 0.5 * float(np.ptp(readings))) < 1.0:
+            continue
+        lever = (readings / half)[:, None]
+        constant = any(_in_proportion(effect, points, axis) for effect in model.effects)
+        functions = _functions(time) if constant else _one_sided(_functions(time))
+        members = tuple(Member(model.seen(_along(i, lever * f), values), weight=w, values=f) for f, w in functions)
+        name = say("scale of {axis} as a function of time", axis=Verbatim(axis.upper()))
+        yield Explanation(name, UNKNOWN, members, time, "time_s", Nonparametric("time_s", axis, scale=True))
+
+
+def _in_proportion(effect: Effect, points: Points, axis: str) -> bool:
+    if effect.shape or len(effect.coefficients) > 1:
+        return False
+    moved = effect.basis(points)[:, :, 0]
+    read = np.zeros_like(moved)
+    read[:, AXES.index(axis)] = points.readings[axis]
+    factor = float(np.sum(moved * read) / np.sum(read**2))
+    return bool(factor and np.allclose(moved, factor * read, atol=1e-9 * abs(factor) * np.abs(read).max()))
+
+
+def _of_direction(model: RecordingModel) -> Iterator[Explanation]:
+    """Anything of the direction in which points were probed, where there are many; and lobes about Z."""
+    among = directions(model)
+    if len(np.unique(np.round(among, 3), axis=0)) < _MANY_DIRECTIONS:
+        return
+    members = tuple(Member(factor) for factor in _smooth_in_space(among, _DIRECTION_LENGTHS))
+    yield Explanation(say("error as a function of the probing direction"), UNKNOWN, members)
+    azimuth = np.arctan2(among[:, 1], among[:, 0])
+    waves = [UNKNOWN_SD * np.column_stack([np.cos(k * azimuth), np.sin(k * azimuth)]) for k in _LOBES]
+    members = tuple(Member(wave, values=wave) for wave in waves)
+    yield Explanation(say("error in lobes about Z"), UNKNOWN, members, np.degrees(azimuth), "azimuth_deg")
+
+
+def _of_all_scales(model: RecordingModel, points: Points, values: Floats) -> Iterator[Explanation]:
+    """One scale of all axes, about their zero or their middle, as a function of each further column."""
+    readings = points.carriages
+    middle, span = 0.5 * (readings.min(axis=0) + readings.max(axis=0)), 0.5 * float(np.ptp(readings, axis=0).max())
+    levers = [((readings - about) / span)[:, :, None] for about in (np.zeros(3), middle)]
+    for key, column in points.columns.items():
+        if key.startswith(_PLACED) or len(np.unique(column)) < 3:
+            continue
+        factors = [(lever, f) for lever in levers for f in smooth_functions(column)]
+        members = tuple(Member(model.seen(lever * f[:, None, :], values), values=f) for lever, f in factors)
+        name = say("scale of all axes as a function of {name}", name=in_words(key))
+        yield Explanation(name, UNKNOWN, members, column, key)
+
+
+def directions(model: RecordingModel) -> Floats:
+    """Unit vectors (m, 3) along which used observations see a point move; zero where they see differences of points."""
+    points = model.artefact.points
+    values = model.estimate().about
+    seen = model.seen(np.broadcast_to(np.eye(3), (len(points), 3, 3)), values)
+    length = np.linalg.norm(seen, axis=1, keepdims=True)
+    return np.where(length > _SEEN, seen / np.maximum(length, _SEEN), 0.0)
+
+
+def _along(axis: int, factor: Floats) -> Floats:
+    displacement = np.zeros((len(factor), 3, factor.shape[1]))
+    displacement[:, axis] = factor
+    return displacement
+
+
+def covariates(model: RecordingModel) -> dict[str, Floats]:
+    """Mean (m,) of every recorded column of each observation, and its place in the order of time where one is recorded."""
+    found = {name: mean_of(model, values) for name, values in model.artefact.points.columns.items()}
+    if "time_s" in found:
+        found["order"] = np.unique(found["time_s"], return_inverse=True)[1].ravel().astype(np.float64)
+    kept: dict[str, Floats] = {}
+    for name, values in found.items():
+        if len(np.unique(values)) >= 3 and not any(abs(np.corrcoef(values, v)[0, 1]) > 0.999 for v in kept.values()):
+            kept[name] = values
+    return kept
+
+
+def mean_of(model: RecordingModel, values: Floats) -> Floats:
+    """Mean of a column (n,) over the points of each used observation, (m,)."""
+    return np.asarray(values[model.artefact.rows].mean(axis=1)[model.used], dtype=np.float64)
+
+
+def _functions(covariate: Floats, same: float = 0.0) -> Iterator[tuple[Floats, float]]:
+    """Factors (n, r), mm, of functions of a covariate and their weights: smooth ones, and steps in its widest gaps."""
+    for function in smooth_functions(covariate):
+        yield function, 1.0
+    distinct = np.unique(covariate)
+    gaps = np.diff(distinct)
+    apart = np.flatnonzero(gaps > same)
+    parts = np.array_split(apart, min(len(apart), _MOST_STEPS)) if len(apart) else []
+    widest = np.array([part[np.argmax(gaps[part])] for part in parts], dtype=np.int64)
+    for place in distinct[widest] + 0.5 * gaps[widest]:
+        yield UNKNOWN_SD * np.where(covariate > place, 1.0, -1.0)[:, None], 1 / len(widest)
+
+
+def _one_sided(functions: Iterable[tuple[Floats, float]]) -> Iterator[tuple[Floats, float]]:
+    for function, weight in functions:
+        if function.shape[1] > 1:
+            yield function, weight
+            continue
+        for constant in (-UNKNOWN_SD, 0.0, UNKNOWN_SD):
+            yield (function + constant) / (2 if constant else 1), weight / 3
+
+
+def smooth_functions(covariate: Floats) -> Iterator[Floats]:
+    """Factors (n, r), mm, of squared-exponential covariances over a covariate (Karhunen–Loève on a grid, Nyström beyond)."""
+    low, span = float(covariate.min()), float(np.ptp(covariate))
+    place = (covariate - low) / span
+    grid = np.linspace(0, 1, _GRID)
+    for length in LENGTH_SCALES:
+        kernel = np.exp(-0.5 * ((grid[:, None] - grid[None, :]) / length) ** 2)
+        eigenvalues, vectors = linalg.eigh(kernel)
+        keep = eigenvalues > _KEPT * eigenvalues[-1]
+        cross = np.exp(-0.5 * ((place[:, None] - grid[None, :]) / length) ** 2)
+        yield UNKNOWN_SD * cross @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
+
+
+def _smooth_in_space(readings: Floats, lengths: tuple[float, ...] = _SPACE_LENGTHS) -> Iterator[Floats]:
+    """Factors (n, r), mm, of squared-exponential covariances over readings (n, 3) (Nyström on some of their places)."""
+    place = (readings - readings.min(axis=0)) / float(np.ptp(readings, axis=0).max())
+    distinct = np.unique(np.round(place, 6), axis=0)
+    some = distinct[np.unique(np.linspace(0, len(distinct) - 1, _SPACE_PLACES).round().astype(int))]
+    among, across = (np.sum((points[:, None] - some) ** 2, axis=2) for points in (some, place))
+    for length in lengths:
+        eigenvalues, vectors = linalg.eigh(np.exp(-0.5 * among / length**2))
+        keep = np.flatnonzero(eigenvalues > _KEPT * eigenvalues[-1])[-_SPACE_RANK:]
+        factor = np.exp(-0.5 * across / length**2) @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
+        yield UNKNOWN_SD * factor

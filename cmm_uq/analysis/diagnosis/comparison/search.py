@@ -1,8 +1,4 @@
-"""The search for what was left out: a lack-of-fit test with a known false-alarm rate, then a comparison of combinations.
-
-The candidates are each effect of the catalogue, nonparametric terms, and nothing. The test statistic is the evidence of
-"something" over "nothing"; its distribution under nothing is drawn on the recording's own design.
-"""
+"""The search for what was left out: a lack-of-fit test with a known false-alarm rate, then a comparison of combinations."""
 
 from __future__ import annotations
 
@@ -23,12 +19,11 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import (
     effects_together,
     known_effects,
     refine,
+    unknown_functions,
     with_shorter_periods,
 )
-from cmm_uq.analysis.diagnosis.comparison.functions import unknown_functions
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fit, log_prior
-from cmm_uq.analysis.diagnosis.noise import sigma_grid
-from cmm_uq.analysis.diagnosis.noise_shapes import noise_kinds
+from cmm_uq.analysis.diagnosis.noise import noise_kinds, sigma_grid
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import SMALL_LEAN

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.analysis.diagnosis.observations import thin_out
+from cmm_uq.analysis.diagnosis.held_out import thin_out
 from cmm_uq.analysis.parts.machine.conditional import given_recording
 from cmm_uq.analysis.parts.machine.state import MachineState, machine_stated
 from cmm_uq.app.commands.certificates.verification import Verification, examine_certificate, verify_given

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.analysis.diagnosis.comparison.draws import DEGREES, draw_noise, order_and_side, tail_widths
-from cmm_uq.artefacts.error_maps.search import kinds_along
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import DEGREES, draw_noise, order_and_side, tail_widths
+from cmm_uq.artefacts.error_maps.noise import kinds_along
 from cmm_uq.base.points import Floats
 
 

@@ -8,14 +8,25 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from cmm_uq.analysis.diagnosis.comparison import draws as draws_of_noise
+from cmm_uq.analysis.diagnosis.comparison import lack_of_fit as draws_of_noise
 from cmm_uq.analysis.diagnosis.comparison.conditional import Version
-from cmm_uq.analysis.diagnosis.comparison.draws import draw_nothing, left_of_noise, probability_of_tails
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, Explanation, Member
-from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import tail_probability
-from cmm_uq.analysis.diagnosis.noise import TAILS, heavy_tails, probable_tails, shape_of, sigma_grid
-from cmm_uq.analysis.diagnosis.noise_shapes import drawn_shapes, representative_kinds
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import (
+    draw_nothing,
+    left_of_noise,
+    probability_of_tails,
+    tail_probability,
+)
+from cmm_uq.analysis.diagnosis.noise import (
+    TAILS,
+    drawn_shapes,
+    heavy_tails,
+    probable_tails,
+    representative_kinds,
+    shape_of,
+    sigma_grid,
+)
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
 from cmm_uq.machine.model.recorded import Display

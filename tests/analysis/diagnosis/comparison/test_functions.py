@@ -8,8 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN_SD, Explanation
-from cmm_uq.analysis.diagnosis.comparison.functions import _functions, _one_sided, directions, unknown_functions
+from cmm_uq.analysis.diagnosis.comparison.explanations import (
+    UNKNOWN_SD,
+    Explanation,
+    _functions,
+    _one_sided,
+    directions,
+    unknown_functions,
+)
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.points import Floats
