@@ -10,7 +10,7 @@ import numpy as np
 from cmm_uq.analysis.diagnosis.diagnosis import OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import region_of
-from cmm_uq.analysis.screening.finding import Finding
+from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.artefacts.error_maps.columns import MapColumn, columns_of, turned
 from cmm_uq.artefacts.error_maps.fit import expansion, function, held_out, noise_of, residual, squareness_findings
 from cmm_uq.artefacts.error_maps.search import CandidateCause, ColumnComparison, column_comparison
