@@ -15,8 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.screening.columns import Finding
-from cmm_uq.artefacts.error_maps.copies import copies
-from cmm_uq.artefacts.error_maps.spikes import DAMAGED, spikes
 from cmm_uq.base.messages import Text, Verbatim, commas, listed, number, say, signed
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, Unit, unit

@@ -6,7 +6,6 @@ import numpy as np
 
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.analysis.diagnosis.power import POWER, SIZES
-from cmm_uq.analysis.planning.identifiability import RepeatsRow
 from cmm_uq.app.commands.plans.planning import RECORDED, MeasurementPlan
 from cmm_uq.app.commands.plans.words import (
     CRITERIA,

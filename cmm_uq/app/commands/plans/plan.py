@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.planning.identifiability import Identifiability, RepeatsRow
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.app.commands.files import Form, Stage, Written, silent
 from cmm_uq.app.commands.plans.page import placing_rows, to_measure_words

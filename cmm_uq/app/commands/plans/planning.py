@@ -21,7 +21,7 @@ from cmm_uq.analysis.planning.identifiability import (
 )
 from cmm_uq.analysis.planning.information import choose, recording_information, score_of, set_up_information
 from cmm_uq.analysis.planning.set_up import SetUp, append, join, split
-from cmm_uq.analysis.planning.setting import PlannedNoise, Setting, Start, white_noise
+from cmm_uq.analysis.planning.setting import Setting, Start, white_noise
 from cmm_uq.app.commands.model import OVERFLOW_FIX, refuse_planned, refuse_unfit
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError

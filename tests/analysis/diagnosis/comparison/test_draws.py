@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cmm_uq.artefacts.error_maps.noise import kinds_along
 from scipy import stats
 
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import DEGREES, draw_noise, order_and_side, tail_widths
+from cmm_uq.artefacts.error_maps.search import kinds_along
 from cmm_uq.base.points import Floats
 
 
