@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, create_model, field
 
 from cmm_uq.base.errors import suggestion
 from cmm_uq.base.files.limits import CONFORMITY, EFFECTS, LISTED
-from cmm_uq.base.files.table import JobTable, Limit, Names, Number, at_least
+from cmm_uq.base.files.table import JobTable, Limit, Names, Number, at_least, key, required
 from cmm_uq.base.messages import html_table
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.points import Points
@@ -38,14 +38,12 @@ Tolerance = Annotated[float, Field(gt=0, le=1e9), at_least(1e-9)]  # A permissib
 class JobFacts(Identification):
     """``[job]``: identification, and free text for the certificate."""
 
-    diagnosis_on_certificate: bool = False
-    """Whether the whole diagnosis is printed in the certificate's annex."""
+    diagnosis_on_certificate: bool = key(False, "Whether the whole diagnosis is printed in the certificate's annex.")
     recalibration_agreed: dt.date | None = None
     """Date of the next calibration, where the customer agreed to be told one (7.8.4.3); no other is printed."""
     adjusted_since: dt.date | None = None
     """Day on which the machine was last adjusted before this recording; trends in the records begin anew there."""
-    interim: bool = False
-    """Whether this is an interim check between two calibrations, and no certificate."""
+    interim: bool = key(False, "Whether this is an interim check between two calibrations, and no certificate.")
     as_found: str | None = None
     """`results.json`, or the folder with it inside the job's, of the machine before it was adjusted (7.8.4.1 d)."""
     origin: Origin = MEASURED
@@ -67,10 +65,8 @@ class JobFacts(Identification):
 class SetAside(JobTable):
     """A measurement that the laboratory leaves out of the estimates."""
 
-    measurement: Number
-    """Its number."""
-    reason: str = ""
-    """Why it is left out, as the certificate says it beside every decision."""
+    measurement: Number = required("Its number.")
+    reason: str = key("", "Why it is left out, as the certificate says it beside every decision.")
 
 
 def _as_entry(given: Any) -> Any:
@@ -84,12 +80,10 @@ Aside = Annotated[SetAside, BeforeValidator(_as_entry, json_schema_input_type=Se
 class Recorded(JobTable):
     """Which recording, and what is stated of it."""
 
-    file: str
-    """The recording, beside job.toml: a CSV with one row a point, or an export that is imported."""
+    file: str = required("The recording, beside job.toml: a CSV with one row a point, or an export that is imported.")
     earlier: str | None = None
     """Recording of the same artefact in the same placings at an earlier date: what changed between is estimated."""
-    earlier_date: dt.date | None = None
-    """Date of the earlier recording."""
+    earlier_date: dt.date | None = key(None, "Date of the earlier recording.")
     u_coordinate_um: Limit | None = None
     """Stated standard uncertainty of one recorded coordinate; left out, it is estimated from repeats and residuals."""
     set_aside: Annotated[list[Aside], Field(max_length=LISTED.most)] = []
@@ -123,36 +117,27 @@ class ModelFacts(JobTable):
 class JobFile(JobTable):
     """All of job.toml. A job of a kind without a recording has no ``[recording]``."""
 
-    job: JobFacts
-    """Identification, and free text for the certificate."""
-    laboratory: Laboratory = Laboratory()
-    """Who answers for the certificate."""
-    machine: MachineFacts
-    """The machine that was measured."""
-    artefact: ArtefactFacts
-    """The artefact that it was measured with, or the kind of measurement."""
-    recording: RecordingFacts
-    """What was recorded, and in which file."""
+    job: JobFacts = required("Identification, and free text for the certificate.")
+    laboratory: Laboratory = key(Laboratory(), "Who answers for the certificate.")
+    machine: MachineFacts = required("The machine that was measured.")
+    artefact: ArtefactFacts = required("The artefact that it was measured with, or the kind of measurement.")
+    recording: RecordingFacts = required("What was recorded, and in which file.")
     short_gauge: ShortGaugeFacts | None = None
     """A short gauge met from both sides, recorded beside lengths that are not bidirectional by themselves."""
     thermometer: Annotated[list[ThermometerFacts], Field(max_length=100)] = []
     """The thermometers that recorded temperatures were read from, each a table of its own with its certificate."""
     simulation: SimulationFacts | None = None
     """A prediction of another program, or an error map, that the recording is diagnosed against."""
-    probe: ProbeFacts = ProbeFacts()
-    """With what the recording was made."""
+    probe: ProbeFacts = key(ProbeFacts(), "With what the recording was made.")
     test_uncertainty: TestUncertainty = TestUncertainty()
     """What a test value is uncertain by beside the calibration of the artefact (ISO/TS 23165)."""
     rated_conditions: RatedConditions = RatedConditions()
     """Conditions under which the limits of the machine hold, by its data sheet."""
-    model: ModelFacts
-    """The physics that the simulation is told about."""
+    model: ModelFacts = required("The physics that the simulation is told about.")
     conformity: Annotated[list[ConformityFacts], Field(max_length=CONFORMITY.most)] = []
     """Statements of conformity: a standard, a limit and a rule each."""
-    plan: PlanFacts = PlanFacts()
-    """What may be measured, where, and what it should tell; read by `cmm-uq plan`."""
-    acquire: AcquireFacts = AcquireFacts()
-    """The instruments that the recording is taken from live."""
+    plan: PlanFacts = key(PlanFacts(), "What may be measured, where, and what it should tell; read by `cmm-uq plan`.")
+    acquire: AcquireFacts = key(AcquireFacts(), "The instruments that the recording is taken from live.")
     prove: ProveFacts = ProveFacts()
     """By which figures the diagnosis is accepted on these set-ups; read by `cmm-uq prove`."""
 

@@ -18,19 +18,16 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator
 
 from cmm_uq.base.files.limits import COLUMNS, EFFECTS
-from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Uncertainty
+from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Uncertainty, key, required
 from cmm_uq.jobs.importing.recording import REQUIRED, largest
 
 
 class ByAxis(JobTable):
     """One number for each axis."""
 
-    x: Uncertainty
-    """Along x."""
-    y: Uncertainty
-    """Along y."""
-    z: Uncertainty
-    """Along z."""
+    x: Uncertainty = required("Along x.")
+    y: Uncertainty = required("Along y.")
+    z: Uncertainty = required("Along z.")
 
 
 class NoiseFacts(JobTable):
@@ -42,16 +39,14 @@ class NoiseFacts(JobTable):
     """Standard deviation of the offset of each point of each placing, which its repeats share."""
     growth_um: Uncertainty = 0.0
     """Standard deviation of what is added at the longest distance in a placing, in proportion to the distance."""
-    slow_um: Uncertainty = 0.0
-    """Standard deviation of slow noise; needs `time_s` in the recording."""
+    slow_um: Uncertainty = key(0.0, "Standard deviation of slow noise; needs `time_s` in the recording.")
     slow_time_s: Annotated[float, Field(gt=0, le=1e9)] | Literal["never"] = 600.0
     """Time over which slow noise forgets; `"never"` for a random walk from the first reading on, of which `slow_um` is
     then the root mean square over the recording."""
     tails_dof: Annotated[float, Field(gt=2, le=1000)] | None = None
     """Degrees of freedom of readings with Student's t distribution of the same standard deviation; normal by
     default."""
-    resolution_um: Uncertainty = 0.0
-    """Step of the display."""
+    resolution_um: Uncertainty = key(0.0, "Step of the display.")
 
     @property
     def coordinates_um(self) -> tuple[float, float, float]:
@@ -66,12 +61,10 @@ class Truth(JobTable):
     """True parameters of each effect that acts, by the effect's name, whatever the job's model names."""
     artefact: dict[str, AnyFloat] = {}
     """True sizes of the artefact, by name, such as `length_mm`; as certified by default."""
-    noise: NoiseFacts = NoiseFacts()
-    """Noise of the simulated readings."""
+    noise: NoiseFacts = key(NoiseFacts(), "Noise of the simulated readings.")
     columns: Annotated[dict[Column, AnyFloat], Field(max_length=COLUMNS.most)] = {}
     """Columns of the recording at a value that holds for every row, such as temperatures."""
-    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
-    """Seed of the random numbers."""
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = key(0, "Seed of the random numbers.")
 
     @field_validator("columns")
     @classmethod

@@ -3,14 +3,15 @@
 A range holds everything that a machine, an artefact or a laboratory can have, and keeps squares, sums and quotients of what
 it holds within a double's range.
 
-The string below a field is the sentence of its key: in schemas, reference pages, comments of a new job and messages.
+The sentence of a key stands beside what it is where it is left out, or below it: in schemas, reference pages, comments of a
+new job and messages.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Self
+from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
@@ -35,6 +36,20 @@ class JobTable(BaseModel):
     def problems(self) -> Iterable[str]:
         """What keys say that do not go together; the first is told."""
         return ()
+
+
+Default = TypeVar("Default")
+
+
+def key(default: Default, sentence: str) -> Default:
+    """A key with what it is where it is left out, and its sentence."""
+    field: Default = Field(default, description=sentence)
+    return field
+
+
+def required(sentence: str) -> Any:
+    """A key that must be there, with its sentence."""
+    return Field(description=sentence)
 
 
 LONGEST_MM = 1e7

@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator
 
 from cmm_uq.base.files.limits import COLUMNS
-from cmm_uq.base.files.table import Column, JobTable
+from cmm_uq.base.files.table import Column, JobTable, key
 from cmm_uq.base.points import Floats
 
 
@@ -115,8 +115,7 @@ class FileKeys(JobTable):
     """Unit of the file's lengths, as `"inch"`, where the file does not say it."""
     sheet: str | None = None
     """Which sheet of a workbook, or which sort of feature of a report (`"spheres"`), where there are several."""
-    decimal: Literal[".", ","] | None = None
-    """The file's decimal sign, where its numbers can be read either way."""
+    decimal: Literal[".", ","] | None = key(None, "The file's decimal sign, where its numbers can be read either way.")
     delimiter: Literal[",", ";", "tab", "blank", "|"] | None = None
     """What separates the cells of a text file, where that is not found."""
     encoding: Literal["utf-8", "utf-16", "cp1252", "latin-1"] | None = None

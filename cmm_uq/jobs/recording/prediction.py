@@ -22,7 +22,7 @@ from cmm_uq.base.files.content import text_of
 from cmm_uq.base.files.csv_table import Cells, cells_of
 from cmm_uq.base.files.limits import MAPS
 from cmm_uq.base.files.numbers import numbers
-from cmm_uq.base.files.table import JobTable, Length, Names, Uncertainty
+from cmm_uq.base.files.table import JobTable, Length, Names, Uncertainty, key
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.importing.recording import COORDINATES, WHOLE, largest
@@ -38,26 +38,20 @@ NOMINAL_C = 20.0  # °C of a map that is named without its temperature
 class SimulationFacts(JobTable):
     """``[simulation]``."""
 
-    file: str | None = None
-    """File of predicted coordinates or lengths."""
+    file: str | None = key(None, "File of predicted coordinates or lengths.")
     map: Annotated[list[ErrorMapFile], Field(max_length=MAPS.most)] = []
     """In place of a file, error maps: the displacements that they give at the recorded positions are the prediction."""
-    program: str = ""
-    """Program that made the prediction, in your words."""
+    program: str = key("", "Program that made the prediction, in your words.")
     u_um: Uncertainty = 0.0
     """Standard uncertainty of each predicted coordinate (or length), where the file has no column of it; repeats share it."""
-    u_common_um: Uncertainty = 0.0
-    """Standard uncertainty of the artefact's size that all predictions share."""
+    u_common_um: Uncertainty = key(0.0, "Standard uncertainty of the artefact's size that all predictions share.")
     length_mm: Length | None = None
     """Length of the artefact, as the simulation took it; otherwise that of [artefact]."""
-    unit: Literal["mm", "m", "cm", "um", "inch"] = "mm"
-    """Unit of predicted coordinates and lengths."""
+    unit: Literal["mm", "m", "cm", "um", "inch"] = key("mm", "Unit of predicted coordinates and lengths.")
     columns: Annotated[dict[str, str], Field(max_length=10)] = {}
     """Names of the file's columns, where they are others than the recording's."""
-    effects: Names = []
-    """Effects that the simulation contains."""
-    refit: bool = False
-    """Whether these are estimated anew, as corrections to what the simulation contains."""
+    effects: Names = key([], "Effects that the simulation contains.")
+    refit: bool = key(False, "Whether these are estimated anew, as corrections to what the simulation contains.")
 
     @field_validator("map", mode="before")
     @classmethod
@@ -71,9 +65,9 @@ class SimulationFacts(JobTable):
             yield 'give either file = "predicted.csv", or map = "error_map.csv"'
         if self.refit and not self.effects:
             yield "refit = true says nothing of what: name the effects that the simulation contains"
-        for key in ("length_mm", "unit", "columns"):
-            if self.map and key in self.model_fields_set:
-                yield f"{key} belongs to a file of predictions, not to a map: leave it out"
+        for name in ("length_mm", "unit", "columns"):
+            if self.map and name in self.model_fields_set:
+                yield f"{name} belongs to a file of predictions, not to a map: leave it out"
 
 
 LENGTH, UNCERTAINTY = "length_mm", "u_um"
@@ -209,10 +203,10 @@ def _check_unique(prediction: Prediction) -> None:
     repeat = np.ones_like(prediction.lines) if prediction.repeat is None else prediction.repeat
     seen: dict[tuple[int, ...], int] = {}
     keys = np.column_stack([prediction.measurement, prediction.point, repeat]).tolist()
-    for key, line in zip(map(tuple, keys), prediction.lines.tolist(), strict=True):
-        if key in seen:
-            point = "" if prediction.of_lengths else f", point {key[1]}"
-            raise CmmUqError(f"measurement {key[0]}{point} is predicted twice",
-                             where=f"{prediction.where} lines {seen[key]} and {line}",
+    for row, line in zip(map(tuple, keys), prediction.lines.tolist(), strict=True):
+        if row in seen:
+            point = "" if prediction.of_lengths else f", point {row[1]}"
+            raise CmmUqError(f"measurement {row[0]}{point} is predicted twice",
+                             where=f"{prediction.where} lines {seen[row]} and {line}",
                              fix="Number repeats in a column repeat, as the recording does, or keep one")  # fmt: skip
-        seen[key] = line
+        seen[row] = line

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.table import AnyFloat, JobTable, Length, Limit
+from cmm_uq.base.files.table import AnyFloat, JobTable, Length, Limit, key, required
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.importing.recording import read_recording
@@ -27,25 +27,19 @@ class ShortGaugeFacts(JobTable):
 
     file: str
     """Its recording: points 1 and 2, the middles of its two faces, in every measurement and repeat."""
-    length_mm: Length
-    """Certified length at 20 °C."""
+    length_mm: Length = required("Certified length at 20 °C.")
     u_um: Limit
     """Standard uncertainty (k = 1) of that length as it was met: of the certificate and of the gauge's temperature;
     `U_um` with `k` may stand for it."""
     U_um: Limit | None = None
     """Expanded uncertainty, as a certificate states it, in place of `u_um`; needs `k` or `degrees_of_freedom`."""
-    k: Factor | None = None
-    """Coverage factor of `U_um`."""
+    k: Factor | None = key(None, "Coverage factor of `U_um`.")
     degrees_of_freedom: Freedom | None = None
     """Effective degrees of freedom by the certificate; without `k` the factor is Student's t for 95 % by them."""
-    cte_per_k: AnyFloat = 0.0
-    """Coefficient of thermal expansion of the gauge, 1/K."""
-    name: str = ""
-    """Name of the gauge on the certificate."""
-    serial: str = ""
-    """Serial number of the gauge."""
-    certificate: Traceability | None = None
-    """The gauge's own certificate."""
+    cte_per_k: AnyFloat = key(0.0, "Coefficient of thermal expansion of the gauge, 1/K.")
+    name: str = key("", "Name of the gauge on the certificate.")
+    serial: str = key("", "Serial number of the gauge.")
+    certificate: Traceability | None = key(None, "The gauge's own certificate.")
 
     @model_validator(mode="before")
     @classmethod

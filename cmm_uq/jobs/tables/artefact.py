@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
-from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Length
+from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Length, key, required
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.importing.keys import FileKeys
 from cmm_uq.jobs.tables.length_formula import Factor, Freedom, Growing, LengthUncertainty, with_standard_uncertainty
@@ -69,15 +69,12 @@ CIPM: Arrangement = "CIPM MRA"
 class Traceability(JobTable):
     """A certificate of the artefact, the short gauge or a thermometer."""
 
-    number: str = ""
-    """Number of the certificate, for the statement of traceability."""
-    laboratory: str = ""
-    """Who issued the certificate."""
+    number: str = key("", "Number of the certificate, for the statement of traceability.")
+    laboratory: str = key("", "Who issued the certificate.")
     machine: str = ""
     """Measuring machine that the artefact was certified on, by its name or serial number: the machine that it tests
     is warned of."""
-    date: dt.date | None = None
-    """Date of the certificate."""
+    date: dt.date | None = key(None, "Date of the certificate.")
     due: dt.date | None = None
     """Last day on which the calibration holds, by the laboratory that uses it; `interval_months` may stand for it."""
     interval_months: Annotated[int, Field(ge=1, le=600)] | None = None
@@ -85,10 +82,8 @@ class Traceability(JobTable):
     issuer: Issuer | None = None
     """What the issuer is: `national institute`, `accredited`, `not accredited`, `in-house` (the laboratory itself),
     `reference material` (its producer) or `consensus`."""
-    accreditation: str = ""
-    """Number of the issuer's accreditation."""
-    accredited_by: str = ""
-    """Body that accredited the issuer."""
+    accreditation: str = key("", "Number of the issuer's accreditation.")
+    accredited_by: str = key("", "Body that accredited the issuer.")
     arrangement: Arrangement | None = None
     """What covers this calibration: `CIPM MRA` of a national institute; of an accredited laboratory the arrangement that its
     accreditation body has signed, as `ILAC MRA` or `EA MLA`."""
@@ -119,12 +114,9 @@ class ThermometerFacts(JobTable):
 
     columns: Annotated[list[Column], Field(min_length=1, max_length=50)] = ["temp_artefact_c"]
     """Columns of the recording that it gave."""
-    name: str = ""
-    """Name of the thermometer on the certificate."""
-    serial: str = ""
-    """Serial number of the thermometer."""
-    certificate: Traceability = Traceability()
-    """The thermometer's own certificate."""
+    name: str = key("", "Name of the thermometer on the certificate.")
+    serial: str = key("", "Serial number of the thermometer.")
+    certificate: Traceability = key(Traceability(), "The thermometer's own certificate.")
 
 
 class CertificateFile(FileKeys, Traceability):
@@ -149,12 +141,9 @@ class ArtefactFacts(JobTable):
     form_key: ClassVar[str | None] = None
     certified_values: ClassVar[tuple[CertifiedValue, ...]] = (LENGTH,)
 
-    kind: str
-    """What kind of measurement it is; the further keys of the table depend on it."""
-    name: str = ""
-    """Name of the artefact on the certificate."""
-    serial: str = ""
-    """Serial number of the artefact."""
+    kind: str = required("What kind of measurement it is; the further keys of the table depend on it.")
+    name: str = key("", "Name of the artefact on the certificate.")
+    serial: str = key("", "Serial number of the artefact.")
     length_mm: Length | None = None
     """Certified length at 20 °C, of a sphere its diameter; left out for an artefact that is not calibrated."""
     u_um: LengthUncertainty | None = None
@@ -163,8 +152,7 @@ class ArtefactFacts(JobTable):
     U_um: LengthUncertainty | None = None
     """Expanded uncertainty as the artefact's certificate states it, in place of `u_um`: a number, or a formula of the length
     as `"0.2 + 0.5·L/1000"` or `"Q[0.2; 0.5·L/1000]"`, L in mm; needs `k` or `degrees_of_freedom`."""
-    k: Factor | None = None
-    """Coverage factor of `U_um`, or of a column `reference_U_um`."""
+    k: Factor | None = key(None, "Coverage factor of `U_um`, or of a column `reference_U_um`.")
     degrees_of_freedom: Freedom | None = None
     """Effective degrees of freedom by the certificate; without `k` the factor is Student's t for 95 % by them."""
     cte_per_k: AnyFloat = 0.0

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from cmm_uq.base.files.limits import LISTED
-from cmm_uq.base.files.table import JobTable, Temperature, Uncertainty
+from cmm_uq.base.files.table import JobTable, Temperature, Uncertainty, key, required
 from cmm_uq.jobs.tables.identification import Capability, RequiredText
 
 if TYPE_CHECKING:
@@ -26,22 +26,15 @@ class HeldClause(JobTable):
 
     does: str
     """What the program does, as it wrote the form; a clause of which it does something else by now is not checked."""
-    source: str = ""
-    """Where that comes from."""
-    agrees: bool | None = None
-    """Whether it agrees with the copy; left out, nobody has looked."""
-    differs: str = ""
-    """How it differs."""
+    source: str = key("", "Where that comes from.")
+    agrees: bool | None = key(None, "Whether it agrees with the copy; left out, nobody has looked.")
+    differs: str = key("", "How it differs.")
     stricter: bool = False
     """Whether the program asks for more than the copy where it differs, so that a pass stays one."""
-    clause: str = ""
-    """Number of the clause in the copy."""
-    checked_by: RequiredText | None = None
-    """Who held this clause against the copy, where another than the form's."""
-    on: dt.date | None = None
-    """When, where another day than the form's."""
-    edition: RequiredText | None = None
-    """Of which edition, where another than the form's."""
+    clause: str = key("", "Number of the clause in the copy.")
+    checked_by: RequiredText | None = key(None, "Who held this clause against the copy, where another than the form's.")
+    on: dt.date | None = key(None, "When, where another day than the form's.")
+    edition: RequiredText | None = key(None, "Of which edition, where another than the form's.")
 
     def problems(self) -> Iterator[str]:
         if (self.agrees is False) != bool(self.differs.strip()):
@@ -53,14 +46,10 @@ class HeldClause(JobTable):
 class ClausesForm(JobTable):
     """The form of a standard, filled in: ``cmm-uq standards NAME --form FILE`` writes it."""
 
-    standard: str
-    """The standard, by its name in `[[conformity]]`."""
-    checked_by: RequiredText
-    """Who held the clauses against the laboratory's copy."""
-    on: dt.date
-    """When."""
-    edition: RequiredText
-    """Edition of the copy, as its title page has it."""
+    standard: str = required("The standard, by its name in `[[conformity]]`.")
+    checked_by: RequiredText = required("Who held the clauses against the laboratory's copy.")
+    on: dt.date = required("When.")
+    edition: RequiredText = required("Edition of the copy, as its title page has it.")
     clauses: Annotated[dict[str, HeldClause], Field(max_length=LISTED.most)]
     """Each clause, by the name that the form has for it."""
 
@@ -77,10 +66,8 @@ Words = Annotated[str, AfterValidator(_says_something)]
 class Declared(JobTable):
     """What somebody answers for in place of a figure; the certificate prints both."""
 
-    by: Words
-    """Who declares it."""
-    reason: Words
-    """Why."""
+    by: Words = required("Who declares it.")
+    reason: Words = required("Why.")
 
 
 class MachineLines(JobTable):
@@ -88,33 +75,22 @@ class MachineLines(JobTable):
 
     expansion: Declared | None = None
     """The machine measures and corrects the artefact's expansion, its coefficient included."""
-    temperature: Declared | None = None
-    """The machine measures and corrects the artefact's temperature."""
-    alignment: Declared | None = None
-    """The machine aligns the artefact."""
-    fixturing: Declared | None = None
-    """The artefact's mounting belongs to the machine."""
-    repeat: Declared | None = None
-    """What changes between repeated readings is the machine's."""
+    temperature: Declared | None = key(None, "The machine measures and corrects the artefact's temperature.")
+    alignment: Declared | None = key(None, "The machine aligns the artefact.")
+    fixturing: Declared | None = key(None, "The artefact's mounting belongs to the machine.")
+    repeat: Declared | None = key(None, "What changes between repeated readings is the machine's.")
 
 
 class NegligibleLines(JobTable):
     """``[test_uncertainty.negligible]``: lines of the test uncertainty that contribute nothing worth counting."""
 
-    calibration: Declared | None = None
-    """Calibration of the artefact."""
-    expansion: Declared | None = None
-    """The artefact's coefficient of expansion."""
-    temperature: Declared | None = None
-    """The artefact's temperature."""
-    alignment: Declared | None = None
-    """Alignment of the artefact."""
-    fixturing: Declared | None = None
-    """Fixturing of the artefact."""
-    form: Declared | None = None
-    """Calibration of the form deviation of a test sphere."""
-    repeat: Declared | None = None
-    """What of the artefact changes between repeated readings."""
+    calibration: Declared | None = key(None, "Calibration of the artefact.")
+    expansion: Declared | None = key(None, "The artefact's coefficient of expansion.")
+    temperature: Declared | None = key(None, "The artefact's temperature.")
+    alignment: Declared | None = key(None, "Alignment of the artefact.")
+    fixturing: Declared | None = key(None, "Fixturing of the artefact.")
+    form: Declared | None = key(None, "Calibration of the form deviation of a test sphere.")
+    repeat: Declared | None = key(None, "What of the artefact changes between repeated readings.")
 
 
 class TestUncertainty(JobTable):
@@ -126,25 +102,20 @@ class TestUncertainty(JobTable):
     """Standard uncertainty of the artefact's coefficient of expansion, 1/K."""
     u_temperature_k: Annotated[float, Field(ge=0, le=100)] = 0.0
     """Standard uncertainty of the artefact's temperature."""
-    u_alignment_um: Uncertainty = 0.0
-    """Standard uncertainty of a length by misalignment of the artefact."""
-    u_fixturing_um: Uncertainty = 0.0
-    """Standard uncertainty of a length by what the clamping does to it."""
-    u_form_um: Uncertainty = 0.0
-    """Standard uncertainty of the calibrated form deviation of a test sphere."""
+    u_alignment_um: Uncertainty = key(0.0, "Standard uncertainty of a length by misalignment of the artefact.")
+    u_fixturing_um: Uncertainty = key(0.0, "Standard uncertainty of a length by what the clamping does to it.")
+    u_form_um: Uncertainty = key(0.0, "Standard uncertainty of the calibrated form deviation of a test sphere.")
     u_repeat_um: Uncertainty = 0.0
     """Standard uncertainty of a range or difference of repeated readings, by what of the artefact changed between
     them."""
-    negligible: NegligibleLines = NegligibleLines()
-    """Lines that are declared negligible, by whom and why."""
-    machine: MachineLines = MachineLines()
-    """Lines that are declared the machine's own, by whom and why."""
+    negligible: NegligibleLines = key(NegligibleLines(), "Lines that are declared negligible, by whom and why.")
+    machine: MachineLines = key(MachineLines(), "Lines that are declared the machine's own, by whom and why.")
 
     def problems(self) -> Iterator[str]:
-        for line, key in LINE_KEYS.items():
+        for line, stated in LINE_KEYS.items():
             declared = sum(bool(getattr(table, line, None)) for table in (self.negligible, self.machine))
-            if declared > 1 or (declared and getattr(self, key)):
-                yield f"{line} is stated more than once: give {key}, or declare it in one table"
+            if declared > 1 or (declared and getattr(self, stated)):
+                yield f"{line} is stated more than once: give {stated}, or declare it in one table"
 
     def declared(self, line: str) -> Declared | None:
         """By whom and why a line is declared negligible or the machine's own."""
@@ -171,16 +142,11 @@ Kelvins = Annotated[float, Field(gt=0, le=1000)]
 class RatedConditions(JobTable):
     """``[rated_conditions]``: under which the limits of the machine hold, by its data sheet."""
 
-    temperature_c: Limits | None = None
-    """Lowest and highest temperature."""
-    change_k_per_h: Kelvins | None = None
-    """Largest change of temperature in an hour."""
-    difference_k: Kelvins | None = None
-    """Largest difference of temperature between places at one time."""
-    probe: str | None = None
-    """Probe for which the limits hold, as `[probe]` names it."""
-    stylus: str | None = None
-    """Stylus for which the limits hold, as `[probe]` names it."""
+    temperature_c: Limits | None = key(None, "Lowest and highest temperature.")
+    change_k_per_h: Kelvins | None = key(None, "Largest change of temperature in an hour.")
+    difference_k: Kelvins | None = key(None, "Largest difference of temperature between places at one time.")
+    probe: str | None = key(None, "Probe for which the limits hold, as `[probe]` names it.")
+    stylus: str | None = key(None, "Stylus for which the limits hold, as `[probe]` names it.")
     declared: Declared | None = None
     """By whom and why the test counts as one under rated conditions, where no rated temperature is stated."""
 
@@ -194,10 +160,8 @@ class ProbeFacts(JobTable):
 
     sensing: Literal["contacting", "optical"] | None = None
     """Whether the probe touches; standards are for one or the other."""
-    name: str = ""
-    """Name of the probe."""
-    stylus: str = ""
-    """Name of the stylus."""
+    name: str = key("", "Name of the probe.")
+    stylus: str = key("", "Name of the stylus.")
 
 
 @dataclass(frozen=True)

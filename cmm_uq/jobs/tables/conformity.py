@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Protocol, Self
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.table import LARGEST_UM, JobTable, Limit, Uncertainty, at_least
+from cmm_uq.base.files.table import LARGEST_UM, JobTable, Limit, Uncertainty, at_least, key, required
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.circumstances import TEST_KEYS, ClausesForm, TestUncertainty
@@ -20,12 +20,10 @@ from cmm_uq.jobs.tables.length_formula import FLATTEST, mpe_of
 class MaximumPermissibleError(JobTable):
     """``mpe`` in one of three forms: A + L/K, min(A + L/K, B), or B; L in mm, A, B and the result in µm."""
 
-    a_um: Uncertainty | None = None
-    """A of A + L/K."""
+    a_um: Uncertainty | None = key(None, "A of A + L/K.")
     k: Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)] | None = None
     """K of A + L/K, with L in mm and the result in µm."""
-    b_um: Limit | None = None
-    """Limit that does not grow with the length, or at which A + L/K stops growing."""
+    b_um: Limit | None = key(None, "Limit that does not grow with the length, or at which A + L/K stops growing.")
 
     def problems(self) -> Iterator[str]:
         if (self.a_um is None) != (self.k is None):
@@ -48,8 +46,7 @@ Permissible = Annotated[
 class GuardBand(JobTable):
     """A guard band of so many expanded uncertainties; between acceptance and rejection lies *undecided*."""
 
-    guard_band: Annotated[float, Field(ge=0, le=100)]
-    """Width of the guard band in expanded uncertainties."""
+    guard_band: Annotated[float, Field(ge=0, le=100)] = required("Width of the guard band in expanded uncertainties.")
 
 
 class FalseAccept(JobTable):
@@ -83,12 +80,10 @@ class UnconditionalRisk(JobTable):
 class Prior(JobTable):
     """``prior``: what is known of the tested errors beforehand, a normal distribution (JCGM 106:2012, 7.2)."""
 
-    sd_um: Limit | None = None
-    """Standard deviation of the errors of such machines."""
+    sd_um: Limit | None = key(None, "Standard deviation of the errors of such machines.")
     share_of_limit: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
     """The same over the limit of each error."""
-    mean_um: Annotated[float, Field(ge=-LARGEST_UM, le=LARGEST_UM)] = 0.0
-    """Mean of the errors of such machines."""
+    mean_um: Annotated[float, Field(ge=-LARGEST_UM, le=LARGEST_UM)] = key(0.0, "Mean of the errors of such machines.")
 
     def problems(self) -> Iterator[str]:
         if (self.sd_um is None) == (self.share_of_limit is None):
@@ -114,17 +109,14 @@ def needs_prior(rule: Rule) -> bool:
 class ConformityFacts(JobTable):
     """One ``[[conformity]]``: a standard, a limit and a decision rule; ``prior`` for rules and risks that go by one."""
 
-    standard: str
-    """Standard by which it is decided, with its edition."""
+    standard: str = required("Standard by which it is decided, with its edition.")
     characteristic: str | None = None
     """Which of the standard's characteristics, where it has several: E0, R0, E150, P_FTU …; the first where it is
     left out."""
-    limit_um: Limit | None = None
-    """Limit of the quantity."""
+    limit_um: Limit | None = key(None, "Limit of the quantity.")
     mpe: Permissible | None = None
     """Maximum permissible error: `"3 + L/300"` (L in mm, the error in µm), or a table of `a_um`, `k`, `b_um`."""
-    rule: Rule = "ISO 14253-1"
-    """Decision rule, by name or by its figure."""
+    rule: Rule = key("ISO 14253-1", "Decision rule, by name or by its figure.")
     prior: Prior | None = None
     """What is known of such machines beforehand, for rules and risks that go by it (JCGM 106:2012, 7.2)."""
 

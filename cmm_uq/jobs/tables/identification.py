@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from cmm_uq.base.files.table import JobTable, Limit, at_least
+from cmm_uq.base.files.table import JobTable, Limit, at_least, key, required
 from cmm_uq.base.languages.translation import ENGLISH, Code
 from cmm_uq.jobs.source import device_name
 
@@ -41,14 +41,10 @@ _NOTHING_CHANGED = re.compile(
 class ReplacedCertificate(JobTable):
     """The certificate that this one replaces, why, and what changed."""
 
-    number: RequiredText
-    """Number of the certificate that is replaced."""
-    date: dt.date
-    """Its date of issue."""
-    reason: RequiredText
-    """Why it is replaced."""
-    changed: RequiredText
-    """What is changed in this certificate against it (7.8.8.1)."""
+    number: RequiredText = required("Number of the certificate that is replaced.")
+    date: dt.date = required("Its date of issue.")
+    reason: RequiredText = required("Why it is replaced.")
+    changed: RequiredText = required("What is changed in this certificate against it (7.8.8.1).")
     figures_changed: bool | None = None
     """Whether a figure or a decision is changed against it; `false` is refused where one is."""
     results: str | None = None
@@ -79,38 +75,25 @@ class Identification(JobTable):
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$", max_length=100)]
     """Name of the job and of the folder its reports go to: letters, digits, `.`, `_` and `-`."""
-    date: dt.date
-    """Date of the measurement."""
-    number: str = ""
-    """Number of the certificate; the id where it is left out."""
+    date: dt.date = required("Date of the measurement.")
+    number: str = key("", "Number of the certificate; the id where it is left out.")
     replaces: ReplacedCertificate | None = None
     """The certificate that this one replaces (7.8.8), in a table of its own."""
-    issued: dt.date | None = None
-    """Date on which the certificate is issued (ISO/IEC 17025:2017, 7.8.2.1 j)."""
-    customer: str = ""
-    """Name of the customer (7.8.2.1 e)."""
-    address: str = ""
-    """How to reach the customer (7.8.2.1 e)."""
-    place: str = ""
-    """Where the measurement was made (7.8.2.1 c)."""
-    operator: str = ""
-    """Who measured."""
-    procedure: str = ""
-    """The method of the measurement (7.8.2.1 f)."""
-    order: str = ""
-    """Number of the customer's order."""
-    conditions: str = ""
-    """Conditions that influence the results, in words (7.8.4.1 b)."""
+    issued: dt.date | None = key(None, "Date on which the certificate is issued (ISO/IEC 17025:2017, 7.8.2.1 j).")
+    customer: str = key("", "Name of the customer (7.8.2.1 e).")
+    address: str = key("", "How to reach the customer (7.8.2.1 e).")
+    place: str = key("", "Where the measurement was made (7.8.2.1 c).")
+    operator: str = key("", "Who measured.")
+    procedure: str = key("", "The method of the measurement (7.8.2.1 f).")
+    order: str = key("", "Number of the customer's order.")
+    conditions: str = key("", "Conditions that influence the results, in words (7.8.4.1 b).")
     received: dt.date | None = None
     """Day on which the item was received, where that matters for the results (7.8.2.1 h)."""
-    deviations: str = ""
-    """Additions to, deviations from and exclusions from the method (7.8.2.1 n)."""
-    external: str = ""
-    """Results that external providers gave, and who they are (7.8.2.1 p)."""
+    deviations: str = key("", "Additions to, deviations from and exclusions from the method (7.8.2.1 n).")
+    external: str = key("", "Results that external providers gave, and who they are (7.8.2.1 p).")
     from_customer: str = ""
     """Data that the customer gave and the results may rest on; the certificate says that they are the customer's (7.8.2.2)."""
-    remarks: str = ""
-    """Free text of the certificate."""
+    remarks: str = key("", "Free text of the certificate.")
     language: Code = ENGLISH
     """Language of the documents: `en`, `de`, `fr` or `ja`; files for programs stay English."""
 
@@ -133,8 +116,7 @@ _RATIOS, _ANGLES = ("ppm", "µm/m"), ("″",)
 class LengthCapability(JobTable):
     """U = A + L/K of a length, L in mm and U in µm; without ``k`` the same for every length."""
 
-    a_um: Limit
-    """A of U = A + L/K."""
+    a_um: Limit = required("A of U = A + L/K.")
     k: Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)] | None = None
     """K of U = A + L/K, with L in mm and U in µm; without it U is the same for every length."""
 
@@ -142,12 +124,9 @@ class LengthCapability(JobTable):
 class Capability(JobTable):
     """``[laboratory.cmc]``: calibration and measurement capability, the least U (95 %, k = 2) that a certificate may state."""
 
-    length: LengthCapability | None = None
-    """Least U of what is stated in mm or µm."""
-    scale_ppm: Limit | None = None
-    """Least U of what is stated in ppm or µm/m."""
-    angle_arcsec: Limit | None = None
-    """Least U of what is stated in ″."""
+    length: LengthCapability | None = key(None, "Least U of what is stated in mm or µm.")
+    scale_ppm: Limit | None = key(None, "Least U of what is stated in ppm or µm/m.")
+    angle_arcsec: Limit | None = key(None, "Least U of what is stated in ″.")
 
     def least(self, unit: str, length_mm: float) -> float:
         """The least U of a quantity in its own unit; 0 where none is given for it."""
@@ -162,20 +141,14 @@ class Capability(JobTable):
 class Laboratory(JobTable):
     """``[laboratory]``: who answers for the certificate."""
 
-    name: str = ""
-    """Name of the laboratory (7.8.2.1 b)."""
-    address: str = ""
-    """Address of the laboratory (7.8.2.1 b)."""
+    name: str = key("", "Name of the laboratory (7.8.2.1 b).")
+    address: str = key("", "Address of the laboratory (7.8.2.1 b).")
     country: Annotated[str, Field(pattern=r"^([A-Z]{2})?$")] = ""
     """Country of the laboratory, two capital letters of ISO 3166-1; the digital certificate asks for it."""
-    accreditation: str = ""
-    """Accreditation as it is printed, with its number."""
-    signatory: str = ""
-    """Who authorises the certificate (7.8.2.1 o)."""
-    signatory_role: str = ""
-    """Function of who authorises it."""
-    logo: str = ""
-    """File of its logo, SVG or PNG, beside job.toml: it stands at the head of certificates."""
+    accreditation: str = key("", "Accreditation as it is printed, with its number.")
+    signatory: str = key("", "Who authorises the certificate (7.8.2.1 o).")
+    signatory_role: str = key("", "Function of who authorises it.")
+    logo: str = key("", "File of its logo, SVG or PNG, beside job.toml: it stands at the head of certificates.")
     four_eyes: bool = False
     """Whether two persons, neither of them the operator, must release a certificate before it is released."""
     cmc: Capability | None = None

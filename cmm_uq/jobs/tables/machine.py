@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED, MAPS
-from cmm_uq.base.files.table import Column, JobTable, Number, Range, Temperature, Triple, at_least
+from cmm_uq.base.files.table import Column, JobTable, Number, Range, Temperature, Triple, at_least, key, required
 
 Method = Literal["fixed", "A3", "S2", "staircase", "control chart", "drift"]
 Months = Annotated[int, Field(ge=1, le=600)]
@@ -24,8 +24,7 @@ class Recalibration(JobTable):
     """How the interval follows from the history: `fixed`, NCSLI RP-1 `A3` or `S2`, `staircase`, `control chart`, `drift`."""
     reliability: Annotated[float, Field(ge=0.5, le=0.999)] | None = None
     """Probability with which the machine is to be within its limits at its next calibration; 0.95 where nothing is said."""
-    shortest_months: Months = 1
-    """Shortest interval that a method may come to."""
+    shortest_months: Months = key(1, "Shortest interval that a method may come to.")
     longest_months: Months | None = None
     """Longest interval that a method, or with a fixed one interim checks in control, may come to."""
 
@@ -53,12 +52,9 @@ Sensors = Annotated[list[Column], Field(min_length=1, max_length=COLUMNS.most)]
 class Travel(JobTable):
     """``travel_mm``: lowest and highest scale reading of each axis."""
 
-    x: Range | None = None
-    """Lowest and highest scale reading of x."""
-    y: Range | None = None
-    """Lowest and highest scale reading of y."""
-    z: Range | None = None
-    """Lowest and highest scale reading of z."""
+    x: Range | None = key(None, "Lowest and highest scale reading of x.")
+    y: Range | None = key(None, "Lowest and highest scale reading of y.")
+    z: Range | None = key(None, "Lowest and highest scale reading of z.")
 
     def problems(self) -> Iterator[str]:
         for axis in "xyz":
@@ -72,12 +68,9 @@ class Travel(JobTable):
 class SquarenessFacts(JobTable):
     """``squareness_arcsec``: beside an error map."""
 
-    xy: Angle = 0.0
-    """Squareness of y to x: e_x = −S·y."""
-    yz: Angle = 0.0
-    """Squareness of z to y: e_y = −S·z."""
-    zx: Angle = 0.0
-    """Squareness of z to x: e_x = −S·z."""
+    xy: Angle = key(0.0, "Squareness of y to x: e_x = −S·y.")
+    yz: Angle = key(0.0, "Squareness of z to y: e_y = −S·z.")
+    zx: Angle = key(0.0, "Squareness of z to x: e_x = −S·z.")
 
 
 def _of_a_workshop(celsius: float) -> float:
@@ -90,12 +83,10 @@ def _of_a_workshop(celsius: float) -> float:
 class ErrorMapFile(JobTable):
     """One error map, the temperature it was taken at, and the squareness of the axes at that temperature."""
 
-    file: str
-    """CSV of the map: axis, position_mm, three translations in µm and three rotations in ″."""
+    file: str = required("CSV of the map: axis, position_mm, three translations in µm and three rotations in ″.")
     temperature_c: Annotated[Temperature, AfterValidator(_of_a_workshop)]
     """Temperature of the scales at which the map was taken."""
-    squareness_arcsec: SquarenessFacts | None = None
-    """Squareness of the axes at that temperature."""
+    squareness_arcsec: SquarenessFacts | None = key(None, "Squareness of the axes at that temperature.")
 
 
 def _squareness_of_all_or_none(maps: list[ErrorMapFile]) -> list[ErrorMapFile]:
@@ -111,21 +102,16 @@ def _squareness_of_all_or_none(maps: list[ErrorMapFile]) -> list[ErrorMapFile]:
 class ScaleColumns(JobTable):
     """``columns`` of a temperature log: the thermocouples on each scale, by the names of their columns."""
 
-    x: Sensors
-    """Columns of the thermocouples on the scale of x."""
-    y: Sensors
-    """Columns of the thermocouples on the scale of y."""
-    z: Sensors
-    """Columns of the thermocouples on the scale of z."""
+    x: Sensors = required("Columns of the thermocouples on the scale of x.")
+    y: Sensors = required("Columns of the thermocouples on the scale of y.")
+    z: Sensors = required("Columns of the thermocouples on the scale of z.")
 
 
 class TemperatureLogFile(JobTable):
     """``temperature_log``: what the scales' thermocouples showed while the recording was made."""
 
-    file: str
-    """CSV of the log: `time_s` or `time`, and the temperatures."""
-    start: dt.datetime | None = None
-    """Moment at which the recording's `time_s` was 0, for a log that gives dates."""
+    file: str = required("CSV of the log: `time_s` or `time`, and the temperatures.")
+    start: dt.datetime | None = key(None, "Moment at which the recording's `time_s` was 0, for a log that gives dates.")
     columns: ScaleColumns | None = None
     """Columns of the thermocouples on each scale, where their names do not say so."""
     max_gap_s: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
@@ -135,23 +121,17 @@ class TemperatureLogFile(JobTable):
 class Pose(JobTable):
     """Attitude of a digitizer in one index of the wrist: Euler angles 3-1-3 (Harris 2004 eq. 7)."""
 
-    pose: Number = 1
-    """Number of the pose, as the cloud or the recording gives it."""
-    alpha_deg: Turn
-    """First Euler angle (3-1-3)."""
-    beta_deg: Turn
-    """Second Euler angle."""
-    gamma_deg: Turn
-    """Third Euler angle."""
+    pose: Number = key(1, "Number of the pose, as the cloud or the recording gives it.")
+    alpha_deg: Turn = required("First Euler angle (3-1-3).")
+    beta_deg: Turn = required("Second Euler angle.")
+    gamma_deg: Turn = required("Third Euler angle.")
 
 
 class DigitizerFacts(JobTable):
     """``digitizer``: a laser digitizer on the ram."""
 
-    offset_mm: Triple | None = None
-    """[U1, V1, W1]: the mount in the digitizer's frame."""
-    poses: Annotated[list[Pose], Field(max_length=LISTED.most)] = []
-    """Attitudes of the digitizer."""
+    offset_mm: Triple | None = key(None, "[U1, V1, W1]: the mount in the digitizer's frame.")
+    poses: Annotated[list[Pose], Field(max_length=LISTED.most)] = key([], "Attitudes of the digitizer.")
     calibration: Annotated[str, Field(min_length=1)] | None = None
     """In place of both: `results.json` of the digitizer's calibration, or the folder with it, inside the job's."""
 
@@ -175,34 +155,25 @@ def check_carriages(chain: str) -> None:
 class MachineFacts(JobTable):
     """``[machine]``."""
 
-    name: str
-    """Name of the machine."""
-    manufacturer: str = ""
-    """Manufacturer of the machine."""
-    model: str = ""
-    """Model or type of the machine."""
-    serial: str = ""
-    """Serial number of the machine (7.8.2.1 g)."""
-    owner: str = ""
-    """Owner of the machine."""
+    name: str = required("Name of the machine.")
+    manufacturer: str = key("", "Manufacturer of the machine.")
+    model: str = key("", "Model or type of the machine.")
+    serial: str = key("", "Serial number of the machine (7.8.2.1 g).")
+    owner: str = key("", "Owner of the machine.")
     chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}$")] = "XYZ"
     """Carriages from the table to the ram, with F for the frame where the workpiece moves."""
-    travel_mm: Travel = Travel()
-    """Lowest and highest scale reading of each axis."""
+    travel_mm: Travel = key(Travel(), "Lowest and highest scale reading of each axis.")
     origin_mm: Triple = [0.0, 0.0, 0.0]
     """Scale reading of the recording's origin: scale reading = recorded coordinate + origin."""
     error_map: Annotated[
         list[ErrorMapFile], Field(max_length=MAPS.most), AfterValidator(_squareness_of_all_or_none)
     ] = []
     """Error maps of the machine; several are interpolated by the temperature of the scales."""
-    squareness_arcsec: SquarenessFacts | None = None
-    """Squareness of the axes beside an error map."""
+    squareness_arcsec: SquarenessFacts | None = key(None, "Squareness of the axes beside an error map.")
     temperature_log: TemperatureLogFile | None = None
     """What the scales' thermocouples showed while the recording was made."""
-    digitizer: DigitizerFacts | None = None
-    """A laser digitizer on the ram."""
-    calibrate: Recalibration | None = None
-    """When the machine is to be calibrated again, for `cmm-uq due`."""
+    digitizer: DigitizerFacts | None = key(None, "A laser digitizer on the ram.")
+    calibrate: Recalibration | None = key(None, "When the machine is to be calibrated again, for `cmm-uq due`.")
 
     def problems(self) -> Iterator[str]:
         for file in [each.file for each in self.error_map if each.squareness_arcsec and self.squareness_arcsec]:

@@ -12,9 +12,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from cmm_uq.base.errors import CmmUqError, Gathered
+from cmm_uq.base.files.table import JobTable, required
 from cmm_uq.base.output import MANIFEST, read_manifest
 
 Origin = Literal["measured", "simulated", "compensated"]
@@ -34,24 +35,18 @@ _EXAMPLE = re.compile(r"[ \t]*([A-Za-z_]+)[ \t]*=.*# EXAMPLE\b")
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 
-class DerivedFrom(BaseModel):
+class DerivedFrom(JobTable):
     """``derived_from``: the job that a recording was made from, by what, and SHA-256 of what went in and came out.
 
     ``inputs``: of the files of that job; ``files``: of the recording and of what else was written with it (the truth, the
     error maps), which belong to this job and are attached to its documents.
     """
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, defer_build=True, use_attribute_docstrings=True)
-    job: str
-    """Id of the job that the recording was made from."""
-    by: Literal["simulate", "compensate"]
-    """Command that made it."""
-    program: str
-    """Program and version that made it."""
-    inputs: dict[str, Digest]
-    """SHA-256 of each file of that job."""
-    files: dict[str, Digest]
-    """SHA-256 of each file that was written with the recording."""
+    job: str = required("Id of the job that the recording was made from.")
+    by: Literal["simulate", "compensate"] = required("Command that made it.")
+    program: str = required("Program and version that made it.")
+    inputs: dict[str, Digest] = required("SHA-256 of each file of that job.")
+    files: dict[str, Digest] = required("SHA-256 of each file that was written with the recording.")
 
 
 def first_line(by: str, program: str, how: str) -> str:

@@ -9,7 +9,18 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED
-from cmm_uq.base.files.table import AnyFloat, Column, Duration, JobTable, Length, Names, Range, Uncertainty, at_least
+from cmm_uq.base.files.table import (
+    AnyFloat,
+    Column,
+    Duration,
+    JobTable,
+    Length,
+    Names,
+    Range,
+    Uncertainty,
+    at_least,
+    key,
+)
 
 Criterion = Literal["separation", "D", "A", "worst"]
 _SHORTEST = 1e-6  # length of a direction below which it is none
@@ -22,8 +33,7 @@ class FixtureFacts(JobTable):
     directions: Annotated[list[Direction], Field(max_length=LISTED.most)] = []
     """Directions in which a bar or gauge can be held, either way along it, or normals of a plate or triangle; any
     without them."""
-    heights_mm: Range | None = None
-    """Lowest and highest z reading of the artefact's middle."""
+    heights_mm: Range | None = key(None, "Lowest and highest z reading of the artefact's middle.")
 
     def problems(self) -> Iterator[str]:
         if any(not any(direction) for direction in self.directions):
@@ -45,12 +55,9 @@ class PlanFacts(JobTable):
     """Name of the ready plan to start from; the usual one of the kind where it is left out."""
     volume_mm: dict[Literal["x", "y", "z"], Range] = {}
     """Scale readings that points may have; the machine's travel, else the recorded range."""
-    margin_mm: Annotated[float, Field(ge=0, le=1e6)] = 10.0
-    """Kept free at each end of that range."""
-    fixtures: FixtureFacts = FixtureFacts()
-    """How the artefact may stand."""
-    length_mm: Length | None = None
-    """Length of an artefact that is not certified, roughly."""
+    margin_mm: Annotated[float, Field(ge=0, le=1e6)] = key(10.0, "Kept free at each end of that range.")
+    fixtures: FixtureFacts = key(FixtureFacts(), "How the artefact may stand.")
+    length_mm: Length | None = key(None, "Length of an artefact that is not certified, roughly.")
     lengths_mm: Annotated[list[Length], Field(max_length=LISTED.most)] = []
     """Distances of a gauge's faces from the first, or lengths of blocks."""
     pitch_mm: Length | None = None
@@ -59,8 +66,7 @@ class PlanFacts(JobTable):
     """Balls of a plate, or points on a surface, along each side."""
     both_ways: bool | None = None
     """Whether faces of a gauge are met on the way back too; the ready plan of ISO 10360-2 does so by default."""
-    repeats: Annotated[int, Field(ge=1, le=20)] = 3
-    """How often each point is measured."""
+    repeats: Annotated[int, Field(ge=1, le=20)] = key(3, "How often each point is measured.")
     rivals: Names | None = None
     """Effects that may act and are not named in the model; by default all linear ones that these columns could show."""
     columns: Annotated[dict[Column, AnyFloat], Field(max_length=COLUMNS.most)] = {}
@@ -72,18 +78,13 @@ class PlanFacts(JobTable):
     """What a better plan is searched by: that effects can be told apart, or the volume, mean or worst variance."""
     number: Annotated[int, Field(ge=1, le=200)] | None = None
     """Placings of the better plan; as many as the ready plan by default."""
-    more: Annotated[int, Field(ge=1, le=50)] | None = None
-    """Placings to be added to those that there are."""
-    candidates: Annotated[int, Field(ge=1, le=2000)] = 300
-    """Placings that a better plan is chosen from."""
-    minutes_per_placing: Duration = 5.0
-    """Time to set up the artefact once, min."""
-    seconds_per_point: Duration = 10.0
-    """Time to measure one point, s."""
+    more: Annotated[int, Field(ge=1, le=50)] | None = key(None, "Placings to be added to those that there are.")
+    candidates: Annotated[int, Field(ge=1, le=2000)] = key(300, "Placings that a better plan is chosen from.")
+    minutes_per_placing: Duration = key(5.0, "Time to set up the artefact once, min.")
+    seconds_per_point: Duration = key(10.0, "Time to measure one point, s.")
     noise_from: str | None = None
     """`results.json` of an earlier recording, or the folder with it inside the job's, whose noise is expected again."""
-    placing_um: Uncertainty | None = None
-    """Standard deviation of a set-up offset, instead."""
+    placing_um: Uncertainty | None = key(None, "Standard deviation of a set-up offset, instead.")
     growth_um: Uncertainty | None = None
     """Standard deviation of what grows with the length, at the longest, instead."""
     budget_min: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
@@ -111,10 +112,8 @@ class DeclaredSource(JobTable):
     port: Annotated[str, Field(max_length=300)] = ""
     """Where it is: `/dev/ttyUSB0`, `COM3`, `socket://host:port`, `rfc2217://host:port`, `tcp://host:port`,
     `visa://RESOURCE`, or `file:NAME` to replay bytes. """
-    serial: str = ""
-    """Serial number of the instrument; one that it gives itself must be the same."""
-    certificate: str = ""
-    """Number of its calibration certificate."""
+    serial: str = key("", "Serial number of the instrument; one that it gives itself must be the same.")
+    certificate: str = key("", "Number of its calibration certificate.")
     values: Annotated[dict[str, Column], Field(max_length=100)] = {}
     """Column of the recording by the quantity that the instrument gives; without it each goes into the column of its name."""
     latency_ms: Annotated[float, Field(ge=0, le=1e6)] = 0.0
