@@ -15,7 +15,7 @@ from pathlib import Path
 
 from benchmarks.batch.measuring import Watch
 from cmm_uq.app.commands.laboratory.batch import BatchOptions, write_batch
-from cmm_uq.app.commands.laboratory.batch_job import reported
+from cmm_uq.app.commands.laboratory.batch_job import begin
 from cmm_uq.app.commands.reading import read_job
 from tests.conftest import ROOT
 
@@ -33,10 +33,10 @@ def copies(count: int, folder: Path) -> Path:
 
 def alone(repeats: int, *, results_only: bool) -> float:
     """Seconds of processor that one job takes in a process that has imported everything; the least of a few."""
-    task, spent = (str(EXAMPLE), dict(read_job(EXAMPLE).inputs)), []
+    task, spent, report = (str(EXAMPLE), dict(read_job(EXAMPLE).inputs)), [], begin((0, results_only))
     for _ in range(repeats + 1):
         began = time.process_time()
-        reported(task, (0, results_only))
+        report(0, task)
         spent.append(time.process_time() - began)
     return min(spent[1:])
 
