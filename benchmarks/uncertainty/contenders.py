@@ -183,7 +183,7 @@ def suncal_monte_carlo() -> Result:
 
 def ours_gauge_block() -> Result:
     from cmm_uq.maths.uncertainty.monte_carlo import simulate_adaptively
-    from cmm_uq.maths.uncertainty.reference.jcgm_101 import gauge_block
+    from cmm_uq.maths.uncertainty.reference.jcgm import gauge_block
 
     def work() -> list[float]:
         found = simulate_adaptively(gauge_block(), coverage=0.99, digits=2, seed=1)

@@ -77,9 +77,7 @@ def test_the_linear_sum_of_the_effects_would_miss_it(truth: list[float]) -> None
 
 @settings(max_examples=15, deadline=None)
 @given(
-    st.tuples(*[st.floats(-500, 500)] * 3),
-    st.tuples(*[st.floats(-1500, 1500)] * 3),
-    st.sampled_from(["yzx", "zxy"]),
+    st.tuples(*[st.floats(-500, 500)] * 3), st.tuples(*[st.floats(-1500, 1500)] * 3), st.sampled_from(["yzx", "zxy"])
 )
 def test_axes_by_other_names_are_the_same_axes(scales, squareness, order: str) -> None:
     """What is found does not depend on which axis the frame is laid along: x, y, z renamed in turn."""

@@ -6,31 +6,31 @@ import pytest
 
 from cmm_uq.maths.uncertainty.distributions import normal
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.reference import jcgm_100, jcgm_101
+from cmm_uq.maths.uncertainty.reference import jcgm
 
 
 @pytest.fixture
 def end_gauge() -> MeasurementModel:
     """JCGM 100:2008 annex H.1: length of an end gauge by comparison, nm and °C."""
-    return jcgm_100.end_gauge()
+    return jcgm.end_gauge()
 
 
 @pytest.fixture
 def gauge_block() -> MeasurementModel:
     """JCGM 101:2008 9.5: the same with the distributions of the supplement, deviation from 50 mm, nm."""
-    return jcgm_101.gauge_block()
+    return jcgm.gauge_block()
 
 
 @pytest.fixture
 def mass() -> MeasurementModel:
     """JCGM 101:2008 9.3: mass calibration, deviation from 100 g in mg."""
-    return jcgm_101.mass()
+    return jcgm.mass()
 
 
 @pytest.fixture
 def readings() -> dict[str, list[float]]:
     """JCGM 100:2008 table H.2: five simultaneous readings of voltage, current and phase."""
-    return jcgm_100.READINGS
+    return jcgm.READINGS
 
 
 @pytest.fixture

@@ -9,9 +9,8 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.uncertainty.budget import Labels
-from cmm_uq.maths.uncertainty.choice import compare
 from cmm_uq.maths.uncertainty.distributions import normal, rectangular, student_t
-from cmm_uq.maths.uncertainty.evaluation import Request, evaluate, one_at_a_time
+from cmm_uq.maths.uncertainty.evaluation import Request, compare, evaluate, one_at_a_time
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.maths.uncertainty.choice import stability
 from cmm_uq.maths.uncertainty.coverage import draws_in_tail, pareto, tail_of
 from cmm_uq.maths.uncertainty.distributions import normal, student_t
-from cmm_uq.maths.uncertainty.evaluation import Request, evaluate
+from cmm_uq.maths.uncertainty.evaluation import Request, evaluate, stability
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.monte_carlo import simulate_adaptively
 

@@ -219,3 +219,18 @@ def test_a_model_of_linear_algebra_is_propagated_by_complex_steps() -> None:
     assert found.u[0] == pytest.approx(np.hypot(0.3, 0.2))
     with pytest.raises(CmmUqError, match="not exact"):
         second_order(MeasurementModel(model, inputs, differentiation="complex_step"))
+
+
+def test_the_package_uncertainties_propagates_alike() -> None:
+    peer, umath = pytest.importorskip("uncertainties"), pytest.importorskip("uncertainties.umath")
+    mean, V = np.array([1.0, 2.0, 0.5]), np.array([[0.04, 0.01, 0.0], [0.01, 0.09, -0.02], [0.0, -0.02, 0.01]])
+    x, y, z = peer.correlated_values(mean.tolist(), V.tolist())
+    theirs = [umath.sqrt(x * y) + umath.sin(z), x / y - z**3]
+    joint = multivariate_normal(["x", "y", "z"], mean, V)
+    ours = first_order(
+        MeasurementModel(
+            lambda x, y, z: {"a": np.sqrt(x * y) + np.sin(z), "b": x / y - z**3}, joint.inputs, "ab", joint.correlation
+        )
+    )
+    np.testing.assert_allclose(ours.value, [t.nominal_value for t in theirs], rtol=1e-14)
+    np.testing.assert_allclose(ours.covariance, peer.covariance_matrix(theirs), rtol=1e-12)

@@ -116,11 +116,7 @@ def test_what_cannot_be_stated_is_refused(value: float, u: float) -> None:
         rounded(value, u)
 
 
-@given(
-    value=st.floats(-1e9, 1e9),
-    u=st.floats(1e-9, 1e9),
-    digits=st.integers(1, 2),
-)
+@given(value=st.floats(-1e9, 1e9), u=st.floats(1e-9, 1e9), digits=st.integers(1, 2))
 def test_rounding_moves_the_value_by_half_a_unit_and_never_lowers_u_by_more_than_five_percent(
     value: float, u: float, digits: int
 ) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cmm_uq.maths.uncertainty.reference.case import ReferenceCase
+from cmm_uq.maths.uncertainty.reference.jcgm import ReferenceCase
 from cmm_uq.maths.uncertainty.reference.selftest import HEADINGS, REFERENCE_CASES, as_text, run
 
 

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 KELVIN = 273.15  # 0 °C in K
-
 _TRIPLE_POINT_K, _TRIPLE_POINT_PA = 273.16, 611.657
 
 
@@ -53,14 +52,9 @@ def relative_humidity(temperature_c: Any, dew_point_c: Any) -> Any:
     return 100.0 * saturation_pressure(dew_point_c) / saturation_pressure(temperature_c)
 
 
-_GAS_CONSTANT = 8.314472
-_MOLAR_MASS_WATER = 0.018015
-_STANDARD_PA, _STANDARD_K, _STANDARD_COMPRESSIBILITY, _STANDARD_VAPOUR_DENSITY = (
-    101325.0,
-    288.15,
-    0.9995922115,
-    0.00985938,
-)
+_GAS_CONSTANT, _MOLAR_MASS_WATER = 8.314472, 0.018015
+_STANDARD_PA, _STANDARD_K = 101325.0, 288.15
+_STANDARD_COMPRESSIBILITY, _STANDARD_VAPOUR_DENSITY = 0.9995922115, 0.00985938
 _TORR = 101325.0 / 760.0  # 1 mm Hg in Pa
 
 

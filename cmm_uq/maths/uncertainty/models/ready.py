@@ -25,10 +25,9 @@ from cmm_uq.maths.uncertainty.air.state import Air
 from cmm_uq.maths.uncertainty.budget import Budget, Labels
 from cmm_uq.maths.uncertainty.budgets.measurements import UNITS, length_at_20, scale_error, triangle_angles
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES, BudgetTable
-from cmm_uq.maths.uncertainty.choice import Ways
 from cmm_uq.maths.uncertainty.correlation import Correlations
 from cmm_uq.maths.uncertainty.distributions import Distribution
-from cmm_uq.maths.uncertainty.evaluation import Evaluation, OutputResult, Request
+from cmm_uq.maths.uncertainty.evaluation import Evaluation, OutputResult, Request, Ways
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.models.expression import Expression
 
