@@ -8,6 +8,7 @@ import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 from cmm_uq.artefacts import BUILT_IN
@@ -167,6 +168,21 @@ def test_imports_stand_at_the_top() -> None:
     own = sum(count for name, count in inside.items() if name.split(".")[0] == "cmm_uq")
     assert own <= OWN_IMPORTS_INSIDE
     assert {name.split(".")[0] for name in inside} - {"cmm_uq"} <= LOADED_LATE
+
+
+def test_what_benchmarks_import_of_the_package_is_there() -> None:
+    imported = {
+        (node.module, alias.name)
+        for path in (ROOT / "benchmarks").rglob("*.py")
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.ImportFrom) and (node.module or "") in MODULES
+        for alias in node.names
+    }
+    assert not [
+        (module, name)
+        for module, name in imported
+        if f"{module}.{name}" not in MODULES and not hasattr(import_module(str(module)), name)
+    ]
 
 
 def test_the_package_does_not_grow() -> None:

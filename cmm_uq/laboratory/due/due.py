@@ -136,13 +136,16 @@ def machine_due(of: CalibrationRecord, artefacts: Mapping[str, ArtefactRow], on:
     due, reason = _due_date(of, last, adjusted, pool)
     blocked: Text | None = None
     if (used := artefacts.get(last.artefact)) is not None and used.due is not None and used.due < max(on, due):
-        named = {"artefact": Verbatim(used.serial), "due": day(used.due)}
+        artefact, until = Verbatim(used.serial), day(used.due)
         if used.due < on:
             blocked = say(
-                "its artefact {artefact} is out of date since {due}: no certificate can be made with it", **named
-            )
+                "its artefact {artefact} is out of date since {due}: no certificate can be made with it",
+                artefact=artefact, due=until,
+            )  # fmt: skip
         else:
-            remarks.append(say("Its artefact {artefact} is itself due on {due}, before that.", **named))
+            remarks.append(
+                say("Its artefact {artefact} is itself due on {due}, before that.", artefact=artefact, due=until)
+            )
     return item(last.day, due, reason, tuple(remarks), last.artefact, blocked, last.decision in BEYOND and not adjusted)
 
 

@@ -136,7 +136,9 @@ def test_a_second_signal_changes_nothing(tmp_path: Path) -> None:
     ) as process:  # fmt: skip
         assert process.stdout is not None
         process.stdout.readline()
-        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGTERM):
+        process.send_signal(signal.SIGTERM)
+        time.sleep(0.2)  # of signals that wait together the one with the lowest number comes first
+        for number in (signal.SIGINT, signal.SIGTERM):
             process.send_signal(number)
         process.wait(timeout=10)
     assert process.returncode == 128 + signal.SIGTERM
