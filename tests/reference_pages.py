@@ -21,8 +21,7 @@ from cmm_uq.certificate.part.results import PART_RESULTS
 from cmm_uq.certificate.proof.results import KEYS as PROOF, RATE
 from cmm_uq.certificate.results.keys import QUANTITY, RESULTS
 from cmm_uq.jobs.beginning import Beginning
-from cmm_uq.jobs.columns import COLUMNS
-from cmm_uq.jobs.importing.recording import REQUIRED
+from cmm_uq.jobs.columns import COLUMNS, REQUIRED
 from cmm_uq.jobs.part import dmis as drawing_dmis, qif as drawing_qif
 from cmm_uq.jobs.part.characteristic import ASKS, LIMITS, Asks
 from cmm_uq.jobs.part.dmis import PROGRAM as DMIS

@@ -8,8 +8,7 @@ import pytest
 
 from cmm_uq.app.commands.jobs.new import known
 from cmm_uq.artefacts import kind_named
-from cmm_uq.jobs.columns import COLUMNS
-from cmm_uq.jobs.importing.recording import OPTIONAL, REQUIRED
+from cmm_uq.jobs.columns import COLUMNS, OPTIONAL, REQUIRED
 from cmm_uq.machine.physics.catalogue import EVERY
 from tests.conftest import ROOT
 from tests.reference_pages import files

@@ -1,15 +1,24 @@
 """What each column of a recording is: in a sentence, and in a few words for the middle of a text or the axis of a picture.
 
-Columns of one kind alone stand with the kind; a column that only the user knows keeps its name.
+Which there must be, and how large a number each may hold. Columns of one kind alone stand with the kind; a column that only
+the user knows keeps its name.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from cmm_uq.base.files.csv_table import LARGEST
+from cmm_uq.base.files.table import LONGEST_MM
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.base.points import AXES
 from cmm_uq.base.units import unit
+
+COORDINATES = ("x_mm", "y_mm", "z_mm")
+REQUIRED = ("measurement", "point", *COORDINATES)
+WHOLE = ("measurement", "point", "repeat")
 
 COLUMNS: Mapping[str, str] = MappingProxyType({
     "measurement": "Number of the set-up: points of one measurement belong together.",
@@ -24,19 +33,11 @@ COLUMNS: Mapping[str, str] = MappingProxyType({
     "reference_u_x_um": "Standard uncertainty of `reference_x_mm`, where the coordinates of a ball have different ones.",
     "reference_u_y_um": "Standard uncertainty of `reference_y_mm`, likewise.",
     "reference_u_z_um": "Standard uncertainty of `reference_z_mm`, likewise.",
-    "reference_x_mm": "Certified, or nominal, x of this ball or hole in the plate's own frame.",
-    "reference_y_mm": "Certified, or nominal, y of this ball or hole in the plate's own frame.",
-    "reference_z_mm": "Certified, or nominal, z of this ball or hole in the plate's own frame.",
-    "approach_x": "Direction of travel along x into the point: −1, 0 or +1.",
-    "approach_y": "Direction of travel along y into the point: −1, 0 or +1.",
-    "approach_z": "Direction of travel along z into the point: −1, 0 or +1.",
-    "nx": "Outward unit normal at the probed point, along x.",
-    "ny": "Outward unit normal at the probed point, along y.",
-    "nz": "Outward unit normal at the probed point, along z.",
+    **{f"reference_{a}_mm": f"Certified, or nominal, {a} of this ball or hole in the plate's own frame." for a in AXES},
+    **{f"approach_{a}": f"Direction of travel along {a} into the point: −1, 0 or +1." for a in AXES},
+    **{f"n{a}": f"Outward unit normal at the probed point, along {a}." for a in AXES},
     "time_s": "Time since the start of the job, or by a clock that began more than 12 days before.",
-    "temp_x_c": "Temperature of the scale of x.",
-    "temp_y_c": "Temperature of the scale of y.",
-    "temp_z_c": "Temperature of the scale of z.",
+    **{f"temp_{a}_c": f"Temperature of the scale of {a}." for a in AXES},
     "temp_artefact_c": "Temperature of the artefact, by which its length is corrected with cte_per_k.",
     "temp_table_top_c": "Temperature of the table's top.",
     "temp_table_bottom_c": "Temperature of the table's underside.",
@@ -51,16 +52,28 @@ COLUMNS: Mapping[str, str] = MappingProxyType({
     "gamma_deg": "Turn of the digitizer about its own axis.",
     "depth_mm": "Scan depth of the point, along the digitizer's line of sight.",
     "turned_deg": "By how much a sphere was turned about Z against its first set-up: what turns with it is its own form.",
-    "tip_x_mm": "Offset of the stylus tip from the end of the ram, along x.",
-    "tip_y_mm": "Offset of the stylus tip from the end of the ram, along y.",
-    "tip_z_mm": "Offset of the stylus tip from the end of the ram, along z.",
+    **{f"tip_{a}_mm": f"Offset of the stylus tip from the end of the ram, along {a}." for a in AXES},
     "radius_mm": "Radius of the fit that gave the point.",
     "fit_rms_um": "Root mean square of the residuals of the fit that gave the point.",
     "n_points": "Number of points of the fit that gave the point.",
 })  # fmt: skip
+_OF_SOME_MACHINES = re.compile(r"temp_(bridge|ram)_.*|depth_mm|turned_deg")
+OPTIONAL = tuple(name for name in COLUMNS if name not in REQUIRED and not _OF_SOME_MACHINES.fullmatch(name))
+"""Columns that a recording may have, and that are refused in another unit than that of their name."""
+
+LARGEST_NUMBER = 1e9  # of a measurement, point or repeat
+LARGEST_OF = {"_mm": LONGEST_MM, "_um": 1e9, "_c": 1e5, "_pct": 1e6, "_deg": 1e6}
+"""By the ending of a column's name: far beyond any recording in its unit, so that a mistaken unit is still told as one."""
 
 
-_AXES = {a: Verbatim(a.upper()) for a in "xyz"}
+def largest(column: str) -> float:
+    """Largest number, either way, that a column of this name may hold; that of every number where its name says nothing."""
+    if column in WHOLE:
+        return LARGEST_NUMBER
+    return next((most for ending, most in LARGEST_OF.items() if column.endswith(ending)), LARGEST)
+
+
+_AXES = {a: Verbatim(a.upper()) for a in AXES}
 
 WORDS: Mapping[str, Text] = MappingProxyType({
     **{f"{a}_mm": axis for a, axis in _AXES.items()},

@@ -19,8 +19,8 @@ from cmm_uq.base.messages import html_table
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.acquired import Provenance
+from cmm_uq.jobs.importing.format import Recognition
 from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.jobs.importing.sheet import Recognition
 from cmm_uq.jobs.recording.prediction import Prediction, SimulationFacts
 from cmm_uq.jobs.recording.short_gauge import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.reports import AsFound

@@ -19,7 +19,7 @@ from pydantic import Field, field_validator
 
 from cmm_uq.base.files.limits import COLUMNS, EFFECTS
 from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Uncertainty, key, required
-from cmm_uq.jobs.importing.recording import REQUIRED, largest
+from cmm_uq.jobs.columns import REQUIRED, largest
 
 
 class ByAxis(JobTable):

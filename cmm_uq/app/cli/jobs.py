@@ -20,8 +20,8 @@ from cmm_uq.base.errors import CmmUqError, printable
 if TYPE_CHECKING:
     from cmm_uq.app.commands.jobs.check import JobCheck
     from cmm_uq.certificate.wording import Summary
+    from cmm_uq.jobs.importing.format import Recognition
     from cmm_uq.jobs.importing.keys import ImportKeys
-    from cmm_uq.jobs.importing.sheet import Recognition
     from cmm_uq.jobs.job import Job
 
 Columns = Annotated[

@@ -17,8 +17,8 @@ from tomlkit.exceptions import TOMLKitError
 
 from cmm_uq.base.errors import MOST_GATHERED, CmmUqError, shortened, suggestion
 from cmm_uq.base.files.content import text_of
+from cmm_uq.base.files.csv_table import conversion
 from cmm_uq.base.files.limits import DEPTH, LISTED, NUMERAL, TEXT, TOML_KEY, WORD
-from cmm_uq.base.files.numbers import conversion
 from cmm_uq.base.files.table import sentences
 
 _STRING = (

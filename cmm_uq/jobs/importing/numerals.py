@@ -12,10 +12,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.numbers import GIVE, LARGEST, number_problem, numbers
+from cmm_uq.base.files.csv_table import GIVE, LARGEST, number_problem, numbers
 from cmm_uq.base.points import Floats
+from cmm_uq.jobs.importing.format import Cell
 from cmm_uq.jobs.importing.keys import WrittenUnit, apart, unit_named
-from cmm_uq.jobs.importing.sheet import Cell
 
 _E = r"(?:[eE][+-]?\d+)?"
 _BLANKS = " \u00a0\u202f\u2009'’"

@@ -1,54 +1,58 @@
-"""Reads a recording: a CSV with one row a point.
+"""The file of a recording: a CSV with one row a point is read as it is, a file in any other format is imported.
 
-Every cell is checked where it stands, so that a message can name line and column. What a column of a known name must
-look like is listed here once; any other numeric column is kept as a covariate.
+Every cell is checked where it stands, so that a message can name line and column; any numeric column of another name than
+those of a recording is kept as a covariate.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import compress
-from types import MappingProxyType
+from pathlib import PurePath
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.base.files.csv_table import cells_of, column_problem
-from cmm_uq.base.files.numbers import GIVE, GIVE_OR_REMOVE, LARGEST, MEASURE, conversion, numbers
-from cmm_uq.base.files.table import LONGEST_MM
-from cmm_uq.base.points import Floats, Machine, Points
-
-COORDINATES = ("x_mm", "y_mm", "z_mm")
-REQUIRED = ("measurement", "point", *COORDINATES)
-OPTIONAL = (
-    "repeat", "reference_mm", "reference_u_um", "reference_U_um", "approach_x", "approach_y", "approach_z",
-    "reference_x_mm", "reference_y_mm", "reference_z_mm", "reference_u_x_um", "reference_u_y_um", "reference_u_z_um",
-    "nx", "ny", "nz", "time_s", "temp_x_c", "temp_y_c", "temp_z_c", "temp_artefact_c",
-    "temp_table_top_c", "temp_table_bottom_c", "temp_air_c", "pressure_hpa", "humidity_pct", "speed_mm_s", "gamma_deg",
-    "tip_x_mm", "tip_y_mm", "tip_z_mm", "radius_mm", "fit_rms_um", "n_points",
-)  # fmt: skip
-WHOLE = ("measurement", "point", "repeat")
-QUANTITIES: Mapping[str, str] = MappingProxyType(
-    {re.sub(r"_(mm|um|c|s|hpa|pct|deg|mm_s)$", "", name): name for name in (*REQUIRED, *OPTIONAL)}
-)
-LARGEST_NUMBER = 1e9  # of a measurement, point or repeat
-
-LARGEST_OF: Mapping[str, float] = MappingProxyType({"_mm": LONGEST_MM, "_um": 1e9, "_c": 1e5, "_pct": 1e6, "_deg": 1e6})
-"""By the ending of a column's name: far beyond any recording in its unit, so that a mistaken unit is still told as one."""
+from cmm_uq.base.files.csv_table import GIVE, GIVE_OR_REMOVE, MEASURE, cells_of, column_problem, conversion, numbers
+from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.messages import Verbatim, commas, names, say
+from cmm_uq.base.points import Floats, Ints, Machine, Points
+from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest
+from cmm_uq.jobs.importing.columns import columns_of
+from cmm_uq.jobs.importing.format import Fact, Recognition, Sheet, format_of
+from cmm_uq.jobs.importing.header import POINTS, REFERENCES, Header, header_of, no_header
+from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys, length_named
 
 SHORTEST_NORMAL, LONGEST_NORMAL = 1e-3, 1e3
 """Lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled."""
 
-OTHER_UNITS = re.compile(
+_QUANTITIES = {re.sub(r"_(mm|um|c|s|hpa|pct|deg|mm_s)$", "", name): name for name in (*REQUIRED, *OPTIONAL)}
+_OTHER_UNITS = re.compile(
     r"_(m|cm|um|µm|mm|nm|in|inch|mil|k|f|c|min|ms|h|s|pa|kpa|hpa|mbar|mmhg|rad|deg|arcsec|pct|percent)$"
+)
+_UNIT_LINE = re.compile(
+    r"\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;]+\s*([^\s;]+)",
+    re.IGNORECASE,
 )
 
 
 def read_recording(content: bytes, name: str, machine: Machine, without: Collection[str] = ()) -> Points:
+    """Points of a recording in the project's own format, but for columns that it is to be read ``without``."""
     wrong, table = Gathered(), dict[str, Floats]()
-    header, rows, lines = _table(content, name, wrong)
+    cells = cells_of(content, name, "Save the recording as CSV in UTF-8")
+    header, whole = cells.header, [len(row) == len(cells.header) for row in cells.rows]
+    for row, line in zip(cells.rows, cells.lines, strict=True):
+        if len(row) != len(header):
+            wrong.add(CmmUqError(
+                f"has {len(row)} cells where the header has {len(header)}", where=f"{name} line {line}",
+                fix="Complete the row; if it is the last one, the file was cut off: export it again",
+            ))  # fmt: skip
+    if not cells.rows:
+        raise CmmUqError("has no rows", where=name, fix="The first line names the columns, then one row a point")
+    rows, lines = list(compress(cells.rows, whole)), list(compress(cells.lines, whole))
     with wrong.going_on():
         _check_header(header, name)
     if not set(REQUIRED) <= set(header):
@@ -59,17 +63,16 @@ def read_recording(content: bytes, name: str, machine: Machine, without: Collect
         return numbers([row[i] for row in rows], lambda row: f"{name} line {lines[row]}, column {header[i]}", fix)
 
     for i, column in enumerate(header):
-        if column in without:
-            continue
-        with wrong.going_on():
-            table[column] = column_of(i)
+        if column not in without:
+            with wrong.going_on():
+                table[column] = column_of(i)
     return points_of(table, lines, name, machine, wrong)
 
 
 def points_of(
     table: Mapping[str, Floats], lines: Sequence[int], name: str, machine: Machine, wrong: Gathered | None = None
 ) -> Points:
-    """Points of the columns of a recording, each (n,), those of :data:`REQUIRED` among them."""
+    """Points of the columns of a recording, each (n,), the required ones among them."""
     wrong = wrong or Gathered()
 
     def refuse(bad: NDArray[np.bool_], problem: Callable[[float], str], fix: str, column: str, of: Floats) -> None:
@@ -97,30 +100,18 @@ def points_of(
         refuse(~np.isin(values, (-1, 0, 1)), "{:g} is no direction".format,
                "The direction of travel into the point is −1, 0 or +1", column, values)  # fmt: skip
     wrong.refuse()
-    number = {column: table.get(column, np.ones(len(lines))).astype(np.int64) for column in WHOLE}
-    points = Points(
-        np.column_stack([table["x_mm"], table["y_mm"], table["z_mm"]]),
-        number["measurement"], number["point"], number["repeat"], machine,
-        {column: values for column, values in table.items() if column not in (*REQUIRED, "repeat")},
-        np.array(lines, dtype=np.int64),
-    )  # fmt: skip
-    _check_unique(points, name)
-    return points
-
-
-def _table(content: bytes, name: str, wrong: Gathered) -> tuple[list[str], list[list[str]], list[int]]:
-    """Header, complete rows and their lines; rows of another length are gathered."""
-    cells = cells_of(content, name, "Save the recording as CSV in UTF-8")
-    whole = [len(row) == len(cells.header) for row in cells.rows]
-    for row, line in zip(cells.rows, cells.lines, strict=True):
-        if len(row) != len(cells.header):
-            wrong.add(CmmUqError(
-                f"has {len(row)} cells where the header has {len(cells.header)}", where=f"{name} line {line}",
-                fix="Complete the row; if it is the last one, the file was cut off: export it again",
-            ))  # fmt: skip
-    if not cells.rows:
-        raise CmmUqError("has no rows", where=name, fix="The first line names the columns, then one row a point")
-    return cells.header, list(compress(cells.rows, whole)), list(compress(cells.lines, whole))
+    measurement, point, repeat = (table.get(column, np.ones(len(lines))).astype(np.int64) for column in WHOLE)
+    seen: dict[tuple[int, int, int], int] = {}
+    for key, line in zip(zip(*map(np.ndarray.tolist, (measurement, point, repeat)), strict=True), lines, strict=True):
+        if key in seen:
+            raise CmmUqError(
+                f"measurement {key[0]}, point {key[1]}, repeat {key[2]} is there twice",
+                where=f"{name} lines {seen[key]} and {line}", fix="Number repeated measurements in a column repeat",
+            )  # fmt: skip
+        seen[key] = line
+    columns = {column: values for column, values in table.items() if column not in (*REQUIRED, "repeat")}
+    xyz = np.column_stack([table[column] for column in COORDINATES])
+    return Points(xyz, measurement, point, repeat, machine, columns, np.array(lines, dtype=np.int64))
 
 
 def _check_header(header: Sequence[str], name: str) -> None:
@@ -137,7 +128,7 @@ def _check_header(header: Sequence[str], name: str) -> None:
         elif problem := column_problem(column):
             wrong.add(CmmUqError(problem, where=where, fix="Name it with letters, digits and _"))
     for column in header:
-        known = QUANTITIES.get(OTHER_UNITS.sub("", column))
+        known = _QUANTITIES.get(_OTHER_UNITS.sub("", column))
         if known and column not in (*REQUIRED, *OPTIONAL):
             fix = conversion(column, [known]) or f"Convert it and name it {known}, or say unit under [recording]"
             wrong.add(CmmUqError(f"the column {column!r} is not in the unit of {known!r}", where=where, fix=fix))
@@ -148,20 +139,102 @@ def _check_header(header: Sequence[str], name: str) -> None:
     wrong.refuse()
 
 
-def largest(column: str) -> float:
-    """Largest number, either way, that a column of this name may hold; that of every number where its name says nothing."""
-    if column in WHOLE:
-        return LARGEST_NUMBER
-    return next((most for ending, most in LARGEST_OF.items() if column.endswith(ending)), LARGEST)
+@dataclass(frozen=True, eq=False)
+class ImportedTable:
+    """A file, read: columns of a recording by name, each (n,), in the units of their names, and each point's line."""
+
+    columns: dict[str, Floats]
+    lines: Ints
+    recognised: Recognition
 
 
-def _check_unique(points: Points, name: str) -> None:
-    seen: dict[tuple[int, int, int], int] = {}
-    keys = zip(points.measurement.tolist(), points.point.tolist(), points.repeat.tolist(), strict=True)
-    for key, line in zip(keys, points.lines.tolist(), strict=True):
-        if key in seen:
-            raise CmmUqError(
-                f"measurement {key[0]}, point {key[1]}, repeat {key[2]} is there twice",
-                where=f"{name} lines {seen[key]} and {line}", fix="Number repeated measurements in a column repeat",
-            )  # fmt: skip
-        seen[key] = line
+def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | None = None) -> ImportedTable:
+    """A recording in any format that is known."""
+    table = _imported(content, where, keys, POINTS, reach_mm)
+    headings, columns = table.recognised.columns, table.columns
+    uncertainties = [name for name in columns if name.startswith("reference_u_") or name == "reference_U_um"]
+    others = [name for name in uncertainties if headings[name] != name and name not in keys.columns]
+    if not others or any(name.startswith("reference_") and name.endswith("_mm") for name in columns):
+        return table
+    # of the measured point, not of a certificate
+    unused = Fact(
+        "uncertainties_not_used", say("Uncertainties not used"), commas(names([headings[name] for name in others]))
+    )
+    recognised = replace(
+        table.recognised, columns={name: heading for name, heading in headings.items() if name not in others},
+        facts=(*table.recognised.facts, unused),
+    )  # fmt: skip
+    used = {name: values for name, values in columns.items() if name not in others}
+    return replace(table, columns=used, recognised=recognised)
+
+
+def imported_references(content: bytes, where: str, keys: FileKeys) -> ImportedTable:
+    """Certified values in any format that is known: distances or places, by the number of their point."""
+    every = ImportKeys.model_validate({name: getattr(keys, name) for name in FileKeys.model_fields})
+    table = _imported(content, where, every, REFERENCES, None)
+    columns = {f"reference_{name}" if name in COORDINATES else name: values for name, values in table.columns.items()}
+    return replace(table, columns=columns)
+
+
+def _imported(
+    content: bytes, where: str, keys: ImportKeys, wanted: Sequence[Sequence[str]], reach_mm: float | None
+) -> ImportedTable:
+    if len(content) > TABLE_BYTES.most:
+        raise CmmUqError(f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file", where=where,
+                         fix="Split it")  # fmt: skip
+    form = format_of(content, where)
+    sheet, header = _chosen(form.read(content, where, keys), keys, where, wanted)
+    for row in sheet.rows[: header.row] if sheet.unit is None else ():  # ``Units: mm`` in a line before the table
+        match = _UNIT_LINE.search(";".join(map(str, row)))
+        if match and (unit := length_named(match[1].strip("[]().,;"))):
+            sheet = replace(sheet, unit=unit.name)
+            break
+    columns = columns_of(sheet, header, keys, where, reach_mm=reach_mm, points=wanted is POINTS)
+    named = (Fact("sheet", say("Sheet"), Verbatim(sheet.name)),) if sheet.name else ()
+    recognised = Recognition(PurePath(where).name, form.name, form.title, (*named, *sheet.facts, *columns.facts),
+                             columns.sources, len(columns.lines))  # fmt: skip
+    return ImportedTable(columns.values, columns.lines, recognised)
+
+
+def _chosen(
+    sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Sequence[Sequence[str]]
+) -> tuple[Sheet, Header]:
+    """The sheet with the table, and its header."""
+    if keys.sheet is not None:
+        known = [sheet.name for sheet in sheets if sheet.name]
+        sheets = [sheet for sheet in sheets if sheet.name.casefold() == keys.sheet.casefold()]
+        if not sheets:
+            fix = suggestion(keys.sheet, known) if known else "Leave sheet out: the file has only one table"
+            raise CmmUqError(f"has no sheet {keys.sheet!r}", where=where, fix=fix)
+    tables = [(sheet, header) for sheet in sheets if (header := header_of(sheet, keys, where, wanted)) is not None]
+    if not tables:
+        raise no_header(sheets, keys, where, wanted)
+    if len(tables) > 1:
+        listed = ", ".join(repr(sheet.name) for sheet, _ in tables)
+        raise CmmUqError(f"holds {len(tables)} tables of points: {listed}", where=where,
+                         fix=f'Say which: sheet = "{tables[0][0].name}"')  # fmt: skip
+    return tables[0]
+
+
+def read_recording_file(
+    content: bytes, where: str, machine: Machine, keys: ImportKeys, without: Collection[str] = ()
+) -> tuple[Points, Recognition | None]:
+    """Points of a recording, and how it was read where it is in another format than the project's own."""
+    if not keys.asked and is_own(content):
+        return read_recording(content, where, machine, without), None
+    spans = machine.travel_mm[:, 1] - machine.travel_mm[:, 0]
+    reach = float(np.linalg.norm(spans)) if np.all(np.isfinite(spans)) else None
+    table = imported(content, where, keys, reach_mm=reach)
+    return points_of(table.columns, table.lines.tolist(), where, machine), table.recognised
+
+
+def is_own(content: bytes) -> bool:
+    """Whether a recording is in the project's own format: empty, or a header that names one of its columns between commas."""
+    return not content.strip() or any(name in REQUIRED for name in header(content))
+
+
+def header(content: bytes) -> list[str]:
+    """Names between commas in the first line that is no comment."""
+    text = content[:16_384].decode("utf-8-sig", errors="replace")
+    line = next((line for line in map(str.strip, text.splitlines()) if line and not line.startswith("#")), "")
+    return [name.strip().strip('"') for name in line.split(",")]

@@ -14,8 +14,8 @@ from copy import copy
 from xml.etree.ElementTree import Element, SubElement
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.jobs.importing.documents import child
 from cmm_uq.jobs.importing.encodings import local, root_of
-from cmm_uq.jobs.importing.qif import child
 from cmm_uq.jobs.part.characteristic import ASKS, What
 from cmm_uq.jobs.part.drawing import (
     Drawing,

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from xml.etree.ElementTree import Element
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.jobs.importing.documents import child, length_unit, three
 from cmm_uq.jobs.importing.encodings import local
 from cmm_uq.jobs.importing.keys import UNITS, length_named
-from cmm_uq.jobs.importing.qif import child, length_unit, three
 from cmm_uq.jobs.part.characteristic import What
 from cmm_uq.jobs.part.datums import BETWEEN
 from cmm_uq.jobs.part.drawing import Facts, NotUnderstoodError

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.base.files.csv_table import Cells, cells_of
-from cmm_uq.base.files.numbers import numbers
+from cmm_uq.base.files.csv_table import Cells, cells_of, numbers
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.part.probed import Probed
 from cmm_uq.jobs.part.tables import CalibratedPartFacts, OrientationsFacts, PartFile, Places

@@ -23,9 +23,9 @@ from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import UNITS
 from cmm_uq.jobs.dcc import Certificate, read
 from cmm_uq.jobs.dcc.figures import QuantityFigures, figures
-from cmm_uq.jobs.importing.dcc import Dcc, heading
-from cmm_uq.jobs.importing.imported import imported_references
-from cmm_uq.jobs.importing.sheet import Fact, Recognition
+from cmm_uq.jobs.importing.documents import Dcc, heading
+from cmm_uq.jobs.importing.format import Fact, Recognition
+from cmm_uq.jobs.importing.recording import imported_references
 from cmm_uq.jobs.tables import artefact as artefacts
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertificateFile, CertifiedValue, ReferencedFacts
 from cmm_uq.jobs.tables.length_formula import Growing, growing_of, with_standard_uncertainty

@@ -19,13 +19,12 @@ from pydantic import Field, field_validator
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.content import text_of
-from cmm_uq.base.files.csv_table import Cells, cells_of
+from cmm_uq.base.files.csv_table import Cells, cells_of, numbers
 from cmm_uq.base.files.limits import MAPS
-from cmm_uq.base.files.numbers import numbers
 from cmm_uq.base.files.table import JobTable, Length, Names, Uncertainty, key
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.jobs.importing.recording import COORDINATES, WHOLE, largest
+from cmm_uq.jobs.columns import COORDINATES, WHOLE, largest
 from cmm_uq.jobs.tables.machine import ErrorMapFile
 
 KEY = "[simulation]"

@@ -17,10 +17,10 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import REFERENCE_TEMPERATURE
-from cmm_uq.jobs.importing.imported import imported_references
-from cmm_uq.jobs.importing.recording import LARGEST_NUMBER, OPTIONAL, largest
-from cmm_uq.jobs.importing.sheet import Recognition
-from cmm_uq.jobs.importing.vocabulary import COVERAGE
+from cmm_uq.jobs.columns import LARGEST_NUMBER, OPTIONAL, largest
+from cmm_uq.jobs.importing.format import Recognition
+from cmm_uq.jobs.importing.header import COVERAGE
+from cmm_uq.jobs.importing.recording import imported_references
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.length_formula import factor_of
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.numbers import number_problem
+from cmm_uq.base.files.csv_table import number_problem
 from cmm_uq.base.files.table import LONGEST_MM
 from cmm_uq.base.messages import Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.points import Floats, Machine

@@ -19,9 +19,8 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.csv_table import CsvTable, csv_table
+from cmm_uq.base.files.csv_table import CsvTable, csv_table, number_problem
 from cmm_uq.base.files.limits import LINE, MAP_BYTES, MAP_ROWS
-from cmm_uq.base.files.numbers import number_problem
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
 

@@ -28,7 +28,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.origin import origin_warnings
 from cmm_uq.certificate.results.keys import RESULTS, described
 from cmm_uq.certificate.results.plain import as_json
-from cmm_uq.jobs.importing.recording import REQUIRED
+from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.origin import SIMULATED
 from tests.app.commands.test_schemas import dated

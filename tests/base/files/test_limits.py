@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-from cmm_uq.base.files import limits, numbers, table
+from cmm_uq.base.files import csv_table as numbers, limits, table
+from cmm_uq.jobs import columns
 from cmm_uq.jobs.importing import recording
 from cmm_uq.jobs.tables.machine import SHORTEST_TRAVEL_MM
 from tests.conftest import ROOT
@@ -32,12 +33,12 @@ def test_every_limit_is_in_the_table() -> None:
 def test_the_ranges_of_the_page_are_those_of_the_code() -> None:
     for text in (
         f"between {plain(numbers.SMALLEST)} and {plain(numbers.LARGEST)} in size",
-        f"| {plain(recording.LARGEST_NUMBER)} | whole numbers",
-        *(f"{ending}`" for ending in recording.LARGEST_OF),
-        f"| `…_mm` | {plain(recording.LARGEST_OF['_mm'])} |",
-        f"| `…_um` | {plain(recording.LARGEST_OF['_um'])} |",
-        f"| `…_c` | {plain(recording.LARGEST_OF['_c'])} |",
-        f"`…_deg` | {plain(recording.LARGEST_OF['_deg'])} |",
+        f"| {plain(columns.LARGEST_NUMBER)} | whole numbers",
+        *(f"{ending}`" for ending in columns.LARGEST_OF),
+        f"| `…_mm` | {plain(columns.LARGEST_OF['_mm'])} |",
+        f"| `…_um` | {plain(columns.LARGEST_OF['_um'])} |",
+        f"| `…_c` | {plain(columns.LARGEST_OF['_c'])} |",
+        f"`…_deg` | {plain(columns.LARGEST_OF['_deg'])} |",
         f"between {plain(recording.SHORTEST_NORMAL)} and {plain(recording.LONGEST_NORMAL)} is refused",
         f"−{plain(table.LONGEST_MM)} … {plain(table.LONGEST_MM)}; a travel of at least {plain(SHORTEST_TRAVEL_MM)}",
         f"| `u_coordinate_um`, limits, µm | {plain(table.SMALLEST_UM)} … {plain(table.LARGEST_UM)} |",

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import example, given, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.numbers import LARGEST, SMALLEST, conversion, number_problem, numbers
+from cmm_uq.base.files.csv_table import LARGEST, SMALLEST, conversion, number_problem, numbers
 
 GRAMMAR = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 """Written down anew, without a look at the code."""

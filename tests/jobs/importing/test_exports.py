@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.imported import ImportedTable, imported
 from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.recording import ImportedTable, imported
 from tests.jobs.importing.exports import EXPORTS, NUMBERS, XYZ
 
 PAIRS = {"trace.txt": {"points_per_measurement": 2}}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.imported import imported
 from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.recording import imported
 from tests.jobs.importing.exports import EXPORTS, archive, excel, opendocument
 
 HEAD = "Measurement,Point,X [mm],Y [mm],Z [mm]\n"

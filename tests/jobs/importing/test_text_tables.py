@@ -9,8 +9,8 @@ import pytest
 from hypothesis import assume, given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.imported import ImportedTable, imported
 from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.recording import ImportedTable, imported
 from tests.jobs.importing.exports import HEADINGS
 
 MICROMETRES = st.integers(-2_000_000_000, 2_000_000_000)

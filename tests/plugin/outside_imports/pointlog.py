@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cmm_uq.base.messages import say
-from cmm_uq.jobs.importing.format import Format
+from cmm_uq.jobs.importing.format import Format, Sheet
 from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.jobs.importing.sheet import Sheet
 
 
 class PointLog(Format):

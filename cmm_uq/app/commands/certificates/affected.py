@@ -27,7 +27,7 @@ from cmm_uq.app.commands.report import REPORT, report_outcome
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import ENGLISH, code_of
 from cmm_uq.certificate.results.plain import as_json
-from cmm_uq.jobs.importing.imported import header, is_own
+from cmm_uq.jobs.importing.recording import header, is_own
 from cmm_uq.jobs.job import Recorded
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records import content as contents

@@ -16,10 +16,10 @@ from cmm_uq.base.output.new_file import refuse_taken, write_new
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
 from cmm_uq.certificate.results.qif_file import qif
+from cmm_uq.jobs.columns import WHOLE
 from cmm_uq.jobs.dcc import Certificate, read
-from cmm_uq.jobs.importing.imported import ImportedTable, imported
 from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.jobs.importing.recording import WHOLE, points_of
+from cmm_uq.jobs.importing.recording import ImportedTable, imported, points_of
 from cmm_uq.jobs.reports import ReportResults, read_results
 from cmm_uq.jobs.source import RESULTS
 

@@ -12,7 +12,7 @@ from cmm_uq.artefacts import kind_named, names
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.jobs.beginning import Beginning
-from cmm_uq.jobs.importing.recording import REQUIRED
+from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.schema import commented
 from cmm_uq.jobs.tables.origin import EXAMPLE, SIMULATED

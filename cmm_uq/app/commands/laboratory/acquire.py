@@ -25,10 +25,10 @@ from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.acquired import provenance_name
+from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.derived_job import PROGRAM
-from cmm_uq.jobs.importing.imported import ImportedTable, imported, is_own
 from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.jobs.importing.recording import REQUIRED, read_recording
+from cmm_uq.jobs.importing.recording import ImportedTable, imported, is_own, read_recording
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import inside
 from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED

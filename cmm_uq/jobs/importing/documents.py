@@ -1,17 +1,27 @@
-"""QIF results (ANSI/DMSC QIF 3.0, ISO 23952): measured spheres, points and circles, or the measured points themselves."""
+"""Documents in XML: results of QIF (ANSI/DMSC QIF 3.0, ISO 23952), and digital calibration certificates (DCC 3, PTB).
+
+Of QIF measured spheres, points and circles are read, or the measured points themselves; of a certificate the quantities of a
+result, a column each, by the names that it gives.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from itertools import groupby
+from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import ROWS
 from cmm_uq.base.messages import Verbatim, number, say
+from cmm_uq.base.units import UNITS as PRINTED
 from cmm_uq.jobs.importing.encodings import begins_with, local, root_of
-from cmm_uq.jobs.importing.format import Format
+from cmm_uq.jobs.importing.format import Fact, Format, Row, Sheet, sheets_of
 from cmm_uq.jobs.importing.keys import LENGTH, UNITS, ImportKeys, WrittenUnit, length_named
-from cmm_uq.jobs.importing.sheet import Fact, Row, Sheet, sheets_of
+
+if TYPE_CHECKING:
+    from cmm_uq.jobs.dcc.figures import QuantityFigures
 
 _MEASUREMENT = "FeatureMeasurement"
 PLACED = tuple(f"{sort}{_MEASUREMENT}" for sort in ("Sphere", "Point", "Circle"))
@@ -45,8 +55,8 @@ class Qif(Format):
         facts = [Fact("version", say("Version of QIF"), Verbatim(root.get("versionQIF", "")))]
         if others:
             facts.append(Fact("features_not_used", say("Features that are no place"), number(others)))
-        unit = length_unit(root, where)
-        return sheets_of(rows, ["name", "x", "y", "z", "i", "j", "k"], unit=unit, decimal=".", facts=tuple(facts))
+        headings, unit = ["name", "x", "y", "z", "i", "j", "k"], length_unit(root, where)
+        return sheets_of(rows, headings, unit=unit, decimal=".", facts=tuple(facts))
 
 
 def length_unit(root: Element, where: str) -> str | None:
@@ -61,14 +71,10 @@ def length_unit(root: Element, where: str) -> str | None:
         lengths = (one for one in UNITS.values() if one.sort == LENGTH)
         unit = next((one for one in lengths if abs(_metres(one) / metres - 1) < 1e-9), None)
     if unit is None or abs(_metres(unit) / metres - 1) > 1e-6:
-        problem = (
-            f"of {factor} m is not known"
-            if factor
-            else "has no Factor to metres (UnitConversion), and is then the metre"
-        )
-        raise CmmUqError(
-            f"the unit {name!r} {problem}", where=f"{where}: FileUnits", fix="Export the results in mm or inch"
-        )
+        unknown = f"of {factor} m is not known"
+        problem = unknown if factor else "has no Factor to metres (UnitConversion), and is then the metre"
+        raise CmmUqError(f"the unit {name!r} {problem}", where=f"{where}: FileUnits",
+                         fix="Export the results in mm or inch")  # fmt: skip
     return unit.name
 
 
@@ -120,3 +126,57 @@ def child(element: Element, name: str) -> str:
 
 def _first(element: Element, name: str) -> Element | None:
     return next((inner for inner in element if local(inner) == name), None)
+
+
+_BY_DSI = {unit.dsi: str.__str__(unit) for unit in PRINTED.values()}
+DCC = "digitalCalibrationCertificate"  # root of a certificate
+
+
+class Dcc(Format):
+    """A certificate."""
+
+    name = "dcc"
+    title = say("digital calibration certificate (DCC)")
+
+    def recognises(self, head: bytes) -> bool:
+        return begins_with(head, DCC)
+
+    def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
+        """A sheet for each result that has more than one value of something."""
+        from cmm_uq.jobs.dcc import read  # the model of a certificate is made for who has one
+        from cmm_uq.jobs.dcc.figures import figures
+
+        sheets = []
+        for place, of_result in groupby(figures(read(content, where)), key=lambda one: one.place[:2]):
+            columns = [_column(one, where) for one in of_result]
+            if any(len(cells) > 1 for _, cells in columns):
+                sheets.append(_sheet(place[1], columns, where))
+        if not sheets:
+            raise CmmUqError("holds no result with lists of values", where=where,
+                             fix="Give the certified values as a CSV with the columns point and reference_mm")  # fmt: skip
+        return sheets
+
+
+def heading(quantity: QuantityFigures) -> str:
+    """Of the column of a quantity: its name, or what it is by its refType, with its unit."""
+    name = quantity.name or " ".join(quantity.ref_types)
+    symbol = _BY_DSI.get(quantity.units[0], quantity.units[0]) if quantity.units else ""
+    return f"{name} [{symbol}]" if symbol not in ("", "1") else name
+
+
+def _column(quantity: QuantityFigures, where: str) -> tuple[str, list[str]]:
+    units = sorted(set(quantity.units))
+    if len(units) > 1:
+        raise CmmUqError(f"{quantity.name!r} is in {' and '.join(units)}: the list mixes units", where=where,
+                         fix="Ask the laboratory for one unit a list")  # fmt: skip
+    return heading(quantity), [str(value) for value in quantity.values] or list(quantity.words)
+
+
+def _sheet(name: str, columns: Sequence[tuple[str, list[str]]], where: str) -> Sheet:
+    count = max(len(values) for _, values in columns)
+    odd = next((heading for heading, values in columns if len(values) not in (1, count)), None)
+    if odd is not None or count > ROWS.most:
+        raise CmmUqError(f"the lists of {name!r} differ in length ({odd!r})", where=where,
+                         fix="Ask the laboratory for a certificate whose lists belong together")  # fmt: skip
+    full = ([heading, *(values if len(values) == count else values * count)] for heading, values in columns)
+    return Sheet(name, list(zip(*full, strict=True)), [1, *range(1, count + 1)], decimal=".")

@@ -1,0 +1,327 @@
+"""Files that are tables already: text with anything between the cells (CSV and its kin), and workbooks.
+
+The delimiter of a text is the one by which a line names the columns of a recording: a header read with a wrong one names none.
+Workbooks are those of Excel (ISO/IEC 29500, read by openpyxl) and of OpenDocument (ISO/IEC 26300), values as they were last
+computed; of OpenDocument ``office:value`` holds a number to all its digits, whatever the cell shows. Repeated rows and columns
+are counted, not unfolded, so that a file of a few bytes cannot become a table of millions of cells.
+"""
+
+from __future__ import annotations
+
+import csv
+import datetime as dt
+import io
+import re
+import warnings
+import zipfile
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
+from typing import Any
+from xml.etree.ElementTree import Element, ParseError
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.csv_table import lines_within
+from cmm_uq.base.files.limits import CELL, COLUMNS, LINE, LINES, ROWS, UNPACKED
+from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.jobs.importing.encodings import HOSTILE_FIX, decoded, head_text, local
+from cmm_uq.jobs.importing.format import Cell, Fact, Format, Sheet
+from cmm_uq.jobs.importing.header import LINES_BEFORE, REFERENCES, header_of, understood
+from cmm_uq.jobs.importing.keys import DELIMITERS, ImportKeys
+
+_SEVERAL = "  "  # two blanks or more between cells, so that single ones may stand in headings
+_TITLES: dict[str, Text] = {
+    ",": say("comma"), ";": say("semicolon"), "\t": say("tab"), "|": say("bar"), " ": say("blanks"),
+    _SEVERAL: say("two blanks or more"),
+}  # fmt: skip
+_BLANKS = {" ": re.compile(r"\s+"), _SEVERAL: re.compile(r"\s{2,}|\t")}
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
+Rows = tuple[list[list[str]], list[int]]  # cells of every line, and their lines
+
+
+class Delimited(Format):
+    """Any text."""
+
+    name = "text"
+    title = say("text table (CSV)")
+
+    def recognises(self, head: bytes) -> bool:
+        text = head_text(head)
+        return bool(text.strip()) and _CONTROL.search(text) is None
+
+    def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
+        text, encoding = decoded(content, where, keys.encoding)
+        delimiter = _delimiter(text, where, keys)
+        facts = (
+            Fact("encoding", say("Encoding"), Verbatim(encoding)),
+            Fact("delimiter", say("Between cells"), _TITLES[delimiter]),
+        )
+        return [Sheet("", *_rows(text, delimiter, where), unended=not text.endswith(("\n", "\r")), facts=facts)]
+
+
+def _delimiter(text: str, where: str, keys: ImportKeys) -> str:
+    if keys.delimiter is not None:
+        return DELIMITERS[keys.delimiter]
+    scores = {",": 0}
+    for candidate in _TITLES:
+        rows, lines = _rows(text, candidate, where, LINES_BEFORE)
+        if candidate in text or candidate in _BLANKS:
+            if header_of(Sheet("", rows, lines), keys, where, REFERENCES) is not None:
+                return candidate
+            known = (sum(understood(cell).column is not None for cell in row) for row in rows)
+            scores[candidate] = max(known, default=0)
+    return max(scores, key=lambda candidate: scores[candidate])
+
+
+def _rows(text: str, delimiter: str, where: str, most: int | None = None) -> Rows:
+    """Of every line, or of the first ``most``."""
+    if delimiter in _BLANKS:
+        split, lines = _BLANKS[delimiter].split, lines_within(text, where)
+        return _filled(islice(((i, split(line.strip())) for i, line in enumerate(lines, 1)), most), where)
+    if '"' not in text:
+        return _unquoted(text, delimiter, where, most)
+    reader = csv.reader(lines_within(text, where), delimiter=delimiter, skipinitialspace=True)
+    rows: Rows = ([], [])
+    try:
+        return _filled(islice(((reader.line_num, row) for row in reader), most), where, rows)
+    except csv.Error as error:
+        if most is not None:
+            return rows
+        raise CmmUqError(f"cells cannot be told apart: {error}", where=f"{where} line {reader.line_num}",
+                         fix="Close every quotation mark on its own line, or leave them out") from None  # fmt: skip
+
+
+def _unquoted(text: str, delimiter: str, where: str, most: int | None) -> Rows:
+    """Of a text without quotation marks, as fast as it can be: cells are looked at one by one where some are loose."""
+    lines = text.splitlines() if most is None else text[: most * 200].splitlines()[:most]
+    longest = max(map(len, lines), default=0)
+    if len(lines) > LINES.most or longest > LINE.most:
+        list(lines_within(text, where))
+    rows = [line.split(delimiter) for line in lines]
+    if lines and longest <= CELL.most and len(lines) <= ROWS.most and max(map(len, rows)) <= COLUMNS.most:
+        # blanks around a cell, an empty cell at the end of a row, a line with nothing in it
+        edges = (
+            edge for blank in " \xa0" for edge in (f"\n{blank}", f"{blank}\n", delimiter + blank, blank + delimiter)
+        )
+        joined = "\n".join(["", *lines, ""])
+        if not any(edge in joined for edge in ("\n\n", f"{delimiter}\n", *edges)):
+            return rows, list(range(1, len(rows) + 1))
+    return _filled(enumerate(rows, 1), where)
+
+
+def _filled(counted: Iterable[tuple[int, list[str]]], where: str, filled: Rows | None = None) -> Rows:
+    """Without empty cells at the ends of rows, and without empty rows; added to ``filled``."""
+    rows, lines = filled or ([], [])
+    for line, row in counted:
+        if not (cells := _without_end([cell.strip() for cell in row])):
+            continue
+        longest = max(map(len, cells))
+        if len(cells) > COLUMNS.most or longest > CELL.most:
+            wide = len(cells) > COLUMNS.most
+            what, limit = (f"{len(cells)} cells", COLUMNS) if wide else (f"a cell of {longest} characters", CELL)
+            raise CmmUqError(f"has {what}, {limit.most} are the most", where=f"{where} line {line}",
+                             fix="Export the columns that are needed; close every quotation mark on its own line")  # fmt: skip
+        rows.append(cells)
+        lines.append(line)
+    if len(rows) > ROWS.most + LINES_BEFORE:
+        problem = f"has {len(rows)} rows, {ROWS.most} are the most"
+        raise CmmUqError(problem, where=where, fix="Split or thin out the table")
+    return rows, lines
+
+
+def _without_end(cells: list[Any]) -> list[Any]:
+    while cells and cells[-1] == "":
+        cells.pop()
+    return cells
+
+
+_PROLOG = 65_536  # bytes of a part in which its root begins
+_MEMBERS = 2000
+_EMPTY_MOST = 5000  # empty rows in turn after which a sheet has ended
+_TABLE = "{urn:oasis:names:tc:opendocument:xmlns:table:1.0}"
+_OFFICE = "{urn:oasis:names:tc:opendocument:xmlns:office:1.0}"
+
+
+def _opened(content: bytes, where: str) -> zipfile.ZipFile:
+    """A ZIP archive that can be read, and whose XML declares no document type, and with it entities."""
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(content))
+        members = archive.infolist()
+    except (zipfile.BadZipFile, ValueError, NotImplementedError, OSError):
+        raise CmmUqError("is a damaged workbook: the end of the file is missing or spoiled", where=where,
+                         fix="Copy or export it again") from None  # fmt: skip
+    size = sum(member.file_size for member in members)
+    if size > UNPACKED.most or len(members) > _MEMBERS:
+        problem = f"holds {size} bytes in {len(members)} parts once it is unpacked: {UNPACKED.most} are the most"
+        fix = "Save the sheet of the recording as a workbook of its own, or as CSV"
+        raise CmmUqError(problem, where=where, fix=fix)
+    if any(member.flag_bits & 1 for member in members):
+        raise CmmUqError("is encrypted", where=where, fix="Save it without a password")
+    for name in archive.namelist():
+        if name.endswith((".xml", ".rels")):
+            try:
+                with archive.open(name) as part:
+                    head = head_text(part.read(_PROLOG))
+            except (zipfile.BadZipFile, zlib.error, OSError, EOFError, NotImplementedError):
+                raise CmmUqError(f"is a damaged workbook: its part {name!r} is spoiled", where=where,
+                                 fix="Copy or export it again") from None  # fmt: skip
+            # the root must be found where it must begin
+            if "<!DOCTYPE" in head or (re.search(r"<[A-Za-z]", head) is None and len(head) >= _PROLOG // 2):
+                raise CmmUqError(f"declares entities or a document type (in {name!r})", where=where, fix=HOSTILE_FIX)
+    return archive
+
+
+def _sheet(name: str, counted: Iterable[tuple[int, list[Cell]]], where: str) -> Sheet:
+    """A sheet of rows that are not empty, none beyond the limits of a table."""
+    rows: list[list[Cell]] = []
+    lines: list[int] = []
+    for line, cells in counted:
+        place = f"{where}: {name} row {line}"
+        _check_width(len(cells), place)
+        if len(rows) >= ROWS.most + LINES_BEFORE:
+            raise CmmUqError(f"goes on after {len(rows)} rows: {ROWS.most} are the most", where=place,
+                             fix="Split or thin out the table")  # fmt: skip
+        longest = max((len(cell) for cell in cells if isinstance(cell, str)), default=0)
+        if longest > CELL.most:
+            raise CmmUqError(
+                f"has a cell of {longest} characters, {CELL.most} are the most", where=place, fix="Shorten it"
+            )
+        rows.append(cells)
+        lines.append(line)
+    return Sheet(name, rows, lines, spreadsheet=True)
+
+
+def _check_width(width: int, place: str) -> None:
+    if width > COLUMNS.most:
+        problem, fix = f"has {width} cells, {COLUMNS.most} are the most", "Keep the columns that the job needs"
+        raise CmmUqError(problem, where=place, fix=fix)
+
+
+class Excel(Format):
+    """A workbook."""
+
+    name = "xlsx"
+    title = say("Excel workbook")
+
+    def recognises(self, head: bytes) -> bool:
+        members = (b"[Content_Types].xml", b"xl/workbook.xml", b"xl/worksheets", b"_rels/.rels")
+        return head.startswith(b"PK\x03\x04") and any(name in head for name in members)
+
+    def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
+        with _opened(content, where) as archive:
+            if not any(name.startswith("xl/") for name in archive.namelist()):
+                raise CmmUqError("is an Office document, and no workbook", where=where, fix="Save the table as .xlsx")
+        from openpyxl import load_workbook
+
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of styles and extensions, which are not looked at
+                book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
+                visible = (sheet for sheet in book.worksheets if sheet.sheet_state == "visible")
+                sheets = [_sheet(sheet.title, _excel_rows(sheet), where) for sheet in visible]
+                book.close()
+        except CmmUqError:
+            raise
+        except Exception as error:  # the library has as many as there are ways to spoil a workbook
+            raise CmmUqError(f"is a damaged workbook: {type(error).__name__}: {error}", where=where,
+                             fix="Open and save it again, or export it as CSV") from None  # fmt: skip
+        if not sheets:
+            raise CmmUqError("has no visible sheet", where=where, fix="Show the sheet of the recording")
+        return sheets
+
+
+def _excel_rows(sheet: Any) -> Iterator[tuple[int, list[Cell]]]:
+    last = 0
+    sheet.reset_dimensions()
+    for line, values in enumerate(sheet.iter_rows(values_only=True), 1):
+        if cells := _without_end([_excel_cell(value) for value in values]):
+            last = line
+            yield line, cells
+        elif line - last > _EMPTY_MOST:
+            break
+
+
+def _excel_cell(value: Any) -> Cell:
+    if isinstance(value, bool):
+        return str(value).upper()
+    if isinstance(value, (int, float)):
+        return float(value)
+    if isinstance(value, (dt.date, dt.time)):
+        return value.isoformat()
+    return "" if value is None else str(value).strip()
+
+
+class OpenDocument(Format):
+    """A spreadsheet."""
+
+    name = "ods"
+    title = say("OpenDocument spreadsheet")
+
+    def recognises(self, head: bytes) -> bool:
+        return b"mimetypeapplication/vnd.oasis.opendocument.spreadsheet" in head[:200]
+
+    def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
+        from defusedxml.common import DefusedXmlException
+        from defusedxml.ElementTree import iterparse
+
+        with _opened(content, where) as archive:
+            try:
+                with archive.open("content.xml") as file:
+                    events = iter(iterparse(file, ("start", "end"), forbid_dtd=True))
+                    names = (each.get(f"{_TABLE}name", "") for of, each in events if (of, each.tag) == _BEGINS)
+                    sheets = [_sheet(name, _ods_rows(events, f"{where}: {name}"), where) for name in names]
+            except DefusedXmlException:
+                raise CmmUqError("declares entities or a document type", where=where, fix=HOSTILE_FIX) from None
+            except (KeyError, ParseError, zipfile.BadZipFile, OSError, EOFError, ValueError) as error:
+                raise CmmUqError(f"is a damaged spreadsheet: {error}", where=where,
+                                 fix="Open and save it again, or export it as CSV") from None  # fmt: skip
+        if not sheets:
+            raise CmmUqError("has no sheet", where=where, fix="Export the sheet of the recording")
+        return sheets
+
+
+_BEGINS, _ENDS, _ROW = ("start", f"{_TABLE}table"), ("end", f"{_TABLE}table"), ("end", f"{_TABLE}table-row")
+
+
+def _ods_rows(events: Iterator[tuple[str, Element]], place: str) -> Iterator[tuple[int, list[Cell]]]:
+    """Rows of a table up to its end."""
+    line = 1
+    for event, element in events:
+        if (event, element.tag) == _ROW:
+            repeated, cells = _count(element, "number-rows-repeated"), _ods_cells(element, f"{place} row {line}")
+            yield from ((line + copy, cells) for copy in range(repeated if cells else 0))
+            line += repeated
+            element.clear()
+        elif (event, element.tag) == _ENDS:
+            element.clear()
+            break
+
+
+def _ods_cells(row: Element, place: str) -> list[Cell]:
+    """Cells of a row, without the empty ones at its end."""
+    cells: list[Cell] = []
+    empty = 0
+    for element in row:
+        if local(element) not in ("table-cell", "covered-table-cell"):
+            continue
+        repeated, value = _count(element, "number-columns-repeated"), _ods_value(element)
+        if value == "":
+            empty += repeated
+            continue
+        _check_width(len(cells) + empty + repeated, place)
+        cells += [""] * empty + [value] * repeated
+        empty = 0
+    return cells
+
+
+def _ods_value(element: Element) -> Cell:
+    if element.get(f"{_OFFICE}value-type") in ("float", "currency", "percentage"):
+        return float(element.get(f"{_OFFICE}value", "nan"))
+    for key in ("date-value", "time-value", "boolean-value"):
+        if text := element.get(f"{_OFFICE}{key}"):
+            return text
+    return "\n".join("".join(part.itertext()) for part in element if local(part) == "p").strip()
+
+
+def _count(element: Element, key: str) -> int:
+    return max(1, int(element.get(f"{_TABLE}{key}", "1")))
