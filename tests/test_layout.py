@@ -23,7 +23,7 @@ KNOW_KINDS = {"artefacts", "app"}
 """Domains that know all kinds; a plane and a sphere are features of geometry, of parts and of plans of parts too."""
 SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
 MAY_BE_SHORT = re.compile(
-    r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.migrations\.|\.reference\."
+    r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.reference\."
 )
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
@@ -34,7 +34,7 @@ CEILING = {
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 282, 1608
 """Imports of the package within functions, and exemptions from the formatter: only falling."""
 LOADED_LATE = {
-    "alembic", "arviz", "asn1crypto", "contourpy", "cryptography", "ctypes", "defusedxml", "emcee", "fcntl",
+    "arviz", "asn1crypto", "contourpy", "cryptography", "ctypes", "defusedxml", "emcee", "fcntl",
     "hashlib", "importlib", "jinja2", "json", "lxml", "markupsafe", "matplotlib", "msvcrt", "numpy", "openpyxl",
     "pandas", "pint", "pkcs11", "pty", "pydantic", "pyhanko", "pyhanko_certvalidator", "pypdf", "pyvisa", "rich",
     "scipy", "serial", "signxml", "sqlalchemy", "termios", "tty", "typst", "uncertainties", "webbrowser",

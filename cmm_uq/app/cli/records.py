@@ -179,11 +179,11 @@ def retain(
 @app.command("migrate", epilog=examples("records backup before.db", "records migrate"))
 def migrate(records: Records = None, quiet: Quiet = False, json: Json = False) -> None:
     """Bring the tables of an older version to this one; entries stay as they are. Back up first."""
-    from cmm_uq.laboratory.records import migrations
+    from cmm_uq.laboratory.records import backup as backups
     from cmm_uq.laboratory.records.place import shown
 
     place = _place(records)
-    before, after = migrations.migrate(place)
+    before, after = backups.migrate(place)
     if json:
         put_data({"records": shown(place), "from": before, "to": after})
     elif not quiet:

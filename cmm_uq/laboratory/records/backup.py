@@ -1,4 +1,4 @@
-"""Backup, whole and checked, and restored over nothing that still holds."""
+"""Records as a whole: backed up and checked, restored over nothing that still holds, brought to the newest tables."""
 
 from __future__ import annotations
 
@@ -11,19 +11,24 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sqlalchemy import select
+from sqlalchemy import select, text
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output.new_file import writing_to
 from cmm_uq.base.output.staging import synced
+from cmm_uq.laboratory.records import indexing
 from cmm_uq.laboratory.records.facts import Entry
-from cmm_uq.laboratory.records.indexing import chain
-from cmm_uq.laboratory.records.opening import open_records
+from cmm_uq.laboratory.records.opening import KNOWN, REVISION, check_revision, engine_of, open_records, state_of
 from cmm_uq.laboratory.records.place import is_url, shown, told
 from cmm_uq.laboratory.records.tables import entries
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
+
+ADDED = {
+    "0002": ("ALTER TABLE certificates ADD COLUMN artefact_due VARCHAR(10)", "ALTER TABLE machines ADD COLUMN calibrate TEXT"),
+}  # fmt: skip
+"""What a revision adds to the tables that follow from the entries; what stands in them is then made again from these."""
 
 _MENDED = "Free the disk, mend the permissions, or name another file"
 KEPT = ".before-restore"  # what restored records are put in place of is kept under its name with this behind it
@@ -70,6 +75,26 @@ def restore(file: Path, place: str | Path) -> tuple[int, str]:
     return head
 
 
+def migrate(place: str | Path, *, to: str = REVISION) -> tuple[str, str]:
+    """Bring records to a revision in one transaction that touches no entry; revision before, and after."""
+    engine = engine_of(place)
+    try:
+        with told(place), engine.connect() as connection:
+            before = state_of(connection)
+        if before not in KNOWN:
+            check_revision(before, place)
+        if before != to:
+            with told(place), engine.connect().execution_options(writing=True) as connection, connection.begin():
+                for revision in KNOWN[KNOWN.index(before) + 1 : KNOWN.index(to) + 1]:
+                    for statement in ADDED[revision]:
+                        connection.exec_driver_sql(statement)
+                indexing.rebuild(connection)
+                connection.execute(text("UPDATE alembic_version SET version_num = :to"), {"to": to})
+        return before, to
+    finally:
+        engine.dispose()
+
+
 def _set_aside(target: Path) -> None:
     """Keep the present file, with all that is still in its journal."""
     if not target.exists():
@@ -89,7 +114,7 @@ def _set_aside(target: Path) -> None:
 def _checked(path: Path) -> tuple[int, str]:
     with open_records(path, read_only=True) as records:
         with told(path), records.engine.connect() as connection:
-            found = chain(connection)
+            found = indexing.chain(connection)
         if found:
             fix = "cmm-uq records verify says all; a backup with a broken chain is none"
             raise CmmUqError(f"entry {found[0].entry}: {found[0].problem}", where=str(path), fix=fix)

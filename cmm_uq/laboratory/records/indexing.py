@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,36 +14,17 @@ from sqlalchemy.pool import StaticPool
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import read_manifest, sha256_of
-from cmm_uq.laboratory.records.facts import (
-    BEGINNING,
-    CERTIFIED,
-    STANDING,
-    ChainFinding,
-    Entry,
-    artefact_key,
-    called,
-    machine_key,
-    spelled,
-)
-from cmm_uq.laboratory.records.tables import (
-    INDEX,
-    META,
-    adjustments,
-    artefacts,
-    certificates,
-    covariances,
-    entries,
-    figures,
-    machines,
-    quantities,
-    signatures,
-)
+from cmm_uq.laboratory.records import facts, tables
+from cmm_uq.laboratory.records.facts import ChainFinding, Entry, called, spelled
+from cmm_uq.laboratory.records.tables import INDEX, artefacts, certificates, entries, machines
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
 
 Row = dict[str, Any]
 STATE_AFTER = {"withdrawal": "withdrawn", "replacement": "replaced"}
+MOST = 1000  # findings after which no more are looked for
+_BLOCK = 5000  # entries that are read or written together
 
 
 class Indexer:
@@ -57,19 +39,37 @@ class Indexer:
         self._counts: dict[Table, int] = {}
         self._adjusted: set[tuple[int, str]] = set()
 
+    def all(self, new: Iterable[Entry], *, chain: bool) -> list[Entry]:
+        """Write the rows of entries, block by block, and with ``chain`` the entries themselves."""
+        added: list[Entry] = []
+        written = 0
+        for entry in new:
+            self.add(entry)
+            added.append(entry)
+            if len(added) - written == _BLOCK:
+                self._block(added[written:], chain=chain)
+                written = len(added)
+        self._block(added[written:], chain=chain)
+        return added
+
+    def _block(self, block: list[Entry], *, chain: bool) -> None:
+        if chain and block:
+            rows = [{name: getattr(entry, name) for name in Entry.__slots__} for entry in block]
+            self.connection.execute(insert(entries), rows)
+        self.flush()
+
     def add(self, entry: Entry) -> None:
         """Add what an entry says."""
-        data = entry.data
+        data, day = entry.data, entry.at[:10]
         try:
-            if entry.kind in CERTIFIED:
+            if entry.kind in facts.CERTIFIED:
                 self._certificate(entry, data)
             elif entry.kind == "machine":
-                self._machine(data, str(data.get("day") or entry.at[:10]), entry.number)
+                self._machine(data, str(data.get("day") or day), entry.number)
             elif entry.kind == "artefact":
-                self._artefact(data, str(data.get("kind") or ""), str(data.get("day") or entry.at[:10]), entry.number)
+                self._artefact(data, str(data.get("kind") or ""), str(data.get("day") or day), entry.number)
             elif entry.kind == "adjustment":
-                machine = self._machine(data["machine"], "", entry.number)
-                self._adjustment(machine["id"], data["day"], entry.number)
+                self._adjustment(self._machine(data["machine"], "", entry.number), data["day"], entry.number)
             elif entry.kind in ("release", "withdrawal", "replacement"):
                 self._signature(entry, data)
         except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -84,14 +84,13 @@ class Indexer:
         self._certificates.clear()
 
     def _certificate(self, entry: Entry, data: Mapping[str, Any]) -> None:
-        day = str(data["day"])
+        day, used, since = str(data["day"]), data.get("artefact") or {}, data.get("adjusted_since")
         machine = self._machine(data["machine"], day, entry.number)
-        used = data.get("artefact") or {}
         artefact = self._artefact(used, str(data["kind"]), day, entry.number)
-        if since := data.get("adjusted_since"):
-            self._adjustment(machine["id"], since, entry.number)
+        if since:
+            self._adjustment(machine, since, entry.number)
         row = {
-            "entry": entry.number, "machine": machine["id"], "artefact": artefact, "command": data.get("command", "report"),
+            "entry": entry.number, "machine": machine, "artefact": artefact, "command": data.get("command", "report"),
             "job": data["job"], "number": data.get("number") or data["job"], "kind": data["kind"],
             "origin": data["origin"], "day": day, "at": entry.at, "adjusted_since": since or None, "state": "draft",
             "decision": data.get("decision") or "none", "diagnosis": data.get("diagnosis") or "",
@@ -101,73 +100,72 @@ class Indexer:
         }  # fmt: skip
         self._rows[certificates].append(row)
         self._certificates[entry.number] = row
-        for place, (name, quantity, unit, value, u, lower, upper, u_artefact, limit) in enumerate(
-            data.get("values") or ()
-        ):
-            self._rows[figures].append({
-                "certificate": entry.number, "place": place, "quantity": self._quantity((name, quantity, unit)),
-                "value": value, "u": u, "lower": lower, "upper": upper, "u_artefact": u_artefact, "at_most": limit,
-            })  # fmt: skip
+        names = ("value", "u", "lower", "upper", "u_artefact", "at_most")
+        self._rows[tables.figures] += [
+            {"certificate": entry.number, "place": place, "quantity": self._quantity((name, quantity, unit)),
+             **dict(zip(names, stated, strict=True))}
+            for place, (name, quantity, unit, *stated) in enumerate(data.get("values") or ())
+        ]  # fmt: skip
         if together := data.get("covariance"):
-            self._rows[covariances].append({
-                "certificate": entry.number, "names": json.dumps(together["names"], ensure_ascii=False),
-                "lower": json.dumps(together["lower"]),
-            })  # fmt: skip
+            names_of = json.dumps(together["names"], ensure_ascii=False)
+            row = {"certificate": entry.number, "names": names_of, "lower": json.dumps(together["lower"])}
+            self._rows[tables.covariances].append(row)
 
-    def _machine(self, facts: Mapping[str, Any], day: str, entry: int) -> Row:
-        key = machine_key(facts)
-        row = self._known(machines, key)
-        said = {name: called(facts, name) for name in ("name", "manufacturer", "model", "place")}
-        said["named"] = spelled(said["name"])
-        rule = json.dumps(facts["calibrate"], sort_keys=True) if facts.get("calibrate") else None
-        if row is None:
-            row = {
-                "id": self._next(machines), "recognised": key, "called": self._name_of(facts),
-                "spelled": spelled(called(facts, "serial", "name")), **said, "calibrate": rule, "day": day,
-                "entry": entry,
-            }  # fmt: skip
-            self._add(machines, key, row)
-        elif day >= row["day"]:
-            changed: Row = {name: value for name, value in said.items() if value and value != row[name]}
-            if "calibrate" in facts and rule != row["calibrate"]:
-                changed["calibrate"] = rule
-            self._change(machines, row, changed, day, entry)
-        return row
+    def _machine(self, said: Mapping[str, Any], day: str, entry: int) -> int:
+        names = ("name", "manufacturer", "model", "place")
+        row: Row = {name: text for name in names if (text := called(said, name))}  # what is not said changes nothing
+        if "name" in row:
+            row["named"] = spelled(row["name"])
+        if "calibrate" in said:
+            row["calibrate"] = json.dumps(said["calibrate"], sort_keys=True) if said["calibrate"] else None
 
-    def _name_of(self, facts: Mapping[str, Any]) -> str:
+        def first() -> Row:
+            known = {"called": self._name_of(said), "spelled": spelled(called(said, "serial", "name"))}
+            return {**dict.fromkeys(("named", *names), ""), "calibrate": None, **known}
+
+        return self._thing(machines, facts.machine_key(said), row, first, day, entry)
+
+    def _name_of(self, said: Mapping[str, Any]) -> str:
         """As it is asked for: its serial, and where another has the same, what tells them apart behind it."""
-        name = called(facts, "serial", "name") or "unnamed"
+        name = called(said, "serial", "name") or "unnamed"
         others = {row["called"] for row in self._recognised[machines].values()}
-        further = (called(facts, "manufacturer", "name") or "other", *range(2, 100))
+        further = (called(said, "manufacturer", "name") or "other", *range(2, 100))
         for candidate in (name, *(f"{name} ({end})" for end in further)):
             there = select(machines.c.called).where(machines.c.called == candidate)
             if candidate not in others and not self.connection.execute(there).first():
                 return candidate
         raise ValueError(name)
 
-    def _artefact(self, facts: Mapping[str, Any], kind: str, day: str, entry: int) -> int | None:
-        key = artefact_key(facts)
-        if not key:
+    def _artefact(self, said: Mapping[str, Any], kind: str, day: str, entry: int) -> int | None:
+        if not (key := facts.artefact_key(said)):
             return None
-        row = self._known(artefacts, key)
-        said: Row = {name: called(facts, name) for name in ("certificate", "laboratory")}
-        said |= {name: facts.get(name) or None for name in ("calibrated", "due")}
-        said["kind"] = kind
+        row: Row = {name: called(said, name) for name in ("certificate", "laboratory")} | {"kind": kind}
+        row |= {name: said.get(name) or None for name in ("calibrated", "due")}
+        return self._thing(artefacts, key, row, lambda: {"called": called(said, "serial", "certificate", "name")}, day,
+                           entry)  # fmt: skip
+
+    def _thing(self, table: Table, key: str, said: Row, first: Callable[[], Row], day: str, entry: int) -> int:
+        """Number of the row that is recognised by a key: made, or changed by what is no older than the row."""
+        cache, waiting = self._recognised[table], self._rows[table]
+        row = cache.get(key) or self._stored(table, table.c.recognised == key)
         if row is None:
-            name = called(facts, "serial", "certificate", "name")
-            row = {"id": self._next(artefacts), "recognised": key, "called": name, **said, "day": day, "entry": entry}
-            self._add(artefacts, key, row)
-        elif day >= row["day"]:
-            changed = {name: value for name, value in said.items() if value != row[name]}
-            self._change(artefacts, row, changed, day, entry)
+            row = {"id": self._next(table), "recognised": key, **first(), **said, "day": day, "entry": entry}
+            waiting.append(row)
+        elif day >= row["day"] and (changed := {name: value for name, value in said.items() if value != row[name]}):
+            changed |= {"day": day, "entry": entry}
+            row.update(changed)
+            if not waiting or row["id"] < waiting[0]["id"]:  # it is written already: rows are numbered as they come
+                self.connection.execute(update(table).where(table.c.id == row["id"]).values(**changed))
+        cache[key] = row
         return int(row["id"])
 
     def _adjustment(self, machine: int, day: str, entry: int) -> None:
-        there = select(adjustments.c.entry).where(adjustments.c.machine == machine, adjustments.c.day == day)
+        c = tables.adjustments.c
+        there = select(c.entry).where(c.machine == machine, c.day == day)
         if (machine, day) in self._adjusted or self.connection.execute(there).first():
             return
         self._adjusted.add((machine, day))
-        self._rows[adjustments].append({"machine": machine, "day": day, "entry": entry})
+        self._rows[tables.adjustments].append({"machine": machine, "day": day, "entry": entry})
 
     def _signature(self, entry: Entry, data: Mapping[str, Any]) -> None:
         number = int(data["certificate"])
@@ -176,13 +174,13 @@ class Indexer:
             raise ValueError(f"certificate {number}")
         # why, and what was said of a certificate that states no pass
         despite = f"{data['outcome']}: {data['despite']}" if data.get("despite") else ""
-        self._rows[signatures].append({
+        self._rows[tables.signatures].append({
             "entry": entry.number, "certificate": number, "what": entry.kind, "by": data["by"],
             "reason": "; ".join(filter(None, (data.get("reason"), despite))), "at": entry.at,
             "replaced_by": data.get("replaced_by"),
         })  # fmt: skip
         state = STATE_AFTER.get(entry.kind, "released" if data.get("complete", True) else row["state"])
-        if state == "released" and row["state"] not in STANDING:
+        if state == "released" and row["state"] not in facts.STANDING:
             raise ValueError(f"the certificate {number}, {row['state']},")
         if number in self._certificates:
             row["state"] = state
@@ -191,38 +189,18 @@ class Indexer:
 
     def _quantity(self, key: tuple[str, str, str]) -> int:
         if key not in self._quantities:
-            c = quantities.c
+            c = tables.quantities.c
             there = select(c.id).where(c.name == key[0], c.quantity == key[1], c.unit == key[2])
             number = self.connection.execute(there).scalar()
             if number is None:
-                number = self._next(quantities)
-                self._rows[quantities].append(dict(zip(quantities.c.keys(), (number, *key), strict=True)))
+                number = self._next(tables.quantities)
+                self._rows[tables.quantities].append(dict(zip(c.keys(), (number, *key), strict=True)))
             self._quantities[key] = number
         return self._quantities[key]
 
     def _stored(self, table: Table, where: ColumnElement[bool]) -> Row | None:
         found = self.connection.execute(select(table).where(where)).mappings().first()
         return None if found is None else dict(found)
-
-    def _known(self, table: Table, key: str) -> Row | None:
-        """The row that is recognised by a key, the very object where it is still to be written."""
-        cache = self._recognised[table]
-        if key not in cache and (row := self._stored(table, table.c.recognised == key)) is not None:
-            cache[key] = row
-        return cache.get(key)
-
-    def _add(self, table: Table, key: str, row: Row) -> None:
-        self._recognised[table][key] = row
-        self._rows[table].append(row)
-
-    def _change(self, table: Table, row: Row, changed: Row, day: str, entry: int) -> None:
-        """Change a row, be it written already or not: rows are numbered as they come."""
-        if changed:
-            changed = {**changed, "day": day, "entry": entry}
-            row.update(changed)
-            waiting = self._rows[table]
-            if not waiting or row["id"] < waiting[0]["id"]:
-                self.connection.execute(update(table).where(table.c.id == row["id"]).values(**changed))
 
     def _next(self, table: Table) -> int:
         if table not in self._counts:
@@ -231,16 +209,17 @@ class Indexer:
         return self._counts[table]
 
 
-def index(connection: Connection, entries: Iterable[Entry]) -> None:
-    """Add what entries say to the tables that follow from them."""
-    indexer = Indexer(connection)
-    for entry in entries:
-        indexer.add(entry)
-    indexer.flush()
+def in_blocks(block: Callable[[int], list[Entry]], first: int = 1) -> Iterator[Entry]:
+    """All entries from a number on, read by a function that gives those from a number on, as many as belong together."""
+    while found := block(first):
+        yield from found
+        first = found[-1].number + 1
 
 
-MOST = 1000  # findings after which no more are looked for
-_BLOCK = 2000
+def entry_block(connection: Connection, first: int, kind: str | None = None) -> list[Entry]:
+    """Entries from a number on, of one kind or all, as many as are read together."""
+    query = select(entries).where(entries.c.number >= first).order_by(entries.c.number).limit(_BLOCK)
+    return [Entry(*row) for row in connection.execute(query if kind is None else query.where(entries.c.kind == kind))]
 
 
 def verified(records: Records, head: str | None, *, files: bool) -> list[ChainFinding]:
@@ -257,8 +236,8 @@ def verified(records: Records, head: str | None, *, files: bool) -> list[ChainFi
 def chain(connection: Connection, head: str | None = None) -> list[ChainFinding]:
     """What is wrong with the entries by themselves."""
     found: list[ChainFinding] = []
-    number, previous, met = 0, BEGINNING, head is None
-    for entry in _entries(connection):
+    number, previous, met = 0, facts.BEGINNING, head is None
+    for entry in in_blocks(partial(entry_block, connection)):
         if entry.number != number + 1:
             one = entry.number == number + 2
             gap = f"entry {number + 1} is" if one else f"entries {number + 1} to {entry.number - 1} are"
@@ -280,27 +259,7 @@ def rebuild(connection: Connection) -> None:
     """Make the tables that follow from the entries again, in a transaction that writes."""
     for table in reversed(INDEX):
         connection.execute(delete(table))
-    _index(connection, connection)
-
-
-def _index(source: Connection, target: Connection) -> None:
-    indexer = Indexer(target)
-    for count, entry in enumerate(_entries(source), 1):
-        indexer.add(entry)
-        if count % _BLOCK == 0:
-            indexer.flush()
-    indexer.flush()
-
-
-def _entries(connection: Connection) -> Iterator[Entry]:
-    number = 0
-    while True:
-        query = select(entries).where(entries.c.number > number).order_by(entries.c.number).limit(_BLOCK)
-        rows = connection.execute(query).all()
-        yield from (Entry(*row) for row in rows)
-        if len(rows) < _BLOCK:
-            return
-        number = rows[-1].number
+    Indexer(connection).all(in_blocks(partial(entry_block, connection)), chain=False)
 
 
 def _tables(connection: Connection) -> list[ChainFinding]:
@@ -308,10 +267,10 @@ def _tables(connection: Connection) -> list[ChainFinding]:
     engine = create_engine("sqlite://", poolclass=StaticPool)
     event.listen(engine, "connect", lambda raw, _: raw.execute("PRAGMA foreign_keys = OFF"))
     try:
-        META.create_all(engine, tables=list(INDEX))
+        tables.META.create_all(engine, tables=list(INDEX))
         with engine.connect() as fresh:
             try:
-                _index(connection, fresh)
+                Indexer(fresh).all(in_blocks(partial(entry_block, connection)), chain=False)
             except CmmUqError as error:
                 return [ChainFinding("index", str(error))]
             return [finding for table in INDEX for finding in _compared(table, connection, fresh)][:MOST]

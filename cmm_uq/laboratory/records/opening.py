@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 PATIENCE_S = 15.0  # how long to wait for another process that writes
 _TURNS = 150
-REVISION = "0002"  # newest revision of the tables; see :mod:`cmm_uq.laboratory.records.migrations`
+REVISION = "0002"  # newest revision of the tables; see :func:`cmm_uq.laboratory.records.backup.migrate`
 KNOWN = ("0001", "0002")  # all revisions, oldest first
 
 

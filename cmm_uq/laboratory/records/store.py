@@ -21,7 +21,7 @@ from sqlalchemy import Connection, Engine, delete, insert, select, text
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import MANIFEST, InDoubtError, finish_interrupted, is_pending, sha256_of
 from cmm_uq.laboratory.records.facts import BEGINNING, ChainFinding, Entry, canonical, following, moment_of, now
-from cmm_uq.laboratory.records.indexing import Indexer
+from cmm_uq.laboratory.records.indexing import Indexer, entry_block, in_blocks, verified
 from cmm_uq.laboratory.records.place import APPLICATION, shown, told
 from cmm_uq.laboratory.records.queries import RecordQueries, entry_of_results
 from cmm_uq.laboratory.records.tables import entries, pending
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 New = tuple[str, Mapping[str, Any], dt.datetime | None]
 """Kind, content, and moment of an entry to be added; ``None`` for now."""
-
-_BLOCK = 5000  # entries that are written together
 
 
 class Records(RecordQueries):
@@ -76,17 +74,12 @@ class Records(RecordQueries):
 
     def entries(self, first: int = 1, kind: str | None = None) -> Iterator[Entry]:
         """Entries in their order, of one kind or all, read block by block."""
-        number = first
-        while True:
-            wanted = select(entries).where(entries.c.number >= number).order_by(entries.c.number).limit(_BLOCK)
-            if kind is not None:
-                wanted = wanted.where(entries.c.kind == kind)
+
+        def block(number: int) -> list[Entry]:
             with self.reading() as connection:
-                rows = connection.execute(wanted).all()
-            yield from (Entry(*row) for row in rows)
-            if len(rows) < _BLOCK:
-                return
-            number = rows[-1].number + 1
+                return entry_block(connection, number, kind)
+
+        return in_blocks(block, first)
 
     def append(self, kind: str, content: Mapping[str, Any], *, at: dt.datetime | None = None) -> Entry:
         """Add an entry; refused where no entry before it allows what it says."""
@@ -142,8 +135,6 @@ class Records(RecordQueries):
 
     def verify(self, head: str | None = None, *, files: bool = True) -> list[ChainFinding]:
         """What is wrong of everything against the chain, and the hash of an entry that was filed elsewhere."""
-        from cmm_uq.laboratory.records.indexing import verified
-
         return verified(self, head, files=files)
 
 
@@ -153,11 +144,11 @@ class Writing:
 
     def add(self, new: Iterable[New]) -> list[Entry]:
         """Add entries after the last one, with the rows that follow from them."""
-        return self._all(self._following(new))
+        return Indexer(self.connection).all(self._following(new), chain=True)
 
     def copy(self, whole: Iterable[Entry]) -> None:
         """Add entries of other records as they are, into records that hold none."""
-        self._all(whole)
+        Indexer(self.connection).all(whole, chain=True)
 
     def record(self, kind: str, content: dict[str, Any]) -> None:
         """Add an entry of a set of files; the same results are recorded once, and anew after they were withdrawn."""
@@ -175,25 +166,6 @@ class Writing:
             entry = following(previous, number, at or self._clock(), kind, content)
             previous = entry.hash
             yield entry
-
-    def _all(self, whole: Iterable[Entry]) -> list[Entry]:
-        indexer, added = Indexer(self.connection), []
-        block: list[Entry] = []
-        for entry in whole:
-            indexer.add(entry)
-            block.append(entry)
-            if len(block) == _BLOCK:
-                self._write(block, indexer)
-                added += block
-                block = []
-        self._write(block, indexer)
-        return added + block
-
-    def _write(self, block: list[Entry], indexer: Indexer) -> None:
-        if block:
-            rows = [{name: getattr(entry, name) for name in Entry.__slots__} for entry in block]
-            self.connection.execute(insert(entries), rows)
-        indexer.flush()
 
 
 def last(connection: Connection) -> tuple[int, str]:

@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sqlalchemy import Engine
 
 from cmm_uq.laboratory.records import open_records
+from cmm_uq.laboratory.records.opening import KNOWN
 from cmm_uq.laboratory.records.store import New, Records
 
 BEGINNING = dt.date(2016, 1, 4)
@@ -91,6 +93,15 @@ def history(
                 signed = {"certificate": number, "by": "A. Releaser", "reason": "checked", "complete": True}
                 number += 1
                 yield "release", signed, moment(day) + dt.timedelta(hours=1)
+
+
+def take_back(engine: Engine) -> None:
+    """Tables of empty records as the first revision had them."""
+    with engine.connect().execution_options(writing=True) as connection, connection.begin():
+        for column in ("certificates DROP COLUMN artefact_due", "machines DROP COLUMN calibrate"):
+            connection.exec_driver_sql(f"ALTER TABLE {column}")
+        connection.exec_driver_sql(f"UPDATE alembic_version SET version_num = '{KNOWN[0]}'")
+    engine.dispose()
 
 
 def made(place: Path | str, machines: int, each: int, **how: Any) -> Records:

@@ -9,18 +9,14 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.records import open_records
-from cmm_uq.laboratory.records.migrations import migrate, upgrade
+from cmm_uq.laboratory.records.backup import migrate
 from cmm_uq.laboratory.records.opening import KNOWN, REVISION, engine_of
-from cmm_uq.laboratory.records.place import APPLICATION
-from tests.laboratory.records.histories import history
+from tests.laboratory.records.histories import history, take_back
 
 
 def first(path: Path) -> Path:
-    engine = engine_of(path, create=True)
-    with engine.connect().execution_options(writing=True) as connection, connection.begin():
-        upgrade(connection, KNOWN[0])
-        connection.exec_driver_sql(f"PRAGMA application_id = {APPLICATION}")
-    engine.dispose()
+    open_records(path, create=True).close()
+    take_back(engine_of(path))
     return path
 
 

@@ -13,11 +13,10 @@ import pytest
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.laboratory.records import open_records
-from cmm_uq.laboratory.records.backup import back_up, restore
+from cmm_uq.laboratory.records.backup import back_up, migrate, restore
 from cmm_uq.laboratory.records.listing import CertificateFilter, chosen, courses, entry_of, standing_of_all
-from cmm_uq.laboratory.records.migrations import migrate, upgrade
 from cmm_uq.laboratory.records.opening import KNOWN, REVISION, engine_of
-from tests.laboratory.records.histories import certificate, history
+from tests.laboratory.records.histories import certificate, history, take_back
 
 psycopg = pytest.importorskip("psycopg")
 
@@ -111,10 +110,8 @@ def test_a_backup_of_a_server_is_a_file_and_is_restored_into_an_empty_database(
 
 
 def test_an_older_version_on_a_server_is_migrated(url: str) -> None:
-    engine = engine_of(url)
-    with engine.begin() as connection:
-        upgrade(connection, KNOWN[0])
-    engine.dispose()
+    open_records(url, create=True).close()
+    take_back(engine_of(url))
     with pytest.raises(CmmUqError, match="older version"):
         open_records(url)
     assert migrate(url) == (KNOWN[0], REVISION)
