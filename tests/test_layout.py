@@ -22,9 +22,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 KNOW_KINDS = {"artefacts", "app"}
 """Domains that know all kinds; a plane and a sphere are features of geometry, of parts and of plans of parts too."""
 SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
-MAY_BE_SHORT = re.compile(
-    r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.reference\."
-)
+MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.reference\.")
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
     "": 200, "base": 3_050, "maths": 12_600, "jobs": 14_300, "machine": 6_700, "analysis": 18_900, "laboratory": 16_300,
