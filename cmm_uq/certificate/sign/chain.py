@@ -13,12 +13,11 @@ from pyhanko_certvalidator import CertificateValidator, ValidationContext
 from pyhanko_certvalidator.errors import PathBuildingError, PathValidationError, RevokedError
 
 from cmm_uq.base.messages import Text, Verbatim, day, say
-from cmm_uq.certificate.sign.found import Revocation, Trust, ran
+from cmm_uq.certificate.sign.found import NOBODY, Revocation, Trust, ran
 from cmm_uq.certificate.sign.signer import is_test, unfit
 
 NO_TIME = say("the signature says no time, so that nobody knows whether its certificate was in date")
 UNTRUSTED = say("no chain of certificates leads from the signer to anybody who is trusted")
-NOBODY = say("nobody is trusted: name the certificates that you trust")
 REVOKED = say("the certificate was revoked")
 UNREADABLE = say("the certificate cannot be read")
 SPOILT = say("a certificate that comes with the signature was changed")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from cmm_uq.base.errors import CmmUqError, NotInstalledError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import KEY_BYTES
-from cmm_uq.base.messages import Text
+from cmm_uq.base.messages import Text, say
 
 if TYPE_CHECKING:
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
@@ -84,7 +84,7 @@ class Trust:
     revocations: tuple[bytes, ...] = ()  # lists, DER, besides those in the file
 
 
-NOBODY = Trust()
+NOBODY = say("nobody is trusted: name the certificates that you trust")
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from __future__ import annotations
 import datetime as dt
 import io
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, get_args
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.sign.found import NOBODY, Trust, appending, installed, ran
+from cmm_uq.certificate.sign.found import Trust, appending, installed, ran
 from cmm_uq.certificate.sign.signer import ONE_DIGEST, Signer
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Stamping:
 
     server: str  # address of a time stamp server
     level: Level = "B-T"  # B-T, B-LT or B-LTA
-    trust: Trust = NOBODY  # whom the chains of signer and server must lead to, for B-LT and B-LTA
+    trust: Trust = field(default_factory=Trust)  # whom the chains of signer and server must lead to, for B-LT and B-LTA
 
     def __post_init__(self) -> None:
         if not self.server.startswith(("http://", "https://")):

@@ -1,4 +1,4 @@
-"""A certificate beside what its inputs give when they are computed again: every figure, every form.
+"""The inputs of a certificate, and it beside what they give when they are computed again: every figure, every form.
 
 Equal to the byte by the same version on the same kernels of linear algebra. Other kernels change the last bits, and with them
 which draws a sampler takes: then nearly every sampled figure differs a little, all within Monte Carlo error and printed
@@ -9,20 +9,183 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any
 
+from cmm_uq.analysis.conformity.decision import rule_name
+from cmm_uq.analysis.parts.plan import Plan
+from cmm_uq.certificate.part.results import standing_data
 from cmm_uq.certificate.verify.figures import quantities
 from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.certificate.verify.given import RESULTS, Given, strict_json
-from cmm_uq.certificate.verify.views import differing_parts, first_difference, squashed
+from cmm_uq.certificate.verify.given import JOB, RESULTS, Given, canonical, strict_json
+from cmm_uq.certificate.verify.html_page import read_html
+from cmm_uq.certificate.verify.views import Difference, differing_parts, first_difference, squashed
+from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.maths.uncertainty.quantity import rounded
 
+if TYPE_CHECKING:
+    from cmm_uq.base.points import Floats
+    from cmm_uq.certificate.part.measurement import CertificateStatus
+
+Stated = tuple[str, object, object]  # JSON path, what stands there, what should
+
+
+def check_results(inquiry: Inquiry, given: Given) -> None:
+    """``results.json`` given and attached, and as this program writes it."""
+    if given.results is None:
+        return
+    name, data, content = given.results
+    inquiry.looked("forms")
+    if content != (should := canonical(data)):
+        inquiry.wrong("files", name, f"line {_first_line(content, should)[0]}", "is not as cmm-uq writes it")
+    if given.pdf is None:
+        return
+    inside = given.pdf[1].files.get(RESULTS)
+    if inside is None:
+        inquiry.wrong("forms", given.pdf[0], "", f"has no {RESULTS} inside")
+    elif inside != content:
+        place = f"attachment {RESULTS}: line {_first_line(inside, content)[0]}"
+        inquiry.wrong("forms", given.pdf[0], place, f"is not {name}")
+
+
+def inputs_of(inquiry: Inquiry, given: Given) -> dict[str, bytes] | None:
+    """The inputs by name, each with the hash that results.json says; ``None`` where one is missing or another."""
+    if given.results is None:
+        return None
+    name, data, _ = given.results
+    wanted, files = data["job"]["inputs_sha256"], given.files
+
+    def is_sound(file: str, digest: str, source: str, missing: str) -> bool:
+        if file not in files:
+            if given.pdf is not None:
+                inquiry.wrong("inputs", given.pdf[0], f"attachment {file}", missing)
+            return False
+        stands = sha256(files[file]).hexdigest()
+        if stands != digest:
+            where = f"{file} in {given.pdf[0]}" if given.pdf is not None and file in given.pdf[1].files else file
+            inquiry.wrong("inputs", where, "", f"is not the file whose hash {source} has", stands, digest)
+        return stands == digest
+
+    inquiry.looked("inputs", len(wanted))
+    missing = f"is missing, and {name} names it as an input"
+    sound = sum(is_sound(file, digest, name, missing) for file, digest in wanted.items()) == len(wanted)
+    if given.pdf is None and not sound and not (wanted.keys() & files.keys()):
+        inquiry.left("inputs", "neither a PDF that has them inside nor the files themselves are given")
+    elif given.pdf is None and not sound:
+        inquiry.left("inputs", f"not given: {', '.join(sorted(wanted.keys() - files.keys()))}")
+    if entry := data.get("posterior"):
+        draws = str(entry["file"])
+        inquiry.looked("inputs", draws in files)
+        is_sound(draws, entry["sha256"], RESULTS, f"is missing, and {RESULTS} names it")
+    return {file: files[file] for file in wanted} if sound and JOB in wanted else None
+
+
+def check_job(inquiry: Inquiry, job: Job, data: Mapping[str, Any], file: str) -> None:
+    """Whether results.json speaks of this job: its name, dates, machine, and what it wishes to be decided."""
+    said, facts = data["job"], job.facts
+    stated: list[Stated] = [
+        ("job.id", said.get("id"), facts.job.id), ("job.origin", said.get("origin"), facts.job.origin),
+        ("job.date", said.get("date"), facts.job.date.isoformat()), ("job.machine", said.get("machine"), facts.machine.name),
+        ("job.serial", said.get("serial") or "", facts.machine.serial or ""),
+        ("job.altered", said.get("altered") or [], list(job.altered)),
+        ("job.inputs_sha256", sorted(said["inputs_sha256"]), sorted(job.inputs)),
+    ]  # fmt: skip
+    entries = data.get("conformity") or ()
+    if "estimates" in data and len(entries) != len(facts.conformity):
+        stated.append(("conformity", len(entries), len(facts.conformity)))
+    for i, (entry, wish) in enumerate(zip(entries, facts.conformity, strict=False)):
+        wished: dict[str, object] = {
+            "standard": wish.standard, "rule": rule_name(wish.rule), "mpe": wish.mpe and wish.mpe.model_dump(),
+            "prior": wish.prior and wish.prior.model_dump(),
+        }  # fmt: skip
+        if wish.characteristic is not None:
+            wished["characteristic"] = wish.characteristic
+        if wish.limit_um is not None:
+            wished["limit_um"] = float(f"{wish.limit_um:.10g}")
+        stated += [(f"conformity[{i}].{key}", entry.get(key), should) for key, should in wished.items()]
+    _compare_stated(inquiry, stated, file, f"is not what {JOB} says")
+
+
+def check_dates(inquiry: Inquiry, job: Job) -> None:
+    """Whether every artefact was in date on the day of the measurement, and the other dates are in order."""
+    inquiry.looked("dates")
+    for text in dates_out_of_order(job):
+        inquiry.wrong("dates", JOB, "", str.__str__(text))
+    chain = job.facts.artefact.certificate
+    if certified_on_this_machine(job.facts):
+        inquiry.notes.append("The artefact was certified on the machine that it tests; the certificate says so.")
+    if chain is not None and chain.number and chain.until is None:
+        note = "The artefact's certificate has no date by which it is due: that it was in date is not shown."
+        inquiry.notes.append(note)
+
+
+_OF_THE_MACHINE = (
+    "source", "files", "number", "laboratory", "machine", "serial", "origin", "date", "age_days", "valid_until", "draft",
+    "inputs_sha256",
+)  # fmt: skip
+"""Of ``machine``, what its certificate says; what was verified of it depends on the version that did."""
+
+_SAME = 1e-9
+_NEAR_MM = 1e-7  # features that are found by going on from a start agree so well on any processor
+
+
+def check_part_job(
+    inquiry: Inquiry, job: PartJob, plan: Plan, measured: Floats | None, data: Mapping[str, Any], file: str
+) -> None:
+    """Keep what the job says otherwise; ``measured``: (c,) values of the measured points, mm and rad."""
+    facts, said, problem = job.facts, data["job"], f"is not what {JOB} says"
+    part, decision, prior = data["part"], data["decision"], facts.decision.prior
+    stated: list[Stated] = [
+        ("job.id", said["id"], facts.job.id), ("job.number", said.get("number") or "", facts.job.number or ""),
+        ("job.origin", said["origin"], facts.job.origin), ("job.date", said["date"], facts.job.date.isoformat()),
+        ("part.name", part["name"], facts.part.name), ("part.drawing", part["drawing"] or "", facts.part.drawing),
+        ("part.serial", part["serial"] or "", facts.part.serial),
+        ("part.not_measured", part["not_measured"], list(facts.part.not_measured)),
+        ("decision.rule", decision["rule"], rule_name(facts.decision.rule)),
+        ("decision.prior", decision["prior"], prior and prior.model_dump()),
+        ("simulation.points", data["simulation"]["points"], len(plan.points)),
+        ("characteristics", len(data["characteristics"]), len(facts.characteristic)),
+    ]  # fmt: skip
+    each = zip(data["characteristics"], facts.characteristic, plan.characteristics, strict=False)
+    for i, (one, wish, known) in enumerate(each):
+        where, angle = f"characteristics[{i}]", wish.asks.limits == "angles"
+        wished = {"name": wish.name, "what": wish.what, "features": list(wish.features), "datums": list(wish.datums),
+                  "association": known.association, "unit": "°" if angle else "mm"}  # fmt: skip
+        stated += [(f"{where}.{key}", one[key], should) for key, should in wished.items()]
+        limits = one["limits"] or {"lower": None, "upper": None}
+        value = None if measured is None else float(measured[i])
+        for key, stands, should, room, otherwise in (
+            ("limits.lower", limits["lower"], known.lower, _SAME, problem),
+            ("limits.upper", limits["upper"], known.upper, _SAME, problem),
+            ("measured", one["measured"], value, _NEAR_MM, "is not the value of the measured points"),
+        ):
+            inquiry.looked("inputs")
+            inside = None if should is None else math.degrees(should) if angle else should
+            near = stands is inside if stands is None or inside is None else (
+                abs(stands - inside) <= room * max(1.0, abs(inside)))  # fmt: skip
+            if not near:
+                inquiry.wrong("inputs", file, f"{where}.{key}", otherwise, stands, f"{inside}")
+    _compare_stated(inquiry, stated, file, problem)
+
+
+def check_standing(inquiry: Inquiry, standing: CertificateStatus, data: Mapping[str, Any], file: str) -> None:
+    """Keep what the machine's certificate says otherwise."""
+    should, said = standing_data(standing), data["machine"]
+    stated = [(f"machine.{key}", said[key], should[key]) for key in _OF_THE_MACHINE]
+    _compare_stated(inquiry, stated, file, "is not what the machine's certificate says")
+
+
+def _compare_stated(inquiry: Inquiry, stated: Sequence[Stated], file: str, problem: str) -> None:
+    for place, stands, should in stated:
+        inquiry.compare("inputs", file, place, problem, stands, should)
+
+
 _NUMBER = re.compile(r"[−-]?\d+(?:[.,]\d+)*")
-_OTHER_KERNELS = (
-    0.5  # share of the sampled figures from which on their differences are taken for those of other kernels
-)
+_OTHER_KERNELS = 0.5  # share of sampled figures from which on their differences are taken for those of other kernels
 _OF_ONE = ("sampling", "diagnosis", "budget", "correlation", "unseen", "decision")
 """Parts whose figures are compared with one and not with themselves: shares, probabilities, statistics of a sampler."""
 
@@ -35,15 +198,10 @@ class Again:
     """What was computed again."""
 
     files: Mapping[str, bytes]  # all that the command writes, by name, without the PDF
-    pdf: bytes | None = (
-        None  # with the files attached that the given one has; ``None`` where the same program cannot set it
-    )
+    pdf: bytes | None = None  # with the files attached that the given one has; ``None`` where the program is another
     why_no_pdf: str = ""
     kept: tuple[str, ...] = ()  # files that say on what platform they were made, and are otherwise what the inputs give
     beside: tuple[str, ...] = ()  # names of files that lie beside the documents and are not inside the PDF
-
-
-Difference = tuple[str, Any, Any]  # JSON path, what stands there, and what it should be
 
 
 def compare_again(inquiry: Inquiry, given: Given, again: Again) -> bool:
@@ -85,16 +243,15 @@ def leaves(data: Any, path: str = "") -> Iterator[tuple[str, Any]]:
         yield path, data
 
 
-def differences(data: Any, new: Any) -> list[Difference]:
-    """Whatever differs, or stands in one alone."""
+def differences(data: Any, new: Any) -> list[tuple[str, Any, Any]]:
+    """Whatever differs, or stands in one alone: JSON path, what stands there, and what it should be."""
     a, b = dict(leaves(data)), dict(leaves(new))
-    found = [(path, a.get(path, ""), b.get(path, "")) for path in dict.fromkeys((*a, *b))
+    found = [(path, a.get(path, ""), b.get(path, "")) for path in {**a, **b}
              if path not in a or path not in b or type(a[path]) is not type(b[path]) or a[path] != b[path]]  # fmt: skip
     if not found and data != new:
-        found.append(("", "other parts", ""))
+        return [("", "other parts", "")]
     if not found and list(a) != list(b):
-        path = next(one for one, other in zip(a, b, strict=True) if one != other)
-        found.append((path, "another order", ""))
+        return [(list(a)[first_difference(list(a), list(b))], "another order", "")]
     return found
 
 
@@ -105,7 +262,7 @@ def by_other_kernels(data: Any, new: Any) -> bool:
     return bool(figures) and sum(a[path] != b[path] for path in figures) > _OTHER_KERNELS * len(figures)
 
 
-def beyond_sampling(data: Any, new: Any, found: list[Difference]) -> Iterator[Difference]:
+def beyond_sampling(data: Any, new: Any, found: list[tuple[str, Any, Any]]) -> Iterator[tuple[str, Any, Any]]:
     """Of some differences those that neither printed digits nor Monte Carlo error explain."""
     draws = min(filter(None, map(_draws, (data, new))), default=0.0)
     part = _ERRORS * math.sqrt(2.0 / draws) if draws > 0 else 1e-6
@@ -115,7 +272,7 @@ def beyond_sampling(data: Any, new: Any, found: list[Difference]) -> Iterator[Di
             if not (isinstance(stands, str) and isinstance(should, str) and _words_alike(stands, should, part)):
                 yield path, stands, should
             continue
-        owner = path.rpartition(".")[0] if "interval95" not in path else path.rpartition(".interval95")[0]
+        owner = path.rpartition(".interval95" if "interval95" in path else ".")[0]
         scale = max(abs(stands), abs(should))
         if owner in uncertain:
             u = uncertain[owner]["u"] if path.endswith((".value", "]", ".u", ".U")) else scale
@@ -161,8 +318,6 @@ def _compare_html(inquiry: Inquiry, given: Given, again: Again, *, kernels: bool
     if content == should:
         return True
     if kernels:
-        from cmm_uq.certificate.verify.html_page import read_html
-
         here, there = (_NUMBER.sub("#", squashed(text)) for text in (page.text, read_html(should, name).text))
         if here == there:
             inquiry.left("pictures", "the figures differ in their last digits, and with them the pictures")
@@ -214,10 +369,10 @@ def _compare_pdf(inquiry: Inquiry, given: Given, again: Again) -> bool:
         inquiry.left("drawings and letters of the PDF's pages", again.why_no_pdf)
         return False
     inquiry.looked("again")
-    if pdf.content[: pdf.ends[0]] == again.pdf:
-        return True
     stands, should = pdf.content[: pdf.ends[0]], again.pdf
-    parts = differing_parts(stands, should)
+    if stands == should:
+        return True
+    parts: list[Difference] = differing_parts(stands, should)
     for where, here, there in parts:
         inquiry.wrong("again", name, where, "is not what its inputs give", here, there)
     if not parts:

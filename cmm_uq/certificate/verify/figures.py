@@ -242,9 +242,8 @@ def _check_budget(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> None:
     """A share of each cause and factor for each characteristic; what is not seen stands in a line of it."""
     budget, wrong = data["budget"], partial(inquiry.wrong, "figures", file)
     names = [each["name"] for each in data["characteristics"]]
-    inquiry.compare(
-        "figures", file, "budget.characteristics", "are not those of the part", budget["characteristics"], names
-    )
+    stated = budget["characteristics"]
+    inquiry.compare("figures", file, "budget.characteristics", "are not those of the part", stated, names)
     rows = [(f"causes[{i}].{key}", line[key]) for i, line in enumerate(budget["causes"]) for key in ("first", "total")]
     rows += [(f"factors[{i}].share", line["share"]) for i, line in enumerate(budget["factors"])]
     for place, shares in rows:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from hashlib import sha256
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, get_args
 
@@ -30,10 +32,7 @@ _FIX_OF_GIVEN = "Give files that cmm-uq report, diagnose or part wrote, or their
 
 def strict_json(content: bytes, where: str) -> dict[str, Any]:
     """The object of a JSON file: each key once, numbers that are numbers, nested within limits."""
-
-    def refusal(problem: str, where: str = where) -> CmmUqError:
-        return CmmUqError(problem, where=where, fix=_FIX)
-
+    refusal = partial(CmmUqError, where=where, fix=_FIX)
     if len(content) > JSON_BYTES.most:
         raise refusal(f"is larger than {JSON_BYTES.most} bytes")
     text = text_of(content, where, _FIX)
@@ -43,8 +42,8 @@ def strict_json(content: bytes, where: str) -> dict[str, Any]:
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         values = dict(pairs)
         if len(values) < len(pairs):
-            twice = next(key for i, (key, _) in enumerate(pairs) if key in {name for name, _ in pairs[:i]})
-            raise refusal(f"has the key {twice!r} twice")
+            names = [key for key, _ in pairs]
+            raise refusal(f"has the key {next(key for i, key in enumerate(names) if key in names[:i])!r} twice")
         return values
 
     def numeral(of: type[int | float], text: str) -> Any:
@@ -59,7 +58,7 @@ def strict_json(content: bytes, where: str) -> dict[str, Any]:
             text, object_pairs_hook=once, parse_int=partial(numeral, int), parse_float=real, parse_constant=real
         )
     except json.JSONDecodeError as error:
-        raise refusal(f"is no JSON: {error.msg}", f"{where} line {error.lineno}") from None
+        raise CmmUqError(f"is no JSON: {error.msg}", where=f"{where} line {error.lineno}", fix=_FIX) from None
     if not isinstance(data, dict):
         raise refusal("holds no JSON object")
     return data
@@ -70,23 +69,13 @@ def canonical(data: Any) -> bytes:
     return (json.dumps(data, indent=2, ensure_ascii=False) + "\n").encode()
 
 
+_QUOTED = re.compile(r'"(?:[^"\\]|\\.)*+"?', re.DOTALL)
+
+
 def _depth(text: str) -> int:
-    """Of brackets outside strings, before anything recurses; counted until it is too deep."""
-    depth, deepest, quoted, escaped = 0, 0, False, False
-    for c in text:
-        if quoted:
-            quoted = escaped or c != '"'
-            escaped = not escaped and c == "\\"
-        elif c == '"':
-            quoted = True
-        elif c in "[{":
-            depth += 1
-            deepest = max(deepest, depth)
-            if deepest > JSON_DEPTH.most:
-                break
-        elif c in "]}":
-            depth -= 1
-    return deepest
+    """Of brackets outside strings, before anything recurses."""
+    steps = (1 if bracket in "[{" else -1 for bracket in re.findall(r"[\[{\]}]", _QUOTED.sub("", text)))
+    return max(accumulate(steps), default=0)
 
 
 @dataclass
@@ -123,8 +112,8 @@ def read_given(paths: Iterable[Path]) -> Given:
     read: dict[str, tuple[bytes, str]] = {}
     for name, path in _files(paths):
         if name in read:
-            raise CmmUqError(f"there are two files {name!r}, and one certificate is verified at a time", where=str(path),
-                             fix=_FIX_OF_GIVEN)  # fmt: skip
+            problem = f"there are two files {name!r}, and one certificate is verified at a time"
+            raise CmmUqError(problem, where=str(path), fix=_FIX_OF_GIVEN)
         read[name] = content_of(path, PDF_BYTES, _FIX_OF_GIVEN), str(path)
     return _given(read)
 
@@ -153,9 +142,10 @@ def _given(read: Mapping[str, tuple[bytes, str]]) -> Given:
 def _files(paths: Iterable[Path]) -> list[tuple[str, Path]]:
     """Those of a folder in order, also of folders inside it those that its manifest names; links lead elsewhere: refused."""
     files: list[tuple[str, Path]] = []
+    link = "is a link, which may lead to anything"
     for path in paths:
         if path.is_symlink():
-            raise CmmUqError("is a link, which may lead to anything", where=str(path), fix="Give the file itself")
+            raise CmmUqError(link, where=str(path), fix="Give the file itself")
         if not path.is_dir():
             files.append((path.name, path))
             continue
@@ -168,12 +158,11 @@ def _files(paths: Iterable[Path]) -> list[tuple[str, Path]]:
         for name in (*inside, *_deeper(path)):
             steps = [path.joinpath(*name.split("/")[: i + 1]) for i in range(name.count("/") + 1)]
             if any(step.is_symlink() for step in steps):
-                where = str(path / name)
-                raise CmmUqError("is a link, which may lead to anything", where=where, fix="Put the file itself there")
+                raise CmmUqError(link, where=str(path / name), fix="Put the file itself there")
             files.append((name, path / name))
     if len(files) > GIVEN.most:
-        raise CmmUqError(f"{len(files)} files are given, and {GIVEN.most} are read at once", where=str(files[0][1].parent),
-                         fix=_FIX_OF_GIVEN)  # fmt: skip
+        problem = f"{len(files)} files are given, and {GIVEN.most} are read at once"
+        raise CmmUqError(problem, where=str(files[0][1].parent), fix=_FIX_OF_GIVEN)
     return files
 
 

@@ -1,4 +1,4 @@
-"""Whether PDF, HTML and digital certificate (DCC) say the same, to the character and to the element; where two PDFs differ.
+"""Whether PDF, HTML and digital certificate (DCC) say the same, to the character and to the element; who signed them.
 
 What a PDF has more than a page is taken off first: the foot of every page, the banner at its head, the head of a table that
 goes on over pages, signs of lists. White space tells nothing: lines break elsewhere. The digital certificate is made again of
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import html
 import io
+import json
 import re
 import unicodedata
 from collections.abc import Iterator, Sequence
@@ -16,13 +17,14 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError, NotInstalledError
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.given import Given
 from cmm_uq.certificate.verify.html_page import HtmlPage, read_html
 from cmm_uq.certificate.verify.pdf_file import PdfFile, reading
 
 if TYPE_CHECKING:
+    from cmm_uq.certificate.sign import FileSignature, Trust
     from cmm_uq.jobs.dcc.tree import Node
     from cmm_uq.jobs.job import Job
 
@@ -33,48 +35,37 @@ MISSING = "□"  # in place of a character that a PDF's fonts lack
 _ANCHOR = 24  # characters by which the views are brought together again behind a difference
 _MOST_SHOWN = 20
 _CONTEXT = 24
-
-
-def compare_views(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, *, files: tuple[str, str]) -> None:
-    """Keep every difference between the text of a PDF and that of a page."""
-    name, beside = files
-    banner = squashed(page.banner)
-    whole, count = squashed(page.text).removeprefix(banner), 0
-    replaced = any(MISSING in text for text in pdf.pages) and MISSING not in page.text
-    heads = sorted({squashed("".join(table.headings)) for table in page.tables} - {""}, key=len, reverse=True)
-    at = 0
-    for number, text in enumerate(pdf.pages, 1):
-        shown, foot = without_foot(squashed(text), squashed(page.title), number, len(pdf.pages))
-        if not foot:
-            inquiry.wrong("forms", name, f"page {number}", "has no foot with title, number and count of pages",
-                          text[-60:].strip(), page.title)  # fmt: skip
-        if not shown.startswith(banner):
-            inquiry.wrong("forms", name, f"page {number}", "does not begin with the banner", shown[:60], page.banner)
-        shown = shown.removeprefix(banner)
-        found, at = _differences(shown, whole, at, heads, replaced=replaced)
-        for stands, should in found:
-            count += 1
-            if count <= _MOST_SHOWN:
-                inquiry.wrong("forms", name, f"page {number}", f"says something else than {beside}", stands, should)
-    if at < len(whole):
-        inquiry.wrong("forms", name, f"page {len(pdf.pages)}", f"ends before {beside} does", "", whole[at:])
-    inquiry.looked("forms", len(pdf.pages))
-    _compare_information(inquiry, pdf, page, name)
-
-
-def check_style(inquiry: Inquiry, page: HtmlPage, name: str) -> None:
-    """Keep a style sheet that is not the template's: it could hide what a page says, or say something else."""
-    from cmm_uq.certificate.render.html import style_sheet
-
-    inquiry.looked("files")
-    should = style_sheet(page.title, page.banner, page.language)
-    if page.style.strip() != should.strip():
-        inquiry.wrong("files", name, "style sheet", "is not that of the template")
+Difference = tuple[str, str, str]  # path in a PDF or XPath, what stands there, what should
 
 
 def squashed(text: str) -> str:
     """Text without what tells nothing; letters composed of two are one."""
     return _NO_TEXT.sub("", unicodedata.normalize("NFC", text))
+
+
+def compare_views(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, *, files: tuple[str, str]) -> None:
+    """Keep every difference between the text of a PDF and that of a page."""
+    name, beside = files
+    banner, at, count = squashed(page.banner), 0, 0
+    whole = squashed(page.text).removeprefix(banner)
+    replaced = any(MISSING in text for text in pdf.pages) and MISSING not in page.text
+    heads = sorted({squashed("".join(table.headings)) for table in page.tables} - {""}, key=len, reverse=True)
+    for number, text in enumerate(pdf.pages, 1):
+        where = f"page {number}"
+        shown, foot = without_foot(squashed(text), squashed(page.title), number, len(pdf.pages))
+        if not foot:
+            problem = "has no foot with title, number and count of pages"
+            inquiry.wrong("forms", name, where, problem, text[-60:].strip(), page.title)
+        if not shown.startswith(banner):
+            inquiry.wrong("forms", name, where, "does not begin with the banner", shown[:60], page.banner)
+        found, at = _differences(shown.removeprefix(banner), whole, at, heads, replaced=replaced)
+        for stands, should in found[: max(0, _MOST_SHOWN - count)]:
+            inquiry.wrong("forms", name, where, f"says something else than {beside}", stands, should)
+        count += len(found)
+    if at < len(whole):
+        inquiry.wrong("forms", name, f"page {len(pdf.pages)}", f"ends before {beside} does", "", whole[at:])
+    inquiry.looked("forms", len(pdf.pages))
+    _compare_information(inquiry, pdf, page, name)
 
 
 def without_foot(text: str, title: str, number: int, pages: int) -> tuple[str, bool]:
@@ -92,35 +83,21 @@ def _differences(
     """What stands on a page and what should, and the place in the whole up to which they were compared."""
     here, found = 0, list[tuple[str, str]]()
     while here < len(text):
-        length = _alike(text, here, whole, at, replaced=replaced)
-        here, at = here + length, at + length
+        rest, other = text[here:], whole[at : at + len(text)]
+        if replaced:  # a character that the fonts lack may stand for any
+            other = "".join(MISSING if x == MISSING else y for x, y in zip(rest, other, strict=False))
+        alike = first_difference(rest, other)
+        here, at = here + alike, at + alike
         if here == len(text):
             break
-        if head := next((one for one in heads if text.startswith(one, here) and here == 0), ""):
-            here += len(head)
+        if here == 0 and (head := next((one for one in heads if text.startswith(one)), "")):
+            here = len(head)
             continue
         skipped, on = _together(text, here, whole, at)
         before = text[max(0, here - _CONTEXT) : here]
         found.append((before + text[here : here + skipped], before + whole[at:on]))
         here, at = here + skipped, on
     return found, at
-
-
-def _alike(text: str, here: int, whole: str, at: int, *, replaced: bool) -> int:
-    """Characters that are the same from two places on."""
-    length, most = 0, min(len(text) - here, len(whole) - at)
-    step = most
-    while step:
-        if (
-            length + step <= most
-            and text[here + length : here + length + step] == whole[at + length : at + length + step]
-        ):
-            length += step
-        elif replaced and length < most and text[here + length] == MISSING:
-            length += 1
-        else:
-            step //= 2
-    return length
 
 
 def _together(text: str, here: int, whole: str, at: int) -> tuple[int, int]:
@@ -133,99 +110,83 @@ def _together(text: str, here: int, whole: str, at: int) -> tuple[int, int]:
     return len(text) - here, at
 
 
+def first_difference(a: Sequence[object], b: Sequence[object]) -> int:
+    """Where two sequences begin to differ."""
+    return next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
+
+
 def _compare_information(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, name: str) -> None:
     """Title, language, subject and author in the file's own information, which a reader's window shows."""
     subject = page.metas.get("description", "")
-    for key, should in (
-        ("/Title", page.title), ("/Author", page.metas.get("author", "")),
-        ("/Subject", f"{page.banner}. {subject}" if page.banner else subject),
-    ):  # fmt: skip
+    wished = {"/Title": page.title, "/Author": page.metas.get("author", ""),
+              "/Subject": f"{page.banner}. {subject}" if page.banner else subject}  # fmt: skip
+    for key, should in wished.items():
         stands = pdf.information.get(key, "")
-        if " ".join(stands.split()) != " ".join(should.split()):
+        if stands.split() != should.split():
             inquiry.wrong("forms", name, f"information {key}", "is not that of the document", stands, should)
     for key, value in pdf.information.items():
-        words = "".join(value.split())
-        if not key.endswith("Date") and words not in "".join(html.unescape(pdf.xmp).split()):
+        if not key.endswith("Date") and "".join(value.split()) not in "".join(html.unescape(pdf.xmp).split()):
             inquiry.wrong("forms", name, f"information {key}", "does not stand in the metadata", "", value)
     if pdf.language.lower() != page.language.lower():
         inquiry.wrong("forms", name, "language", "is not that of the document", pdf.language, page.language)
     inquiry.looked("forms", 4)
 
 
+def check_style(inquiry: Inquiry, page: HtmlPage, name: str) -> None:
+    """Keep a style sheet that is not the template's: it could hide what a page says, or say something else."""
+    from cmm_uq.certificate.render.html import style_sheet
+
+    inquiry.looked("files")
+    if page.style.strip() != style_sheet(page.title, page.banner, page.language).strip():
+        inquiry.wrong("files", name, "style sheet", "is not that of the template")
+
+
 MOST = 8  # differences that are told
 _PAGE = re.compile(r"^/Root/Pages/Kids\[(\d+)\]")
 _NOT_STATED = frozenset({"/ID", "/Prev", "/Size", "/XRefStm", "/Length", "/Filter", "/Parent", "/DecodeParms"})
-Part = tuple[str, str, str]  # path, what stands there, what should
 
 
-def differing_parts(stands: bytes, should: bytes) -> list[Part]:
-    """The first parts that differ; none where only the writing does."""
-    from pypdf import PdfReader
-
+def differing_parts(stands: bytes, should: bytes) -> list[Difference]:
+    """The first parts of two PDFs that differ, what a page has named by the page; none where only the writing does."""
     with reading("the PDF"):
-        a, b = (PdfReader(io.BytesIO(content), strict=False).trailer for content in (stands, should))
-        return _Pairs().compared(a, b)
-
-
-class _Pairs:
-    def __init__(self) -> None:
-        self.found: list[Part] = []
-
-    def compared(self, a: Any, b: Any) -> list[Part]:
-        """Both files walked together from their trailers, each pair of objects once."""
-        from pypdf.generic import ArrayObject, DictionaryObject, StreamObject
-
-        seen: set[tuple[object, object]] = set()
-        waiting: list[tuple[str, Any, Any]] = [("", a, b)]
-        while waiting and len(self.found) < MOST:
-            path, one, other = waiting.pop()
-            key = getattr(one, "idnum", None), getattr(other, "idnum", None)
-            if all(key):
-                if key in seen:
-                    continue
-                seen.add(key)
-            one, other = one.get_object(), other.get_object()
-            if isinstance(one, DictionaryObject) and isinstance(other, DictionaryObject):
-                if isinstance(one, StreamObject) and isinstance(other, StreamObject):
-                    self._stream(path, one, other)
-                waiting += reversed(self._keys(path, one, other))
-            elif isinstance(one, ArrayObject) and isinstance(other, ArrayObject):
-                if len(one) != len(other):
-                    self._tell(path, f"{len(one)} parts", f"{len(other)} parts")
-                pairs = zip(list.__iter__(one), list.__iter__(other), strict=False)
-                waiting += reversed([(f"{path}[{i}]", x, y) for i, (x, y) in enumerate(pairs)])
-            elif one != other:
-                self._tell(path, repr(one), repr(other))
-        return self.found
-
-    def _keys(self, path: str, one: Any, other: Any) -> list[tuple[str, Any, Any]]:
-        keys = [key for key in dict.fromkeys((*dict.keys(one), *dict.keys(other))) if key not in _NOT_STATED]
-        for key in keys:
-            if key not in one or key not in other:
-                self._tell(f"{path}{key}", "" if key not in one else "there", "" if key not in other else "there")
-        keys.sort(key=lambda key: key != "/Pages")  # what else leads to a page is told by the page
-        raw = dict.__getitem__
-        return [(f"{path}{key}", raw(one, key), raw(other, key)) for key in keys if key in one and key in other]
-
-    def _stream(self, path: str, one: Any, other: Any) -> None:
-        a, b = one.get_data(), other.get_data()
-        if a != b:
-            at = first_difference(a, b)
-            self._tell(path, *(data[max(0, at - 20) : at + 20].decode("latin-1") for data in (a, b)))
-
-    def _tell(self, path: str, stands: str, should: str) -> None:
+        a, b = (dict(_parts(content)) for content in (stands, should))
+    found = []
+    for path in islice((path for path in {**a, **b} if a.get(path) != b.get(path)), MOST):
+        x, y = a.get(path, ""), b.get(path, "")
+        begin = max(0, first_difference(x, y) - 20) if x and y else 0
         page = _PAGE.match(path)
         where = f"page {int(page[1]) + 1}: {path[page.end() :]}" if page else path.removeprefix("/Root")
-        self.found.append((where or "trailer", stands, should))
+        found.append((where or "trailer", x[begin : begin + 40], y[begin : begin + 40]))
+    return found
 
 
-def first_difference(a: Sequence[object], b: Sequence[object]) -> int:
-    """Where two sequences begin to differ."""
-    return next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
+def _parts(content: bytes) -> Iterator[tuple[str, str]]:
+    """Everything that a PDF states by its path from the trailer, each object once, pages before what leads to them."""
+    from pypdf import PdfReader
+    from pypdf.generic import ArrayObject, DictionaryObject, StreamObject
+
+    seen: set[int] = set()
+    waiting: list[tuple[str, Any]] = [("", PdfReader(io.BytesIO(content), strict=False).trailer)]
+    while waiting:
+        path, part = waiting.pop()
+        if (number := getattr(part, "idnum", None)) is not None:
+            if number in seen:
+                continue
+            seen.add(number)
+            part = part.get_object()
+        if isinstance(part, DictionaryObject):
+            if isinstance(part, StreamObject):
+                yield path, part.get_data().decode("latin-1")
+            keys = sorted(dict.keys(part) - _NOT_STATED, key=lambda key: (key != "/Pages", key))
+            waiting += reversed([(f"{path}{key}", dict.__getitem__(part, key)) for key in keys])
+        elif isinstance(part, ArrayObject):
+            waiting += reversed([(f"{path}[{i}]", inner) for i, inner in enumerate(list.__iter__(part))])
+        else:
+            yield path, repr(part)
 
 
 _MOST = 12
-Difference = tuple[str, str, str]  # XPath, what stands there, what should
+_ROOT = "/dcc:digitalCalibrationCertificate"
 
 
 def open_digital(inquiry: Inquiry, given: Given) -> None:
@@ -248,23 +209,20 @@ def open_digital(inquiry: Inquiry, given: Given) -> None:
     inquiry.looked("forms")
     document = read(content, name).document
     if document is None:
-        inquiry.wrong("forms", name, "/dcc:digitalCalibrationCertificate", "carries no copy for reading")
+        inquiry.wrong("forms", name, _ROOT, "carries no copy for reading")
         return
     given.page_inside = document.data
-    place = "/dcc:digitalCalibrationCertificate/dcc:document"
     if given.html is None:
         where = f"{document.file_name} in {name}"
         given.html = where, read_html(document.data, where), document.data
     elif given.html[2] != document.data:
-        inquiry.wrong("forms", name, place, f"is not {given.html[0]}")
+        inquiry.wrong("forms", name, f"{_ROOT}/dcc:document", f"is not {given.html[0]}")
 
 
 def check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
     """Keep every element that results.json and the job do not give; of this version of the package."""
     if given.xml is None or given.results is None:
         return
-    import json
-
     from cmm_uq.certificate.digital_certificate.certificate import digital_certificate
     from cmm_uq.jobs.dcc import written
 
@@ -322,7 +280,7 @@ def differences(one: Node, other: Node) -> Iterator[Difference]:
         return
     if one.attributes != other.attributes:
         yield f"{one.xpath}/@*", str(one.attributes), str(other.attributes)
-    if " ".join(one.text.split()) != " ".join(other.text.split()):
+    if one.text.split() != other.text.split():
         yield one.xpath, one.text, other.text
     a, b = ([child for child in node.children if node.parent or not _is_signature(child)] for node in (one, other))
     for mine, theirs in zip(a, b, strict=False):
@@ -333,3 +291,59 @@ def differences(one: Node, other: Node) -> Iterator[Difference]:
 
 def _is_signature(node: Node) -> bool:
     return node.tag.rpartition(":")[2].rpartition("}")[2] == "Signature"
+
+
+_OPENING = b"http://www.w3.org/2000/09/xmldsig#"
+
+
+def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> None:
+    """Keep signatures that are not intact, over the whole file, of somebody trusted, or by a key for trying.
+
+    ``trust``: ``None`` where nobody said whom the reader trusts: then nothing need be signed, and a signature that is intact
+    shows that nothing was changed since, not by whom.
+    """
+    from cmm_uq.certificate import sign
+
+    held = trust or sign.Trust()
+    try:
+        if given.pdf is not None:
+            name, pdf = given.pdf
+            if not pdf.signatures and len(pdf.ends) > 1:
+                problem = "was changed after it was made, and nobody signed that"
+                inquiry.wrong("signatures", name, f"byte {pdf.ends[0]}", problem)
+            signed = sign.signatures_of_pdf(pdf.content, held, where=name) if pdf.signatures else ()
+            _check_signed(inquiry, name, signed, trust)
+        if given.xml is not None:
+            name, content = given.xml
+            signed = sign.signatures_of_xml(content, held, where=name) if _OPENING in content else ()
+            if signed or not given.digital_inside:  # what is inside a signed PDF is signed with it
+                _check_signed(inquiry, name, signed, trust)
+    except NotInstalledError as error:
+        inquiry.left("electronic signatures", f"{error.problem}. {error.fix}")
+
+
+def _check_signed(inquiry: Inquiry, name: str, signed: Sequence[FileSignature], trust: Trust | None) -> None:
+    from cmm_uq.certificate.sign import TEST_NOTE
+    from cmm_uq.certificate.sign.found import NOBODY
+
+    inquiry.looked("signatures", len(signed))
+    if not signed and trust is not None:
+        inquiry.wrong("signatures", name, "", "carries no signature, and --trust asks for one")
+    elif not signed:
+        inquiry.notes.append(f"{name} carries no electronic signature: who issued it is not shown.")
+    for number, one in enumerate(signed, 1):
+        at = "at no time that it says" if one.time is None else f"on {one.time:%Y-%m-%d %H:%M} UTC"
+        who = (
+            f"{name}: {one.level} by {one.name or 'nobody'}, {at}{'' if one.time_proven else ' by the signer himself'}"
+        )
+        inquiry.notes.append(f"{who}; revocation: {one.revocation}.")
+        holds = one.problems or (one.intact and one.covers_whole_file and (one.trusted or trust is None))
+        for problem in one.problems if holds else ("does not hold",):
+            if problem == NOBODY and trust is None:
+                inquiry.left(f"who signed {name}", "no trust anchors were given (--trust)")
+            else:
+                inquiry.wrong("signatures", name, f"signature {number}", str.__str__(problem))
+        if one.test_key and trust is None:
+            inquiry.left(f"who signed {name}", str.__str__(TEST_NOTE))
+        elif one.test_key:
+            inquiry.wrong("signatures", name, f"signature {number}", str.__str__(TEST_NOTE))

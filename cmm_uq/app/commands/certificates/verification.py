@@ -1,6 +1,4 @@
-"""A certificate verified: its files compared with each other, and with what is computed again from its inputs.
-
-A certificate verified: its files compared with each other, and with what a given function computes again from its inputs.
+"""Is a certificate what it says? Its files compared with each other, and with what is computed again from its inputs.
 
 What is verified, a machine's certificate or a part's report, is examined by a function that the caller gives, so that the
 evaluation of a part can verify the certificate of its machine. Nothing of a given file is run. Inputs are read from memory as
@@ -21,8 +19,15 @@ from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Inquiry
 from cmm_uq.certificate.verify.given import PART_SCHEMA, RESULTS, RESULTS_SCHEMA, Given, check_files, language_of
-from cmm_uq.certificate.verify.signed import check_signatures
-from cmm_uq.certificate.verify.views import check_schema, open_digital
+from cmm_uq.certificate.verify.views import (
+    check_digital,
+    check_schema,
+    check_signatures,
+    check_style,
+    compare_views,
+    open_digital,
+    same_unsigned,
+)
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.files import Stage
@@ -93,7 +98,6 @@ def recomputed(given: Given, written: Mapping[str, bytes], kept: Sequence[str], 
 def as_attached(given: Given, kept: list[str], name: str, content: bytes) -> bytes:
     """A file as it is attached where it is the same but for a signature, or for the platform, which is then kept in mind."""
     from cmm_uq.certificate.results.provenance import FILE, same_but_for_the_platform
-    from cmm_uq.certificate.verify.views import same_unsigned
 
     attached = given.files.get(name)
     if attached is None or attached == content or not (name == FILE or name.endswith(".xml")):
@@ -196,16 +200,12 @@ def verify_given(
     elif again is not None:
         alike = again.compute()
     if given.pdf is not None and given.html is not None and not alike:
-        from cmm_uq.certificate.verify.views import compare_views
-
         compare_views(inquiry, given.pdf[1], given.html[1], files=(given.pdf[0], given.html[0]))
     if given.of_part and given.pdf is not None and given.html is None and not alike:
         inquiry.left(
             f"words of {given.pdf[0]} beside its figures and decisions", "no HTML is given to compare them with"
         )
     if given.html is not None and not alike and _version(given) == __version__:
-        from cmm_uq.certificate.verify.views import check_style
-
         check_style(inquiry, given.html[1], given.html[0])
     stage("Done", 1.0)
     return Verification(given, inquiry, None if again is None else again.job)
@@ -253,9 +253,9 @@ def _compare(inquiry: Inquiry, given: Given) -> Job | None:
     """The forms with each other, and figures, decisions, inputs and dates; the job, where its inputs are sound."""
     if given.results is None:
         return None
+    from cmm_uq.certificate.verify.again import check_dates, check_job, check_results, inputs_of
     from cmm_uq.certificate.verify.decisions import check_decisions
     from cmm_uq.certificate.verify.figures import check_figures, check_verdicts
-    from cmm_uq.certificate.verify.inputs import check_dates, check_job, check_results, inputs_of
     from cmm_uq.certificate.verify.stated import check_stated
 
     name, data, _ = given.results
@@ -288,8 +288,6 @@ def _check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
     if (made := _version(given)) != __version__:
         inquiry.left(f"{given.xml[0]} element by element", f"made by version {made}, and this is {__version__}")
         return
-    from cmm_uq.certificate.verify.views import check_digital
-
     check_digital(inquiry, given, job)
 
 

@@ -18,12 +18,11 @@ from cmm_uq.app.commands.parts.drift import FILE as HISTORY
 from cmm_uq.app.commands.parts.machine import CALIBRATION, attached_calibration, standing_of, verified, with_history
 from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.verify.again import compare_again
+from cmm_uq.certificate.verify.again import check_part_job, check_results, check_standing, compare_again, inputs_of
 from cmm_uq.certificate.verify.decisions import check_part_decisions
 from cmm_uq.certificate.verify.figures import check_part_figures, check_verdicts
 from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Inquiry, VerificationFinding
 from cmm_uq.certificate.verify.given import RESULTS, Given, language_of
-from cmm_uq.certificate.verify.inputs import check_part_job, check_results, check_standing, inputs_of
 from cmm_uq.certificate.verify.stated import check_part_stated
 from cmm_uq.certificate.verify.views import squashed, without_foot
 from cmm_uq.jobs.part.job import PartJob, part_of
