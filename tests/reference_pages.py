@@ -414,23 +414,17 @@ def _beginning(name: str) -> Beginning:
 def _parameters(command: CommandInfo) -> Iterable[tuple[str, str, str]]:
     """Name, meaning and default of each argument and option."""
     assert command.callback is not None
-    hints = get_type_hints(command.callback, include_extras=True)
+    hints = get_type_hints(command.callback)
     for name, parameter in inspect.signature(command.callback).parameters.items():
-        info = next(iter(getattr(hints[name], "__metadata__", ())), None)
-        long = f"--{name.replace('_', '-')}"
-        switch = hints[name].__args__[0] if hasattr(hints[name], "__args__") else hints[name]
-        given = (getattr(info, "default", None), *(getattr(info, "param_decls", None) or ()))
-        names = [one for one in given if isinstance(one, str) and one.startswith("-")]
-        names = names or ([long, f"--no-{name}"] if parameter.default is True else [long])
+        info, switch = parameter.default, hints[name]
+        declared = [one for one in info.param_decls or () if one.startswith("-")]
+        names = declared or [f"--{name.replace('_', '-')}", *([f"--no-{name}"] if info.default is True else [])]
         shown = f"`{name.upper()}`" if isinstance(info, ArgumentInfo) else ", ".join(f"`{one}`" for one in names)
-        default = parameter.default
-        plain = isinstance(default, (int, float)) and switch is not bool
-        shown_default = getattr(info, "show_default", None)
-        told = " ".join((getattr(info, "help", None) or "").split())
-        if isinstance(shown_default, str):
-            yield shown, told, f"`{shown_default}`" if "<" in shown_default else shown_default
+        plain, told = isinstance(info.default, (int, float)) and switch is not bool, " ".join((info.help or "").split())
+        if isinstance(info.show_default, str):
+            yield shown, told, f"`{info.show_default}`" if "<" in info.show_default else info.show_default
         else:
-            yield shown, told, f"`{default}`" if plain and default is not parameter.empty else "–"
+            yield shown, told, f"`{info.default}`" if plain else "–"
 
 
 def main() -> None:

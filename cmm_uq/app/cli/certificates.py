@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -22,23 +22,17 @@ FINDINGS_SHOWN = 20  # findings of a verification that are told one by one
 
 
 def verify(
-    files: Annotated[
-        list[Path],
-        argument(
-            "PDF, XML, HTML, results.json of one certificate, in any choice, or the folder of its report.", "FILE…"
-        ),
-    ],
-    rerun: Annotated[bool, flag("--rerun/--no-rerun", "Compute everything again from the inputs, and compare.")] = True,
-    trust: Annotated[
-        list[Path] | None,
-        option("Certificates that you trust, PEM or DER: a file or a folder; again for more.", "FILE|DIR", "nobody"),
-    ] = None,
-    schema: Annotated[
-        Path | None, option("Folder with PTB's schemas of the DCC, that the XML is held to.", "DIR", "none")
-    ] = None,
-    quiet: opt.Quiet = False,
-    verbose: opt.Verbose = False,
-    json: opt.Json = False,
+    files: list[Path] = argument(
+        ..., "PDF, XML, HTML, results.json of one certificate, in any choice, or the folder of its report.", "FILE…"
+    ),
+    rerun: bool = flag(True, "--rerun/--no-rerun", "Compute everything again from the inputs, and compare."),
+    trust: list[Path] | None = option(
+        None, "Certificates that you trust, PEM or DER: a file or a folder; again for more.", "FILE|DIR", "nobody"
+    ),
+    schema: Path | None = option(None, "Folder with PTB's schemas of the DCC, that the XML is held to.", "DIR", "none"),
+    quiet: bool = opt.QUIET,
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
 ) -> None:
     """Compare the forms of a certificate with each other, its figures, decisions and inputs, and compute it again.
 
@@ -79,15 +73,15 @@ def _show_verification(found: Verification, *, verbose: bool) -> None:
 
 
 def sign(
-    files: Annotated[list[Path], argument("certificate.pdf, certificate.xml.", "FILE...")],
-    key: opt.Key,
-    time_server: opt.TimeServer = None,
-    level: opt.Level = None,
-    trust: opt.Trusted = None,
-    out: Annotated[Path | None, option("Folder for signed copies.", "DIR", "signed where they are")] = None,
-    records: opt.Records = None,
-    quiet: opt.Quiet = False,
-    json: opt.Json = False,
+    files: list[Path] = argument(..., "certificate.pdf, certificate.xml.", "FILE..."),
+    key: str = opt.KEY,
+    time_server: str | None = opt.TIME_SERVER,
+    level: str | None = opt.LEVEL,
+    trust: list[Path] | None = opt.TRUSTED,
+    out: Path | None = option(None, "Folder for signed copies.", "DIR", "signed where they are"),
+    records: str | None = opt.RECORDS,
+    quiet: bool = opt.QUIET,
+    json: bool = opt.JSON,
 ) -> None:
     """Sign certificates, so that four eyes may look at them first: PDF by PAdES, XML by XAdES B-B.
 
@@ -110,19 +104,17 @@ def sign(
 
 
 def release(
-    certificate: Annotated[str, argument("Number, id of the job, or number of its entry.", "CERTIFICATE")],
-    by: Annotated[str, option("Who does it.", "NAME")],
-    reason: Annotated[str, option("Why; it stays in the records.", "TEXT")] = "",
-    despite: Annotated[
-        str, option("Why it is released although a statement of it is no pass; it stays in the records.", "TEXT")
-    ] = "",
-    withdraw: Annotated[bool, flag("--withdraw", "Withdraw it instead.")] = False,
-    replaced_by: Annotated[
-        str | None, option("Released certificate that takes its place.", "CERTIFICATE", "none")
-    ] = None,
-    records: opt.Records = None,
-    quiet: opt.Quiet = False,
-    json: opt.Json = False,
+    certificate: str = argument(..., "Number, id of the job, or number of its entry.", "CERTIFICATE"),
+    by: str = option(..., "Who does it.", "NAME"),
+    reason: str = option("", "Why; it stays in the records.", "TEXT"),
+    despite: str = option(
+        "", "Why it is released although a statement of it is no pass; it stays in the records.", "TEXT"
+    ),
+    withdraw: bool = flag(False, "--withdraw", "Withdraw it instead."),
+    replaced_by: str | None = option(None, "Released certificate that takes its place.", "CERTIFICATE", "none"),
+    records: str | None = opt.RECORDS,
+    quiet: bool = opt.QUIET,
+    json: bool = opt.JSON,
 ) -> None:
     """Release a certificate: until then it is a draft. By two persons where [laboratory] four_eyes = true.
 
@@ -163,16 +155,16 @@ def _ask_why(stated: str) -> str:
 
 
 def affected(
-    version: Annotated[
-        str, option("Oldest version of the package whose certificates are looked at.", "A", True, "--version")
-    ],
-    to: Annotated[str | None, option("Version that has the corrections.", "B", "the installed one", "--to")] = None,
-    only_list: Annotated[bool, flag("--list", "Only list them; compute nothing again.")] = False,
-    write: Annotated[Path | None, option("Folder for a draft in place of each that changed.", "DIR", "none")] = None,
-    records: opt.Records = None,
-    quiet: opt.Quiet = False,
-    verbose: opt.Verbose = False,
-    json: opt.Json = False,
+    version: str = option(
+        ..., "Oldest version of the package whose certificates are looked at.", "A", True, "--version"
+    ),
+    to: str | None = option(None, "Version that has the corrections.", "B", "the installed one", "--to"),
+    only_list: bool = flag(False, "--list", "Only list them; compute nothing again."),
+    write: Path | None = option(None, "Folder for a draft in place of each that changed.", "DIR", "none"),
+    records: str | None = opt.RECORDS,
+    quiet: bool = opt.QUIET,
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
 ) -> None:
     """Find the certificates that corrections touch, compute them again from the inputs in their PDF, compare figure by figure.
 
@@ -245,13 +237,12 @@ def _affected_data(one: AffectedCertificate) -> dict[str, Any]:
 
 
 def read(
-    files: Annotated[list[Path], argument("Certificates: DCC of version 3 (XML).", "FILE...")],
-    schema: Annotated[
-        Path | None,
-        option("Folder with the schemas of DCC and D-SI (.xsd), to check the files by as well.", "DIR", "own checks"),
-    ] = None,
-    quiet: opt.Quiet = False,
-    json: opt.Json = False,
+    files: list[Path] = argument(..., "Certificates: DCC of version 3 (XML).", "FILE..."),
+    schema: Path | None = option(
+        None, "Folder with the schemas of DCC and D-SI (.xsd), to check the files by as well.", "DIR", "own checks"
+    ),
+    quiet: bool = opt.QUIET,
+    json: bool = opt.JSON,
 ) -> None:
     """Print digital calibration certificates (DCC). Exit code 2 for a file that is none.
 
@@ -294,9 +285,9 @@ def _table(grid: Grid) -> list[str]:
 
 
 def qif(
-    report: Annotated[Path, argument("Folder of a report, or its results.json.", "REPORT")],
-    out: Annotated[Path | None, option("File to write.", "FILE", "<job id>.qif")] = None,
-    quiet: opt.Quiet = False,
+    report: Path = argument(..., "Folder of a report, or its results.json.", "REPORT"),
+    out: Path | None = option(None, "File to write.", "FILE", "<job id>.qif"),
+    quiet: bool = opt.QUIET,
 ) -> None:
     """Write every value that a standard decided on, and the error factors, as QIF 3.0. Nothing is overwritten."""
     from cmm_uq.app.commands.jobs.exchange import write_qif
@@ -314,10 +305,10 @@ keys = opt.group(
 
 @keys.command("new", epilog=examples("keys new test.p12 --name 'Calibration laboratory'"))
 def new_key(
-    file: Annotated[Path, argument("PKCS#12 file to be made.", "FILE")],
-    name: Annotated[str, option("Of whom it is for.", "NAME")] = "cmm-uq",
-    quiet: opt.Quiet = False,
-    json: opt.Json = False,
+    file: Path = argument(..., "PKCS#12 file to be made.", "FILE"),
+    name: str = option("cmm-uq", "Of whom it is for.", "NAME"),
+    quiet: bool = opt.QUIET,
+    json: bool = opt.JSON,
 ) -> None:
     """Make a test key with its certificate, FILE for signing and FILE.pem for whoever is to trust it.
 
@@ -336,8 +327,8 @@ def new_key(
 
 
 def standards(
-    name: Annotated[str | None, argument("Standard with its edition.", "[NAME]")] = None,
-    form: Annotated[Path | None, option("File to write its form to.", "FILE", "none")] = None,
+    name: str | None = argument(None, "Standard with its edition.", "[NAME]"),
+    form: Path | None = option(None, "File to write its form to.", "FILE", "none"),
 ) -> None:
     """List the standards that are decided, or what is done of each clause of one.
 
@@ -360,7 +351,7 @@ def standards(
 
 
 def schema(
-    name: Annotated[str, argument("job (with its plan), part, budget, truth, instrument or schedule.", "NAME")] = "job",
+    name: str = argument("job", "job (with its plan), part, budget, truth, instrument or schedule.", "NAME"),
 ) -> None:
     """Print the JSON Schema of a file, with the kinds, effects and standards that are installed."""
     from cmm_uq.app.commands.jobs.schemas import as_text, schema_named

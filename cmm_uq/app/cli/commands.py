@@ -6,12 +6,12 @@ import os
 import sys
 from collections.abc import Callable
 from copy import copy
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
-from cmm_uq.app.cli import certificates, evaluations, instruments, jobs, laboratory, part, records, schedule
-from cmm_uq.app.cli.options import examples
+from cmm_uq.app.cli import certificates, evaluations, instruments, jobs, laboratory, records, schedule
+from cmm_uq.app.cli.options import examples, flag
 from cmm_uq.app.cli.terminal import BAD_INPUT, say
 from cmm_uq.base.errors import CmmUqError
 
@@ -46,7 +46,11 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, str]] = {
                  "report JOB --json --strict > results.json", "report JOB --sign laboratory.p12",
                  "report --scheduled jobs --dry-run"),
     ),
-    "part": (part.command, "The uncertainty of what is measured on a part, and whether it conforms.", part.EXAMPLES),
+    "part": (
+        evaluations.part, "The uncertainty of what is measured on a part, and whether it conforms.",
+        examples("part examples/part-plate-simulated", "part JOB --digits 2 --rerun",
+                 "part JOB --json --strict > results.json"),
+    ),
     "batch": (
         laboratory.batch, "The reports of many jobs, by processes or a cluster.",
         examples("batch jobs/2026", "batch jobs --workers 8 --results-only --parquet values.parquet",
@@ -171,7 +175,7 @@ cmm-uq --help lists all commands, cmm-uq COMMAND --help the options of one."""
 @app.callback(invoke_without_command=True)
 def _alone(
     context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+    version: bool = flag(False, "--version", "Print the version and stop."),
 ) -> None:
     from cmm_uq import __version__
 

@@ -1,4 +1,4 @@
-"""``cmm-uq report``, ``diagnose``, ``plan``, ``prove``, ``budget`` and ``selftest``: all that is evaluated."""
+"""``cmm-uq report``, ``diagnose``, ``plan``, ``prove``, ``part``, ``budget`` and ``selftest``: all that is evaluated."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -16,7 +16,7 @@ from cmm_uq.app.cli.options import argument, flag, job_folder, option
 from cmm_uq.app.cli.summary import conclude, screen_layout, show_summary
 from cmm_uq.app.cli.terminal import NOT_CONFORMING, progress, put_data, put_json, say, show
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.translation import ENGLISH
+from cmm_uq.base.languages.translation import ENGLISH, Code
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.wording import Summary
@@ -25,35 +25,30 @@ if TYPE_CHECKING:
 
 
 def report(
-    job: Annotated[
-        list[Path],
-        job_folder(
-            "Job folder: job.toml and the recording that it names; with --scheduled folders that hold job folders."
-        ),
-    ],
-    out: Annotated[Path | None, opt.out("reports/<job id>")] = None,
-    seed: opt.Seed = 0,
-    force: opt.Force = False,
-    strict: opt.Strict = False,
-    quiet: opt.Quiet = False,
-    verbose: opt.Verbose = False,
-    json: opt.Json = False,
-    language: opt.Language = None,
-    records: opt.Records = None,
-    sign: opt.Sign = None,
-    time_server: opt.TimeServer = None,
-    level: opt.Level = None,
-    trust: opt.Trusted = None,
-    scheduled: Annotated[
-        bool, flag("--scheduled", "Every job that is new or changed; a line of JSON for each; DIR holds them all.")
-    ] = False,
-    schedule: Annotated[
-        Path | None, option("With --scheduled: what the run goes by.", "FILE", "schedule.toml in the first JOB")
-    ] = None,
-    lines: Annotated[
-        Path | None, option("With --scheduled: file that the lines are added to.", "FILE", "printed")
-    ] = None,
-    dry_run: Annotated[bool, flag("--dry-run", "With --scheduled: say what would happen, and do nothing.")] = False,
+    job: list[Path] = job_folder(
+        ..., "Job folder: job.toml and the recording that it names; with --scheduled folders that hold job folders."
+    ),
+    out: Path | None = opt.out(None, "reports/<job id>"),
+    seed: int = opt.seed(),
+    force: bool = opt.FORCE,
+    strict: bool = opt.STRICT,
+    quiet: bool = opt.QUIET,
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
+    language: Code | None = opt.LANGUAGE,
+    records: str | None = opt.RECORDS,
+    sign: str | None = opt.SIGN,
+    time_server: str | None = opt.TIME_SERVER,
+    level: str | None = opt.LEVEL,
+    trust: list[Path] | None = opt.TRUSTED,
+    scheduled: bool = flag(
+        False, "--scheduled", "Every job that is new or changed; a line of JSON for each; DIR holds them all."
+    ),
+    schedule: Path | None = option(
+        None, "With --scheduled: what the run goes by.", "FILE", "schedule.toml in the first JOB"
+    ),
+    lines: Path | None = option(None, "With --scheduled: file that the lines are added to.", "FILE", "printed"),
+    dry_run: bool = flag(False, "--dry-run", "With --scheduled: say what would happen, and do nothing."),
 ) -> None:
     """Estimate, decide, and write certificate.html, certificate.pdf, certificate.xml and results.json."""
     alone = {"--force": force, "--strict": strict, "--verbose": verbose, "--language": language, "--sign": sign}
@@ -87,21 +82,20 @@ def report(
 
 
 def diagnose(
-    job: opt.Job,
-    out: Annotated[Path | None, opt.out("reports/<job id>/diagnosis")] = None,
-    seed: opt.Seed = 0,
-    alpha: Annotated[float, option("Rate of false alarms, a probability from 0.000001 to 0.5.", "P")] = 0.01,
-    against: Annotated[
-        Path | None,
-        option("Coordinates or lengths that a simulation predicts, or an error map.", "FILE", "the job's model"),
-    ] = None,
-    force: opt.Force = False,
-    strict: opt.Strict = False,
-    quiet: opt.Quiet = False,
-    verbose: opt.Verbose = False,
-    json: opt.Json = False,
-    language: opt.Language = None,
-    records: opt.Records = None,
+    job: Path = opt.JOB,
+    out: Path | None = opt.out(None, "reports/<job id>/diagnosis"),
+    seed: int = opt.seed(),
+    alpha: float = option(0.01, "Rate of false alarms, a probability from 0.000001 to 0.5.", "P"),
+    against: Path | None = option(
+        None, "Coordinates or lengths that a simulation predicts, or an error map.", "FILE", "the job's model"
+    ),
+    force: bool = opt.FORCE,
+    strict: bool = opt.STRICT,
+    quiet: bool = opt.QUIET,
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
+    language: Code | None = opt.LANGUAGE,
+    records: str | None = opt.RECORDS,
 ) -> None:
     """Locate a mismatch, name the physics that was left out, and show what modelling it improves."""
     with progress(quiet=quiet or json, verbose=verbose) as stage:
@@ -116,18 +110,18 @@ def diagnose(
 
 
 def plan(
-    job: Annotated[Path, job_folder("Job folder; its recording may still be missing.")],
-    out: Annotated[Path | None, opt.out("reports/<job id>/plan")] = None,
-    power: Annotated[
-        bool, option("Predict how large an effect must be for the diagnosis to find it; takes most of the time.")
-    ] = True,
-    seed: Annotated[int, option("Seed of the recordings drawn for that.", "N", min=0)] = 0,
-    force: opt.Force = False,
-    strict: opt.Strict = False,
-    quiet: opt.Quiet = False,
-    verbose: opt.Verbose = False,
-    json: opt.Json = False,
-    language: opt.Language = None,
+    job: Path = job_folder(..., "Job folder; its recording may still be missing."),
+    out: Path | None = opt.out(None, "reports/<job id>/plan"),
+    power: bool = option(
+        True, "Predict how large an effect must be for the diagnosis to find it; takes most of the time."
+    ),
+    seed: int = option(0, "Seed of the recordings drawn for that.", "N", min=0),
+    force: bool = opt.FORCE,
+    strict: bool = opt.STRICT,
+    quiet: bool = opt.QUIET,
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
+    language: Code | None = opt.LANGUAGE,
 ) -> None:
     """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
     with progress(quiet=quiet or json, verbose=verbose) as stage:
@@ -138,23 +132,20 @@ def plan(
 
 
 def prove(
-    job: Annotated[Path, job_folder("Job folder; its recording may still be missing where its noise is stated.")],
-    out: Annotated[Path | None, opt.out("reports/<job id>/prove")] = None,
-    cases: Annotated[int, option("How many sealed cases to draw.", "N")] = 200,
-    workers: Annotated[
-        int | None,
-        option("Processes at once; the figures do not depend on it.", "N", "as many as there are processors"),
-    ] = None,
-    seed: Annotated[int, option("Seed of the cases; the same seed gives the same bytes.", "N", min=0)] = 0,
-    alpha: Annotated[float, option("Rate of false alarms that the diagnosis is asked for.", "P")] = 0.01,
-    force: opt.Force = False,
-    strict: Annotated[
-        bool, flag("--strict", "Exit code 4 where the cases show that an acceptance figure is missed.")
-    ] = False,
-    quiet: opt.Quiet = False,
-    verbose: opt.Verbose = False,
-    json: opt.Json = False,
-    language: opt.Language = None,
+    job: Path = job_folder(..., "Job folder; its recording may still be missing where its noise is stated."),
+    out: Path | None = opt.out(None, "reports/<job id>/prove"),
+    cases: int = option(200, "How many sealed cases to draw.", "N"),
+    workers: int | None = option(
+        None, "Processes at once; the figures do not depend on it.", "N", "as many as there are processors"
+    ),
+    seed: int = option(0, "Seed of the cases; the same seed gives the same bytes.", "N", min=0),
+    alpha: float = option(0.01, "Rate of false alarms that the diagnosis is asked for.", "P"),
+    force: bool = opt.FORCE,
+    strict: bool = flag(False, "--strict", "Exit code 4 where the cases show that an acceptance figure is missed."),
+    quiet: bool = opt.QUIET,
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
+    language: Code | None = opt.LANGUAGE,
 ) -> None:
     """Draw cases with known truth on a job's set-ups, diagnose them, and write what a laboratory files as validation."""
 
@@ -173,19 +164,51 @@ def prove(
     conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
 
 
+def part(
+    job: Path = job_folder(
+        ..., "Job folder of a part: job.toml, the machine's certificate, and the measured points if there are some."),
+    out: Path | None = opt.out(None, "reports/<job id>"),
+    seed: int = opt.seed(),
+    trials: int | None = option(None, "Virtual measurements.", "N", "200000", min=1000),
+    digits: int | None = option(
+        None, "Digits of u that are to be known: as many virtual measurements as they need.", "N", "none", min=1, max=3),
+    rerun: bool = flag(False, "--rerun", "Compute the machine's certificate again from its inputs, and compare."),
+    trust: list[Path] | None = option(
+        None, "Certificates that you trust, PEM or DER: the machine's certificate must then be signed.", "FILE|DIR",
+        "nobody"),
+    records: str | None = option(
+        None, "Records of the machine's history, from which its drift is known: a file, a postgresql:// URL, or none.",
+        "WHERE", "none"),
+    force: bool = opt.FORCE,
+    strict: bool = flag(False, "--strict", "Exit code 4 unless every characteristic conforms."),
+    quiet: bool = opt.QUIET,
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
+    language: Code | None = opt.LANGUAGE,
+) -> None:  # fmt: skip
+    """Verify the machine's certificate, measure the part virtually, and write part.html, part.pdf and results.json."""
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.files import silent
+        from cmm_uq.app.commands.parts.documents import write_part
+        from cmm_uq.app.commands.parts.part import PartOptions
+
+        options = PartOptions(seed, trials, digits, rerun, None if trust is None else tuple(trust), records)
+        written = write_part(job, out, options=options, force=force, stage=stage or silent, language=language)
+    conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
+
+
 def budget(
-    file: Annotated[
-        Path,
-        argument("Measurement model: outputs, inputs, correlations, in TOML.", "FILE", autocompletion=opt.toml_files),
-    ],
-    out: Annotated[Path | None, opt.out("reports/<name of the file>")] = None,
-    seed: Annotated[int | None, option("Seed of the Monte Carlo.", "N", "the file's", min=0)] = None,
-    force: opt.Force = False,
-    strict: opt.Settled = False,
-    quiet: opt.Quiet = False,
-    verbose: opt.Verbose = False,
-    json: opt.Json = False,
-    language: opt.Language = None,
+    file: Path = argument(
+        ..., "Measurement model: outputs, inputs, correlations, in TOML.", "FILE", autocompletion=opt.toml_files
+    ),
+    out: Path | None = opt.out(None, "reports/<name of the file>"),
+    seed: int | None = option(None, "Seed of the Monte Carlo.", "N", "the file's", min=0),
+    force: bool = opt.FORCE,
+    strict: bool = flag(False, "--strict", "Exit code 4 unless Monte Carlo is stable to the digits asked for."),
+    quiet: bool = opt.QUIET,
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
+    language: Code | None = opt.LANGUAGE,
 ) -> None:
     """Propagate uncertainty by the GUM and by Monte Carlo, and write budget.html, budget.pdf and results.json."""
     with progress(quiet=quiet or json, verbose=verbose) as stage:
@@ -218,9 +241,9 @@ def _budget_summary(evaluation: Evaluation) -> Summary:
 
 
 def selftest(
-    quiet: Annotated[bool, flag("--quiet", "Print only what fails, and the count.", "-q")] = False,
-    verbose: opt.Verbose = False,
-    json: opt.Json = False,
+    quiet: bool = flag(False, "--quiet", "Print only what fails, and the count.", "-q"),
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
 ) -> None:
     """Compute published reference figures and compare: expected, got, source. Exit code 4 when any differs."""
     from cmm_uq import __version__

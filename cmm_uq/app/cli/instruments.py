@@ -6,12 +6,13 @@ import sys
 import time
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
+from cmm_uq.app.cli import options as opt
 from cmm_uq.app.cli.asking import instrument_answers
-from cmm_uq.app.cli.options import Json, argument, examples, option, profiles
+from cmm_uq.app.cli.options import argument, examples, option
 from cmm_uq.app.cli.terminal import put_data, say, say_now
 from cmm_uq.base.errors import CmmUqError, printable
 
@@ -24,31 +25,27 @@ app = typer.Typer(
 
 SHOWN = 44  # characters of a message beside what was understood of it
 
-Profile = Annotated[
-    str,
-    argument(
-        "Ready profile, a TOML file, or with --job the name of a source in it.", "PROFILE", autocompletion=profiles
-    ),
-]
-Port = Annotated[
-    str,
-    argument(
-        "/dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port, tcp://host:port or file:NAME.", "PORT",
-        "that of the job",
-    ),
-]  # fmt: skip
-Job = Annotated[Path | None, option("Job folder whose source is meant.", "JOB", "none", "--job")]
-Seconds = Annotated[float | None, option("How long.", "S", "until it is interrupted", min=0.1)]
+PROFILE = argument(
+    ..., "Ready profile, a TOML file, or with --job the name of a source in it.", "PROFILE", autocompletion=opt.profiles
+)
+PORT = argument(
+    "",
+    "/dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port, tcp://host:port or file:NAME.",
+    "PORT",
+    "that of the job",
+)
+JOB = option(None, "Job folder whose source is meant.", "JOB", "none", "--job")
+SECONDS = option(None, "How long.", "S", "until it is interrupted", min=0.1)
 
 
 @app.callback()
 def _alone(context: typer.Context) -> None:
     if context.invoked_subcommand is None:
-        list_all()
+        list_all(json=False)
 
 
 @app.command("list", epilog=examples("instruments list", "instruments list --json"))
-def list_all(json: Json = False) -> None:
+def list_all(json: bool = opt.JSON) -> None:
     """List the ready profiles and the serial ports of this computer."""
     from cmm_uq.app.commands.laboratory.instruments import ready_profiles
     from cmm_uq.laboratory.live.instruments.ports import serial_ports
@@ -72,11 +69,11 @@ def list_all(json: Json = False) -> None:
     "test", epilog=examples("instruments test fluke-1502a /dev/ttyUSB0", "instruments test table_top --job my-job")
 )
 def try_out(
-    profile: Profile,
-    port: Port = "",
-    job: Job = None,
-    seconds: Annotated[float, option("How long.", "S", min=0.1, max=86400)] = 5.0,
-    json: Json = False,
+    profile: str = PROFILE,
+    port: str = PORT,
+    job: Path | None = JOB,
+    seconds: float = option(5.0, "How long.", "S", min=0.1, max=86400),
+    json: bool = opt.JSON,
 ) -> None:
     """Try an instrument for a few seconds: who it is, and each message beside what was understood of it.
 
@@ -103,7 +100,7 @@ def try_out(
 
 
 @app.command("watch", epilog=examples("instruments watch line-logger socket://logger:4001"))
-def watch(profile: Profile, port: Port = "", job: Job = None, seconds: Seconds = None) -> None:
+def watch(profile: str = PROFILE, port: str = PORT, job: Path | None = JOB, seconds: float | None = SECONDS) -> None:
     """Show each message beside what is understood of it, gaps and returns too, until it is interrupted."""
     from cmm_uq.app.commands.laboratory.instruments import Attempt
     from cmm_uq.base.output.interruption import speaking
@@ -128,25 +125,19 @@ class Parity(StrEnum):
     ),
 )
 def new(
-    file: Annotated[Path, argument("New file: NAME.toml.", "FILE")],
-    line: Annotated[
-        str, option("An example line with its end: T=20.13 C<CR><LF>.", "TEXT", "asked for on a terminal")
-    ] = "",
-    quantity: Annotated[
-        list[str] | None,
-        option("Name of a quantity with its unit at its end, and which number of the line it is: temp_c=1.", "NAME=N",
-               "asked for on a terminal"),
-    ] = None,
-    limits: Annotated[
-        list[str] | None, option("Plausible values: temp_c=0:40.", "NAME=LOW:HIGH", "none", "--range")
-    ] = None,
-    ask: Annotated[str, option("What is sent to get a line: T?<CR>.", "TEXT", "nothing is sent")] = "",
-    every: Annotated[float, option("Seconds from one question to the next.", "S", min=0.01)] = 1.0,
-    title: Annotated[str, option("What the instrument is.", "TEXT", "the file's name")] = "",
-    baud: Annotated[int, option("Bits per second.", "N", min=50)] = 9600,
-    bits: Annotated[int, option("Data bits.", "N", min=5, max=8)] = 8,
-    parity: Annotated[Parity, option("Parity.", None, "none")] = Parity.NONE,
-    stop: Annotated[int, option("Stop bits.", "N", min=1, max=2)] = 1,
+    file: Path = argument(..., "New file: NAME.toml.", "FILE"),
+    line: str = option("", "An example line with its end: T=20.13 C<CR><LF>.", "TEXT", "asked for on a terminal"),
+    quantity: list[str] | None = option(
+        None, "Name of a quantity with its unit at its end, and which number of the line it is: temp_c=1.", "NAME=N",
+        "asked for on a terminal"),
+    limits: list[str] | None = option(None, "Plausible values: temp_c=0:40.", "NAME=LOW:HIGH", "none", "--range"),
+    ask: str = option("", "What is sent to get a line: T?<CR>.", "TEXT", "nothing is sent"),
+    every: float = option(1.0, "Seconds from one question to the next.", "S", min=0.01),
+    title: str = option("", "What the instrument is.", "TEXT", "the file's name"),
+    baud: int = option(9600, "Bits per second.", "N", min=50),
+    bits: int = option(8, "Data bits.", "N", min=5, max=8),
+    parity: Parity = option(Parity.NONE, "Parity.", None, "none"),
+    stop: int = option(1, "Stop bits.", "N", min=1, max=2),
 ) -> None:  # fmt: skip
     """Write a profile from an example line; on a terminal it asks for what no option says."""
     from cmm_uq.app.commands.laboratory.instruments import write_profile
@@ -166,9 +157,9 @@ def new(
 
 @app.command("simulate", epilog=examples("instruments simulate fluke-1502a", "instruments simulate ipp"))
 def simulate(
-    profile: Annotated[str, argument("Ready profile.", "PROFILE", autocompletion=profiles)],
-    way: Annotated[str, option("pty (a port of this computer), socket or rfc2217.", "WAY", "pty")] = "",
-    seconds: Seconds = None,
+    profile: str = argument(..., "Ready profile.", "PROFILE", autocompletion=opt.profiles),
+    way: str = option("", "pty (a port of this computer), socket or rfc2217.", "WAY", "pty"),
+    seconds: float | None = SECONDS,
 ) -> None:
     """Be an instrument without hardware, at a port that is printed, until it is interrupted."""
     from cmm_uq.app.commands.laboratory.instruments import simulated_instrument

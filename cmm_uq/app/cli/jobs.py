@@ -6,7 +6,7 @@ import json as json_text
 from collections.abc import Iterable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -24,39 +24,33 @@ if TYPE_CHECKING:
     from cmm_uq.jobs.importing.keys import ImportKeys
     from cmm_uq.jobs.job import Job
 
-Columns = Annotated[
-    list[str] | None,
-    option('Column of the recording and of the file: x_mm="X actual", or its number: x_mm=3.', "NAME=COLUMN",
-           "as recognised", "--column"),
-]  # fmt: skip
-Keys = Annotated[
-    list[str] | None,
-    option('Any other key of an import: unit=inch, sheet="Run 2", decimal=",".', "KEY=VALUE", "as recognised", "--key"),
-]
+COLUMN = option(
+    None,
+    'Column of the recording and of the file: x_mm="X actual", or its number: x_mm=3.',
+    "NAME=COLUMN",
+    "as recognised",
+    "--column",
+)
+KEY = option(
+    None, 'Any other key of an import: unit=inch, sheet="Run 2", decimal=",".', "KEY=VALUE", "as recognised", "--key"
+)
 
 
 def new(
-    kind: Annotated[
-        str,
-        argument("Kind of measurement, shift_plate, plan, part or budget; without it they are listed.", "KIND",
-                 autocompletion=opt.kinds),
-    ] = "",
-    folder: Annotated[Path | None, argument("New folder.", "FOLDER", "the kind's name")] = None,
-    machine: Annotated[str, option("Name of the machine.", "TEXT", "asked for, or a name to be replaced")] = "",
-    serial: Annotated[str, option("Serial number of the machine.", "TEXT", "asked for, or none")] = "",
-    settings: Annotated[
-        list[str] | None,
-        option('Any key of job.toml: artefact.length_mm=500, job.customer="A Ltd".', "KEY=VALUE", "none", "--set"),
-    ] = None,
-    export: Annotated[
-        Path | None,
-        option("Begin from a laboratory's export (see cmm-uq import), which needs --machine and --set job.date=…; "
-               "a part from a QIF plan or a DMIS program.", "FILE", "simulated readings", "--from"),
-    ] = None,
-    column: Columns = None,
-    key: Keys = None,
-    quiet: opt.Quiet = False,
-    json: opt.Json = False,
+    kind: str = argument("", "Kind of measurement, shift_plate, plan, part or budget; without it they are listed.", "KIND",
+                         autocompletion=opt.kinds),
+    folder: Path | None = argument(None, "New folder.", "FOLDER", "the kind's name"),
+    machine: str = option("", "Name of the machine.", "TEXT", "asked for, or a name to be replaced"),
+    serial: str = option("", "Serial number of the machine.", "TEXT", "asked for, or none"),
+    settings: list[str] | None = option(
+        None, 'Any key of job.toml: artefact.length_mm=500, job.customer="A Ltd".', "KEY=VALUE", "none", "--set"),
+    export: Path | None = option(
+        None, "Begin from a laboratory's export (see cmm-uq import), which needs --machine and --set job.date=…; "
+              "a part from a QIF plan or a DMIS program.", "FILE", "simulated readings", "--from"),
+    column: list[str] | None = COLUMN,
+    key: list[str] | None = KEY,
+    quiet: bool = opt.QUIET,
+    json: bool = opt.JSON,
 ) -> None:  # fmt: skip
     """Begin a job: job.toml with every key explained, and a simulated recording to be replaced by your own.
 
@@ -117,14 +111,12 @@ def _tables(machine: str, serial: str, settings: list[str]) -> dict[str, dict[st
 
 
 def import_export(
-    file: Annotated[Path, argument("Export: CSV, .xlsx, .ods, PC-DMIS, Calypso, DMIS, QIF, I++.", "FILE")],
-    column: Columns = None,
-    key: Keys = None,
-    out: Annotated[
-        Path | None, option("Write it as a recording, such as recording.csv.", "FILE", "not written")
-    ] = None,
-    quiet: opt.Quiet = False,
-    json: Annotated[bool, flag("--json", "Print what is recognised as JSON.")] = False,
+    file: Path = argument(..., "Export: CSV, .xlsx, .ods, PC-DMIS, Calypso, DMIS, QIF, I++.", "FILE"),
+    column: list[str] | None = COLUMN,
+    key: list[str] | None = KEY,
+    out: Path | None = option(None, "Write it as a recording, such as recording.csv.", "FILE", "not written"),
+    quiet: bool = opt.QUIET,
+    json: bool = flag(False, "--json", "Print what is recognised as JSON."),
 ) -> None:
     """Show what is recognised of a laboratory's export; a job takes the same file with the same keys under [recording]."""
     from cmm_uq.app.commands.jobs.exchange import read_export, write_recording
@@ -178,12 +170,10 @@ def show_imported(job: Job) -> None:
 
 
 def check(
-    jobs: Annotated[list[Path], argument("Job folders.", "JOB...", autocompletion=opt.job_folders)],
-    clauses: Annotated[
-        bool, flag("--clauses", "Every clause of ISO/IEC 17025:2017, 7.8, and what of it is stated.")
-    ] = False,
-    quiet: opt.Quiet = False,
-    json: opt.Json = False,
+    jobs: list[Path] = argument(..., "Job folders.", "JOB...", autocompletion=opt.job_folders),
+    clauses: bool = flag(False, "--clauses", "Every clause of ISO/IEC 17025:2017, 7.8, and what of it is stated."),
+    quiet: bool = opt.QUIET,
+    json: bool = opt.JSON,
 ) -> None:
     """Say all that is wrong with each job at once: file, line, key, fix. Exit code 2 when something would stop report.
 
@@ -233,16 +223,16 @@ def _check_summary(check: JobCheck) -> Summary:
 
 
 def simulate(
-    job: Annotated[Path, job_folder("Job folder whose recording gives the placings.")],
-    truth: Annotated[
-        Path, option("TOML file with the effects, the noise and the seed.", "FILE", autocompletion=opt.toml_files)
-    ],
-    out: Annotated[Path, option("Folder for the simulated job.", "DIR")],
-    seed: Annotated[int | None, option("Seed of everything random.", "N", "the truth's", min=0)] = None,
-    force: opt.Force = False,
-    quiet: opt.Quiet = False,
-    verbose: opt.Verbose = False,
-    json: opt.Json = False,
+    job: Path = job_folder(..., "Job folder whose recording gives the placings."),
+    truth: Path = option(
+        ..., "TOML file with the effects, the noise and the seed.", "FILE", autocompletion=opt.toml_files
+    ),
+    out: Path = option(..., "Folder for the simulated job.", "DIR"),
+    seed: int | None = option(None, "Seed of everything random.", "N", "the truth's", min=0),
+    force: bool = opt.FORCE,
+    quiet: bool = opt.QUIET,
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
 ) -> None:
     """Draw a recording from the same model that report fits, as a job folder of its own."""
     from cmm_uq.app.commands.jobs.simulate import write_simulation
@@ -252,22 +242,18 @@ def simulate(
 
 
 def compensate(
-    job: Annotated[Path, job_folder("Job folder with [machine] error_map.")],
-    out: Annotated[Path, option("Folder for the compensated job.", "DIR")],
-    extrapolate: Annotated[bool, option("Extrapolate beyond the maps, and flag those points.")] = False,
-    map_text: Annotated[
-        float | None,
-        option("Also write the error map at this temperature, in °C, in the contractors' text form.", "T", "not written"),
-    ] = None,
-    cloud: Annotated[
-        Path | None,
-        option("Cloud of a digitizer to correct instead: .csv, .parquet, .npy or a folder of them.", "FILE",
-               "the job's recording"),
-    ] = None,
-    force: opt.Force = False,
-    quiet: opt.Quiet = False,
-    verbose: opt.Verbose = False,
-    json: opt.Json = False,
+    job: Path = job_folder(..., "Job folder with [machine] error_map."),
+    out: Path = option(..., "Folder for the compensated job.", "DIR"),
+    extrapolate: bool = option(False, "Extrapolate beyond the maps, and flag those points."),
+    map_text: float | None = option(
+        None, "Also write the error map at this temperature, in °C, in the contractors' text form.", "T", "not written"),
+    cloud: Path | None = option(
+        None, "Cloud of a digitizer to correct instead: .csv, .parquet, .npy or a folder of them.", "FILE",
+        "the job's recording"),
+    force: bool = opt.FORCE,
+    quiet: bool = opt.QUIET,
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
 ) -> None:  # fmt: skip
     """Correct a recording by its machine's error maps, as a job folder of its own."""
     from cmm_uq.app.commands.jobs.compensate import write_compensated, write_compensated_cloud

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -24,17 +24,17 @@ FAILED_SHOWN = 20  # failed jobs that are named where not everything is asked fo
 
 
 def acquire(
-    job: Annotated[Path, opt.job_folder("Job folder; its instruments are named in [acquire].")],
-    simulate: Annotated[bool, option("Try it without instruments: simulated ones, in a job so marked.")] = False,
-    out: Annotated[
-        Path | None, option("With --simulate: folder for a copy of the job, so marked.", "DIR", "the job itself")
-    ] = None,
-    seed: Annotated[int, option("Seed of what simulated instruments say.", "N", min=0)] = 0,
-    plain: Annotated[bool, flag("--plain", "Lines instead of a screen, as without a terminal.")] = False,
-    skip_damaged: Annotated[
-        bool, flag("--skip-damaged", "Go on behind damaged lines of earlier journals; the recording then says so.")
-    ] = False,
-    quiet: opt.Quiet = False,
+    job: Path = opt.job_folder(..., "Job folder; its instruments are named in [acquire]."),
+    simulate: bool = option(False, "Try it without instruments: simulated ones, in a job so marked."),
+    out: Path | None = option(
+        None, "With --simulate: folder for a copy of the job, so marked.", "DIR", "the job itself"
+    ),
+    seed: int = option(0, "Seed of what simulated instruments say.", "N", min=0),
+    plain: bool = flag(False, "--plain", "Lines instead of a screen, as without a terminal."),
+    skip_damaged: bool = flag(
+        False, "--skip-damaged", "Go on behind damaged lines of earlier journals; the recording then says so."
+    ),
+    quiet: bool = opt.QUIET,
 ) -> None:
     """Take the recording of a job from its instruments, a folder of results or the keyboard, point by point of its plan.
 
@@ -52,37 +52,30 @@ def acquire(
 
 
 def batch(
-    folders: Annotated[
-        list[Path],
-        argument(
-            "Job folders, or folders with job folders anywhere below.", "FOLDER...", autocompletion=opt.job_folders
-        ),
-    ],
-    out: Annotated[Path | None, opt.out("reports")] = None,
-    workers: Annotated[
-        int | None, option("Processes at once; no byte depends on it.", "N", "as many as there are processors")
-    ] = None,
-    scheduler: Annotated[
-        str | None, option("Address of a Dask cluster that computes instead.", "tcp://HOST:PORT")
-    ] = None,
-    results_only: Annotated[
-        bool, flag("--results-only", "Write results.json alone: the same bytes, no document, no picture.")
-    ] = False,
-    parquet: Annotated[Path | None, option("Write a Parquet file, too: a row for each value.", "FILE")] = None,
-    resume: Annotated[
-        bool, flag("--resume", "Leave jobs alone whose report is there, from the same files by this version.")
-    ] = False,
-    time_limit: Annotated[float, option("Seconds that one job may take before it is stopped.", "S")] = 1800.0,
-    tries: Annotated[
-        int, option("Processes that one job may end (killed, out of memory) before it is given up.", "N")
-    ] = 3,
-    seed: opt.Seed = 0,
-    force: opt.Force = False,
-    strict: opt.Strict = False,
-    quiet: opt.Quiet = False,
-    verbose: opt.Verbose = False,
-    json: opt.Json = False,
-    records: opt.Records = None,
+    folders: list[Path] = argument(
+        ..., "Job folders, or folders with job folders anywhere below.", "FOLDER...", autocompletion=opt.job_folders
+    ),
+    out: Path | None = opt.out(None, "reports"),
+    workers: int | None = option(
+        None, "Processes at once; no byte depends on it.", "N", "as many as there are processors"
+    ),
+    scheduler: str | None = option(None, "Address of a Dask cluster that computes instead.", "tcp://HOST:PORT"),
+    results_only: bool = flag(
+        False, "--results-only", "Write results.json alone: the same bytes, no document, no picture."
+    ),
+    parquet: Path | None = option(None, "Write a Parquet file, too: a row for each value.", "FILE"),
+    resume: bool = flag(
+        False, "--resume", "Leave jobs alone whose report is there, from the same files by this version."
+    ),
+    time_limit: float = option(1800.0, "Seconds that one job may take before it is stopped.", "S"),
+    tries: int = option(3, "Processes that one job may end (killed, out of memory) before it is given up.", "N"),
+    seed: int = opt.seed(),
+    force: bool = opt.FORCE,
+    strict: bool = opt.STRICT,
+    quiet: bool = opt.QUIET,
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
+    records: str | None = opt.RECORDS,
 ) -> None:
     """Write the report of every job as `report` does; one that fails never stops the others. Exit code 2 when one failed."""
     with progress(quiet=quiet or json, verbose=verbose) as stage:
@@ -134,20 +127,18 @@ def _batch_summary(batch: Batch, *, verbose: bool) -> Summary:
 
 
 def due(
-    machines: Annotated[
-        list[str] | None, argument("Serial numbers or names; all machines and artefacts without.", "[MACHINE]...")
-    ] = None,
-    records: opt.ReadRecords = None,
-    on: opt.On = None,
-    fleet: opt.Fleet = None,
-    within: Annotated[
-        str | None, option("Only what is due that soon (90d, 12w, 3m, 1y), or has no date.", "TIME", "all")
-    ] = None,
-    out: Annotated[Path | None, option("Folder for due.html and due.json.", "DIR", "none")] = None,
-    force: opt.Force = False,
-    strict: Annotated[bool, flag("--strict", "Exit code 4 where anything is overdue.")] = False,
-    quiet: opt.Quiet = False,
-    json: opt.Json = False,
+    machines: list[str] | None = argument(
+        None, "Serial numbers or names; all machines and artefacts without.", "[MACHINE]..."
+    ),
+    records: str | None = opt.READ_RECORDS,
+    on: str | None = opt.ON,
+    fleet: Path | None = opt.FLEET,
+    within: str | None = option(None, "Only what is due that soon (90d, 12w, 3m, 1y), or has no date.", "TIME", "all"),
+    out: Path | None = option(None, "Folder for due.html and due.json.", "DIR", "none"),
+    force: bool = opt.FORCE,
+    strict: bool = flag(False, "--strict", "Exit code 4 where anything is overdue."),
+    quiet: bool = opt.QUIET,
+    json: bool = opt.JSON,
 ) -> None:
     """Say which machines and artefacts are due for calibration, when, and why."""
     from cmm_uq.app.commands.laboratory.due import what_is_due, write_due
@@ -168,18 +159,17 @@ def due(
 
 
 def fleet(
-    records: opt.ReadRecords = None,
-    name: Annotated[
-        list[str] | None,
-        option("Value to look at, such as scale_x.ppm; may be repeated.", "NAME", "all with a limit", "--name"),
-    ] = None,
-    out: Annotated[Path | None, option("Folder for fleet.html, fleet.json and fleet.csv.", "DIR", "none")] = None,
-    seed: opt.Seed = 1,
-    force: opt.Force = False,
-    strict: Annotated[bool, flag("--strict", "Exit code 4 where a machine does not belong.")] = False,
-    quiet: opt.Quiet = False,
-    verbose: opt.Verbose = False,
-    json: opt.Json = False,
+    records: str | None = opt.READ_RECORDS,
+    name: list[str] | None = option(
+        None, "Value to look at, such as scale_x.ppm; may be repeated.", "NAME", "all with a limit", "--name"
+    ),
+    out: Path | None = option(None, "Folder for fleet.html, fleet.json and fleet.csv.", "DIR", "none"),
+    seed: int = opt.seed(1),
+    force: bool = opt.FORCE,
+    strict: bool = flag(False, "--strict", "Exit code 4 where a machine does not belong."),
+    quiet: bool = opt.QUIET,
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
 ) -> None:
     """Learn from all machines of the records what drift is usual for models and places, and which do not belong."""
     with progress(quiet=quiet or json, verbose=verbose) as stage:
@@ -198,17 +188,15 @@ def fleet(
 
 
 def history(
-    machine: Annotated[str, argument("Serial number of the machine, or its name.", "MACHINE")],
-    records: opt.ReadRecords = None,
-    on: opt.On = None,
-    fleet: opt.Fleet = None,
-    out: Annotated[
-        Path | None, option("Folder for history.html, with pictures, and history.json.", "DIR", "none")
-    ] = None,
-    force: opt.Force = False,
-    quiet: opt.Quiet = False,
-    verbose: opt.Verbose = False,
-    json: opt.Json = False,
+    machine: str = argument(..., "Serial number of the machine, or its name.", "MACHINE"),
+    records: str | None = opt.READ_RECORDS,
+    on: str | None = opt.ON,
+    fleet: Path | None = opt.FLEET,
+    out: Path | None = option(None, "Folder for history.html, with pictures, and history.json.", "DIR", "none"),
+    force: bool = opt.FORCE,
+    quiet: bool = opt.QUIET,
+    verbose: bool = opt.VERBOSE,
+    json: bool = opt.JSON,
 ) -> None:
     """Say how every error factor and figure of a machine has gone, what changed last, and when a limit will be crossed."""
     from cmm_uq.app.commands.laboratory.due import history_of, write_history
@@ -236,21 +224,18 @@ def _show_table(
 
 
 def serve(
-    records: opt.ReadRecords = None,
-    port: Annotated[int, option("Port to listen on; 0 takes a free one.", "N", min=0, max=65535)] = 8765,
-    bind: Annotated[
-        str,
-        option(
-            "Address to listen on; 0.0.0.0 is every network of this machine. Whoever reaches it can read the records.",
-            "ADDRESS",
-        ),
-    ] = "127.0.0.1",
-    name: Annotated[
-        list[str] | None,
-        option("Further name by which browsers reach this machine; repeatable.", "HOST", "this machine's own"),
-    ] = None,
-    open_: Annotated[bool, flag("--open", "Open the page in a browser.")] = False,
-    quiet: opt.Quiet = False,
+    records: str | None = opt.READ_RECORDS,
+    port: int = option(8765, "Port to listen on; 0 takes a free one.", "N", min=0, max=65535),
+    bind: str = option(
+        "127.0.0.1",
+        "Address to listen on; 0.0.0.0 is every network of this machine. Whoever reaches it can read the records.",
+        "ADDRESS",
+    ),
+    name: list[str] | None = option(
+        None, "Further name by which browsers reach this machine; repeatable.", "HOST", "this machine's own"
+    ),
+    open_: bool = flag(False, "--open", "Open the page in a browser."),
+    quiet: bool = opt.QUIET,
 ) -> None:
     """Show the records in a browser: what is due or fails, trends, certificates, artefacts. Nothing can be changed there."""
     from cmm_uq.app.serve.server import RecordsServer

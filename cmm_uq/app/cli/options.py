@@ -8,13 +8,12 @@ import re
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from cmm_uq.app.cli.terminal import on_terminal, say
 from cmm_uq.base.errors import CmmUqError, printable
-from cmm_uq.base.languages.translation import Code
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.signing import Signing
@@ -71,33 +70,38 @@ def _files(incomplete: str) -> Iterator[tuple[str, str]]:
                 todo.append((os.path.join(folder, entry.name), depth + 1))  # noqa: PTH118
 
 
-def option(text: str, metavar: str | None = None, default: str | bool = True, *names: str, **more: Any) -> Any:
-    """An option: its help, what stands for its value, what is told of its default, and names beside that of the parameter."""
-    return typer.Option(*names, help=text, metavar=metavar, show_default=default, **more)
+def option(
+    default: Any, text: str, metavar: str | None = None, shown: str | bool = True, *names: str, **more: Any
+) -> Any:
+    """An option: its default and help, what stands for its value and for its default, and names beside its parameter's."""
+    return typer.Option(default, *names, help=text, metavar=metavar, show_default=shown, **more)
 
 
-def argument(text: str, metavar: str, default: str | bool = True, **more: Any) -> Any:
-    return typer.Argument(help=text, metavar=metavar, show_default=default, **more)
+def argument(default: Any, text: str, metavar: str, shown: str | bool = True, **more: Any) -> Any:
+    return typer.Argument(default, help=text, metavar=metavar, show_default=shown, **more)
 
 
-def flag(name: str, text: str, *names: str) -> Any:
+def flag(default: bool, name: str, text: str, *names: str) -> Any:
     """An option without a value."""
-    return typer.Option(name, *names, help=text)
+    return typer.Option(default, name, *names, help=text)
 
 
-def out(default: str) -> Any:
+def out(default: None, shown: str) -> Any:
     """Of ``--out``, where a folder is chosen without it."""
-    return option("Folder to write to.", "DIR", default)
+    return option(default, "Folder to write to.", "DIR", shown)
 
 
-def job_folder(text: str) -> Any:
-    return argument(text, "JOB", autocompletion=job_folders)
+def job_folder(default: Any, text: str) -> Any:
+    return argument(default, text, "JOB", autocompletion=job_folders)
 
 
-def of_environment(text: str, metavar: str, name: str, variable: str, otherwise: str = "") -> Any:
+def of_environment(text: str, metavar: str, name: str, variable: str, shown: str, default: Any = None) -> Any:
     """An option that a variable of the environment gives where nobody else does."""
-    default = f"{variable}, else {otherwise}" if otherwise else variable
-    return option(text, metavar, default, name, envvar=variable, show_envvar=False)
+    return option(default, text, metavar, shown, name, envvar=variable, show_envvar=False)
+
+
+def seed(default: int = 0) -> Any:
+    return option(default, "Seed of everything random; the same seed gives the same bytes.", "N", min=0)
 
 
 def group(text: str, epilog: str) -> typer.Typer:
@@ -117,63 +121,52 @@ def examples(*lines: str) -> str:
     return "\n".join(["\b", "Examples:", *(f"  cmm-uq {line}" for line in lines)])
 
 
-Job = Annotated[Path, job_folder("Job folder: job.toml and the recording that it names.")]
-Language = Annotated[
-    Code | None, option("Language of the documents; files for programs stay English.", None, "the job's, else en")
-]
-Seed = Annotated[int, option("Seed of everything random; the same seed gives the same bytes.", "N", min=0)]
-Quiet = Annotated[bool, flag("--quiet", "Print nothing but errors.", "-q")]
-Verbose = Annotated[bool, flag("--verbose", "Print everything, whole; without a terminal also the stages.", "-v")]
-Json = Annotated[bool, flag("--json", "Print one JSON object instead of the summary; an error is one too.")]
-Force = Annotated[bool, flag("--force", "Keep what stands in the way as NAME.previous instead of refusing.")]
-Settled = Annotated[bool, flag("--strict", "Exit code 4 unless Monte Carlo is stable to the digits asked for.")]
-Strict = Annotated[bool, flag("--strict", "Exit code 4 unless everything conforms and agrees with the model.")]
-Records = Annotated[
-    str | None,
-    option(
-        "Records that it is kept in: a file, a postgresql:// URL, or none.", "WHERE", "records.db beside the reports",
-        "--records", envvar="CMM_UQ_RECORDS", show_envvar=False,
-    ),
-]  # fmt: skip
-ReadRecords = Annotated[
-    str | None,
-    option(
-        "The records: a file, or the URL of a PostgreSQL database.", "WHERE", "CMM_UQ_RECORDS, or reports/records.db",
-        "--records",
-    ),
-]  # fmt: skip
-On = Annotated[str | None, option("The day asked about; later recordings do not count.", "DATE", "today", "--on")]
-Fleet = Annotated[
-    Path | None,
-    option(
-        "fleet.json of the fleet that the drift model takes as prior.", "FILE", "a prior without a fleet", "--fleet"
-    ),
-]
+JOB = job_folder(..., "Job folder: job.toml and the recording that it names.")
+LANGUAGE = option(None, "Language of the documents; files for programs stay English.", None, "the job's, else en")
+QUIET = flag(False, "--quiet", "Print nothing but errors.", "-q")
+VERBOSE = flag(False, "--verbose", "Print everything, whole; without a terminal also the stages.", "-v")
+JSON = flag(False, "--json", "Print one JSON object instead of the summary; an error is one too.")
+FORCE = flag(False, "--force", "Keep what stands in the way as NAME.previous instead of refusing.")
+STRICT = flag(False, "--strict", "Exit code 4 unless everything conforms and agrees with the model.")
+RECORDS = of_environment(
+    "Records that it is kept in: a file, a postgresql:// URL, or none.",
+    "WHERE",
+    "--records",
+    "CMM_UQ_RECORDS",
+    "records.db beside the reports",
+)
+READ_RECORDS = option(
+    None,
+    "The records: a file, or the URL of a PostgreSQL database.",
+    "WHERE",
+    "CMM_UQ_RECORDS, or reports/records.db",
+    "--records",
+)
+ON = option(None, "The day asked about; later recordings do not count.", "DATE", "today", "--on")
+FLEET = option(
+    None, "fleet.json of the fleet that the drift model takes as prior.", "FILE", "a prior without a fleet", "--fleet"
+)
 _KEY = "a PKCS#12 file, or pkcs11:token=LABEL;object=LABEL?module-path=FILE"
-Sign = Annotated[
-    str | None, of_environment(f"Sign with this key: {_KEY}.", "KEY", "--sign", "CMM_UQ_SIGN_KEY", "nobody signs")
-]
-Key = Annotated[str, of_environment(f"The key: {_KEY}.", "KEY", "--key", "CMM_UQ_SIGN_KEY")]
-TimeServer = Annotated[
-    str | None,
-    of_environment(
-        "Time stamp server (RFC 3161) for the PDF.", "URL", "--time-server", "CMM_UQ_SIGN_TIME_SERVER", "none"
-    ),
-]
-Level = Annotated[
-    str | None,
-    option(
-        "Of the PDF's signature: B-B, B-T, B-LT or B-LTA.", "LEVEL", "B-T with a time stamp server, else B-B", "--level",
-        envvar="CMM_UQ_SIGN_LEVEL", show_envvar=False,
-    ),
-]  # fmt: skip
-Trusted = Annotated[
-    list[Path] | None,
-    option(
-        "Certificates that one trusts: PEM file or folder; again for more.", "PATH", "nobody", "--trust",
-        envvar="CMM_UQ_TRUST", show_envvar=False,
-    ),
-]  # fmt: skip
+_SIGN = "CMM_UQ_SIGN_KEY"
+SIGN = of_environment(f"Sign with this key: {_KEY}.", "KEY", "--sign", _SIGN, f"{_SIGN}, else nobody signs")
+KEY = of_environment(f"The key: {_KEY}.", "KEY", "--key", _SIGN, _SIGN, default=...)
+TIME_SERVER = of_environment(
+    "Time stamp server (RFC 3161) for the PDF.",
+    "URL",
+    "--time-server",
+    "CMM_UQ_SIGN_TIME_SERVER",
+    "CMM_UQ_SIGN_TIME_SERVER, else none",
+)
+LEVEL = of_environment(
+    "Of the PDF's signature: B-B, B-T, B-LT or B-LTA.",
+    "LEVEL",
+    "--level",
+    "CMM_UQ_SIGN_LEVEL",
+    "B-T with a time stamp server, else B-B",
+)
+TRUSTED = of_environment(
+    "Certificates that one trusts: PEM file or folder; again for more.", "PATH", "--trust", "CMM_UQ_TRUST", "nobody"
+)
 
 _DAYS = {"d": 1, "w": 7, "m": 30, "y": 365}
 _LONGEST = 36_500
@@ -212,8 +205,11 @@ def ask_secret(question: str, *, twice: bool = False) -> str:
     from cmm_uq.app.commands.certificates.signing import PASSPHRASE_FILE
 
     if not on_terminal(sys.stdin):
-        raise CmmUqError(f"{question.rstrip(': ')}: nobody is there to be asked", where="standard input",
-                         fix=f"Write it into a file, chmod 600, and name that in {PASSPHRASE_FILE}")  # fmt: skip
+        raise CmmUqError(
+            f"{question.rstrip(': ')}: nobody is there to be asked",
+            where="standard input",
+            fix=f"Write it into a file, chmod 600, and name that in {PASSPHRASE_FILE}",
+        )
     found: str = typer.prompt(question.rstrip(": "), hide_input=True, confirmation_prompt=twice, err=True)
     return found
 

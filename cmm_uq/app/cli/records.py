@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import datetime as dt
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.options import Json, Quiet, Records, argument, examples, flag, group, option
+from cmm_uq.app.cli import options as opt
+from cmm_uq.app.cli.options import argument, examples, flag, option
 from cmm_uq.app.cli.terminal import NOT_CONFORMING, put_data, say
 from cmm_uq.base.errors import CmmUqError, printable
 
-app = group(
+app = opt.group(
     "The history of machines and certificates: verified, backed up, imported, kept small, brought to a new version.",
     examples("records import reports", "records verify --head HASH", "records backup records-2026.db"),
 )
@@ -26,12 +26,10 @@ def _entries(count: int) -> str:
 
 @app.command("verify", epilog=examples("records verify", "records verify --head 5f2c… --no-files"))
 def verify(
-    records: Records = None,
-    head: Annotated[
-        str | None, option("Hash that records head printed, filed elsewhere.", "HASH", "none", "--head")
-    ] = None,
-    files: Annotated[bool, flag("--files/--no-files", "Compare the files of the reports too.")] = True,
-    json: Json = False,
+    records: str | None = opt.RECORDS,
+    head: str | None = option(None, "Hash that records head printed, filed elsewhere.", "HASH", "none", "--head"),
+    files: bool = flag(True, "--files/--no-files", "Compare the files of the reports too."),
+    json: bool = opt.JSON,
 ) -> None:
     """Find every entry that was altered, deleted or exchanged, every table and file that is not as it was recorded.
 
@@ -59,7 +57,7 @@ def verify(
 
 
 @app.command("head", epilog=examples("records head"))
-def head(records: Records = None, json: Json = False) -> None:
+def head(records: str | None = opt.RECORDS, json: bool = opt.JSON) -> None:
     """Print number and hash of the last entry, to be filed elsewhere: on paper, in a mail, on another machine."""
     from cmm_uq.laboratory.records import open_records
 
@@ -73,10 +71,10 @@ def head(records: Records = None, json: Json = False) -> None:
 
 @app.command("import", epilog=examples("records import reports", "records import /archive/2025 --records lab.db"))
 def import_reports(
-    folders: Annotated[list[Path], argument("Folders that hold reports, at any depth.", "FOLDER…")],
-    records: Records = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    folders: list[Path] = argument(..., "Folders that hold reports, at any depth.", "FOLDER…"),
+    records: str | None = opt.RECORDS,
+    quiet: bool = opt.QUIET,
+    json: bool = opt.JSON,
 ) -> None:
     """Record reports and diagnoses that were written before; what is recorded already is passed over."""
     from cmm_uq.app.commands.laboratory import records as commands
@@ -103,10 +101,10 @@ def import_reports(
 
 @app.command("backup", epilog=examples("records backup records-2026-11-22.db"))
 def backup(
-    file: Annotated[Path, argument("New file of the backup.", "FILE")],
-    records: Records = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    file: Path = argument(..., "New file of the backup.", "FILE"),
+    records: str | None = opt.RECORDS,
+    quiet: bool = opt.QUIET,
+    json: bool = opt.JSON,
 ) -> None:
     """Write everything into one new SQLite file, while others go on writing, and verify its chain."""
     from cmm_uq.laboratory.records import open_records
@@ -131,10 +129,10 @@ def _place(records: str | None) -> str | Path:
 
 @app.command("restore", epilog=examples("records restore records-2026-11-22.db --records reports/records.db"))
 def restore(
-    file: Annotated[Path, argument("File of a backup.", "FILE")],
-    records: Records = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    file: Path = argument(..., "File of a backup.", "FILE"),
+    records: str | None = opt.RECORDS,
+    quiet: bool = opt.QUIET,
+    json: bool = opt.JSON,
 ) -> None:
     """Make records of a backup whose chain holds; a file in its place is kept as NAME.before-restore."""
     from cmm_uq.laboratory.records import backup as backups
@@ -150,11 +148,11 @@ def restore(
 
 @app.command("retain", epilog=examples("records retain --keep-years 10 --dry-run"))
 def retain(
-    keep_years: Annotated[int, option("Years for which files are kept.", "N", min=1, max=1000)],
-    records: Records = None,
-    dry_run: Annotated[bool, flag("--dry-run", "Only say what would be removed.")] = False,
-    quiet: Quiet = False,
-    json: Json = False,
+    keep_years: int = option(..., "Years for which files are kept.", "N", min=1, max=1000),
+    records: str | None = opt.RECORDS,
+    dry_run: bool = flag(False, "--dry-run", "Only say what would be removed."),
+    quiet: bool = opt.QUIET,
+    json: bool = opt.JSON,
 ) -> None:
     """Remove the files of older reports; what they stated stays in the records, and so does what was removed.
 
@@ -177,7 +175,7 @@ def retain(
 
 
 @app.command("migrate", epilog=examples("records backup before.db", "records migrate"))
-def migrate(records: Records = None, quiet: Quiet = False, json: Json = False) -> None:
+def migrate(records: str | None = opt.RECORDS, quiet: bool = opt.QUIET, json: bool = opt.JSON) -> None:
     """Bring the tables of an older version to this one; entries stay as they are. Back up first."""
     from cmm_uq.laboratory.records import backup as backups
     from cmm_uq.laboratory.records.place import shown

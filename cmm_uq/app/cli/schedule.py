@@ -6,11 +6,12 @@ import json as json_text
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cmm_uq.app.cli.options import Json, argument, examples, group, option
+from cmm_uq.app.cli import options as opt
+from cmm_uq.app.cli.options import argument, examples, option
 from cmm_uq.app.cli.terminal import NEEDS_A_PERSON, closed, put, put_data, put_json, say
 from cmm_uq.base.errors import OutputError, printable
 
@@ -19,15 +20,15 @@ if TYPE_CHECKING:
 
 STANDARD_OUTPUT = Path("-")  # in place of a file for the lines
 
-app = group(
+app = opt.group(
     "Scheduled runs: a schedule.toml, a trial of its messages, ready files for cron, systemd and Windows.",
     examples("schedule new jobs/schedule.toml", "schedule print systemd jobs --at 06:15"),
 )
-ScheduleOption = Annotated[Path | None, option("File schedule.toml.", "FILE", "that in the first FOLDER", "--schedule")]
+SCHEDULE = option(None, "File schedule.toml.", "FILE", "that in the first FOLDER", "--schedule")
 
 
 @app.command("new", epilog=examples("schedule new jobs/schedule.toml"))
-def new(file: Annotated[Path, argument("New file: schedule.toml.", "FILE")] = Path("schedule.toml")) -> None:
+def new(file: Path = argument(Path("schedule.toml"), "New file: schedule.toml.", "FILE")) -> None:
     """Write a schedule.toml with every key explained; never over anything."""
     from cmm_uq.app.commands.laboratory.schedule import write_schedule
 
@@ -38,9 +39,9 @@ def new(file: Annotated[Path, argument("New file: schedule.toml.", "FILE")] = Pa
 
 @app.command("test", epilog=examples("schedule test jobs", "schedule test --schedule jobs/schedule.toml"))
 def try_out(
-    folders: Annotated[list[Path] | None, argument("Folders with jobs.", "FOLDER", "none")] = None,
-    schedule: ScheduleOption = None,
-    json: Json = False,
+    folders: list[Path] | None = argument(None, "Folders with jobs.", "FOLDER", "none"),
+    schedule: Path | None = SCHEDULE,
+    json: bool = opt.JSON,
 ) -> None:
     """Send a trial message to everybody whom the schedule names. Exit code 1 when one did not go out."""
     from cmm_uq.app.commands.laboratory.schedule import schedule_of, send_trial
@@ -59,12 +60,12 @@ def try_out(
     epilog=examples("schedule print cron jobs", "schedule print systemd jobs --at 06:15 --days MON,THU --out units"),
 )
 def ready(
-    scheduler: Annotated[str, argument("cron, systemd or windows.", "SCHEDULER")],
-    folders: Annotated[list[Path], argument("Folders with jobs.", "FOLDER")],
-    schedule: ScheduleOption = None,
-    at: Annotated[str, option("Time of day.", "HH:MM")] = "06:15",
-    days: Annotated[str, option("Days of the week: MON,THU.", "DAYS", "every day")] = "",
-    out: Annotated[Path | None, option("Folder to write the files to.", "DIR", "printed")] = None,
+    scheduler: str = argument(..., "cron, systemd or windows.", "SCHEDULER"),
+    folders: list[Path] = argument(..., "Folders with jobs.", "FOLDER"),
+    schedule: Path | None = SCHEDULE,
+    at: str = option("06:15", "Time of day.", "HH:MM"),
+    days: str = option("", "Days of the week: MON,THU.", "DAYS", "every day"),
+    out: Path | None = option(None, "Folder to write the files to.", "DIR", "printed"),
 ) -> None:
     """Print what starts a scheduled run: a line of cron, a service and a timer of systemd, a task of Windows."""
     from cmm_uq.app.commands.laboratory.schedule import ready_files, write_ready
