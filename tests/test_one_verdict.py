@@ -29,10 +29,9 @@ from cmm_uq.app.cli.summary import conclude
 from cmm_uq.app.commands.certificates.release import release
 from cmm_uq.app.commands.files import Written
 from cmm_uq.app.commands.laboratory.batch_jobs import COLUMNS, conforming, rows
-from cmm_uq.app.commands.laboratory.due import due_in, history_of
-from cmm_uq.app.commands.laboratory.fleet import _members
+from cmm_uq.app.commands.laboratory.due import _members, due_in, history_of
 from cmm_uq.app.serve.certificate_page import _notices
-from cmm_uq.app.serve.overview import by_rule, groups
+from cmm_uq.app.serve.view import by_rule, groups
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.certificate import certified
 from cmm_uq.certificate.digital_certificate.certificate import digital_certificate

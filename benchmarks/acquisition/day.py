@@ -17,10 +17,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.jobs.tables.plan import DeclaredSource
-from cmm_uq.laboratory.live.folder import begin
 from cmm_uq.laboratory.live.instruments.source import Moment, Reading
 from cmm_uq.laboratory.live.journal import lines_in
 from cmm_uq.laboratory.live.recorder import Recorder, readings_of
+from cmm_uq.laboratory.live.story import begin
 
 RATE, TICK_S, S = 100, 0.1, 1_000_000_000
 LATENCY_MS = (0.0, 50.0, 0.0, 20.0, 0.0, 0.0)

@@ -20,9 +20,9 @@ from pathlib import Path
 
 from cmm_uq.app.commands.laboratory import acquire
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.laboratory.live.folder import read_story, sessions_in
 from cmm_uq.laboratory.live.instruments.source import SYSTEM, Reading
 from cmm_uq.laboratory.live.journal import lines_in
+from cmm_uq.laboratory.live.story import read_story, sessions_in
 
 EACH = 40
 """Kills of one job, whose plan has so many bars that none is ever complete."""

@@ -21,10 +21,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq.laboratory.live.folder import read_story
-from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedIppServer
-from cmm_uq.laboratory.live.instruments.simulated_line import simulated
-from cmm_uq.laboratory.live.instruments.speakers import Lines
+from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer
+from cmm_uq.laboratory.live.instruments.simulated_line import Lines, SimulatedLine
+from cmm_uq.laboratory.live.story import read_story
 from tests.laboratory.live.session import job_folder
 
 TERMINAL = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "110", "LINES": "45"}
@@ -33,7 +32,7 @@ TERMINAL = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "110", "LINES": "
 def main(points: int) -> None:
     machine, dice = SimulatedIppServer(), random.Random(0)
     with ExitStack() as stack, tempfile.TemporaryDirectory() as folder:
-        loggers = [stack.enter_context(simulated(Lines(), "socket")) for _ in range(3)]
+        loggers = [stack.enter_context(SimulatedLine(Lines(), "socket")) for _ in range(3)]
         more = f'[[acquire.source]]\nname = "cmm"\nprofile = "ipp"\nport = "{machine.url}"\n'
         for i, logger in enumerate(loggers):
             more += f'[[acquire.source]]\nname = "l{i}"\nprofile = "line-logger"\nport = "{logger.port}"\n'

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from benchmarks.batch.measuring import Watch
 from cmm_uq.app.commands.laboratory.batch import BatchOptions, write_batch
-from cmm_uq.app.commands.laboratory.batch_job import begin
+from cmm_uq.app.commands.laboratory.batch_jobs import begin
 from cmm_uq.app.commands.reading import read_job
 from tests.conftest import ROOT
 

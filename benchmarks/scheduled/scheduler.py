@@ -15,11 +15,10 @@ import time
 from pathlib import Path
 
 from cmm_uq.base.output import Owner, staged
-from cmm_uq.laboratory.schedule.channels import channels
 from cmm_uq.laboratory.schedule.jobs import JobFolder, JobReporting
 from cmm_uq.laboratory.schedule.notices import Outbox
 from cmm_uq.laboratory.schedule.run import RunClock, ScheduledRun
-from cmm_uq.laboratory.schedule.settings import RunTable, ScheduleFile
+from cmm_uq.laboratory.schedule.settings import RunTable, ScheduleFile, channels
 from cmm_uq.laboratory.schedule.state import FolderState
 
 JOB = '[job]\nid = "{id}"\n[recording]\nfile = "points.csv"\n'

@@ -10,7 +10,7 @@ from typing import Any
 
 import typer
 
-from cmm_uq.app.cli import certificates, evaluations, instruments, jobs, laboratory, records, schedule
+from cmm_uq.app.cli import certificates, evaluations, instruments, jobs, laboratory, records
 from cmm_uq.app.cli.options import examples, flag
 from cmm_uq.app.cli.terminal import BAD_INPUT, say
 from cmm_uq.base.errors import CmmUqError
@@ -155,7 +155,7 @@ for name, (function, short, epilog) in COMMANDS.items():
     app.command(name, short_help=short, epilog=epilog)(function)
 for name, group, short in (
     ("instruments", instruments.app, "Instruments: ready profiles, tried at a port, new ones."),
-    ("schedule", schedule.app, "Scheduled runs: what they go by, whom they tell, what starts them."),
+    ("schedule", records.schedule_app, "Scheduled runs: what they go by, whom they tell, what starts them."),
     ("keys", certificates.keys, "Keys for electronic signatures: a new one for trying."),
     ("records", records.app, "The history: verified, imported, backed up, brought up to date."),
 ):

@@ -58,7 +58,7 @@ def report(
             fix = "Leave it out" if scheduled else "Add --scheduled"
             raise CmmUqError(f"goes {'without' if scheduled else 'with'} --scheduled", where=name, fix=fix)
     if scheduled:
-        from cmm_uq.app.cli.schedule import STANDARD_OUTPUT, run
+        from cmm_uq.app.cli.records import STANDARD_OUTPUT, run
         from cmm_uq.app.commands.laboratory.schedule import ScheduledOptions
 
         options = ScheduledOptions(tuple(job), out, schedule, records, seed or None, dry_run)

@@ -48,7 +48,7 @@ def _alone(context: typer.Context) -> None:
 def list_all(json: bool = opt.JSON) -> None:
     """List the ready profiles and the serial ports of this computer."""
     from cmm_uq.app.commands.laboratory.instruments import ready_profiles
-    from cmm_uq.laboratory.live.instruments.ports import serial_ports
+    from cmm_uq.laboratory.live.instruments.source import serial_ports
 
     rows, ports = ready_profiles(), serial_ports()
     if json:

@@ -97,7 +97,7 @@ def _batch_summary(batch: Batch, *, verbose: bool) -> Summary:
     """What came of it, and which jobs failed."""
     from cmm_uq.base.messages import Text, Verbatim, plural, say
     from cmm_uq.certificate.wording import Headline, Summary
-    from cmm_uq.laboratory.schedule.progress import duration, pace
+    from cmm_uq.laboratory.schedule.state import duration, pace
 
     counts = (
         (batch.already, say("{count} there already", count=batch.already)),
@@ -174,7 +174,7 @@ def fleet(
     """Learn from all machines of the records what drift is usual for models and places, and which do not belong."""
     with progress(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.files import silent
-        from cmm_uq.app.commands.laboratory.fleet import fleet, write_fleet
+        from cmm_uq.app.commands.laboratory.due import fleet, write_fleet
         from cmm_uq.certificate.pages.fleet_summary import fleet_data, fleet_summary
 
         found = fleet(records, name or (), seed=seed, stage=stage or silent)

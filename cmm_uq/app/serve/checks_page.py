@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Literal
 
 from cmm_uq.app.serve import page as p
+from cmm_uq.app.serve.certificate_page import files_of
 from cmm_uq.app.serve.exchange import LARGEST, UploadedFile, WebRequest, read_dropped
 from cmm_uq.app.serve.page import Block, Cell, PageFacts, PageNotice, PageParagraph, PageSection, WebPage
-from cmm_uq.app.serve.recorded_files import files_of
 from cmm_uq.app.serve.view import MOST, SiteView, machine_cell
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, number, plural, say
 from cmm_uq.certificate.document import Standing

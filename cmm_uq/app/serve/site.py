@@ -20,11 +20,9 @@ from cmm_uq.app.serve import trends as drawing
 from cmm_uq.app.serve.certificate_page import certificate_page, recorded_file
 from cmm_uq.app.serve.checks_page import dropped_page, file_page, integrity_page
 from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse
-from cmm_uq.app.serve.lists import artefacts_page, certificates_page, diagnoses_page
-from cmm_uq.app.serve.machines_page import machine_page, machines_page
-from cmm_uq.app.serve.overview import DueDates, MachineStanding, by_rule, overview
+from cmm_uq.app.serve.lists import artefacts_page, certificates_page, diagnoses_page, machine_page, machines_page
 from cmm_uq.app.serve.page import Cell, Chart, PageNotice, WebPage
-from cmm_uq.app.serve.view import ChainComparing, SiteView, problem_of
+from cmm_uq.app.serve.view import ChainComparing, DueDates, MachineStanding, SiteView, by_rule, overview, problem_of
 from cmm_uq.base.errors import CmmUqError, printable
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.certificate.plots import style as plot_style

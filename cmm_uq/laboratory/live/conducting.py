@@ -18,11 +18,10 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, names, say, si
 from cmm_uq.jobs.tables.plan import AcquireFacts
 from cmm_uq.laboratory.live.instruments.source import Event, Moment, Reading
 from cmm_uq.laboratory.live.judging import Judge, PointJudgement
-from cmm_uq.laboratory.live.lead import Lead, PlannedPoint, Run
+from cmm_uq.laboratory.live.lead import TYPED, Lead, LiveRecording, PlannedPoint, Run, rows_of
 from cmm_uq.laboratory.live.recorder import COORDINATES, Recorder
 from cmm_uq.laboratory.live.screen import WORDS, OperatorInput, SessionView, Soak, coming, picture, understood
 from cmm_uq.laboratory.live.story import Place, Point, Story
-from cmm_uq.laboratory.live.table import TYPED, LiveRecording, rows_of
 
 _SHOWN = 50  # lines of what happened that a screen may show
 _PASTED_S = 0.6  # between two points that are typed: in less nobody measures

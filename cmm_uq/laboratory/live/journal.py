@@ -1,7 +1,7 @@
 """Append-only files of records, a line each with a checksum, that open whatever happened while they were written.
 
 A line is the CRC-32 of its text, a blank, the text (JSON on one line, ASCII only), and a line feed. Records are numbered, so
-that one that is missing shows. A record counts as kept once :meth:`Journal.commit` has returned: it is then on the disk.
+that one that is missing shows. A record counts as kept once :meth:`RecordingJournal.commit` has returned: it is then on disk.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ class RecordingJournal:
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
             _keep_name(path.parent)
         except OSError as error:
-            raise _refused("cannot be made", error, path) from None
+            raise refused("cannot be made", error, path) from None
 
     def append(self, kind: str, data: Mapping[str, Any], moment: Moment) -> Record:
         """A record that will be kept by the next :meth:`commit`."""
@@ -141,7 +141,7 @@ class RecordingJournal:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self.written)
             if error.errno not in _NO_ROOM:
-                raise _refused("cannot be written", error, self.path) from None
+                raise refused("cannot be written", error, self.path) from None
             raise NoRoomError(
                 f"there is no room on the disk ({error.strerror}): {len(self._waiting)} records wait in memory, not accepted",
                 where=str(self.path), fix="Make room; they are written as soon as there is some",
@@ -156,8 +156,10 @@ class RecordingJournal:
             os.close(self._file)
 
 
-def _refused(what: str, error: OSError, path: Path) -> OutputError:
-    return OutputError(f"{what}: {error.strerror}", where=str(path), fix="Make room, or mend the folder's permissions")
+def refused(
+    what: str, error: OSError, path: Path, fix: str = "Make room, or mend the folder's permissions"
+) -> OutputError:
+    return OutputError(f"{what}: {error.strerror}", where=str(path), fix=fix)
 
 
 def _keep_name(folder: Path) -> None:
@@ -192,4 +194,4 @@ def written_whole(path: Path, content: bytes) -> None:
     except OSError as error:
         with contextlib.suppress(OSError):
             temporary.unlink()
-        raise _refused("cannot be written", error, path) from None
+        raise refused("cannot be written", error, path) from None

@@ -24,10 +24,9 @@ from cmm_uq.base.messages import Text, Verbatim, number, say, signed
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.laboratory.live.lead import Lead, PlannedPoint, Run
+from cmm_uq.laboratory.live.lead import Lead, PlannedPoint, Row, Run
 from cmm_uq.laboratory.live.recorder import COORDINATES
 from cmm_uq.laboratory.live.story import Place, Point, Story
-from cmm_uq.laboratory.live.table import Row
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.kind import Observe
 from cmm_uq.machine.physics.effect import Effect

@@ -15,10 +15,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.tables.plan import DeclaredSource
-from cmm_uq.laboratory.live.folder import STREAMS, Journals
 from cmm_uq.laboratory.live.instruments.source import Clock, Event, Identity, Moment, Reading, Returned
 from cmm_uq.laboratory.live.journal import NoRoomError, RecordingJournal, lines_in
-from cmm_uq.laboratory.live.story import NS, Joined, Place, Story, Stream
+from cmm_uq.laboratory.live.story import NS, STREAMS, Joined, Journals, Place, Story, Stream
 
 READINGS = "readings"  # kind of such a record
 COORDINATES = tuple(f"{axis}_mm" for axis in AXES)

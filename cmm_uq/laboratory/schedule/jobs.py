@@ -27,7 +27,7 @@ from cmm_uq.base.plugins import told_with_package
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.source import RESULTS, device_name
 from cmm_uq.jobs.tables.origin import is_planned
-from cmm_uq.laboratory.schedule import progress
+from cmm_uq.laboratory.schedule import state as states
 from cmm_uq.laboratory.schedule.notices import Notice, decisions, of_results
 from cmm_uq.laboratory.schedule.state import PRIVATE, State
 
@@ -186,7 +186,7 @@ class JobReporting:
 
     def was_left(self, job: JobFolder) -> bool:
         """Whether the last run ended in this job."""
-        return bool(job.id) and progress.was_left(self.lock_of(job))
+        return bool(job.id) and states.was_left(self.lock_of(job))
 
     def reason(self, job: JobFolder) -> str:
         """Why a job is to be reported; empty where its certificate stands."""
@@ -221,7 +221,7 @@ class JobReporting:
             self.report(job)
             return JobOutcome(job, WAITING, "was changed while it was read: left for the next run")
         folder = self.out / job.id
-        with progress.turn(self.lock_of(job)) as turn:
+        with states.turn(self.lock_of(job)) as turn:
             if turn is None:
                 return JobOutcome(job, BUSY, "another run is at it")
             finish_interrupted(folder)

@@ -25,8 +25,7 @@ from cmm_uq.base.messages import Text, Verbatim, commas, day, say
 from cmm_uq.base.output.new_file import writing_to
 from cmm_uq.base.output.staging import synced
 from cmm_uq.jobs.verdicts import Verdicts
-from cmm_uq.laboratory.schedule.progress import turn
-from cmm_uq.laboratory.schedule.state import PRIVATE, State
+from cmm_uq.laboratory.schedule.state import PRIVATE, State, turn
 
 Event = Literal["fail", "incomplete", "undecided", "mismatch", "drift", "due", "error"]  # what a message may be about
 EVENTS: tuple[Event, ...] = get_args(Event)

@@ -16,10 +16,9 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.laboratory.live.folder import read_story
-from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedIppServer
-from cmm_uq.laboratory.live.instruments.simulated_line import simulated
-from cmm_uq.laboratory.live.instruments.speakers import Lines
+from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer
+from cmm_uq.laboratory.live.instruments.simulated_line import Lines, SimulatedLine
+from cmm_uq.laboratory.live.story import read_story
 from tests.app.cli.process import COMMAND, run
 from tests.app.cli.terminal import until
 from tests.conftest import ROOT
@@ -156,7 +155,7 @@ def test_on_a_full_disk_nothing_is_accepted_and_it_goes_on_when_there_is_room(tm
 
 def test_a_machine_and_a_logger_at_real_sockets_one_of_them_unplugged(tmp_path: Path) -> None:
     machine = SimulatedIppServer()
-    with simulated(Lines(), "socket") as logger:
+    with SimulatedLine(Lines(), "socket") as logger:
         folder = job_folder(tmp_path / "job", f"""
 max_gap_s = 0.8
 [[acquire.source]]

@@ -11,8 +11,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.laboratory.due import what_is_due
-from cmm_uq.app.commands.laboratory.fleet import fleet
+from cmm_uq.app.commands.laboratory.due import fleet, what_is_due
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.due.crossing import crossing
 from cmm_uq.laboratory.due.drift import DriftPrior, history

@@ -16,8 +16,7 @@ import pytest
 
 from cmm_uq.app.commands.laboratory import batch as batch_run, batch as module, batch_jobs
 from cmm_uq.app.commands.laboratory.batch import Batch, BatchOptions, write_batch
-from cmm_uq.app.commands.laboratory.batch_job import begin
-from cmm_uq.app.commands.laboratory.batch_jobs import conforming
+from cmm_uq.app.commands.laboratory.batch_jobs import begin, conforming
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError, OutputError

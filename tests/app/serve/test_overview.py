@@ -6,7 +6,7 @@ import datetime as dt
 
 import pytest
 
-from cmm_uq.app.serve.overview import DueDate, MachineStanding, groups, in_order
+from cmm_uq.app.serve.view import DueDate, MachineStanding, groups, in_order
 from cmm_uq.base.messages import say
 from cmm_uq.laboratory.records.listing import Called, ListedCertificate, Newest
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from cmm_uq.app.serve.certificate_page import RecordedFile, content_of, files_of, results_of, sent
 from cmm_uq.app.serve.exchange import RefusedRequest
-from cmm_uq.app.serve.recorded_files import RecordedFile, content_of, files_of, results_of, sent
 from cmm_uq.laboratory.records.facts import Entry
 
 CONTENT = b'{"a": 1}'

@@ -17,10 +17,9 @@ import pytest
 
 from cmm_uq.app.commands.laboratory.due import due_in
 from cmm_uq.app.serve.exchange import WebRequest, read_address
-from cmm_uq.app.serve.overview import DueDate
 from cmm_uq.app.serve.page import WebPage
 from cmm_uq.app.serve.site import PAGES, Site
-from cmm_uq.app.serve.view import ChainComparing
+from cmm_uq.app.serve.view import ChainComparing, DueDate
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.laboratory.records import open_records

@@ -13,9 +13,9 @@ from cmm_uq.app.commands.laboratory.acquire import begin_acquisition
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim
-from cmm_uq.laboratory.live.folder import read_story
-from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedIppServer
+from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer
 from cmm_uq.laboratory.live.instruments.source import Gap, Moment, Returned
+from cmm_uq.laboratory.live.story import read_story
 from tests.laboratory.live.session import FakeClock, job_folder, probed, said, session, temperature, type_in
 
 BAR = ("100 100 -300", "600.003 100 -300")

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.laboratory.live.folder import begin, read_story, sessions_in
 from cmm_uq.laboratory.live.instruments.source import Moment
 from cmm_uq.laboratory.live.journal import (
     NoRoomError,
@@ -21,6 +20,7 @@ from cmm_uq.laboratory.live.journal import (
     record_of,
     written_whole,
 )
+from cmm_uq.laboratory.live.story import begin, read_story, sessions_in
 
 NOW = Moment(1_700_000_000_000_000_000, 7)
 SAID = st.dictionaries(st.text(max_size=5), st.none() | st.integers() | st.floats(allow_nan=False, allow_infinity=False)

@@ -13,9 +13,8 @@ from typing import Any
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.schedule.channels import channels
 from cmm_uq.laboratory.schedule.notices import Channel, OutgoingMessage, UndeliveredError, within
-from cmm_uq.laboratory.schedule.settings import ScheduleFile
+from cmm_uq.laboratory.schedule.settings import ScheduleFile, channels
 from tests.laboratory.schedule.servers import HOST, Post, Taken, certificate, hanging_server, mail_server, web_server
 from tests.laboratory.schedule.told import NOW, notice
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import OutputError
-from cmm_uq.laboratory.schedule.progress import turn, turn_at, was_left
+from cmm_uq.laboratory.schedule.state import turn, turn_at, was_left
 
 HOLD = """
 import sys, time
 from pathlib import Path
-from cmm_uq.laboratory.schedule.progress import turn_at
+from cmm_uq.laboratory.schedule.state import turn_at
 assert turn_at(Path(sys.argv[1])) is not None
 print("held", flush=True)
 time.sleep(60)

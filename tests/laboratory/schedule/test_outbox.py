@@ -13,8 +13,7 @@ import pytest
 
 from cmm_uq.base.errors import OutputError
 from cmm_uq.laboratory.schedule.notices import MOST, Channel, Outbox, OutgoingMessage
-from cmm_uq.laboratory.schedule.progress import turn
-from cmm_uq.laboratory.schedule.state import FolderState
+from cmm_uq.laboratory.schedule.state import FolderState, turn
 from tests.laboratory.schedule.told import NOW, Kept, notice, notices
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from cmm_uq.app.commands.laboratory import batch_jobs as module
+from cmm_uq.app.commands.laboratory.batch_jobs import Row, check_parquet, write_parquet
 from cmm_uq.base.errors import OutputError
-from cmm_uq.laboratory.schedule import parquet as module
-from cmm_uq.laboratory.schedule.parquet import Row, check_parquet, write_parquet
 
 parquet = pytest.importorskip("pyarrow.parquet")
 

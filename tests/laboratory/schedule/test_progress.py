@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.laboratory.schedule.progress import Log, Pace, duration, pace
+from cmm_uq.laboratory.schedule.state import Log, Pace, duration, pace
 
 
 def test_rate_and_remaining_time_follow_from_what_was_computed_alone() -> None:
@@ -43,7 +43,7 @@ def test_a_duration_is_told_in_its_two_largest_units(seconds: float, said: str) 
 WRITE = """
 import sys
 from pathlib import Path
-from cmm_uq.laboratory.schedule.progress import Log
+from cmm_uq.laboratory.schedule.state import Log
 log = Log(Path(sys.argv[1]), 500, 100)
 for i in range(150):
     log.write(f"{sys.argv[2]} {i}")

@@ -11,8 +11,7 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.laboratory.schedule.jobs import JobFolder, Snapshot, snapshot
-from cmm_uq.laboratory.schedule.progress import turn, turn_at
-from cmm_uq.laboratory.schedule.state import FolderState
+from cmm_uq.laboratory.schedule.state import FolderState, turn, turn_at
 from tests.laboratory.schedule.runs import Jobs, made
 from tests.laboratory.schedule.told import notice
 

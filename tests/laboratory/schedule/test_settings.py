@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.schedule.channels import Mail, channels
 from cmm_uq.laboratory.schedule.notices import EVENTS
-from cmm_uq.laboratory.schedule.settings import read_schedule
+from cmm_uq.laboratory.schedule.settings import Mail, channels, read_schedule
 
 MAIL = '[[email]]\nto = ["a@example.org"]\nsender = "cmm@example.org"\nserver = "mail.example.org"\n'
 

@@ -32,7 +32,7 @@ from cmm_uq.certificate.sign import (
 )
 from cmm_uq.certificate.sign.signer import SCHEME, signer_of_token
 from cmm_uq.laboratory.records.place import beside, place_of
-from cmm_uq.laboratory.schedule import channels as credentials
+from cmm_uq.laboratory.schedule import settings as credentials
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records

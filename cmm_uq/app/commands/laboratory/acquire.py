@@ -33,18 +33,16 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import inside
 from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED
 from cmm_uq.laboratory.live.conducting import Conductor
-from cmm_uq.laboratory.live.folder import FOLDER, Journals, begin, read_story, sessions_in
 from cmm_uq.laboratory.live.instruments.instrument import open_source
-from cmm_uq.laboratory.live.instruments.ipp.machine import IppMachine
+from cmm_uq.laboratory.live.instruments.ipp_machine import IppMachine
 from cmm_uq.laboratory.live.instruments.source import SYSTEM, Clock, LiveSource, Moment
 from cmm_uq.laboratory.live.journal import made_folder, written_whole
 from cmm_uq.laboratory.live.judging import Judge
-from cmm_uq.laboratory.live.lead import Lead, titles_of
+from cmm_uq.laboratory.live.lead import Lead, LiveRecording, titles_of
 from cmm_uq.laboratory.live.recorder import Recorder, settle_earlier
 from cmm_uq.laboratory.live.running import DroppedFile, Item, Listening, Screen, WatchedFolder, run
 from cmm_uq.laboratory.live.simulated import SimulatedMachine, simulated
-from cmm_uq.laboratory.live.story import Story
-from cmm_uq.laboratory.live.table import LiveRecording
+from cmm_uq.laboratory.live.story import FOLDER, Journals, Story, begin, read_story, sessions_in
 from cmm_uq.machine.model.kind import Observe
 from cmm_uq.machine.physics.catalogue import effects
 

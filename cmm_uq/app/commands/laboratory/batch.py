@@ -17,10 +17,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.app.commands.files import REPORTS, RESULTS, Stage, ledger_of, opened, silent
-from cmm_uq.app.commands.laboratory.batch_job import PROGRAM, Task
 from cmm_uq.app.commands.laboratory.batch_jobs import (
+    PROGRAM,
     BatchJob,
     BatchOutput,
+    Task,
+    check_parquet,
     conforming,
     jobs_in,
     results_of,
@@ -32,9 +34,8 @@ from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import interruption, staged
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.place import NONE
-from cmm_uq.laboratory.schedule.parquet import check_parquet
 from cmm_uq.laboratory.schedule.processes import TaskAnswer, WorkerTask, answers, check_workers, processes
-from cmm_uq.laboratory.schedule.progress import Pace
+from cmm_uq.laboratory.schedule.state import Pace
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records

@@ -1,27 +1,37 @@
-"""Which jobs a batch has, which of them are done already, and what reports say as one table."""
+"""The jobs of a batch: which there are, which are done, a process that reports them, and what reports say as one table.
+
+``python -m cmm_uq.app.commands.laboratory.batch_jobs`` is sent the bytes of a job's files, answers with the bytes of the
+report's, and writes nothing: these follow from those alone, wherever it runs. The table is a Parquet file, written a group of
+rows at a time; it is there when it is whole, and not before, and its bytes follow from its rows and the version of pyarrow.
+"""
 
 from __future__ import annotations
 
 import datetime as dt
 import json
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib import import_module
+from itertools import islice
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 from cmm_uq import __version__
 from cmm_uq.app.commands.files import RESULTS, called
-from cmm_uq.app.commands.report import REPORT
+from cmm_uq.app.commands.reading import job_of
+from cmm_uq.app.commands.report import REPORT, report_outcome
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.output import read_manifest, sha256_of
+from cmm_uq.base.output.new_file import new_file, refuse_taken
 from cmm_uq.base.output.placing import journal_for
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.content import values
 from cmm_uq.laboratory.schedule.jobs import job_folders
-from cmm_uq.laboratory.schedule.parquet import Row, write_parquet
+from cmm_uq.laboratory.schedule.processes import serve
 
 
 class BatchJob(NamedTuple):
@@ -154,3 +164,67 @@ def rows(results: Mapping[str, Any]) -> Iterator[Row]:
     tail = (Verdicts.of_results(results).overall, verdict(results), results["software"]["version"])
     for value in values(results, called):
         yield (*head, *value, *tail)
+
+
+PROGRAM = "cmm_uq.app.commands.laboratory.batch_jobs"
+
+Setting = tuple[int, bool]  # seed of everything random, and whether figures alone are wanted: no document, no picture
+Task = tuple[str, dict[str, bytes]]  # folder of a job, for messages, and contents of job.toml and of all that it names
+
+
+def begin(setting: Setting) -> Callable[[int, Task], dict[str, bytes]]:
+    """What answers a job with the contents of its report's files, by name."""
+    seed, results_only = setting
+
+    def reported(number: int, task: Task) -> dict[str, bytes]:
+        folder, files = task
+        job = replace(job_of(files), folder=Path(folder))
+        outcome = report_outcome(job, seed=seed, composed=not results_only)
+        return REPORT.contents(outcome, results_only=results_only)
+
+    return reported
+
+
+Row = tuple[Any, ...]
+GROUP = 20_000  # rows in a group: a few megabytes, and few enough groups
+Columns = Sequence[tuple[str, str, str]]
+"""Name, Arrow type and meaning of each column; a ``word`` is text that is said again and again, and kept once."""
+
+
+def check_parquet(path: Path, *, force: bool) -> None:
+    """Make sure, before there are any rows, that they could be written."""
+    arrow("pyarrow")
+    if not force:
+        refuse_taken(path)
+
+
+def write_parquet(path: Path, columns: Columns, rows: Iterable[Row], *, force: bool) -> None:
+    module, parquet, left = arrow("pyarrow"), arrow("pyarrow.parquet"), iter(rows)
+    schema = module.schema(
+        [module.field(name, _type(module, kind), metadata={"meaning": told}) for name, kind, told in columns]
+    )
+    with (
+        new_file(path, force=force) as unfinished,
+        parquet.ParquetWriter(unfinished, schema, compression="zstd") as file,
+    ):
+        while group := list(islice(left, GROUP)):
+            arrays = [
+                module.array(column, type=field.type)
+                for column, field in zip(zip(*group, strict=True), schema, strict=True)
+            ]
+            file.write_batch(module.record_batch(arrays, schema=schema))
+
+
+def arrow(module: str) -> ModuleType:
+    try:
+        return import_module(module)
+    except ModuleNotFoundError:
+        raise CmmUqError("Parquet needs pyarrow", where="--parquet", fix="Install it: pip install pyarrow") from None
+
+
+def _type(module: Any, kind: str) -> Any:
+    return module.dictionary(module.int32(), module.string()) if kind == "word" else getattr(module, kind)()
+
+
+if __name__ == "__main__":
+    serve(begin)

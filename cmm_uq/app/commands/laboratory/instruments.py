@@ -93,11 +93,10 @@ def simulated_instrument(profile: str, way: str) -> Iterator[str]:
 
     way : ``pty``, ``socket`` or ``rfc2217``; empty for the usual one.
     """
-    from cmm_uq.laboratory.live.instruments.simulated_line import WAYS, simulated
-    from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS
+    from cmm_uq.laboratory.live.instruments.simulated_line import SPEAKERS, WAYS, SimulatedLine
 
     if profile_named(profile).protocol == "ipp":
-        from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedIppServer as SimulatedMachine
+        from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer as SimulatedMachine
 
         machine = SimulatedMachine()
         try:
@@ -113,6 +112,6 @@ def simulated_instrument(profile: str, way: str) -> Iterator[str]:
         raise CmmUqError(f"{way!r} is no way to a simulated instrument here", where="--way", fix=suggestion(way, WAYS))
     with (
         tempfile.TemporaryDirectory(prefix="cmm-uq-") as folder,
-        simulated(SPEAKERS[profile](), chosen, Path(folder)) as line,
+        SimulatedLine(SPEAKERS[profile](), chosen, Path(folder)) as line,
     ):
         yield line.port

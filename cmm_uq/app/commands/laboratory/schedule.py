@@ -25,7 +25,6 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.schema import commented
 from cmm_uq.laboratory.due.history import machine_history
 from cmm_uq.laboratory.records.place import NONE, beside, is_url, place_of
-from cmm_uq.laboratory.schedule.channels import channels
 from cmm_uq.laboratory.schedule.jobs import REPORTED, JobFolder, JobReporting
 from cmm_uq.laboratory.schedule.notices import (
     Channel,
@@ -37,11 +36,10 @@ from cmm_uq.laboratory.schedule.notices import (
     of_due,
     of_error,
 )
-from cmm_uq.laboratory.schedule.progress import Log
 from cmm_uq.laboratory.schedule.run import RunClock, ScheduledRun
 from cmm_uq.laboratory.schedule.schedulers import DAYS, READY, ScheduledCall, encoded
-from cmm_uq.laboratory.schedule.settings import FILE, ScheduleFile, read_schedule
-from cmm_uq.laboratory.schedule.state import FolderState, Problems, RecordsState
+from cmm_uq.laboratory.schedule.settings import FILE, ScheduleFile, channels, read_schedule
+from cmm_uq.laboratory.schedule.state import FolderState, Log, Problems, RecordsState
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records

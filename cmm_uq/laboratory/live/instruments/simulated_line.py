@@ -1,18 +1,22 @@
-"""A simulated instrument at a real pseudo-terminal, TCP socket or RFC 2217 server, well-behaved or not."""
+"""Simulated instruments at a real pseudo-terminal, TCP socket or RFC 2217 server, well-behaved or not.
+
+What each answers is by its manual, written from the same sources as the profiles and not from the profiles.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import re
 import select
 import socket
 import threading
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Protocol
-
-from cmm_uq.laboratory.live.instruments.speakers import Speaker
+from types import MappingProxyType
+from typing import Any, Literal
 
 Way = Literal["pty", "socket", "rfc2217"]
 WAYS: tuple[Way, ...] = ("pty", "socket", "rfc2217")
@@ -33,33 +37,19 @@ class Mischief:
         """What goes onto the line."""
         if self.hangs or not data:
             return b""
-        if self.halves:
-            data = data[: len(data) // 2]
-        if self.garbled:
-            data = bytes(0x80 | (byte * 37 + 11) & 0x7F for byte in data)
-        return self.noise + data
+        data = data[: len(data) // 2] if self.halves else data
+        return self.noise + (bytes(0x80 | (byte * 37 + 11) & 0x7F for byte in data) if self.garbled else data)
 
 
-class _Wire(Protocol):
-    def receive(self) -> bytes:
-        """What came, after a short while at most; raises ``OSError`` where the other side is gone."""
-        ...
-
-    def send(self, data: bytes) -> None: ...
-
-    def close(self) -> None: ...
-
-
-class SimulatedLine:
+class SimulatedLine(contextlib.AbstractContextManager["SimulatedLine"]):
     """An instrument that speaks from a thread of its own until closed; a pseudo-terminal keeps its name in ``folder``."""
 
     def __init__(self, speaker: Speaker, way: Way = "pty", folder: Path | None = None, tcp_port: int = 0) -> None:
         self.speaker, self.mischief, self._way = speaker, Mischief(), way
         self._name = (folder or Path()) / "tty"
-        self._stop, self._speaking = threading.Event(), threading.Lock()
+        self._speaking, self._tcp_port = threading.Lock(), tcp_port
         self._wire: _Wire | None = None
         self._listening: socket.socket | None = None
-        self._tcp_port = tcp_port
         self.sent = 0  # messages that the instrument sent whole
         self.plug_in()
 
@@ -93,7 +83,9 @@ class SimulatedLine:
             if self._wire is not None:
                 self._wire.send(said)
 
-    def close(self) -> None:
+    close = unplug
+
+    def __exit__(self, *_: object) -> None:
         self.unplug()
 
     def _run(self, stop: threading.Event) -> None:
@@ -118,8 +110,7 @@ class SimulatedLine:
 
     def _say(self, wire: _Wire, data: bytes) -> None:
         spoiled = self.mischief.spoiled(data)
-        single = self.mischief.a_byte_at_a_time
-        for part in [spoiled[i : i + 1] for i in range(len(spoiled))] if single else [spoiled]:
+        for part in map(bytes, zip(spoiled)) if self.mischief.a_byte_at_a_time else [spoiled]:
             wire.send(part)
         self.sent += bool(data) and spoiled == data
 
@@ -146,9 +137,7 @@ class _Pty:
         os.close(slave)
 
     def receive(self) -> bytes:
-        if not select.select([self._master], [], [], _TICK_S)[0]:
-            return b""
-        return os.read(self._master, 4096)
+        return os.read(self._master, 4096) if select.select([self._master], [], [], _TICK_S)[0] else b""
 
     def send(self, data: bytes) -> None:
         if data:
@@ -179,32 +168,232 @@ class _Tcp:
         self._connection.close()
 
 
-class _DeviceServer:
+class _DeviceServer(_Tcp):
     def __init__(self, connection: socket.socket) -> None:
         import serial
         from serial import rfc2217
 
-        self._inside = _Tcp(connection)
+        super().__init__(connection)
         self.line: Any = serial.serial_for_url("loop://", timeout=0)
+        self.write = super().send  # of answers of the protocol itself; the manager calls it
         self._manager = rfc2217.PortManager(self.line, self)
 
-    def write(self, data: bytes) -> None:
-        """Answers of the protocol itself; the server calls it."""
-        self._inside.send(data)
-
     def receive(self) -> bytes:
-        return b"".join(self._manager.filter(self._inside.receive()))
+        return b"".join(self._manager.filter(super().receive()))
 
     def send(self, data: bytes) -> None:
-        self._inside.send(b"".join(self._manager.escape(data)))
+        super().send(b"".join(self._manager.escape(data)))
 
     def close(self) -> None:
-        self._inside.close()
+        super().close()
         self.line.close()
 
 
-def simulated(
-    speaker: Speaker, way: Way = "pty", folder: Path | None = None, tcp_port: int = 0
-) -> contextlib.AbstractContextManager[SimulatedLine]:
-    """A simulated instrument that is gone afterwards; see :class:`SimulatedLine`."""
-    return contextlib.closing(SimulatedLine(speaker, way, folder, tcp_port))
+_Wire = _Pty | _Tcp
+
+
+class Speaker:
+    """An instrument that is asked, or that speaks by itself every so often, of readings in the unit that it sends."""
+
+    banner = b""  # what it says when it is switched on
+    every_s = 0.0
+    usual: tuple[float, ...] = (20.0,)
+
+    def __init__(self) -> None:
+        self.readings, self.ill, self._waiting = list(self.usual), False, b""
+
+    def hear(self, received: bytes) -> bytes:
+        self._waiting += received
+        *commands, self._waiting = re.split(rb"[\r\n]", self._waiting)
+        return b"".join(self.answer(command.decode("latin-1").strip()) for command in commands if command)
+
+    def answer(self, command: str) -> bytes:
+        """Nothing to a command that it does not know."""
+        return b""
+
+    def says(self) -> bytes:
+        return b""
+
+    def restarted(self) -> bytes:
+        self.__init__()  # type: ignore[misc]
+        return self.banner
+
+
+class Vaisala(Speaker):
+    """Both stations: FORM with the modifiers that the manuals explain, SEND, ?."""
+
+    model, flags = "PTU300", 4
+    usual: tuple[float, ...] = (1013.21, 20.04, 45.1)
+    banner = b"PTU300 / 5.02\r\n"
+    letters: tuple[str, ...] = ("P", "T", "RH")
+    units = ("hPa", "'C", "%RH")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._form = '6.1 "P=" P " " U6 3.1 "T=" T " " U3 3.1 "RH=" RH " " U4 #r #n'
+
+    def answer(self, command: str) -> bytes:
+        word = command.lower().partition(" ")[0]
+        if word == "form":
+            self._form = command[5:]
+            return b"OK\r\n>"
+        if word == "smode":
+            return b"Serial mode        : STOP\r\n>"
+        if word == "send":
+            return self._sent().encode("latin-1") + b">"
+        if word == "?":
+            serial = "Serial number  : A1234567\r\nBatch number   : B8901234\r\nBaud P D S     : 4800 E 7 1"
+            return f"{self.model} / 1.01\r\n{serial}\r\n>".encode()
+        return b"Unknown command\r\n>"
+
+    def _sent(self) -> str:
+        """The message by the FORM."""
+        said, decimals, unit = "", 1, ""
+        for word in re.findall(r'"[^"]*"|\S+', self._form):
+            if word.startswith('"'):
+                said += word[1:-1]
+            elif re.fullmatch(r"\d\.\d", word):
+                decimals = int(word[2])
+            elif word.startswith("#"):
+                said += {"#r": "\r", "#n": "\n", "#rn": "\r\n", "#t": "\t"}.get(word.lower(), "")
+            elif re.fullmatch(r"U\d", word):
+                said += f"{unit:{word[1]}}"
+            elif word == "ERR":
+                said += ("1" if self.ill else "0") + "0" * (self.flags - 1)
+            elif word in self.letters:
+                value, unit = self.readings[self.letters.index(word)], self.units[self.letters.index(word)]
+                said += "*" * 7 if self.ill and word == "P" else f"{value:7.{decimals}f}"
+        return said
+
+
+class Barometer(Vaisala):
+    model, flags = "PTB330", 3
+    usual = (1013.02,)
+    banner = b"PTB330 / 1.01\r\n"
+    letters = ("P",)
+
+
+class PositionDisplay(Speaker):
+    """ND 287: ESC commands, STX before what is asked for, NAK for what is not known."""
+
+    usual = (-12345.6789,)
+
+    def answer(self, command: str) -> bytes:
+        if self.ill:
+            return b"\x15"
+        if command == "\x1bA0000":
+            return b"\x02ND-287    \r\n646118-01 \r\nV1-01     \r\n"
+        if command in ("\x1bA0100", "\x1bA0200"):
+            value = self.readings[0]
+            return f"\x02{'-' if value < 0 else '+'}{abs(value):.4f}\r\n".encode()
+        return b"\x15"
+
+
+class Readout1529(Speaker):
+    """Fluke 1529: SCPI, a bare number for each channel."""
+
+    usual = (20.0132, 20.1044, 19.9871, 21.0)
+
+    def answer(self, command: str) -> bytes:
+        if asked := re.fullmatch(r"(?:FETC|FETCH|READ|MEAS)\? ?([1-4])", command, re.IGNORECASE):
+            return b"9.9E37\r\n" if self.ill else f"{self.readings[int(asked[1]) - 1]:.4f}\r\n".encode()
+        return b"HART,1529,A12345,1.2\r\n" if command.upper() == "*IDN?" else b""
+
+
+class Readout1502(Speaker):
+    """Fluke 1502A: T, DU, SA, *IDN?; it echoes until DU=H."""
+
+    usual = (20.013,)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._echo = True
+
+    def answer(self, command: str) -> bytes:
+        echo = f"{command}\r\n".encode() if self._echo else b""
+        if command.upper() == "DU=H":
+            self._echo = False
+        if command.upper() == "T":
+            return echo + (b"t:   ----.-  C\r\n" if self.ill else f"t: {self.readings[0]:8.3f} C\r\n".encode())
+        return echo + (b"HART,1502A,A24680,1.10\r\n" if command.upper() == "*IDN?" else b"")
+
+
+class MilliK(Speaker):
+    """Isotech milliK: settings and READ? in one line, CR both ways."""
+
+    usual = (107.794123, 100.012345)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._channel = 1
+
+    def answer(self, command: str) -> bytes:
+        said = b""
+        for one in command.upper().split(";"):
+            if one.startswith("SENSE:CHANNEL "):
+                self._channel = int(one[-1])
+            elif one == "READ?":
+                said += b'-230,"Data error"\r' if self.ill else f"{self.readings[self._channel - 1]:.6f}\r".encode()
+            elif one == "*IDN?":
+                said += b"Isothermal Technology,milliK,21-P2460,4.0.0\r"
+        return said
+
+
+class Digimatic(Speaker):
+    """Mitutoyo: sends by itself, as by its foot switch."""
+
+    every_s = 0.1
+    usual = (0.123,)
+
+    def says(self) -> bytes:
+        return b"911\r" if self.ill else f"01A{self.readings[0]:+09.3f}\r".encode()
+
+
+class Sylvac(Speaker):
+    """Sylvac: ? gives the value, ERR and a number what is wrong; commands are echoed."""
+
+    usual = (12.345,)
+
+    def answer(self, command: str) -> bytes:
+        if command in ("?", "PRI"):
+            return b"ERR3\r" if self.ill else f"{self.readings[0]:+09.3f}\r".encode()
+        return {"ID?": b"SYLVAC Z_CAL\r", "MM": b"MM\r"}.get(command, b"ERR1\r")
+
+
+class Autocollimator(Speaker):
+    """Elcomat 3000: a absolute, r relative."""
+
+    usual = (4.5, -2.3)
+
+    def answer(self, command: str) -> bytes:
+        if command not in ("a", "r"):
+            return b""
+        (x, y), (sort, status) = self.readings, (4, "003") if command == "a" else (2, "103")
+        return f"{sort} 001 {x:.2f}\r".encode() if self.ill else f"{sort} {status} {x:.2f} {y:.2f}\r".encode()
+
+
+class Thermocouples(Speaker):
+    """Eleven channels, a line a scan."""
+
+    every_s = 0.1
+    usual = (20.11, 20.13, 20.09, 20.31, 20.3, 20.28, 20.55, 20.52, 20.57, 20.02, 19.87)
+
+    def says(self) -> bytes:
+        values = [9999.0, *self.readings[1:]] if self.ill else self.readings
+        return ("14:03:22," + ",".join(f"{value:.2f}" for value in values) + "\r\n").encode()
+
+
+class Lines(Speaker):
+    every_s = 0.1
+    usual = (20.01, 20.02, -3.0)
+
+    def says(self) -> bytes:
+        return (b"open\r\n") if self.ill else ("; ".join(map(str, self.readings)) + "\r\n").encode()
+
+
+SPEAKERS: Mapping[str, type[Speaker]] = MappingProxyType({
+    "vaisala-ptu300": Vaisala, "vaisala-ptb330": Barometer, "heidenhain-nd287": PositionDisplay, "fluke-1529": Readout1529,
+    "fluke-1502a": Readout1502, "isotech-millik": MilliK, "mitutoyo-digimatic": Digimatic, "sylvac-rs232": Sylvac,
+    "moeller-wedel-elcomat": Autocollimator, "thermocouple-logger-11": Thermocouples, "line-logger": Lines,
+})  # fmt: skip
+"""By the name of the profile."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmm_uq.laboratory.live.instruments.conversation import SECOND, Conversation
+from cmm_uq.laboratory.live.instruments.instrument import SECOND, Conversation
 from cmm_uq.laboratory.live.instruments.profile import Poll, Send
 
 

@@ -9,9 +9,15 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.live.instruments.simulated_line import SimulatedLine, Way, simulated
+from cmm_uq.laboratory.live.instruments.simulated_line import (
+    SPEAKERS,
+    Readout1502,
+    SimulatedLine,
+    Speaker,
+    Thermocouples,
+    Way,
+)
 from cmm_uq.laboratory.live.instruments.source import Gap, Reading, Returned
-from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS, Readout1502, Speaker, Thermocouples
 from tests.laboratory.live.instruments.listening import Listener, hasty, listening, opened
 
 WITHIN_S = 2.0
@@ -29,7 +35,7 @@ def returned(heard: Listener, since: int, at: float) -> float:
 @pytest.mark.parametrize("way", ["pty", "socket", "rfc2217"])
 def test_an_instrument_that_was_unplugged_is_read_again_within_two_seconds(way: Way, tmp_path: Path) -> None:
     with (
-        simulated(Thermocouples(), way, tmp_path) as line,
+        SimulatedLine(Thermocouples(), way, tmp_path) as line,
         listening(opened(hasty("thermocouple-logger-11"), line.port)) as heard,
     ):
         heard.until(lambda one: len(one.good()) >= 2)
@@ -49,7 +55,7 @@ def test_an_instrument_that_was_unplugged_is_read_again_within_two_seconds(way: 
 @pytest.mark.parametrize(("name", "way"), [("sylvac-rs232", "pty"), ("sylvac-rs232", "socket"), ("fluke-1529", "pty")])
 def test_an_instrument_that_hung_is_read_again_within_two_seconds(name: str, way: Way, tmp_path: Path) -> None:
     profile = hasty(name, answer_within_s=0.5)
-    with simulated(SPEAKERS[name](), way, tmp_path) as line, listening(opened(profile, line.port)) as heard:
+    with SimulatedLine(SPEAKERS[name](), way, tmp_path) as line, listening(opened(profile, line.port)) as heard:
         heard.until(lambda one: len(one.good()) >= 4)
         line.mischief.hangs = True
         heard.until(lambda one: one.of(Gap))
@@ -64,7 +70,7 @@ def test_one_that_was_switched_off_is_told_again_what_it_forgot(tmp_path: Path) 
     """The station speaks in its own FORM after a restart, which the profile does not read: it is set again."""
     profile = hasty("vaisala-ptb330", answer_within_s=0.4)
     with (
-        simulated(SPEAKERS["vaisala-ptb330"](), "pty", tmp_path) as line,
+        SimulatedLine(SPEAKERS["vaisala-ptb330"](), "pty", tmp_path) as line,
         listening(opened(profile, line.port)) as heard,
     ):
         heard.until(lambda one: len(one.good()) >= 2)
@@ -81,7 +87,7 @@ def test_half_lines_noise_and_a_wrong_baud_rate_give_words_and_no_value(
 ) -> None:
     profile = hasty("moeller-wedel-elcomat", answer_within_s=0.3)
     with (
-        simulated(SPEAKERS["moeller-wedel-elcomat"](), "pty", tmp_path) as line,
+        SimulatedLine(SPEAKERS["moeller-wedel-elcomat"](), "pty", tmp_path) as line,
         listening(opened(profile, line.port)) as heard,
     ):
         heard.until(lambda one: len(one.good()) >= 2)
@@ -98,7 +104,7 @@ def test_half_lines_noise_and_a_wrong_baud_rate_give_words_and_no_value(
 
 def test_bytes_one_at_a_time_make_the_same_readings(tmp_path: Path) -> None:
     with (
-        simulated(Thermocouples(), "pty", tmp_path) as line,
+        SimulatedLine(Thermocouples(), "pty", tmp_path) as line,
         listening(opened(hasty("thermocouple-logger-11"), line.port)) as heard,
     ):
         line.mischief.a_byte_at_a_time = True
@@ -115,14 +121,17 @@ class Counting(Speaker):
 
 
 def test_at_a_hundred_readings_a_second_none_is_lost_or_twice(tmp_path: Path) -> None:
-    with simulated(Counting(), "pty", tmp_path) as line, listening(opened(hasty("line-logger"), line.port)) as heard:
+    with (
+        SimulatedLine(Counting(), "pty", tmp_path) as line,
+        listening(opened(hasty("line-logger"), line.port)) as heard,
+    ):
         heard.until(lambda one: len(one.good()) >= 150)
         numbers = [one.values["value1"] for one in heard.good()]
         assert numbers == list(range(int(numbers[0]), int(numbers[0]) + len(numbers)))
 
 
 def test_another_instrument_than_the_declared_one_is_refused(tmp_path: Path) -> None:
-    with simulated(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line, pytest.raises(CmmUqError) as error:
+    with SimulatedLine(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line, pytest.raises(CmmUqError) as error:
         opened(hasty("fluke-1502a"), line.port, serial="B99")
     assert "it says serial number 'A24680', the job names 'B99'" in str(error.value)
 
@@ -134,7 +143,7 @@ class Other(Readout1502):
 
 def test_another_instrument_that_comes_back_is_not_read(tmp_path: Path) -> None:
     with (
-        simulated(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line,
+        SimulatedLine(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line,
         listening(opened(hasty("fluke-1502a"), line.port)) as heard,
     ):
         heard.until(lambda one: one.good())
@@ -150,7 +159,10 @@ def test_another_instrument_that_comes_back_is_not_read(tmp_path: Path) -> None:
 def test_another_instrument_that_is_put_at_the_same_line_while_it_is_silent_is_not_read(tmp_path: Path) -> None:
     """As behind a device server, where no port is lost."""
     profile = hasty("fluke-1502a", answer_within_s=0.3)
-    with simulated(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line, listening(opened(profile, line.port)) as heard:
+    with (
+        SimulatedLine(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line,
+        listening(opened(profile, line.port)) as heard,
+    ):
         heard.until(lambda one: one.good())
         line.mischief.hangs = True
         heard.until(lambda one: one.of(Gap))

@@ -14,14 +14,12 @@ import serial
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.tables.plan import DeclaredSource
-from cmm_uq.laboratory.live.instruments import ports
+from cmm_uq.laboratory.live.instruments import source as ports
 from cmm_uq.laboratory.live.instruments.instrument import open_source
 from cmm_uq.laboratory.live.instruments.library import profile_named
-from cmm_uq.laboratory.live.instruments.ports import opener, serial_ports
 from cmm_uq.laboratory.live.instruments.profile import Connection
-from cmm_uq.laboratory.live.instruments.simulated_line import simulated
-from cmm_uq.laboratory.live.instruments.source import Gap, Reading
-from cmm_uq.laboratory.live.instruments.speakers import Lines
+from cmm_uq.laboratory.live.instruments.simulated_line import Lines, SimulatedLine
+from cmm_uq.laboratory.live.instruments.source import Gap, Reading, opener, serial_ports
 from tests.laboratory.live.instruments.listening import opened
 
 here = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals here")
@@ -36,7 +34,7 @@ def refusal(port: str) -> str:
 @here
 def test_two_programs_cannot_have_one_port(tmp_path: Path) -> None:
     profile = profile_named("line-logger")
-    with simulated(Lines(), "pty", tmp_path) as line:
+    with SimulatedLine(Lines(), "pty", tmp_path) as line:
         first = opened(profile, line.port)
         with pytest.raises(CmmUqError, match=r"the port is busy: another program has it. Close that program"):
             opened(profile, line.port)
@@ -99,7 +97,7 @@ def test_an_address_may_leave_out_the_usual_port_number() -> None:
     ("heidenhain-nd287", (9600, 7, "E", 2)), ("vaisala-ptb330", (4800, 7, "E", 1)), ("fluke-1502a", (2400, 8, "N", 1)),
 ])  # fmt: skip
 def test_the_line_is_set_as_the_profile_says(name: str, settings: tuple[object, ...], tmp_path: Path) -> None:
-    with simulated(Lines(), "pty", tmp_path) as line:
+    with SimulatedLine(Lines(), "pty", tmp_path) as line:
         port = opener(line.port, profile_named(name).connection)()
         try:
             open_line = port._serial  # type: ignore[attr-defined]
@@ -110,7 +108,7 @@ def test_the_line_is_set_as_the_profile_says(name: str, settings: tuple[object, 
 
 @here
 def test_a_device_server_is_told_the_settings_by_rfc_2217(tmp_path: Path) -> None:
-    with simulated(Lines(), "rfc2217", tmp_path) as line:
+    with SimulatedLine(Lines(), "rfc2217", tmp_path) as line:
         port = opener(line.port, profile_named("vaisala-ptb330").connection)()
         far = line._wire.line  # type: ignore[union-attr]
         assert (far.baudrate, far.bytesize, far.parity, far.stopbits) == (4800, 7, "E", 1)

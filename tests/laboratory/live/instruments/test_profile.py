@@ -16,9 +16,8 @@ from hypothesis import given, strategies as st
 
 from cmm_uq.laboratory.live.instruments.library import profile_named, ready
 from cmm_uq.laboratory.live.instruments.profile import bytes_of, shown
-from cmm_uq.laboratory.live.instruments.simulated_line import Way, simulated
+from cmm_uq.laboratory.live.instruments.simulated_line import SPEAKERS, SimulatedLine, Way
 from cmm_uq.laboratory.live.instruments.source import Reading
-from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS
 from tests.laboratory.live.instruments.listening import hasty, listening, opened
 
 
@@ -54,7 +53,7 @@ def test_there_is_a_simulated_instrument_for_every_profile_of_messages() -> None
 @pytest.mark.parametrize(("name", "way"), EACH)
 def test_values_are_what_the_instrument_measures_and_raw_is_what_it_sent(name: str, way: Way, tmp_path: Path) -> None:
     speaker = SPEAKERS[name]()
-    with simulated(speaker, way, tmp_path) as line, listening(opened(hasty(name), line.port)) as heard:
+    with SimulatedLine(speaker, way, tmp_path) as line, listening(opened(hasty(name), line.port)) as heard:
         heard.until(lambda one: len(one.good()) >= len(speaker.readings))
         rounds = heard.good()[: len(speaker.readings)]
         found = [value for reading in rounds for value in reading.values.values()][: len(speaker.readings)]

@@ -11,9 +11,9 @@ from hypothesis import given, strategies as st
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments.instrument import open_source
-from cmm_uq.laboratory.live.instruments.ipp.machine import IppMachine
-from cmm_uq.laboratory.live.instruments.ipp.protocol import BadLineError, HeardLine, response_of
-from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedIppServer
+from cmm_uq.laboratory.live.instruments.ipp import BadLineError, HeardLine, response_of
+from cmm_uq.laboratory.live.instruments.ipp_machine import IppMachine
+from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer
 from cmm_uq.laboratory.live.instruments.source import Gap, Reading, Returned
 from tests.laboratory.live.instruments.listening import listening
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, strategies as st
 
-from cmm_uq.laboratory.live.instruments.ipp.protocol import (
+from cmm_uq.laboratory.live.instruments.ipp import (
     ACK,
     DATA,
     DONE,

@@ -9,12 +9,9 @@ from dataclasses import replace
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.laboratory.live.instruments.conversation import SECOND
-from cmm_uq.laboratory.live.instruments.ipp import protocol
-from cmm_uq.laboratory.live.instruments.ipp.client import ANSWER_WITHIN_S, Client
-from cmm_uq.laboratory.live.instruments.ports import NETWORK, PortOpener, opener
+from cmm_uq.laboratory.live.instruments import ipp, source
 from cmm_uq.laboratory.live.instruments.profile import Connection, Positions, ProfileFile, shown
-from cmm_uq.laboratory.live.instruments.source import Clock, Event, Gap, Identity, PortLostError, Reading, Returned
+from cmm_uq.laboratory.live.instruments.source import SECOND, Event, PortLostError
 
 PORT = 1294  # of an I++ DME server (specification 1.4.3, section 6.1)
 
@@ -33,38 +30,40 @@ POINT = "PtMeas"
 _REPORTED = ("X", "Y", "Z")
 
 
-def open_machine(identity: Identity, profile: ProfileFile, port: str, clock: Clock) -> IppMachine:
-    if not port.startswith(NETWORK):
+def open_machine(identity: source.Identity, profile: ProfileFile, port: str, clock: source.Clock) -> IppMachine:
+    if not port.startswith(source.NETWORK):
         fix = f'Give port = "tcp://host:{PORT}"'
         raise CmmUqError("a CMM by I++ DME is reached over the network", where=port or identity.name, fix=fix)
-    return IppMachine(identity, profile.ipp, opener(port, Connection(), tcp_port=PORT), clock)
+    return IppMachine(identity, profile.ipp, source.opener(port, Connection(), tcp_port=PORT), clock)
 
 
 class IppMachine:
     """``identity``: what the job says of it; ``asked``: what the server is asked for."""
 
-    def __init__(self, identity: Identity, asked: Positions, opened: PortOpener, clock: Clock) -> None:
+    def __init__(
+        self, identity: source.Identity, asked: Positions, opened: source.PortOpener, clock: source.Clock
+    ) -> None:
         self.name, self._identity, self._asked = identity.name, identity, asked
         self._opened, self._clock = opened, clock
         self._clear, self._user_needed = threading.Event(), False
         self._number, self._gap_at, self._closed = 0, -1, False
         self._port = opened()
         self._connected = True
-        self.client, began = Client(self._port, clock), clock.monotonic_ns()
+        self.client, began = ipp.Client(self._port, clock), clock.monotonic_ns()
         try:
             self._begin(take_over=False)
-        except protocol.FaultError as error:
+        except ipp.FaultError as error:
             self._port.close()
             fix = "End the session of the other program, and clear the machine's errors"
             raise CmmUqError(f"the server refuses: {error}", where=self.name, fix=fix) from None
-        except (protocol.NoAnswerError, PortLostError) as error:
+        except (ipp.NoAnswerError, PortLostError) as error:
             self._port.close()
             fix = "Check that the port is that of the I++ DME server, usually 1294"
             raise CmmUqError(f"no I++ DME server answers: {error}", where=self.name, fix=fix) from None
         took_s = (clock.monotonic_ns() - began) / SECOND
-        self._again_within_s = min(max(AGAIN_WITHIN_S, took_s), ANSWER_WITHIN_S)
+        self._again_within_s = min(max(AGAIN_WITHIN_S, took_s), ipp.ANSWER_WITHIN_S)
 
-    def identity(self) -> Identity:
+    def identity(self) -> source.Identity:
         return self._identity
 
     def clear_errors(self) -> None:
@@ -74,7 +73,7 @@ class IppMachine:
     def close(self) -> None:
         self._closed = True
         if self._connected:
-            with contextlib.suppress(protocol.NoAnswerError, protocol.FaultError, PortLostError):
+            with contextlib.suppress(ipp.NoAnswerError, ipp.FaultError, PortLostError):
                 self.client.end_session()
             self._port.close()
             self._connected = False
@@ -86,7 +85,7 @@ class IppMachine:
                 continue
             try:
                 yield from self._step()
-            except (PortLostError, protocol.NoAnswerError) as error:
+            except (PortLostError, ipp.NoAnswerError) as error:
                 if not self._closed:
                     yield from self._lost(say("the connection was lost: {why}", why=Verbatim(str(error))))
 
@@ -121,10 +120,10 @@ class IppMachine:
     def _position(self) -> Iterator[Event]:
         try:
             heard = self.client.get(*_REPORTED)
-        except protocol.FaultError as error:
+        except ipp.FaultError as error:
             if error.fault.severity < USER_NEEDED and not self._user_needed:
                 self.client.clear_all_errors()
-            nothing = protocol.HeardLine(b"", None, self._clock.utc_ns(), self._clock.monotonic_ns())
+            nothing = ipp.HeardLine(b"", None, self._clock.utc_ns(), self._clock.monotonic_ns())
             yield self._reading(nothing, status=say("the machine says {what}", what=Verbatim(str(error.fault))))
             return
         yield from self._unasked()
@@ -134,31 +133,31 @@ class IppMachine:
         while self.client.unasked:
             yield from self._told_by(self.client.unasked.popleft())
 
-    def _told_by(self, heard: protocol.HeardLine) -> Iterator[Event]:
+    def _told_by(self, heard: ipp.HeardLine) -> Iterator[Event]:
         response = heard.response
         if response is None:
             seen = Verbatim(shown(heard.raw[:60]))
             yield self._reading(heard, status=say("no line of I++ DME: {seen}", seen=seen))
-        elif response.sign == protocol.DATA:
+        elif response.sign == ipp.DATA:
             yield self._data(heard, response.rest)
-        elif response.sign == protocol.ERROR:
+        elif response.sign == ipp.ERROR:
             try:
-                fault = protocol.fault_of(response.rest)
+                fault = ipp.fault_of(response.rest)
                 self._user_needed = self._user_needed or fault.severity >= USER_NEEDED
                 status = say("the machine says {what}", what=Verbatim(str(fault)))
-            except protocol.BadLineError as error:
+            except ipp.BadLineError as error:
                 status = say("an error that is none of the protocol: {why}", why=Verbatim(str(error)))
             yield self._reading(heard, status=status)
 
-    def _data(self, heard: protocol.HeardLine, rest: str) -> Reading:
+    def _data(self, heard: ipp.HeardLine, rest: str) -> source.Reading:
         """Data of a point, a position, or something else that is no place."""
         point = None
         try:
-            found = protocol.arguments_of(rest)
-            if len(found) == 1 and isinstance(found[0], protocol.Term) and found[0].name == POINT:
+            found = ipp.arguments_of(rest)
+            if len(found) == 1 and isinstance(found[0], ipp.Term) and found[0].name == POINT:
                 point, found = POINT, found[0].arguments
-            terms = protocol.terms_of(found)
-        except protocol.BadLineError as error:
+            terms = ipp.terms_of(found)
+        except ipp.BadLineError as error:
             return self._reading(heard, status=say("not understood: {why}", why=Verbatim(str(error))))
         values = {
             f"{axis.lower()}_mm": place[0]
@@ -172,12 +171,12 @@ class IppMachine:
         return self._reading(heard, status=say("a place without X, Y and Z: {seen}", seen=Verbatim(rest)))
 
     def _reading(
-        self, heard: protocol.HeardLine, values: dict[str, float] | None = None, *, status: Text | None = None,
+        self, heard: ipp.HeardLine, values: dict[str, float] | None = None, *, status: Text | None = None,
         point: str | None = None,
-    ) -> Reading:  # fmt: skip
+    ) -> source.Reading:  # fmt: skip
         self._number += 1
         times = heard.utc_ns, heard.monotonic_ns
-        return Reading(self.name, self._number, *times, heard.raw, values or {}, status, point)
+        return source.Reading(self.name, self._number, *times, heard.raw, values or {}, status, point)
 
     def _lost(self, why: Text) -> Iterator[Event]:
         yield from self._unasked()
@@ -185,7 +184,7 @@ class IppMachine:
         self._connected = False
         if self._gap_at < 0:
             self._gap_at = self._clock.monotonic_ns()
-            yield Gap(self.name, self._clock.utc_ns(), self._gap_at, why)
+            yield source.Gap(self.name, self._clock.utc_ns(), self._gap_at, why)
 
     def _reconnected(self) -> Iterator[Event]:
         """Try once; the session before was this one's own, so it is ended."""
@@ -194,13 +193,13 @@ class IppMachine:
         except CmmUqError:
             self._clock.sleep(RETRY_S)
             return
-        self.client = Client(self._port, self._clock, within_s=self._again_within_s)
+        self.client = ipp.Client(self._port, self._clock, within_s=self._again_within_s)
         try:
             self._begin(take_over=True)
-        except (protocol.NoAnswerError, protocol.FaultError, PortLostError):
+        except (ipp.NoAnswerError, ipp.FaultError, PortLostError):
             self._port.close()
             self._clock.sleep(RETRY_S)
             return
-        self._connected, self.client.within_s = True, ANSWER_WITHIN_S
+        self._connected, self.client.within_s = True, ipp.ANSWER_WITHIN_S
         now, gap, self._gap_at = self._clock.monotonic_ns(), self._gap_at, -1
-        yield Returned(self.name, self._clock.utc_ns(), now, (now - gap) / SECOND)
+        yield source.Returned(self.name, self._clock.utc_ns(), now, (now - gap) / SECOND)

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from cmm_uq.laboratory.live.instruments.ipp import protocol
+from cmm_uq.laboratory.live.instruments import ipp
 from cmm_uq.laboratory.live.instruments.parsing import Framer
 from cmm_uq.laboratory.live.instruments.profile import MessageFrame
 
@@ -138,7 +138,7 @@ class SimulatedIppServer:
             self.state.daemons.clear()
 
     def _serve(self, connection: socket.socket) -> None:
-        framer = Framer(MessageFrame(terminator="<CR><LF>", longest=protocol.LONGEST))
+        framer = Framer(MessageFrame(terminator="<CR><LF>", longest=ipp.LONGEST))
         while not self._stop.is_set():
             if not select.select([connection], [], [], _TICK_S)[0]:
                 continue
@@ -175,24 +175,24 @@ class SimulatedIppServer:
         if not self.mischief.no_ack:
             self._send(f"{tag} &")
         try:
-            (method,) = protocol.arguments_of(text)
-            if line[5:6] != " " or not isinstance(method, protocol.Term):
-                raise protocol.BadLineError("no method")
-        except (protocol.BadLineError, ValueError):
+            (method,) = ipp.arguments_of(text)
+            if line[5:6] != " " or not isinstance(method, ipp.Term):
+                raise ipp.BadLineError("no method")
+        except (ipp.BadLineError, ValueError):
             self._send(f"{tag} ! {_error(8, 'Parser')}")
             self.state.error = True
         else:
             self._answer(tag, method)
         self._send(f"{tag} %")
 
-    def _answer(self, tag: str, method: protocol.Term) -> None:
+    def _answer(self, tag: str, method: ipp.Term) -> None:
         state, name = self.state, method.name.lower()
         try:
             if not state.session and method.name not in ("StartSession", "EndSession"):
                 raise MethodError(8)
             if state.error and method.name not in _IN_ERROR_TOO:
                 raise MethodError(514)
-            act: Callable[[str, protocol.Term], list[str] | None] | None = getattr(self, f"_do_{name}", None)
+            act: Callable[[str, ipp.Term], list[str] | None] | None = getattr(self, f"_do_{name}", None)
             if name in _SETTINGS:
                 setattr(state, *_SETTINGS[name])
             elif act is None and name not in _SAYINGS:
@@ -207,78 +207,78 @@ class SimulatedIppServer:
 
     # --- the methods --------------------------------------------------------------------------------------------------------
 
-    def _do_startsession(self, tag: str, method: protocol.Term) -> None:
+    def _do_startsession(self, tag: str, method: ipp.Term) -> None:
         if self.state.session:
             raise MethodError(8)
         self.state.session, self.state.error, self.state.report = True, False, ("X", "Y", "Z")
 
-    def _do_endsession(self, tag: str, method: protocol.Term) -> None:
+    def _do_endsession(self, tag: str, method: ipp.Term) -> None:
         self.state.session = False
         self.state.daemons.clear()
 
-    def _do_getdmeversion(self, tag: str, method: protocol.Term) -> list[str]:
+    def _do_getdmeversion(self, tag: str, method: ipp.Term) -> list[str]:
         if self.version is None:
             raise MethodError(501)
         return [f'DMEVersion("{self.version}")']
 
-    def _do_home(self, tag: str, method: protocol.Term) -> None:
+    def _do_home(self, tag: str, method: ipp.Term) -> None:
         self.state.homed, self.state.position, self.state.user = True, [0.0, 0.0, 0.0], False
 
-    def _do_get(self, tag: str, method: protocol.Term) -> list[str]:
+    def _do_get(self, tag: str, method: ipp.Term) -> list[str]:
         return [self.reported(_names(method.arguments, ("X", "Y", "Z", "Tool.A", "Tool.B", "Tool.C")))]
 
-    def _do_onptmeasreport(self, tag: str, method: protocol.Term) -> None:
+    def _do_onptmeasreport(self, tag: str, method: ipp.Term) -> None:
         self.state.report = _names(method.arguments, ("X", "Y", "Z", "IJK", "ER", "Q", "Tool.A", "Tool.B", "Tool.C"))
 
-    def _do_onmovereporte(self, tag: str, method: protocol.Term) -> None:
+    def _do_onmovereporte(self, tag: str, method: ipp.Term) -> None:
         if self.state.daemons:
             raise MethodError(515)
-        rest = [one for one in method.arguments if not (isinstance(one, protocol.Term) and one.name in ("Time", "Dis"))]
+        rest = [one for one in method.arguments if not (isinstance(one, ipp.Term) and one.name in ("Time", "Dis"))]
         self.state.daemons[tag] = _names(tuple(rest), ("X", "Y", "Z"))
 
-    def _do_stopdaemon(self, tag: str, method: protocol.Term) -> None:
+    def _do_stopdaemon(self, tag: str, method: ipp.Term) -> None:
         if len(method.arguments) != 1 or str(method.arguments[0]) not in self.state.daemons:
             raise MethodError(513)
         del self.state.daemons[str(method.arguments[0])]
 
-    def _do_stopalldaemons(self, tag: str, method: protocol.Term) -> None:
+    def _do_stopalldaemons(self, tag: str, method: ipp.Term) -> None:
         if not self.state.daemons:
             raise MethodError(512)
         self.state.daemons.clear()
 
-    def _do_goto(self, tag: str, method: protocol.Term) -> None:
+    def _do_goto(self, tag: str, method: ipp.Term) -> None:
         place, _ = _target(method, self.state.position)
         self._move(place)
 
-    def _do_ptmeas(self, tag: str, method: protocol.Term) -> list[str]:
+    def _do_ptmeas(self, tag: str, method: ipp.Term) -> list[str]:
         place, normal = _target(method, self.state.position)
         size = math.hypot(*normal) or 1.0
         unit = (normal[0] / size, normal[1] / size, normal[2] / size)
         self._move([at + self.radial * n for at, n in zip(place, unit, strict=True)])
         return [self.reported(self.state.report, unit)]
 
-    def _do_enumtools(self, tag: str, method: protocol.Term) -> list[str]:
+    def _do_enumtools(self, tag: str, method: ipp.Term) -> list[str]:
         return [f'"{name}"' for name in self.tools]
 
-    def _do_findtool(self, tag: str, method: protocol.Term) -> None:
+    def _do_findtool(self, tag: str, method: ipp.Term) -> None:
         self.state.found = self._tool(method)
 
-    def _do_changetool(self, tag: str, method: protocol.Term) -> None:
+    def _do_changetool(self, tag: str, method: ipp.Term) -> None:
         self.state.tool, self.state.user = self._tool(method), False
 
-    def _do_settool(self, tag: str, method: protocol.Term) -> None:
+    def _do_settool(self, tag: str, method: ipp.Term) -> None:
         self.state.tool = self._tool(method)
 
-    def _do_getprop(self, tag: str, method: protocol.Term) -> list[str]:
+    def _do_getprop(self, tag: str, method: ipp.Term) -> list[str]:
         known = {"Tool.Name": f'"{self.state.tool}"', "FoundTool.Name": f'"{self.state.found}"'}
         if self.part_c is not None:
-            known["Part.Temperature"] = protocol.number_text(self.part_c)
-        names = [one.name if isinstance(one, protocol.Term) else "" for one in method.arguments]
+            known["Part.Temperature"] = ipp.number_text(self.part_c)
+        names = [one.name if isinstance(one, ipp.Term) else "" for one in method.arguments]
         if not set(names) <= set(known):
             raise MethodError(510)
         return [", ".join(f"{name}({known[name]})" for name in names)]
 
-    def _tool(self, method: protocol.Term) -> str:
+    def _tool(self, method: ipp.Term) -> str:
         if len(method.arguments) != 1 or method.arguments[0] not in self.tools:
             raise MethodError(1502)
         return str(method.arguments[0])
@@ -293,22 +293,22 @@ class SimulatedIppServer:
     def reported(self, names: tuple[str, ...], normal: tuple[float, float, float] = (0, 0, 1)) -> str:
         """What a report says of the names, with the direction of a measured point."""
         places = {axis: f"{value:.4f}" for axis, value in zip("XYZ", self.state.position, strict=True)}
-        further = {"IJK": ", ".join(map(protocol.number_text, normal)), "ER": "1.0", "Q": "0"}
+        further = {"IJK": ", ".join(map(ipp.number_text, normal)), "ER": "1.0", "Q": "0"}
         return ", ".join(f"{name}({places.get(name) or further.get(name) or '0'})" for name in names)
 
 
-def _names(arguments: tuple[protocol.Argument, ...], known: tuple[str, ...]) -> tuple[str, ...]:
-    names = tuple(one.name for one in arguments if isinstance(one, protocol.Term) and not one.arguments)
+def _names(arguments: tuple[ipp.Argument, ...], known: tuple[str, ...]) -> tuple[str, ...]:
+    names = tuple(one.name for one in arguments if isinstance(one, ipp.Term) and not one.arguments)
     if not names or len(names) != len(arguments) or not set(names) <= set(known):
         raise MethodError(510)
     return names
 
 
-def _target(method: protocol.Term, position: list[float]) -> tuple[list[float], tuple[float, float, float]]:
+def _target(method: ipp.Term, position: list[float]) -> tuple[list[float], tuple[float, float, float]]:
     """Where a command goes, axes that it does not name staying, and the direction that it names."""
     place, normal = list(position), (0.0, 0.0, 1.0)
     for one in method.arguments:
-        if not isinstance(one, protocol.Term) or not all(isinstance(value, float) for value in one.arguments):
+        if not isinstance(one, ipp.Term) or not all(isinstance(value, float) for value in one.arguments):
             raise MethodError(509)
         numbers = [value for value in one.arguments if isinstance(value, float)]
         if one.name in ("X", "Y", "Z") and len(numbers) == 1:
