@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.bryan.bar import Bryan
+from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model import Noise, RecordingModel

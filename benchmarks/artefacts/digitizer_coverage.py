@@ -16,8 +16,7 @@ import numpy as np
 from scipy import stats
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.digitizer.observe import DigitizerArtefact
-from cmm_uq.artefacts.digitizer.plan import THREE, scan
+from cmm_uq.artefacts.digitizer import THREE, DigitizerArtefact, scan
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts

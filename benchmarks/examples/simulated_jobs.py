@@ -16,8 +16,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.artefacts import artefact_facts, artefact_of
-from cmm_uq.artefacts.digitizer.plan import THREE, scan
-from cmm_uq.artefacts.triangle.observe import TriangleStandard, placed_triangle
+from cmm_uq.artefacts.digitizer import THREE, scan
+from cmm_uq.artefacts.triangle import TriangleStandard, placed_triangle
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.artefact import Size

@@ -23,7 +23,7 @@ from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmod
 from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Plan, Stylus
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
-from cmm_uq.artefacts.ballbar.bar import Ballbar
+from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.recorded import Noise
 from cmm_uq.machine.physics.catalogue import effects

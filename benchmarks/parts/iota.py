@@ -22,7 +22,7 @@ from cmm_uq.analysis.parts.machine.conditional import given_recording, joint_pos
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
 from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
-from cmm_uq.artefacts.ballbar.bar import Ballbar
+from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.parts_drawn import spot

@@ -32,8 +32,8 @@ from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmod
 from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.result import evaluated, stated
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
-from cmm_uq.artefacts.ballbar.bar import Ballbar
-from cmm_uq.artefacts.gauge_lines.observe import StepGauge
+from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact

@@ -25,9 +25,8 @@ Found = tuple[str, bool, bool, float]
 def estimated(task: tuple[int, int]) -> Found | None:
     """One set of maps; nothing where none is concealed, or where no explanation with an expansion is probable."""
     from cmm_uq.artefacts.error_maps.columns import columns_of
+    from cmm_uq.artefacts.error_maps.comparison import column_comparison, expansion
     from cmm_uq.artefacts.error_maps.diagnosis import expansion_shown
-    from cmm_uq.artefacts.error_maps.fit import expansion
-    from cmm_uq.artefacts.error_maps.search import column_comparison
     from cmm_uq.machine.physics.error_map import read_error_map
 
     made = concealed(*task, "set")

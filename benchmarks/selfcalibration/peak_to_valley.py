@@ -13,10 +13,10 @@ import numpy as np
 
 from benchmarks.selfcalibration.machines import FULL, LENGTH, PEAK_TO_VALLEY, SHIFT, machine, record
 from benchmarks.selfcalibration.study import U_SHIFT
-from cmm_uq.artefacts.shift_axis.curve import estimate_curve
-from cmm_uq.artefacts.shift_axis.integration import KnownSpan
-from cmm_uq.artefacts.shift_axis.series import shifted_series
-from cmm_uq.artefacts.shifting.found import peak_to_valley
+from cmm_uq.artefacts.shift.axis import estimate_curve
+from cmm_uq.artefacts.shift.integration import KnownSpan
+from cmm_uq.artefacts.shift.result import peak_to_valley
+from cmm_uq.artefacts.shift.series import shifted_series
 from cmm_uq.base.units import MICROMETRE
 
 SIZES_UM = (0.0, 1.0, 3.0, 10.0, 27.0)

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.examples.shift_job import error as example_error
 from cmm_uq.app.commands.report import analyse
-from cmm_uq.artefacts.shift_axis.analysis import ShiftResult
+from cmm_uq.artefacts.shift.axis import ShiftResult
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.plots.style import ACCENT, INK, MUTED, as_svg, house_style, new_figure
 

@@ -19,10 +19,10 @@ import numpy as np
 
 from benchmarks.examples.shift_plate_job import PLACINGS
 from benchmarks.selfcalibration.machines import RANGE, machine
-from cmm_uq.artefacts.shift_axis.curve import Curve
-from cmm_uq.artefacts.shift_axis.integration import KnownSpan
-from cmm_uq.artefacts.shift_plate.placed_plate import placed_plate
-from cmm_uq.artefacts.shift_plate.plane import PlaneEstimate, estimate_plane
+from cmm_uq.artefacts.shift.integration import KnownSpan
+from cmm_uq.artefacts.shift.placed_plate import placed_plate
+from cmm_uq.artefacts.shift.plane import PlaneEstimate, estimate_plane
+from cmm_uq.artefacts.shift.result import Curve
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import ARCSECOND, PPM
 

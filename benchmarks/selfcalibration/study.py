@@ -30,9 +30,9 @@ from benchmarks.selfcalibration.machines import (
     machine,
     record,
 )  # fmt: skip
-from cmm_uq.artefacts.shift_axis.curve import estimate_curve
-from cmm_uq.artefacts.shift_axis.integration import KnownSpan, calibration_curve, position_error, with_known_length
-from cmm_uq.artefacts.shift_axis.series import shifted_series
+from cmm_uq.artefacts.shift.axis import estimate_curve
+from cmm_uq.artefacts.shift.integration import KnownSpan, calibration_curve, position_error, with_known_length
+from cmm_uq.artefacts.shift.series import shifted_series
 from cmm_uq.base.points import Floats
 
 DESIGNS = {"23 points": FULL, "12 equal": EQUAL_40, "12 unequal": UNEQUAL}

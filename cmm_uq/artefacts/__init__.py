@@ -1,17 +1,15 @@
-"""The kinds of measurement, a folder each: all that is particular to a ballbar, a plate, an axis read in shifted places.
+"""The kinds of measurement: all that is particular to a ballbar, a plate, an axis read in shifted places.
 
 This is the registry: the built-in kinds by name, and those of other packages, which name them as entry points of the group
-``cmm_uq.kinds``. A kind is imported when it is first asked for.
+``cmm_uq.kinds``. What a kind observes, plans and states is imported when it is first asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache
-from importlib import import_module
-from types import MappingProxyType
 from typing import Any
 
+from cmm_uq.artefacts.kinds import BUILT_IN
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.plugins import KINDS, Plugin, named, offered
 from cmm_uq.base.points import Points
@@ -20,27 +18,17 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import Kind
 
-# where each built-in kind is
-BUILT_IN: Mapping[str, str] = MappingProxyType({
-    "ballbar": "ballbar.kind:KIND", "bryan": "bryan.kind:KIND", "step_gauge": "gauge_lines.kind:STEP_GAUGE",
-    "gauge_blocks": "gauge_lines.kind:GAUGE_BLOCKS", "plate": "plate.kind:KIND", "triangle": "triangle.kind:KIND",
-    "sphere": "sphere.kind:KIND", "plane": "plane.kind:KIND", "shift": "shifting.kind:KIND",
-    "error_map": "error_maps.kind:KIND", "digitizer": "digitizer.kind:KIND",
-})  # fmt: skip
-
 
 def names() -> tuple[str, ...]:
-    return (*BUILT_IN, *(plugin.name for plugin in _offered() if plugin.name not in BUILT_IN))
+    return (*BUILT_IN, *(plugin.name for plugin in offered(KINDS, Plugin) if plugin.name not in BUILT_IN))
 
 
 @cache
 def kind_named(name: str) -> Kind | None:
     """A kind by its name; ``None`` where there is none. A built-in kind cannot be replaced."""
     if name in BUILT_IN:
-        module, _, constant = BUILT_IN[name].partition(":")
-        kind: Kind = getattr(import_module(f"cmm_uq.artefacts.{module}"), constant)
-        return kind
-    outside = named(_offered(), name)
+        return BUILT_IN[name]
+    outside = named(offered(KINDS, Plugin), name)
     return None if outside is None else outside.loaded(Kind)
 
 
@@ -65,11 +53,7 @@ def artefact_of(facts: ArtefactFacts, points: Points, *, where: str | None = Non
 
 
 def _known(name: str) -> Kind:
-    found = kind_named(name)
-    if found is None:
+    kind = kind_named(name)
+    if kind is None:
         raise CmmUqError(f"no kind {name!r}", where="job.toml [artefact] kind", fix=f"Known: {', '.join(names())}")
-    return found
-
-
-def _offered() -> tuple[Plugin, ...]:
-    return offered(KINDS, Plugin)
+    return kind

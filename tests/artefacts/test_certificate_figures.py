@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from cmm_uq.app.commands.report import outcome_of
-from cmm_uq.artefacts.shift_plate.page import EVERY
+from cmm_uq.artefacts.shift.plane_page import EVERY
 from cmm_uq.certificate.document import Document, Table
 from cmm_uq.certificate.results.plain import as_json
 from tests.artefacts.reading import tables

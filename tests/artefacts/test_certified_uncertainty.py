@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.gauge_lines.observe import GaugeBlocks, StepGauge
-from cmm_uq.artefacts.plate.observe import Plate
+from cmm_uq.artefacts.gauge_lines import GaugeBlocks, StepGauge
+from cmm_uq.artefacts.plate import Plate
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.jobs.tables.artefact import ReferencedFacts
 from cmm_uq.machine.model import RecordingModel

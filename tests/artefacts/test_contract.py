@@ -251,8 +251,7 @@ def test_a_kind_that_nobody_offers_is_refused_with_those_that_there_are(tracker:
 
 
 @pytest.mark.parametrize(
-    ("where", "told"),
-    [("nowhere:KIND", "fails with ModuleNotFoundError"), ("math:pi", "is no Kind but float")],
+    ("where", "told"), [("nowhere:KIND", "fails with ModuleNotFoundError"), ("math:pi", "is no Kind but float")]
 )
 def test_a_broken_package_is_named(where: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     describe(tmp_path / "site", "odd-kinds", "1.0", {"cmm_uq.kinds": {"odd": where}})

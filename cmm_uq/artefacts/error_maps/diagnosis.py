@@ -12,15 +12,24 @@ from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import region_of
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.artefacts.error_maps.columns import MapColumn, columns_of, turned
-from cmm_uq.artefacts.error_maps.fit import expansion, function, held_out, noise_of, residual, squareness_findings
-from cmm_uq.artefacts.error_maps.search import CandidateCause, ColumnComparison, column_comparison
+from cmm_uq.artefacts.error_maps.comparison import (
+    CandidateCause,
+    ColumnComparison,
+    column_comparison,
+    expansion,
+    function,
+    held_out,
+    noise_of,
+    residual,
+)
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Text, say
+from cmm_uq.base.messages import Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.points import Floats
-from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.units import ARCSECOND, MICROMETRE
+from cmm_uq.certificate.document import Section, Table, figure_columns, text_columns
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model.machine_maps import WHERE, maps_of
-from cmm_uq.machine.physics.catalogue import effects, effects as effects_named
+from cmm_uq.machine.physics.catalogue import effects as effects_named
 from cmm_uq.machine.physics.effects.thermal import ThermalScale
 from cmm_uq.machine.physics.error_map import ErrorMap
 from cmm_uq.maths.inference.ensembles import Progress
@@ -77,12 +86,7 @@ class MapsDiagnosis:
 
 
 def diagnose_maps(
-    columns: Sequence[MapColumn],
-    named: Sequence[str],
-    *,
-    alpha: float,
-    seed: int,
-    progress: Progress | None = None,
+    columns: Sequence[MapColumn], named: Sequence[str], *, alpha: float, seed: int, progress: Progress | None = None
 ) -> MapsDiagnosis:
     comparisons, effects, differences = [], [], []
     for i, column in enumerate(columns):
@@ -201,7 +205,7 @@ def compared_maps(job: Job) -> tuple[tuple[ErrorMap, ...], list[MapColumn], list
     if len(maps) < 2:
         raise CmmUqError("one error map has nothing to be compared with", where=WHERE,
                          fix="Name two or more maps of the machine; with three it shows which of them differs")  # fmt: skip
-    for effect in effects(job.facts.model.effects, where="job.toml [model] effects"):
+    for effect in effects_named(job.facts.model.effects, where="job.toml [model] effects"):
         if effect.columns and not isinstance(effect, ThermalScale):
             raise CmmUqError(f"{effect.name} needs {', '.join(effect.columns)}, which error maps do not have",
                              where="job.toml [model] effects", fix="Leave it out")  # fmt: skip
@@ -218,3 +222,54 @@ def compared_maps(job: Job) -> tuple[tuple[ErrorMap, ...], list[MapColumn], list
 
 def refuse_unfit(job: Job) -> None:
     compared_maps(job)
+
+
+def squareness_data(maps: Sequence[ErrorMap]) -> list[dict[str, float]]:
+    """Of each map for ``results.json``, ″; empty where no map states any."""
+    if not _stated(maps):
+        return []
+    return [{"temperature_c": m.temperature, **m.squareness_arcsec} for m in _by_temperature(maps)]
+
+
+def squareness_findings(maps: Sequence[ErrorMap]) -> list[Finding]:
+    if not _stated(maps):
+        return []
+    same: dict[tuple[float, ...], list[float]] = {}
+    for m in _by_temperature(maps):
+        same.setdefault(tuple(m.squareness.tolist()), []).append(m.temperature)
+    return [Finding("copied", (), (), _same_squareness(some)) for some in same.values() if len(some) > 1]
+
+
+def _same_squareness(temperatures: Sequence[float]) -> Text:
+    return say(
+        "squareness: the maps at {temperatures} °C give the same figures. They were measured once, and say "
+        "nothing of how it changes; measure it at each temperature",
+        temperatures=commas(number(t, "g") for t in temperatures),
+    )
+
+
+def squareness_sections(maps: Sequence[ErrorMap]) -> tuple[Section, ...]:
+    if not _stated(maps):
+        return ()
+    ordered = _by_temperature(maps)
+    figures = np.array([m.squareness for m in ordered]) / ARCSECOND
+    rows: list[tuple[Text, ...]] = [
+        (say("{temperature:g}\u00a0°C", temperature=m.temperature), *(signed(value, ".5g") for value in row))
+        for m, row in zip(ordered, figures, strict=True)
+    ]
+    rows.append((say("Largest less smallest"), *(number(value, ".5g") for value in np.ptp(figures, axis=0))))
+    pairs = (say("{pair} / ″", pair=Verbatim(pair)) for pair in ("XY", "YZ", "ZX"))
+    heads = (*text_columns(say("Map")), *figure_columns(*pairs))
+    note = say(
+        "There is one figure a map, without an uncertainty: whether they differ is not tested. One "
+        "arc second moves a point by 2.4 µm over 500 mm."
+    )
+    return (Section(say("Squareness of the axes"), (Table(say("Squareness"), heads, tuple(rows), (note,)),)),)
+
+
+def _stated(maps: Sequence[ErrorMap]) -> bool:
+    return any(m.squareness.any() for m in maps)
+
+
+def _by_temperature(maps: Sequence[ErrorMap]) -> list[ErrorMap]:
+    return sorted(maps, key=lambda m: m.temperature)

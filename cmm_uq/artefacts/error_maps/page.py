@@ -1,44 +1,196 @@
-"""The diagnosis of error maps as a page and as results."""
+"""The diagnosis of error maps in words that a service technician acts on, in four lines, as a page and as results."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from cmm_uq import __version__
-from cmm_uq.artefacts.error_maps.diagnosis import Difference, MapsDiagnosed, diagnose_error_maps
-from cmm_uq.artefacts.error_maps.fit import squareness_data, squareness_sections
-from cmm_uq.artefacts.error_maps.search import ColumnComparison
-from cmm_uq.artefacts.error_maps.words import VERDICTS, difference_words, next_words, noise_words, overview_of, told
-from cmm_uq.base.messages import Text, Verbatim, commas, day, lines, names, number, say
-from cmm_uq.certificate.diagnosis.overview import held_out, summary_of, sure
-from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
+from cmm_uq.artefacts.error_maps import diagnosis
+from cmm_uq.artefacts.error_maps.comparison import ColumnComparison
+from cmm_uq.artefacts.error_maps.diagnosis import Difference, MapsDiagnosed, MapsDiagnosis
+from cmm_uq.base import messages
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, plural, say, semicolons, sentences, signed
+from cmm_uq.certificate.diagnosis.overview import STANDING, gained, held_out, share_of, summary_of, sure
+from cmm_uq.certificate.document import (
+    Block,
+    Column,
+    Document,
+    Facts,
+    Overview,
+    Paragraph,
+    Section,
+    Table,
+    figure_columns,
+    text_columns,
+    working_page,
+)
 from cmm_uq.certificate.outcome import Outcome, OwnAnalysis, Recipe
 from cmm_uq.certificate.plots.residuals import curve_with_band
 from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.results.contents import effect_data, false_alarms, finding_data, head, improvement_data
 from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.sections.findings import improvement_table
-from cmm_uq.certificate.wording import effect_of, probability, size_of, titles
+from cmm_uq.certificate.wording import effect_of, effect_title, probability, size_of, titles
+
+# a verdict as the title of its overview, and in a sentence
+VERDICTS: Mapping[str, tuple[Text, Text]] = {
+    "consistent": (
+        say("Consistent: the maps agree"), say("The maps agree with each other within their noise."),
+    ),
+    "explained": (
+        say("Explained: what makes the maps differ is found"),
+        say("The maps differ from each other, and what makes them differ is found."),
+    ),
+    "partial": (
+        say("Partly explained: a cause is found, and maps differ besides"),
+        say("The maps differ from each other; something that makes them differ is found, but it does not account for all."),
+    ),
+    "unexplained": (
+        say("Unexplained: maps differ, and no known effect accounts for it"),
+        say("The maps differ from each other, and no known effect accounts for it."),
+    ),
+}  # fmt: skip
+
+
+def difference_words(difference: Difference) -> Text:
+    rival = difference.rival
+    low, high = difference.region
+    size = say(
+        "by up to {amplitude:.2g}\u00a0{unit}, most of all from {axis} = {low} to {high}\u00a0mm",
+        amplitude=difference.amplitude, unit=difference.column.unit[0], axis=Verbatim(difference.column.axis.upper()),
+        low=signed(low, "g"), high=signed(high, "g"),
+    )  # fmt: skip
+    what, chance = rival.name, probability(difference.probability)
+    if rival.map is not None:
+        text = say("{what:capital} differs from the others {size} (probability {chance}).",
+                   what=what, size=size, chance=chance)  # fmt: skip
+    elif len(difference.column.temperatures) == 2:
+        text = say("{what:capital}: {size}; which of the two is right they cannot say (probability {chance}).",
+                   what=what, size=size, chance=chance)  # fmt: skip
+    else:
+        text = say("{what:capital}, changes {size} (probability {chance}).", what=what, size=size, chance=chance)
+    more = [say("With the sign of its figures turned it would agree.")] if difference.turned else []
+    if difference.instead:
+        others = semicolons([effect_title(name) for name in difference.instead])
+        more.append(say("It could also be: {others}.", others=others))
+    return sentences([text, *more])
+
+
+def noise_words(d: MapsDiagnosis) -> list[Text]:
+    return [
+        say(
+            "Standard uncertainty of one reading of a {what} {value:.2g}\u00a0{unit} (95\u00a0% interval "
+            "{low:.2g} to {high:.2g}\u00a0{unit}).",
+            what=what, value=noise.value, unit=noise.unit, low=noise.interval95[0], high=noise.interval95[1],
+        )
+        for what, noise in ((say("displacement"), d.displacement), (say("rotation"), d.rotation))
+        if noise is not None
+    ]  # fmt: skip
+
+
+def next_words(d: MapsDiagnosis) -> list[tuple[tuple[Text, ...], Text]]:
+    found: list[tuple[tuple[Text, ...], Text]] = []
+    for title in dict.fromkeys(difference.column.title for difference in d.differences):
+        some = [difference for difference in d.differences if difference.column.title == title]
+        names = tuple(dict.fromkeys(name for one in some for name in (one.rival.name, *one.instead)))
+        temperatures = some[0].column.temperatures
+        if len(temperatures) == 2:
+            what = say("Map the {title} a third time: with two maps nothing says which of them is off.", title=title)
+        else:
+            chosen = [t for k, t in enumerate(temperatures) if any(k in one.maps for one in some)]
+            shown = [number(t, "g") for t in (chosen if len(chosen) == 1 else temperatures)]
+            what = say(
+                "Measure the {title} again at {temperatures} °C.", title=title, temperatures=messages.listed(shown)
+            )
+        found.append((names, what))
+    return found
+
+
+_SHOWN = 3  # differences that are told; the page has all
+
+
+def overview_of(found: MapsDiagnosed) -> Overview:
+    d = found.diagnosis
+    rows = (
+        (say("Found"), _found(d)), (say("Where"), _where(d)), (say("How sure"), _sure(d)),
+        (say("What to do"), _to_do(found)),
+    )  # fmt: skip
+    return Overview(VERDICTS[d.verdict][0], STANDING[d.verdict], tuple(row for row in rows if row[1]))
+
+
+def told(found: MapsDiagnosed) -> list[Text]:
+    d = found.diagnosis
+    said: list[Text] = [VERDICTS[d.verdict][1]]
+    said += [say("{label}: {text}", label=label, text=text) for label, text in overview_of(found).rows]
+    said += [difference_words(difference) for difference in d.differences]
+    return [*said, *noise_words(d), *(what for _, what in next_words(d))]
+
+
+def _found(d: MapsDiagnosis) -> Text:
+    if d.verdict == "consistent":
+        return say("Nothing beyond noise.")
+    said: list[Text] = [
+        say("{title}: {size}.", title=item.title, size=size_of(effect_of(item.effect), item.parameters, factors=False))
+        for item in d.effects
+    ]
+    said += [_difference(difference) for difference in d.differences[:_SHOWN]]
+    if (more := len(d.differences) - _SHOWN) > 0:
+        said.append(plural(
+            more, one=say("One more difference is told below."),
+            many=say("{more} more differences are told below.", more=more),
+        ))  # fmt: skip
+    return messages.lines(said)
+
+
+def _difference(item: Difference) -> Text:
+    return say(
+        "{what:capital}: off by up to {amplitude:.2g}\u00a0{unit}.",
+        what=item.rival.name, amplitude=item.amplitude, unit=item.column.unit[0],
+    )  # fmt: skip
+
+
+def _where(d: MapsDiagnosis) -> Text:
+    places = [
+        say("{what} from {axis} = {low} to {high}\u00a0mm", what=item.column.title,
+            axis=Verbatim(item.column.axis.upper()), low=signed(item.region[0], "g"), high=signed(item.region[1], "g"))
+        for item in d.differences[:_SHOWN]
+    ]  # fmt: skip
+    return say("{places:capital}.", places=semicolons(places)) if places else NOTHING
+
+
+def _sure(d: MapsDiagnosis) -> Text:
+    said: list[Text] = [say("Noise alone looks like this in {share} sets of maps.", share=share_of(d.p_value))]
+    if d.effects:
+        each = semicolons(
+            say("{what} {probability}", what=one.title, probability=probability(one.probability)) for one in d.effects
+        )
+        said.append(say("Probability: {each}.", each=each))
+        said.append(gained(d.improvement))
+    return messages.lines(said)
+
+
+def _to_do(found: MapsDiagnosed) -> Text:
+    d = found.diagnosis
+    said: list[Text] = [
+        say("{what:capital}.", what=what) for what in dict.fromkeys(item.points_to for item in d.effects)
+    ]
+    said += [what for _, what in next_words(d)[:_SHOWN]]
+    if found.findings:
+        said.append(say("See the warnings on the maps."))
+    return messages.lines(said) if said else say("Nothing on account of these maps.")
 
 
 def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
     d, noise = found.diagnosis, found.diagnosis.displacement
-    squareness = squareness_data(found.maps)
+    squareness = diagnosis.squareness_data(found.maps)
     nothing = {"value": None, "u": None, "interval95": None}
     return {
         **head(found.job, effects=False),
-        "sampling": {
-            "sampler": None,
-            "seed": seed,
-            "ess_min": None,
-            "rhat_max": None,
-            "converged": True,
-        },
+        "sampling": {"sampler": None, "seed": seed, "ess_min": None, "rhat_max": None, "converged": True},
         "diagnosis": {
-            "verdict": d.verdict,
-            "p_value": d.p_value,
-            **false_alarms(d.alpha),
-            "where": [_where(item) for item in d.differences],
+            "verdict": d.verdict, "p_value": d.p_value, **false_alarms(d.alpha),
+            "where": [_where_data(item) for item in d.differences],
             "effects": [effect_data(item, d.improvement) for item in d.effects],
             "indistinguishable": [],
             "suggested_measurements": [
@@ -46,33 +198,24 @@ def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
                 for names, what in next_words(d)
             ],
             "noise": {
-                "stated_coordinate_um": None,
-                "coordinate_um": nothing if noise is None else quantity_data(noise),
-                "rotation_arcsec": nothing if d.rotation is None else quantity_data(d.rotation),
-                "placing_um": nothing,
-                "correlated_in_time": False,
-                "heavy_tails": False,
-                "contradicts_stated": False,
+                "stated_coordinate_um": None, "coordinate_um": nothing if noise is None else quantity_data(noise),
+                "rotation_arcsec": nothing if d.rotation is None else quantity_data(d.rotation), "placing_um": nothing,
+                "correlated_in_time": False, "heavy_tails": False, "contradicts_stated": False,
             },
             "screening": [finding_data(finding, "") for finding in found.findings],
             "improvement": improvement_data(d.improvement),
             "compared": [_compared(compared, d.p_of(compared)) for compared in d.comparisons],
             **({"squareness_arcsec": squareness} if squareness else {}),
         },
-    }
+    }  # fmt: skip
 
 
-def _where(item: Difference) -> dict[str, Any]:
+def _where_data(item: Difference) -> dict[str, Any]:
     return {
-        "covariate": f"{item.column.axis}_mm",
-        "region": list(item.region),
-        "p_value": min(1.0, item.p_value),
-        "amplitude_um": item.amplitude_um,
-        "what": item.rival.name,
-        "probability": item.probability,
-        "instead": list(item.instead),
-        "sign_turned": item.turned,
-    }
+        "covariate": f"{item.column.axis}_mm", "region": list(item.region), "p_value": min(1.0, item.p_value),
+        "amplitude_um": item.amplitude_um, "what": item.rival.name, "probability": item.probability,
+        "instead": list(item.instead), "sign_turned": item.turned,
+    }  # fmt: skip
 
 
 def _compared(compared: ColumnComparison, p_value: float) -> dict[str, Any]:
@@ -93,7 +236,7 @@ _PICTURES = 3
 
 def maps_document(found: MapsDiagnosed, seed: int) -> Document:
     facts, d = found.job.facts, found.diagnosis
-    maps = lines(
+    maps = messages.lines(
         say("{file}, {temperature_c:g} °C", file=Verbatim(given.file), temperature_c=given.temperature_c)
         for given in facts.machine.error_map
     )
@@ -101,45 +244,29 @@ def maps_document(found: MapsDiagnosed, seed: int) -> Document:
         Section(say("What makes the maps differ"), _told(found)),
         Section(say("What to measure next"), tuple(Paragraph(what) for _, what in next_words(d))),
         Section(say("Before and after"), () if d.verdict == "consistent" else (_before_after(found),)),
-        *squareness_sections(found.maps),
+        *diagnosis.squareness_sections(found.maps),
         Section(say("Noise"), tuple(Paragraph(text) for text in noise_words(d))),
         Section(say("Errors compared"), (_compared_of_page(found),)),
     )
-    return working_page(
-        facts,
-        say("Diagnosis of error maps"),
-        day(facts.job.date),
-        overview=overview_of(found),
-        particulars=(
-            Facts(
-                (
-                    (say("Machine"), Verbatim(facts.machine.name)),
-                    (say("p-value of “the maps differ by noise alone”"), number(d.p_value, ".2g")),
-                    (say("False-alarm rate"), say("{alpha:g} %", alpha=100 * d.alpha)),
-                )
-            ),
-            Facts(
-                (
-                    (say("Error maps"), maps),
-                    (say("Effects that the job names"), (commas(titles(facts.model.effects)) or say("none"))),
-                )
-            ),
-        ),
-        warnings=(say("{why:capital}.", why=f.why) for f in found.findings),
-        sections=sections,
-        produced_by=_produced_by(seed),
-        attachments=(*names(found.job.inputs), Verbatim("results.json")),
+    tested = (
+        (say("Machine"), Verbatim(facts.machine.name)),
+        (say("p-value of “the maps differ by noise alone”"), number(d.p_value, ".2g")),
+        (say("False-alarm rate"), say("{alpha:g} %", alpha=100 * d.alpha)),
     )
-
-
-def _produced_by(seed: int) -> Text:
+    named = messages.commas(titles(facts.model.effects)) or say("none")
     program = say("cmm-uq {version}", version=Verbatim(__version__))
-    return commas((program, say("seed {seed}", seed=seed)))
+    return working_page(
+        facts, say("Diagnosis of error maps"), messages.day(facts.job.date), overview=overview_of(found),
+        particulars=(Facts(tested), Facts(((say("Error maps"), maps), (say("Effects that the job names"), named)))),
+        warnings=(say("{why:capital}.", why=f.why) for f in found.findings),
+        sections=sections, produced_by=messages.commas((program, say("seed {seed}", seed=seed))),
+        attachments=(*messages.names(found.job.inputs), Verbatim("results.json")),
+    )  # fmt: skip
 
 
 def _told(found: MapsDiagnosed) -> tuple[Block, ...]:
     d = found.diagnosis
-    blocks: list[Block] = [Paragraph(VERDICTS[d.verdict])]
+    blocks: list[Block] = [Paragraph(VERDICTS[d.verdict][1])]
     blocks += [
         Facts((
             (say("Effect"), item.title),
@@ -160,18 +287,13 @@ def _told(found: MapsDiagnosed) -> tuple[Block, ...]:
 
 def _picture(difference: Difference) -> Block:
     x, y, u = difference.curve
-    unit = difference.column.unit[0]
+    unit, size = difference.column.unit[0], difference.amplitude
     return curve_with_band(
-        x,
-        y,
-        2 * u,
-        x_label=say("{axis} / mm", axis=Verbatim(difference.column.axis.upper())),
+        x, y, 2 * u, x_label=say("{axis} / mm", axis=Verbatim(difference.column.axis.upper())),
         y_label=say("Difference / {unit}", unit=unit),
         caption=say("{name:capital}: the difference, with U (k = 2).", name=difference.rival.name),
-        alternative=say(
-            "A function with a largest value of {amplitude:.3g} {unit}.", amplitude=difference.amplitude, unit=unit
-        ),
-    )
+        alternative=say("A function with a largest value of {amplitude:.3g} {unit}.", amplitude=size, unit=unit),
+    )  # fmt: skip
 
 
 def _before_after(found: MapsDiagnosed) -> Table:
@@ -186,32 +308,21 @@ def _before_after(found: MapsDiagnosed) -> Table:
 
 def _compared_of_page(found: MapsDiagnosed) -> Table:
     d = found.diagnosis
-    rows = tuple(
-        (
-            compared.column.title,
-            number(len(compared.column.values)),
-            number(len(compared.column.positions)),
-            number(d.p_of(compared), ".2g"),
-            *_most_probable(compared),
-        )
-        for compared in d.comparisons
-    )
-    heads = (Column(say("Error"), numeric=False), Column(say("Maps")), Column(say("Positions")), Column(say("p")),
-             Column(say("Most probable explanation"), numeric=False), Column(say("Probability")))  # fmt: skip
+    rows = []
+    for one in d.comparisons:
+        counts = number(len(one.column.values)), number(len(one.column.positions))
+        best = messages.commas([one.rivals[i].short for i in sorted(one.best)]) or say("noise")
+        chance = probability(one.combinations.probability[one.best])
+        rows.append((one.column.title, *counts, number(d.p_of(one), ".2g"), best, chance))
+    heads = (
+        *text_columns(say("Error")), *figure_columns(say("Maps"), say("Positions"), say("p")),
+        *text_columns(say("Most probable explanation")), Column(say("Probability")),
+    )  # fmt: skip
     note = say(
         "p is corrected for having looked at all of them. Each error is a free function of position "
         "that the maps share."
     )
-    return Table(say("What was compared"), heads, rows, (note,))
-
-
-def _most_probable(compared: ColumnComparison) -> tuple[Text, Text]:
-    shown = [_short(compared, i) for i in sorted(compared.best)]
-    return ((commas(shown) or say("noise")), probability(compared.combinations.probability[compared.best]))
-
-
-def _short(compared: ColumnComparison, index: int) -> Text:
-    return compared.rivals[index].short
+    return Table(say("What was compared"), heads, tuple(rows), (note,))
 
 
 def outcome(found: MapsDiagnosed, seed: int) -> Outcome:
@@ -223,4 +334,4 @@ def outcome(found: MapsDiagnosed, seed: int) -> Outcome:
     return Outcome(found, lambda: document, maps_results(found, seed), short, document.warnings, in_order=consistent)
 
 
-OWN = OwnAnalysis(diagnose=Recipe(diagnose_error_maps, outcome))
+OWN = OwnAnalysis(diagnose=Recipe(diagnosis.diagnose_error_maps, outcome))

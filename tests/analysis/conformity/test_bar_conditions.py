@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 from cmm_uq.analysis.conformity.plan_conditions import conditions, most_apart
 from cmm_uq.analysis.conformity.plans import BarPlan
-from cmm_uq.artefacts.ballbar.bar import Ballbar
+from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.points import Machine, Points
 from tests.recordings import TRAVEL, bar_facts
 

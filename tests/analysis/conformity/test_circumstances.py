@@ -14,7 +14,7 @@ from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.gauge_lines.observe import StepGauge
+from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.tables.circumstances import Circumstances, ProbeFacts, RatedConditions, TestUncertainty
 from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError

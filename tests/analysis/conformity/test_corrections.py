@@ -11,8 +11,8 @@ import pytest
 
 from cmm_uq.analysis.conformity.consequences import Consequences, consequences
 from cmm_uq.artefacts import artefact_facts, kind_named
-from cmm_uq.artefacts.ballbar.bar import Ballbar
-from cmm_uq.artefacts.gauge_lines.observe import StepGauge
+from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.tables.conformity import ConformityFacts
 from cmm_uq.machine.model import Noise, RecordingModel

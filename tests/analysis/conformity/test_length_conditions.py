@@ -9,8 +9,8 @@ import pytest
 
 from cmm_uq.analysis.conformity.plan_conditions import lengths_measured, nominals
 from cmm_uq.analysis.conformity.plans import LengthPlan
-from cmm_uq.artefacts.ballbar.bar import Ballbar
-from cmm_uq.artefacts.gauge_lines.observe import StepGauge
+from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.points import Machine
 from tests.analysis.conformity.recorded import MACHINE, bars, gauge
 from tests.recordings import TRAVEL, bar_facts

@@ -10,7 +10,7 @@ import pytest
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import GRAVEST, Statement
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.gauge_lines.observe import StepGauge
+from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError
 from cmm_uq.machine.model.kind import LENGTHS

@@ -13,8 +13,8 @@ from cmm_uq.analysis.conformity.as_recorded import supplemented
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.ballbar.bar import Ballbar
-from cmm_uq.artefacts.gauge_lines.observe import StepGauge
+from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.recording.short_gauge import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError

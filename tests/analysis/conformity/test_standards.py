@@ -11,9 +11,9 @@ from cmm_uq.analysis.conformity.standard import BY_MEASUREMENT_ALONE
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.artefacts import artefact_facts, kind_named
-from cmm_uq.artefacts.ballbar.bar import Ballbar
-from cmm_uq.artefacts.gauge_lines.observe import StepGauge
-from cmm_uq.artefacts.sphere.ball import SphereArtefact
+from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.artefacts.gauge_lines import StepGauge
+from cmm_uq.artefacts.sphere import SphereArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.jobs.tables.circumstances import Circumstances

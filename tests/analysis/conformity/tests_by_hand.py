@@ -9,9 +9,9 @@ from functools import cache
 import numpy as np
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.ballbar.bar import Ballbar
-from cmm_uq.artefacts.gauge_lines.observe import StepGauge
-from cmm_uq.artefacts.sphere.ball import SphereArtefact
+from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.artefacts.gauge_lines import StepGauge
+from cmm_uq.artefacts.sphere import SphereArtefact
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.tables.circumstances import Circumstances, ProbeFacts, TestUncertainty
 from cmm_uq.machine.model.artefact import Artefact

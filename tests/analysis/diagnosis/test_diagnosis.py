@@ -23,8 +23,8 @@ from cmm_uq.app.commands.diagnose import diagnose_job
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.ballbar.bar import Ballbar
-from cmm_uq.artefacts.plate.observe import Plate
+from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.artefacts.plate import Plate
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.jobs.recording.references import against_earlier
 from cmm_uq.machine.model import Noise, RecordingModel

@@ -10,8 +10,8 @@ from scipy import linalg, stats
 from cmm_uq.analysis.diagnosis.held_out import FOLDS, improvement, numbered_by_place
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.ballbar.bar import Ballbar
-from cmm_uq.artefacts.gauge_lines.observe import StepGauge
+from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects

@@ -11,7 +11,7 @@ from hypothesis import Phase, given, settings, strategies as st
 
 from cmm_uq.analysis.diagnosis.comparison.explanations import covariates
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
-from cmm_uq.artefacts.ballbar.bar import Ballbar
+from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects

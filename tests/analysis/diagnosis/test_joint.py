@@ -14,7 +14,7 @@ from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.analysis.diagnosis.joint import UNRESOLVED, Mode, _peaks, _too_little, period_settled
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.plate.observe import Plate
+from cmm_uq.artefacts.plate import Plate
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import unit

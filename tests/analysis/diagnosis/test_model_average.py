@@ -14,7 +14,7 @@ from cmm_uq.analysis.conformity.accuracy import figures
 from cmm_uq.analysis.diagnosis.model_average import REMAINS, SETTLED
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import evaluate as analyse_observations, outcome_of
-from cmm_uq.artefacts.ballbar.bar import Ballbar
+from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.points import Machine
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.diagnosis.sections import costs_data, costs_section

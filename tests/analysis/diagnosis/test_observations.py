@@ -12,8 +12,8 @@ import pytest
 from cmm_uq.analysis.diagnosis.held_out import LEAST_OF_SET_UP, MOST, improvement, thin_out
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, kind_of
-from cmm_uq.artefacts.ballbar.bar import Ballbar
-from cmm_uq.artefacts.sphere.ball import SphereArtefact
+from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.artefacts.sphere import SphereArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.machine.model import Noise, RecordingModel

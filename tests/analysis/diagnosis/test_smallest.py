@@ -12,7 +12,7 @@ from cmm_uq.analysis.diagnosis.power import powers, without_fault
 from cmm_uq.analysis.diagnosis.smallest import SmallestEffect, smallest_effects
 from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.set_up import attitude_along, join
-from cmm_uq.artefacts.ballbar.bar import ballbar
+from cmm_uq.artefacts.ballbar import ballbar
 from cmm_uq.certificate.document import Table
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects

@@ -15,7 +15,7 @@ from cmm_uq.analysis.planning.set_up import direction_words, join, lines
 from cmm_uq.analysis.planning.setting import Start
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_of
-from cmm_uq.artefacts.triangle.observe import TriangleStandard, placed_triangle
+from cmm_uq.artefacts.triangle import TriangleStandard, placed_triangle
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine
 from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, GAUGE, MACHINE, setting

@@ -10,7 +10,7 @@ from cmm_uq.analysis.planning.identifiability import Identifiability, identifiab
 from cmm_uq.analysis.planning.set_up import SetUp, attitude_along, join
 from cmm_uq.analysis.planning.setting import Setting
 from cmm_uq.artefacts import artefact_of
-from cmm_uq.artefacts.ballbar.bar import ballbar
+from cmm_uq.artefacts.ballbar import ballbar
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, GAUGE, SIX, setting

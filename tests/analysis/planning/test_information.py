@@ -26,7 +26,7 @@ from cmm_uq.analysis.planning.information import (
     visible,
 )
 from cmm_uq.analysis.planning.set_up import attitude_along, join
-from cmm_uq.artefacts.ballbar.bar import ballbar
+from cmm_uq.artefacts.ballbar import ballbar
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.linear_model import Unknown

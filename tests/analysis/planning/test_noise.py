@@ -14,7 +14,7 @@ from cmm_uq.analysis.planning.information import gram, recording_information, se
 from cmm_uq.analysis.planning.set_up import attitude_along, join
 from cmm_uq.analysis.planning.setting import PlannedNoise, Setting
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.ballbar.bar import ballbar
+from cmm_uq.artefacts.ballbar import ballbar
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import RecordingModel

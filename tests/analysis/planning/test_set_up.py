@@ -8,8 +8,8 @@ from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.analysis.planning.set_up import Pattern, append, attitude_along, join, split
-from cmm_uq.artefacts.ballbar.bar import ballbar
-from cmm_uq.artefacts.gauge_lines.observe import gauge
+from cmm_uq.artefacts.ballbar import ballbar
+from cmm_uq.artefacts.gauge_lines import gauge
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from tests.analysis.planning.plans import BALLBAR, GAUGE, MACHINE, setting

@@ -16,7 +16,7 @@ from cmm_uq.analysis.planning.set_up import SetUp, attitude_along, join
 from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.planning.suggestion import next_plan
 from cmm_uq.artefacts import artefact_of, kind_named
-from cmm_uq.artefacts.ballbar.bar import ballbar
+from cmm_uq.artefacts.ballbar import ballbar
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model import Noise, RecordingModel

@@ -18,7 +18,7 @@ from cmm_uq.analysis.planning.set_up import attitude_along
 from cmm_uq.analysis.planning.setting import Planning, Volume, turned_set_ups
 from cmm_uq.analysis.planning.suggestion import next_plan
 from cmm_uq.artefacts import kind_named
-from cmm_uq.artefacts.ballbar.bar import ballbar
+from cmm_uq.artefacts.ballbar import ballbar
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Machine, Points

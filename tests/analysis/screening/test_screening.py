@@ -23,7 +23,7 @@ from cmm_uq.analysis.screening.screening import (
 )
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.artefacts.ballbar.bar import Ballbar
+from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.job import Job

@@ -23,7 +23,7 @@ from tests.plugin.packages import OUTSIDE_KINDS, OUTSIDE_STANDARDS, describe, in
 EXAMPLE = ROOT / "examples" / "gauge-blocks-simulated"
 STATED = '\n[[conformity]]\nstandard = "QP 7.2:2026"\nlimit_um = 100.0\n'
 KIND = """
-from cmm_uq.artefacts.gauge_lines.kind import GAUGE_BLOCKS as OURS
+from cmm_uq.artefacts.kinds import GAUGE_BLOCKS as OURS
 from cmm_uq.machine.model.kind import Kind
 {code}
 KIND = Kind("odd", OURS.table, observe=observe, screen=OURS.screen, plan=OURS.plan, page=OURS.page)

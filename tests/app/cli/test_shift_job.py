@@ -11,7 +11,7 @@ import pikepdf
 import pytest
 
 from cmm_uq.app.commands.report import analyse
-from cmm_uq.artefacts.shift_axis.analysis import ShiftResult
+from cmm_uq.artefacts.shift.axis import ShiftResult
 from tests.app.cli.process import run
 from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT

@@ -14,7 +14,7 @@ import pytest
 from cmm_uq.app.commands.diagnose import diagnose_read
 from cmm_uq.app.commands.jobs.compensate import write_compensated
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.artefacts.error_maps.fit import squareness_findings, squareness_sections
+from cmm_uq.artefacts.error_maps.diagnosis import squareness_findings, squareness_sections
 from cmm_uq.artefacts.error_maps.page import maps_results
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats

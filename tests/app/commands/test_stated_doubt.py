@@ -12,8 +12,8 @@ import pytest
 
 from benchmarks.coverage.stated_doubt import held, recorded
 from cmm_uq.app.commands.report import analyse
-from cmm_uq.artefacts.ballbar.bar import results as bar_results
-from cmm_uq.artefacts.gauge_lines.analysis import figures
+from cmm_uq.artefacts.ballbar import results as bar_results
+from cmm_uq.artefacts.gauge_lines_page import figures
 from cmm_uq.certificate.result import Result
 from cmm_uq.machine.model.artefact_doubt import CALIBRATION
 from tests.artefacts.simulated import analysed

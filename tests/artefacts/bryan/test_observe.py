@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.bryan.bar import Bryan
+from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from cmm_uq.maths.geometry import fit_sphere

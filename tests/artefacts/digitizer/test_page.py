@@ -10,9 +10,8 @@ import pytest
 
 from cmm_uq.app.commands.plans.plan import write_plan
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.artefacts.digitizer.observe import DigitizerArtefact
-from cmm_uq.artefacts.digitizer.page import DigitizerFigures, results
-from cmm_uq.artefacts.digitizer.plan import THREE as PLANNED, scan, words
+from cmm_uq.artefacts.digitizer import THREE as PLANNED, DigitizerArtefact, scan, words
+from cmm_uq.artefacts.digitizer_page import DigitizerFigures, results
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.document import Paragraph
 from cmm_uq.certificate.sections.first_page import summary

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.digitizer.observe import DigitizerArtefact, offset_misfit
+from cmm_uq.artefacts.digitizer import DigitizerArtefact, offset_misfit
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from tests.artefacts.constructions import estimated

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.artefacts.distances.adjustment import turns
+from cmm_uq.artefacts.adjustment import turns
 from cmm_uq.machine.physics.kinematics import KinematicChain
 
 ARCSEC = np.pi / 180 / 3600

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.artefacts.ballbar.bar import results
+from cmm_uq.artefacts.ballbar import results
 from cmm_uq.certificate.document import Paragraph
 from tests.artefacts.reading import number
 from tests.artefacts.simulated import SQUARE, analysed, blocks, recovered, table

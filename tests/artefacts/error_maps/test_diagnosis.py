@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from cmm_uq.artefacts.error_maps.columns import MapColumn, columns_of, roughness, turned
+from cmm_uq.artefacts.error_maps.comparison import column_comparison, expansion as expansion_of
 from cmm_uq.artefacts.error_maps.diagnosis import MapsDiagnosis, diagnose_maps
-from cmm_uq.artefacts.error_maps.fit import expansion as expansion_of
-from cmm_uq.artefacts.error_maps.search import column_comparison
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, read_error_map
 from tests.conftest import ROOT

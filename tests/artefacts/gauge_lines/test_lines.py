@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.gauge_lines.analysis import lines_of, periodic_part
-from cmm_uq.artefacts.gauge_lines.observe import StepGauge
+from cmm_uq.artefacts.gauge_lines import StepGauge
+from cmm_uq.artefacts.gauge_lines_page import lines_of, periodic_part
 from tests.artefacts.constructions import indicated, step_gauge
 
 GAUGE = artefact_facts(kind="step_gauge")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.gauge_lines.observe import GaugeBlocks, StepGauge
+from cmm_uq.artefacts.gauge_lines import GaugeBlocks, StepGauge
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from tests.artefacts.constructions import GAUGE_FACES, SEVEN_LINES, estimated, free, indicated, step_gauge

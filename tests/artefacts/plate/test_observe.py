@@ -9,8 +9,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.plate.kind import PlateFacts
-from cmm_uq.artefacts.plate.observe import Plate
+from cmm_uq.artefacts.kinds import PlateFacts
+from cmm_uq.artefacts.plate import Plate
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from tests.artefacts.constructions import FLAT, MIDDLE, estimated, free, indicated, model, plate

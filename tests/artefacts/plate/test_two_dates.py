@@ -9,7 +9,7 @@ import pytest
 
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.plate.observe import Plate
+from cmm_uq.artefacts.plate import Plate
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.recording.references import against_earlier

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.app.commands.report import analyse
-from cmm_uq.artefacts.shift_axis.analysis import ShiftResult
+from cmm_uq.artefacts.shift.axis import ShiftResult
 from cmm_uq.base.errors import CmmUqError
 from tests.conftest import ROOT
 

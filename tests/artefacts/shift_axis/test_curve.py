@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts.shift_axis.curve import CurveEstimate, estimate_curve
-from cmm_uq.artefacts.shift_axis.integration import KnownSpan, integrated, integrated_by_monte_carlo
-from cmm_uq.artefacts.shift_axis.series import shifted_series
+from cmm_uq.artefacts.shift.axis import CurveEstimate, estimate_curve
+from cmm_uq.artefacts.shift.integration import KnownSpan, integrated, integrated_by_monte_carlo
+from cmm_uq.artefacts.shift.series import shifted_series
 from cmm_uq.base.points import Points
 from tests.artefacts.shifting.shifted import PITCH_20, bent, read
 

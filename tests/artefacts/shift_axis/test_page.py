@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from cmm_uq.app.commands.report import analyse, outcome_of
-from cmm_uq.artefacts.shift_axis.analysis import ShiftResult
-from cmm_uq.artefacts.shift_axis.page import shift_results
+from cmm_uq.artefacts.shift.axis import ShiftResult
+from cmm_uq.artefacts.shift.axis_page import shift_results
 from cmm_uq.certificate.document import Document, Plot
 from cmm_uq.certificate.results.plain import as_json
 from tests.artefacts.reading import number, tables

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts.shift_axis.series import shifted_series
-from cmm_uq.artefacts.shifting.repeats import NOISE_RATIO
+from cmm_uq.artefacts.shift.series import NOISE_RATIO, shifted_series
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from tests.artefacts.shifting.shifted import bent, read

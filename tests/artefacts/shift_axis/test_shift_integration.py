@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from cmm_uq.artefacts.shift_axis.integration import (
+from cmm_uq.artefacts.shift.integration import (
     KnownSpan,
     Method,
     calibration_curve,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts.shift_axis.integration import calibration_curve, position_error
-from cmm_uq.artefacts.shift_axis.series import ShiftedSeries, common_period, shifted_series, undetermined
+from cmm_uq.artefacts.shift.integration import calibration_curve, position_error
+from cmm_uq.artefacts.shift.series import ShiftedSeries, common_period, shifted_series, undetermined
 from cmm_uq.base.points import Floats
 from tests.artefacts.shifting.shifted import PITCH_20, bent, read
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cmm_uq.app.commands.report import outcome_of
-from cmm_uq.artefacts.shift_plate.page import plane_shift_results, sections, warnings
-from cmm_uq.artefacts.shift_plate.placed_plate import placed_plate
-from cmm_uq.artefacts.shift_plate.plane import PlaneShiftResult, estimate_plane
+from cmm_uq.artefacts.shift.placed_plate import placed_plate
+from cmm_uq.artefacts.shift.plane import PlaneShiftResult, estimate_plane
+from cmm_uq.artefacts.shift.plane_page import plane_shift_results, sections, warnings
 from cmm_uq.certificate.document import Document, Paragraph, Plot, Table
 from cmm_uq.certificate.results.plain import as_json
 from tests.artefacts.reading import number, tables

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from cmm_uq.artefacts.shift_plate.placed_plate import placed_plate, rigid_motion, rotations
+from cmm_uq.artefacts.shift.placed_plate import placed_plate, rigid_motion, rotations
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from tests.artefacts.shifting.placed import GRID, SHIFTED, TURNED, none, read

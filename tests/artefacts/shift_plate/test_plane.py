@@ -7,10 +7,10 @@ from functools import partial
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts.shift_axis.integration import KnownSpan
-from cmm_uq.artefacts.shift_plate.model import FreeInPlane, free_in_plane, plane_model
-from cmm_uq.artefacts.shift_plate.placed_plate import placed_plate
-from cmm_uq.artefacts.shift_plate.plane import PlaneEstimate, estimate_plane, plane_correction_table
+from cmm_uq.artefacts.shift.integration import KnownSpan
+from cmm_uq.artefacts.shift.placed_plate import placed_plate
+from cmm_uq.artefacts.shift.plane import PlaneEstimate, estimate_plane, plane_correction_table
+from cmm_uq.artefacts.shift.plane_model import FreeInPlane, free_in_plane, plane_model
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.machine.physics.compensation import compensate_points, machine_compensation
@@ -100,7 +100,7 @@ def for_means(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmm_uq.maths.inference.ensembles.MOST_STEPS", 100)
     short = partial(run_ensembles, steps_at_once=100)
     monkeypatch.setattr(
-        "cmm_uq.artefacts.shifting.smooth_model.run_ensembles",
+        "cmm_uq.artefacts.shift.smooth.run_ensembles",
         lambda *given, effective_samples, steps_at_once: short(*given, effective_samples=effective_samples),
     )
 

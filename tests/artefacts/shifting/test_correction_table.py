@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.artefacts.shift_axis.curve import Curve
-from cmm_uq.artefacts.shifting.correction_table import correction_table, table_text
+from cmm_uq.artefacts.shift.result import Curve, correction_table, table_text
 from cmm_uq.base.points import Machine
 from cmm_uq.machine.physics.error_map import parse_error_map
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts.shifting.found import peak_to_valley
+from cmm_uq.artefacts.shift.result import peak_to_valley
 from cmm_uq.base.points import Floats
 
 AT = np.linspace(0, 1, 12)

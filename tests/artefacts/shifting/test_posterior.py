@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import cmm_uq
-from cmm_uq.artefacts.shift_axis.analysis import ShiftResult
-from cmm_uq.artefacts.shifting.found import listed_draws
-from cmm_uq.artefacts.shifting.smooth_model import DRAWS
+from cmm_uq.artefacts.shift.axis import ShiftResult
+from cmm_uq.artefacts.shift.result import listed_draws
+from cmm_uq.artefacts.shift.smooth import DRAWS
 from cmm_uq.maths.inference.ensembles import ENSEMBLES
 from tests.conftest import ROOT
 

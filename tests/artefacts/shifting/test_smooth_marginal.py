@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.artefacts.shifting.smooth_function import ByCoefficients, ByObservations, SmoothMarginal, marginal
+from cmm_uq.artefacts.shift.smooth import ByCoefficients, ByObservations, SmoothFunction, SmoothMarginal, SmoothModel
 
 RANDOM = np.random.default_rng(4)
 EVEN, ENDS, COLUMNS = (RANDOM.standard_normal((9, k)) for k in (4, 4, 2))
@@ -42,8 +42,11 @@ def test_draws_have_the_mean_and_covariance_of_the_conditional(way: SmoothMargin
     np.testing.assert_allclose(found, covariance / np.outer(spread, spread), atol=5 * np.sqrt(2 / count))
 
 
-def test_the_smaller_space_is_chosen() -> None:
-    assert isinstance(marginal(OBSERVED, EVEN, ENDS, COLUMNS, COLUMN_SD, 0.0, 0), ByCoefficients)
-    some = slice(0, 5)
-    few = marginal(OBSERVED[some], EVEN[some], ENDS[some], COLUMNS[some], COLUMN_SD, 0.0, 0)
-    assert isinstance(few, ByObservations)
+@pytest.mark.parametrize(("count", "space"), [(5, ByObservations), (40, ByCoefficients)])
+def test_the_smaller_space_is_chosen(count: int, space: type[SmoothMarginal]) -> None:
+    """Ten sines: five observations are fewer, forty more."""
+    x, none = np.linspace(0.0, 100.0, count), np.zeros((count, 0))
+    function = SmoothFunction("linearity_x", 0.0, 100.0, 25.0, x, np.ones(count), 0.005)
+    assert function.sines(x).shape[1] == 10
+    model = SmoothModel(x, np.ones(count), np.ones((count, 1)), none, np.zeros(0), (function,), None, 0.001)
+    assert type(model._reduced) is space

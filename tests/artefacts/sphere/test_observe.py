@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.sphere.ball import SphereArtefact
+from cmm_uq.artefacts.sphere import SphereArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.maths.geometry import fit_sphere

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.triangle.equations import PARAMETERS, solve_equations
-from cmm_uq.artefacts.triangle.observe import (
+from cmm_uq.artefacts.triangle import (
     SEVEN_PLACINGS,
     SHIFTED,
     Placing,
@@ -17,6 +16,7 @@ from cmm_uq.artefacts.triangle.observe import (
     corners,
     placed_triangle,
 )
+from cmm_uq.artefacts.triangle_page import PARAMETERS, solve_equations
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from tests.artefacts.constructions import estimated, free, indicated, model

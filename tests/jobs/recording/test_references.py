@@ -9,7 +9,7 @@ import pytest
 
 from cmm_uq.app.commands.jobs.simulate import simulated_job
 from cmm_uq.app.commands.reading import job_of
-from cmm_uq.artefacts.gauge_lines.observe import StepGauge
+from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from tests.conftest import ROOT

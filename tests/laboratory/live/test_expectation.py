@@ -7,7 +7,7 @@ import pytest
 
 from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.artefacts.ballbar.bar import Ballbar
+from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.laboratory.live.judging import RARE, predicted, scatter

@@ -8,7 +8,7 @@ import emcee
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts.ballbar.bar import Ballbar
+from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import with_curvature

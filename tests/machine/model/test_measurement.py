@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from cmm_uq.artefacts.ballbar.bar import Ballbar
+from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.machine.model import Noise, RecordingModel

@@ -24,8 +24,7 @@ from cmm_uq.jobs.recording.temperature_log import log_of
 from cmm_uq.jobs.tables.origin import first_line
 from cmm_uq.machine.model.machine_maps import maps_of
 from cmm_uq.machine.physics.compensation import Compensation, compensate_points, machine_compensation
-from cmm_uq.machine.physics.digitized_cloud import DigitizedCloud, columns_for
-from cmm_uq.machine.physics.digitizer import Digitizer
+from cmm_uq.machine.physics.digitizer import DigitizedCloud, Digitizer, columns_for
 from cmm_uq.machine.physics.error_map import error_map_text
 from cmm_uq.machine.physics.kinematics import euler_313
 from cmm_uq.machine.physics.map_interpolation import Beyond, ErrorMaps

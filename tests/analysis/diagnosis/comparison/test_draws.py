@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import DEGREES, draw_noise, order_and_side, tail_widths
-from cmm_uq.artefacts.error_maps.search import kinds_along
+from cmm_uq.artefacts.error_maps.comparison import kinds_along
 from cmm_uq.base.points import Floats
 
 

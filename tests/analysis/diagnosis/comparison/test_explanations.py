@@ -10,7 +10,7 @@ import pytest
 
 from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation, known_effects
 from cmm_uq.artefacts import artefact_facts, artefact_of
-from cmm_uq.artefacts.ballbar.bar import Ballbar
+from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.plugins import BrokenPluginError
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.machine.model import RecordingModel

@@ -33,7 +33,7 @@ from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.app.commands.model import recorded_model
-from cmm_uq.artefacts.ballbar.bar import Ballbar
+from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import RecordingModel

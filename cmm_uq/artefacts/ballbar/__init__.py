@@ -1,1 +1,0 @@
-"""Ballbar: two balls a fixed distance apart."""

@@ -1,1 +1,0 @@
-"""Bryan gauge: a bar whose one ball stays on the table."""

@@ -1,0 +1,271 @@
+"""What the certificate of a laser digitizer aligned on a reference sphere states and shows beside the estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+
+from cmm_uq.artefacts.digitizer import ANGLES, OFFSET, THREE, DigitizerArtefact, words, worst_direction
+from cmm_uq.base.messages import DASH, Text, Verbatim, number, say, semicolons, signed
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
+from cmm_uq.certificate.outcome import Page
+from cmm_uq.certificate.plots.residuals import length_plot
+from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.results.plain import quantity_data
+from cmm_uq.certificate.wording import expanded
+from cmm_uq.machine.model.measurement import ARTEFACT
+from cmm_uq.machine.physics.digitizer import three_alignment_offset
+from cmm_uq.maths.uncertainty.quantity import Quantity, alike, rounded
+
+_SAME_ATTITUDE = 0.01  # degrees within which an attitude is one of the source's three
+
+
+@dataclass(frozen=True, eq=False)
+class AttitudePose:
+    """One attitude, aligned by itself."""
+
+    measurement: int  # number
+    angles_deg: Floats  # (3,) α, β, γ
+    points: int  # recorded in it
+    reading_mm: Floats  # (3,) [D0 E0 F0]
+    off_um: Floats  # (3,) that reading minus the one that the result gives, µm
+    rms_um: float | None  # root mean square of its residuals, µm; ``None`` where none of its observations are used
+
+
+@dataclass(frozen=True, eq=False)
+class DigitizerFigures:
+    """All of these of a result."""
+
+    result: Result
+
+    @property
+    def digitizer(self) -> DigitizerArtefact:
+        return cast("DigitizerArtefact", self.result.artefact)
+
+    @property
+    def offset(self) -> tuple[Quantity, ...]:
+        return tuple(self.result.sizes[f"{name}_mm"] for name in OFFSET)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """(3, 3) of U1, V1, W1, mm²."""
+        columns = [i for i, u in enumerate(self.result.posterior.unknowns) if u.key[0] == ARTEFACT][:3]
+        return np.cov(self.result.values[:, columns], rowvar=False)
+
+    @property
+    def correlation(self) -> Floats:
+        """(3, 3) of U1, V1, W1."""
+        u = np.sqrt(np.diag(self.covariance))
+        return np.asarray(self.covariance / np.outer(u, u))
+
+    @cached_property
+    def sphere(self) -> tuple[float, ...]:
+        """Centre of the reference sphere in the recorded frame, mm."""
+        values = self.result.values.mean(axis=0)
+        model, digitizer = self.result.model, self.digitizer
+        count = len(digitizer.sizes)
+        return tuple(digitizer.centre(model.placed(values), values[len(values) - count :]).tolist())
+
+    @cached_property
+    def times(self) -> tuple[Floats, float]:
+        """The direction that the attitudes tell least of, and its uncertainty in those of one centre."""
+        return worst_direction(self.digitizer.alignments)
+
+    @cached_property
+    def poses(self) -> tuple[AttitudePose, ...]:
+        digitizer, found = self.digitizer, []
+        offset = np.array([one.value for one in self.offset])
+        used = self.result.model.used
+        for i, (measurement, one) in enumerate(
+            zip(digitizer.poses.numbers.tolist(), digitizer.alignments, strict=True)
+        ):
+            of_it = (digitizer.measurement == measurement) & used
+            residuals = self.result.residuals[of_it] / MICROMETRE
+            rows = digitizer.poses.index == i
+            angles = np.array([float(digitizer.points.columns[name][rows][0]) for name in ANGLES])
+            off = (one.reading - one.attitude @ offset - self.sphere) / MICROMETRE
+            rms = float(np.sqrt(np.mean(residuals**2))) if len(residuals) else None
+            found.append(AttitudePose(measurement, angles, int(rows.sum()), one.reading, off, rms))
+        return tuple(found)
+
+    @cached_property
+    def closed_form(self) -> Floats | None:
+        """(3,) offset by the source's eq. 19–21, mm; ``None`` where the attitudes are not its three."""
+        order = []
+        for wanted in THREE:
+            turned = [np.abs((pose.angles_deg - wanted + 180) % 360 - 180).max() for pose in self.poses]
+            if min(turned) > _SAME_ATTITUDE:
+                return None
+            order.append(int(np.argmin(turned)))
+        return three_alignment_offset(np.array([self.poses[i].reading_mm for i in order]), np.zeros(3))[0]
+
+
+def results(result: Result) -> Mapping[str, Any]:
+    """For results.json; ``cmm-uq compensate`` reads offset, covariance and poses back."""
+    found = DigitizerFigures(result)
+    closed, start = found.closed_form, found.digitizer.start
+    direction, times = found.times
+    return {
+        "digitizer": {
+            "offset_mm": {name: quantity_data(one) for name, one in zip(OFFSET, found.offset, strict=True)},
+            "covariance_mm2": found.covariance.tolist(),
+            "correlation": found.correlation.tolist(),
+            "sphere_mm": list(found.sphere),
+            "poses": [
+                {"pose": pose.measurement, **dict(zip(ANGLES, pose.angles_deg.tolist(), strict=True)),
+                 "reading_mm": pose.reading_mm.tolist(), "off_um": pose.off_um.tolist(), "rms_um": pose.rms_um,
+                 "points": pose.points}
+                for pose in found.poses
+            ],
+            "by_centres_mm": start.offset.tolist(),
+            "closed_form_mm": None if closed is None else closed.tolist(),
+            "least_determined": {"direction_uvw": direction.tolist(), "u_over_u_of_a_centre": times},
+        }
+    }  # fmt: skip
+
+
+MEANING = say("The mount lies at [U1 V1 W1] in the digitizer's frame u, v, w, whose origin is that of the scan plane.")
+
+
+def sections(result: Result) -> list[Section]:
+    found = DigitizerFigures(result)
+    offset = (_offset(found), *_assumed(found.digitizer), _two_ways(found))
+    return [
+        Section(say("Offset of the mount"), offset),
+        Section(say("Attitudes"), (_attitudes(found), _residuals(result, found.digitizer))),
+    ]
+
+
+def _offset(found: DigitizerFigures) -> Table:
+    rows = []
+    for i, (name, quantity) in enumerate(zip(OFFSET, found.offset, strict=True)):
+        value, U, k = expanded(quantity)
+        rows.append((Verbatim(name), value, U, k, unit("mm"), *(signed(one, ".2f") for one in found.correlation[i])))
+    columns = (
+        Column(say("Component"), numeric=False), Column(say("Estimate")), Column(say("U")), Column(say("k")),
+        Column(say("Unit"), numeric=False),
+        *(Column(say("Correlation with {name}", name=Verbatim(name))) for name in OFFSET),
+    )  # fmt: skip
+    x, y, z = (signed(value, ".4f") for value in found.sphere)
+    notes = (
+        MEANING,
+        say("U is the expanded uncertainty for a coverage probability of 95 %; k = U/u."),
+        say("Centre of the reference sphere: ({x}, {y}, {z}) mm in the recorded frame.", x=x, y=y, z=z),
+    )
+    return Table(say("Offset of the mount"), columns, tuple(rows), notes)
+
+
+def _assumed(digitizer: DigitizerArtefact) -> list[Block]:
+    known: list[Text] = []
+    missing: list[Text] = []
+    if digitizer.u_turn:
+        known.append(say("attitude, u = {u:g}″ about each axis", u=digitizer.u_turn))
+    else:
+        missing.append(say("of the attitudes"))
+    if any(digitizer.u_shift):
+        x, y, z = digitizer.u_shift
+        known.append(say("the sphere's centre as a whole, u = ({x:g}, {y:g}, {z:g}) µm along x, y, z", x=x, y=y, z=z))
+    else:
+        missing.append(say("of what shifts a whole scan: form of the ball, digitizer, scales"))
+    said: list[Block] = []
+    if known:
+        said.append(Paragraph(say("In each attitude by itself, U contains: {known}.", known=semicolons(known))))
+    if len(missing) == 1:
+        said.append(Paragraph(say("U contains no uncertainty {missing}.", missing=missing[0]), tone="note"))
+    if len(missing) == 2:
+        first, second = missing
+        both = say("U contains no uncertainty {first} and none {second}.", first=first, second=second)
+        said.append(Paragraph(both, tone="note"))
+    return said
+
+
+def _two_ways(found: DigitizerFigures) -> Table:
+    start, closed = found.digitizer.start.offset, found.closed_form
+    rows = []
+    for i, (name, quantity) in enumerate(zip(OFFSET, found.offset, strict=True)):
+        value, _ = rounded(quantity.value, quantity.expanded)
+        each, _ = rounded(float(start[i]), quantity.expanded)
+        by_source = DASH if closed is None else rounded(float(closed[i]), quantity.expanded)[0]
+        rows.append((Verbatim(name), value, each, by_source, unit("mm")))
+    columns = (
+        Column(say("Component"), numeric=False), Column(say("Fitted model")), Column(say("By centres")),
+        Column(say("Closed form")), Column(say("Unit"), numeric=False),
+    )  # fmt: skip
+    notes = (
+        say(
+            "By centres: the centre of the sphere in each attitude by itself, then all equations by weighted least "
+            "squares. Closed form: Harris 2004 eq. 19–21, for its three attitudes."
+        ),
+    )
+    return Table(say("The offset by other ways"), columns, tuple(rows), notes)
+
+
+def _attitudes(found: DigitizerFigures) -> Table:
+    rows = [
+        (
+            number(pose.measurement), *(signed(angle, "g") for angle in pose.angles_deg), number(pose.points),
+            *(signed(value, ".4f") for value in pose.reading_mm), *(signed(value, ".1f") for value in pose.off_um),
+            DASH if pose.rms_um is None else number(pose.rms_um, ".1f"),
+        )
+        for pose in found.poses
+    ]  # fmt: skip
+    columns = (
+        Column(say("No.")), *(Column(Verbatim(name), unit("°")) for name in "αβγ"), Column(say("Points")),
+        *(Column(Verbatim(f"{name}0"), unit("mm")) for name in "DEF"),
+        *(Column(say("Off {axis}", axis=Verbatim(axis)), unit("µm")) for axis in "xyz"), Column(say("Rms"), unit("µm")),
+    )  # fmt: skip
+    direction, times = found.times
+    notes = (
+        say(
+            "D0, E0, F0: scale reading with the origin of the scan plane at the centre of the sphere, from this attitude "
+            "by itself. Off: this minus what the fitted offset gives. Rms: of the residuals."
+        ),
+        say(
+            "These attitudes tell least of the offset along {direction}: {times:.2g} times the uncertainty of one centre.",
+            direction=words(direction),
+            times=times,
+        ),
+    )
+    return Table(say("Every attitude"), columns, tuple(rows), notes)
+
+
+def _residuals(result: Result, digitizer: DigitizerArtefact) -> Plot:
+    after = result.residuals / MICROMETRE
+    before = _before(digitizer) / MICROMETRE
+    expanded_um = result.noise.expanded
+    what = (
+        say("radial distance of each point of the sphere")
+        if digitizer.scanned
+        else say("each coordinate of the centre")
+    )
+    low, high, low_after, high_after = alike(before.min(), before.max(), after.min(), after.max())
+    return length_plot(
+        digitizer.measurement.astype(float), before, after, expanded_before_um=expanded_um, expanded_after_um=expanded_um,
+        reference=say("fitted sphere") if digitizer.scanned else say("common centre"), flagged=result.flagged,
+        position_label=say("Attitude (its observations side by side)"), before_label=say("With the offset by centres"),
+        caption=say(
+            "Residuals, {what}, with U (k = {k}) of a coordinate.", what=what, k=number(result.noise.coverage_factor, ".2f")
+        ),
+        alternative=say(
+            "{count} observations: with the offset by centres they deviate by {low} to {high} µm; after the "
+            "fitted model {low_after} to {high_after} µm remain.",
+            count=len(after), low=low, high=high, low_after=low_after, high_after=high_after,
+        ),
+    )  # fmt: skip
+
+
+def _before(digitizer: DigitizerArtefact) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Residuals (m,), mm, about the offset from the centres, without any effect of the machine."""
+    nominal = np.array([size.nominal for size in digitizer.sizes])
+    xyz = digitizer.points.xyz
+    fitted = digitizer.fit(xyz, nominal)
+    return digitizer.project(fitted, (xyz - fitted)[:, :, None])[:, 0]
+
+
+PAGE = Page(sections, results)

@@ -1,1 +1,0 @@
-"""Distances between two balls: what a ballbar and a Bryan gauge share."""

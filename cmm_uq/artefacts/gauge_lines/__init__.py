@@ -1,1 +1,0 @@
-"""Lengths along lines: what step gauges and gauge blocks share."""

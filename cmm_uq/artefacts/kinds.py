@@ -1,0 +1,337 @@
+"""The built-in kinds: what a job says of each artefact, what a new job of it begins with, and where its parts are."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from cmm_uq.base.files.limits import LISTED
+from cmm_uq.base.files.table import JobTable, Length, Number, Position, Triple, Uncertainty
+from cmm_uq.base.points import AXES, Machine, Points
+from cmm_uq.jobs.beginning import AT_20_C, SIX, Beginning, circumstances
+from cmm_uq.jobs.tables import artefact as tables
+from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertifiedValue, ReferencedFacts
+from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS, Kind
+from cmm_uq.machine.physics.error_map import COLUMNS
+
+_HERE = "cmm_uq.artefacts"
+
+
+def _kind(name: str, table: type[ArtefactFacts], artefact: str, begin: Beginning, *tested: str, page: str = "") -> Kind:
+    """A kind whose parts are in the module of its artefact (``module:Class``), and its page there or in ``page``."""
+    module, _, _ = artefact.partition(":")
+    screen, plan = f"{_HERE}.{module}:SCREENING", f"{_HERE}.{module}:PLANNING"
+    return Kind(
+        name, table, f"{_HERE}.{artefact}", screen, plan, f"{_HERE}.{page or module}:PAGE", begin, tested=tested
+    )
+
+
+BALLBAR = _kind("ballbar", ArtefactFacts, "ballbar:Ballbar", Beginning(
+    title="Ballbar in twenty positions (ASME B89.4.1)",
+    numbering="One measurement is one position of the bar; points 1 and 2 are the centres of its balls.",
+    artefact={"name": "Ballbar", "length_mm": 400.0, "u_um": 0.5, "cte_per_k": 11.5e-6},
+    conformity={"standard": "ASME B89.4.1-1997", "limit_um": 10.0, "rule": "ISO 14253-1"},
+    test=circumstances(u_repeat_um=0.1), recorded=AT_20_C, plan={"repeats": 1},
+), BARS, LENGTHS)  # fmt: skip
+
+BRYAN = _kind("bryan", ArtefactFacts, "bryan:Bryan", Beginning(
+    title="Bryan gauge, a bar swept about a fixed ball",
+    numbering="One measurement is one position of the swept ball, which is point 1; the fixed ball is not recorded.",
+    artefact={"name": "Swept bar", "length_mm": 250.0, "u_um": 0.5}, plan={"repeats": 1},
+))  # fmt: skip
+
+
+def _gauge(name: str, class_: str, effects: tuple[str, ...], further: tuple[str, ...], **others: Any) -> Kind:
+    begin = Beginning(
+        effects=(*SIX, *effects), recorded=AT_20_C, columns={"reference_mm": ""}, further=dict.fromkeys(further, ""),
+        conformity={"standard": "ISO 10360-2:2009", "mpe": "4 + L/100", "rule": "ISO 14253-1"},
+        test=circumstances(u_cte_per_k=1e-6, u_temperature_k=0.1, u_alignment_um=0.1, u_fixturing_um=0.1),
+        plan={"lengths_mm": [20.0, *(100.0 * i for i in range(1, 10))], "repeats": 3}, **others,
+    )  # fmt: skip
+    observe, screen, plan = (f"{_HERE}.gauge_lines:{part}" for part in (class_, "SCREENING", name.upper()))
+    page = f"{_HERE}.gauge_lines_page:PAGE"
+    return Kind(name, ReferencedFacts, observe, screen, plan, page, begin, tested=(LENGTHS,))
+
+
+APPROACHES, NORMALS = tuple(f"approach_{a}" for a in AXES), ("nx", "ny", "nz")
+STEP_GAUGE = _gauge(
+    "step_gauge", "StepGauge", ("hysteresis_x", "hysteresis_y", "hysteresis_z"), APPROACHES,
+    title="Step gauge on seven lines (ISO 10360-2)", artefact={"name": "Step gauge", "u_um": 0.4, "cte_per_k": 11.5e-6},
+    numbering="One measurement is one line; its points are the faces, numbered as they are met, again where met again.",
+)  # fmt: skip
+GAUGE_BLOCKS = _gauge(
+    "gauge_blocks", "GaugeBlocks", ("probe_radius",), (*APPROACHES, *NORMALS),
+    title="Gauge blocks on seven lines (ISO 10360-2)", artefact={"name": "Gauge blocks", "u_um": 0.15, "cte_per_k": 11.5e-6},
+    numbering="One measurement is one block in one place; points 1 and 2 are its outer faces.",
+)  # fmt: skip
+
+
+class PlateFacts(ReferencedFacts):
+    """Two recordings of a plate at two dates can be compared."""
+
+    with_earlier: ClassVar[bool] = True
+
+
+PLATE = _kind("plate", PlateFacts, "plate:Plate", Beginning(
+    title="Ball plate in three attitudes, two places each",
+    numbering="One measurement is one place of the plate; its points are the balls or holes.",
+    artefact={"name": "Ball plate", "u_um": 0.5, "cte_per_k": 11.5e-6}, plan={"pitch_mm": 80.0, "repeats": 1},
+    columns=dict.fromkeys((f"reference_{a}_mm" for a in AXES), ""),
+), LENGTHS)  # fmt: skip
+
+
+class TriangleFacts(ArtefactFacts):
+    """``blocks_mm`` (1–2, 2–3, 3–1) and the diameters ``cylinders_mm`` (1, 2, 3), with the standard uncertainty of each."""
+
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = (
+        CertifiedValue("blocks_mm", "u_blocks_um", tables.LENGTH_WORDS, count=3),
+        CertifiedValue("cylinders_mm", "u_cylinders_um", tables.DIAMETER_WORDS, count=3),
+    )
+
+    blocks_mm: Triple
+    """Lengths of the gauge blocks 1–2, 2–3 and 3–1."""
+    u_blocks_um: Uncertainty = 0.0
+    """Standard uncertainty of each block."""
+    cylinders_mm: Triple
+    """Diameters of the cylinders 1, 2 and 3."""
+    u_cylinders_um: Uncertainty = 0.0
+    """Standard uncertainty of each diameter."""
+
+    @property
+    def traced(self) -> bool:
+        return True
+
+
+TRIANGLE = _kind("triangle", TriangleFacts, "triangle:Triangle", Beginning(
+    title="Triangle of gauge blocks and cylinders in seven placings",
+    numbering="One measurement is one placing; points 1, 2 and 3 are the centres of the cylinders.",
+    artefact={"name": "Triangle of gauge blocks and cylinders", "cte_per_k": 11.5e-6,
+              "blocks_mm": [380.0, 280.0, 340.0], "u_blocks_um": 0.1, "cylinders_mm": [20.0] * 3, "u_cylinders_um": 0.1},
+    plan={"repeats": 3}, further=dict.fromkeys((f"tip_{a}_mm" for a in AXES), ""), noise_um=0.3,
+), page="triangle_page")  # fmt: skip
+
+
+class SphereFacts(ArtefactFacts):
+    """``length_mm`` is the diameter, ``form_um`` the form deviation by the sphere's certificate."""
+
+    form_key: ClassVar[str | None] = "form_um"
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = (
+        tables.DIAMETER, CertifiedValue("form_um", "", tables.FORM_WORDS, needed=False),
+    )  # fmt: skip
+
+    form_um: Uncertainty | None = None
+    """Form deviation of the sphere by its certificate."""
+
+
+SPHERE = _kind("sphere", SphereFacts, "sphere:SphereArtefact", Beginning(
+    title="Test sphere, twenty-five points (ISO 10360-5)",
+    numbering="One measurement is one place of the sphere; its points are the points probed.",
+    artefact={"name": "Test sphere", "length_mm": 25.0, "u_um": 0.1, "form_um": 0.1},
+    effects=("probe_radius", "probe_lobing"), test=circumstances(u_form_um=0.02), recorded=AT_20_C, plan={"repeats": 1},
+    conformity={"standard": "ISO 10360-5:2010", "limit_um": 4.0, "rule": "ISO 14253-1"},
+    further=dict.fromkeys((*NORMALS, *APPROACHES), ""), noise_um=0.3,
+), FORMS)  # fmt: skip
+
+
+class PlaneFacts(ArtefactFacts):
+    """``probe_offset_mm`` is the effective radius by which the plane of the probe's centres is moved to the surface.
+
+    ``acceptance_deg`` is the largest angle between the normal and the direction of approach at which that is believed.
+    """
+
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
+
+    probe_offset_mm: Length | None = None
+    """Effective radius of the probe, by which the plane of its centres is moved to the surface."""
+    u_probe_offset_um: Uncertainty = 0.0
+    """Standard uncertainty of the probe's effective radius."""
+    acceptance_deg: Annotated[float, Field(ge=0.01, le=89.99)] = 60.0
+    """Largest angle between the normal and the direction of approach at which the radius is believed."""
+
+
+PLANE = _kind("plane", PlaneFacts, "plane:PlaneSurface", Beginning(
+    title="Surface plate, a grid of points",
+    numbering="One measurement is one place of the surface; point 0, where there is one, lies just before contact.",
+    artefact={"name": "Surface plate"}, effects=("straightness_x_z", "straightness_y_z"),
+    plan={"grid": [7, 7], "repeats": 2},
+))  # fmt: skip
+
+
+class ReferenceSphereFacts(ArtefactFacts):
+    """``length_mm`` is the diameter of the reference sphere, for a recording of scans.
+
+    ``offset_mm`` [U1 V1 W1] by the drawing, to hold the result against and to plan by; ``u_attitude_arcsec`` standard
+    uncertainty of the attitude in one measurement, about each axis of the machine; ``u_centre_um`` standard
+    uncertainties, along x, y, z of the machine, of what shifts the sphere's centre as found in one measurement as a
+    whole, however many points it has: the ball's form, the digitizer, the scales.
+    """
+
+    carries_probe: ClassVar[bool] = True
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = (tables.DIAMETER,)
+
+    offset_mm: Triple | None = None
+    """[U1, V1, W1] by the drawing, to hold the result against and to plan by; it is not taken as known."""
+    u_attitude_arcsec: Annotated[float, Field(ge=0, le=36_000)] = 0.0
+    """Standard uncertainty of the attitude in one measurement, about each axis of the machine."""
+    u_centre_um: Annotated[list[Uncertainty], Field(min_length=3, max_length=3)] = Field(
+        default_factory=lambda: [0.0] * 3
+    )
+    """Standard uncertainties along x, y, z of what shifts the sphere's centre as a whole in one measurement: form,
+    digitizer, scales."""
+
+
+DIGITIZER = _kind("digitizer", ReferenceSphereFacts, "digitizer:DigitizerArtefact", Beginning(
+    title="Laser digitizer aligned on a reference sphere in three attitudes",
+    numbering="One measurement is one attitude; its points are scanned points of the sphere, or its centre as point 1.",
+    artefact={"name": "Laser digitizer", "length_mm": 25.4, "u_um": 0.3, "offset_mm": [1.0, 200.0, 130.0],
+              "u_attitude_arcsec": 2.0, "u_centre_um": [1.0, 1.0, 1.0]},
+    effects=(), plan={"repeats": 2}, noise_um=5.0,
+    columns={
+        "alpha_deg": "First Euler angle (3-1-3) of the digitizer.", "beta_deg": "Second Euler angle of the digitizer.",
+        "gamma_deg": "Third Euler angle of the digitizer.",
+    },
+    further={
+        "u_mm": "u of a scanned point in the digitizer's scan plane; left out where centres are recorded.",
+        "v_mm": "v of a scanned point in the digitizer's scan plane, likewise.",
+    },
+), page="digitizer_page")  # fmt: skip
+
+
+class KnownLength(JobTable):
+    """A known length between two points of a shifted artefact."""
+
+    from_point: Annotated[Number, Field(alias="from")]
+    """Point from which the known length goes."""
+    to_point: Annotated[Number, Field(alias="to")]
+    """Point to which it goes."""
+    length_mm: Length
+    """The known length."""
+    u_um: Uncertainty
+    """Standard uncertainty (k = 1) of the known length."""
+
+
+class ShiftFacts(ArtefactFacts):
+    """A shifted artefact lies along an ``axis`` or, a plate, in a ``plane``."""
+
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = (
+        CertifiedValue("known.length_mm", "known.u_um", tables.LENGTH_WORDS),
+    )
+
+    axis: Literal["x", "y", "z"] | None = None
+    """Axis along which the artefact is shifted."""
+    plane: Literal["xy", "yz", "zx"] | None = None
+    """Plane in which a plate is shifted and turned, in place of `axis` and `shifts_mm`."""
+    shifts_mm: Annotated[list[Position], Field(max_length=LISTED.most)] = Field(default_factory=list)
+    """Nominal shift of each series along the axis."""
+    u_shift_um: Uncertainty = 0.0
+    """Standard uncertainty of the shifts; where it is not 0 they are estimated."""
+    known: KnownLength | None = None
+    """A known length between two points of the artefact, for the mean scale of the axis."""
+
+    @model_validator(mode="after")
+    def _axis_or_plane(self) -> Self:
+        if self.plane is not None and (self.axis is not None or self.shifts_mm or self.u_shift_um):
+            raise ValueError(
+                "plane belongs to a plate that is shifted and turned: its placings are found from the readings; leave out "
+                "axis, shifts_mm and u_shift_um, or leave out plane"
+            )
+        return self
+
+    @property
+    def traced(self) -> bool:
+        return self.known is not None
+
+
+SIDE, PITCH = 3, 150.0  # balls along a side of the plate, and their distance, mm
+
+# shift of the plate's middle along x and y, mm, and turn, °: enough to part the plate from the machine
+PLACINGS = ((0.0, 0.0, 0.0), (150.0, 0.0, 0.0), (0.0, 150.0, 0.0), (0.0, 0.0, 90.0))
+
+
+def placed_plate(machine: Machine) -> Points:
+    """A square plate of balls about the middle of the plane xy, in every placing."""
+    steps = PITCH * (np.arange(SIDE) - 0.5 * (SIDE - 1))
+    balls = np.column_stack([part.ravel() for part in np.meshgrid(steps, steps)])
+    middle = np.array([np.mean(machine.travel(axis)) for axis in AXES]) - machine.origin_mm
+    parts = []
+    for dx, dy, degrees in PLACINGS:
+        c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        flat = balls @ np.array([[c, s], [-s, c]]) + [dx - 25.0, dy - 25.0]
+        parts.append(np.column_stack([flat, np.zeros(len(flat))]) + middle)
+    count, n = len(balls), len(balls) * len(PLACINGS)
+    measurement, point = np.repeat(np.arange(n // count) + 1, count), np.tile(np.arange(count) + 1, n // count)
+    return Points(np.vstack(parts), measurement, point, np.ones(n, dtype=np.int64), machine)
+
+
+PLANE_SHIFTED = Beginning(
+    title="Self-calibration of a plane by shifting and turning an uncalibrated plate",
+    numbering="One measurement is one placing of the plate; its points are the balls.",
+    artefact={
+        "name": "Ball plate, uncalibrated but for its diagonal", "plane": "xy",
+        "known": {"from": 1, "to": SIDE**2, "length_mm": round(PITCH * (SIDE - 1) * 2**0.5, 4), "u_um": 0.5},
+    },
+    effects=(), points=placed_plate,
+)  # fmt: skip
+SHIFT = Kind(
+    "shift", ShiftFacts, plan=f"{_HERE}.shift.plan:PLANNING",
+    begin=Beginning(
+        title="Self-calibration of an axis by shifting an uncalibrated gauge",
+        numbering="One measurement is one series, at one shift; its points are those of the gauge.",
+        artefact={
+            "name": "Step gauge, uncalibrated but for its length", "axis": "x", "shifts_mm": [0.0, 20.0, 50.0],
+            "u_shift_um": 100.0, "known": {"from": 1, "to": 21, "length_mm": 400.0, "u_um": 0.5},
+        },
+        effects=(), plan={"repeats": 3},
+    ),
+    begin_also={"shift_plate": f"{_HERE}.kinds:PLANE_SHIFTED"},
+    check=f"{_HERE}.shift.analysis:refuse_unfit", own=f"{_HERE}.shift.analysis:OWN",
+    refusal="a shift job cannot be {}: its machine error is a free function, no list of effects",
+    instead="cmm-uq report JOB estimates it",
+)  # fmt: skip
+
+
+class ErrorMapFacts(ArtefactFacts):
+    """The maps are named under ``[machine]``."""
+
+    with_recording: ClassVar[bool] = False
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
+
+
+TEMPERATURES = (20.0, 25.0, 30.0)
+EXPANSION_UM_PER_M_K = 8.0  # of the scales, so that the maps differ by temperature alone
+STEPS, NOISE = 20, 0.2  # steps over each axis, and standard deviation of every figure, µm or ″
+
+
+def maps(machine: Machine) -> dict[str, bytes]:
+    """One map at each temperature, simulated."""
+    random, files = np.random.default_rng(1), {}
+    for temperature in TEMPERATURES:
+        lines = ["# simulated by cmm-uq new: put in the maps of your machine", f"axis,position_mm,{','.join(COLUMNS)}"]
+        for axis in machine.axes:
+            low, high = machine.travel(axis)
+            for position in np.linspace(low, high, STEPS + 1):
+                figures = random.normal(0.0, NOISE, len(COLUMNS)) * (position != low)
+                grown = EXPANSION_UM_PER_M_K * (temperature - 20.0) * (position - low) / 1000.0
+                figures[machine.axes.index(axis)] += grown
+                lines.append(",".join((axis, f"{position:g}", *(f"{figure:.2f}" for figure in figures))))
+        files[f"error_map_{temperature:g}C.csv"] = ("\n".join(lines) + "\n").encode()
+    return files
+
+
+ERROR_MAP = Kind(
+    "error_map", ErrorMapFacts,
+    begin=Beginning(
+        title="Error maps of a machine at several temperatures",
+        numbering="There is no recording: each map is a file under [machine] error_map.",
+        effects=("thermal_scale_x", "thermal_scale_y", "thermal_scale_z"), files=maps, command="diagnose",
+        machine={"error_map": [{"file": f"error_map_{t:g}C.csv", "temperature_c": t} for t in TEMPERATURES]},
+    ),
+    check=f"{_HERE}.error_maps.diagnosis:refuse_unfit", own=f"{_HERE}.error_maps.page:OWN",
+    refusal="error maps cannot be {}: they are free functions, no points of an artefact",
+    instead="cmm-uq diagnose JOB compares them with each other",
+)  # fmt: skip
+BUILT_IN = {kind.name: kind for kind in (
+    BALLBAR, BRYAN, STEP_GAUGE, GAUGE_BLOCKS, PLATE, TRIANGLE, SPHERE, PLANE, SHIFT, ERROR_MAP, DIGITIZER,
+)}  # fmt: skip

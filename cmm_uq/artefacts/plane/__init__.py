@@ -1,1 +1,0 @@
-"""Plane surface, probed with a radius that is to be known."""

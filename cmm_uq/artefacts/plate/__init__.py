@@ -1,1 +1,0 @@
-"""Ball plate or hole plate."""

@@ -1,0 +1,358 @@
+"""The error of an axis from all shifted readings at once, with its posterior.
+
+    reading + e(reading) = X_point · cos + D_series + drift · time + noise,    e(x) = slope · x + smooth function
+
+The artefact's dimensions X and the slope are free; D is known, or known within its uncertainty; a known length ties two X.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cmm_uq.artefacts.kinds import KnownLength, ShiftFacts
+from cmm_uq.artefacts.shift.integration import IntegratedCurve, KnownSpan, Method, integrated
+from cmm_uq.artefacts.shift.result import (
+    Curve,
+    Reported,
+    ShiftFound,
+    correction_table,
+    listed_draws,
+    peak_to_valley,
+    shift_facts,
+)
+from cmm_uq.artefacts.shift.series import RepeatedDrift, ShiftedSeries, Undetermined, shifted_series, undetermined
+from cmm_uq.artefacts.shift.smooth import FINEST, Coefficients, SmoothFunction, SmoothModel, sampled
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats, Ints, Points
+from cmm_uq.base.units import HOUR, MICROMETRE, PPM, unit
+from cmm_uq.jobs.job import Job
+from cmm_uq.machine.physics.effects.rigid_body import SCALE
+from cmm_uq.machine.physics.error_map import ErrorMap
+from cmm_uq.maths.inference.ensembles import Chains, Progress
+from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of
+
+_TYPICAL = 5 * MICROMETRE
+_DRIFT = 10 * MICROMETRE  # standard deviation of the drift, mm per hour
+
+
+@dataclass(frozen=True, eq=False)
+class CurveEstimate:
+    """All that the readings say of an axis."""
+
+    series: ShiftedSeries  # series, known: what it was made from
+    known: KnownSpan | None
+    coefficients: Coefficients  # joint draws of everything linear
+    chains: Chains  # of the hyper-parameters, and how they converged
+    seed: int  # of everything random
+    scale_known: bool  # whether the mean sensitivity is determined: by a known length, or by shifts known exactly
+
+    @cached_property
+    def _ends(self) -> Floats:
+        a = self.series.reading[self.series.series == 0]
+        return np.array([a[0], a[-1]])
+
+    def _raw(self, position: Floats) -> Floats:
+        slope = self.coefficients.flat[:, -1:]
+        return np.asarray(slope * (position - self._ends[0]) + self.coefficients.function(0, position))
+
+    def at(self, position: Floats) -> Curve:
+        """The curve, zero at the first reading of the first series; at its last one too unless the scale is known."""
+        values, ends = self._raw(position), self._raw(self._ends)
+        values -= ends[:, :1]
+        if not self.scale_known:
+            part = (position - self._ends[0]) / (self._ends[1] - self._ends[0])
+            values -= (ends[:, 1:] - ends[:, :1]) * part
+        return Curve(position, values)
+
+    @cached_property
+    def curve(self) -> Curve:
+        return self.at(self.series.positions)
+
+    @cached_property
+    def scale(self) -> Floats:
+        """(N,) draws of the mean of e' between the first and last reading of the first series."""
+        ends = self._raw(self._ends)
+        return np.asarray((ends[:, 1] - ends[:, 0]) / (self._ends[1] - self._ends[0]))
+
+    @cached_property
+    def about_the_ends(self) -> Floats:
+        """(N, m) draws of the curve about the line through its ends at the first series, mm."""
+        draws = self.curve.draws
+        return draws - self.scale[:, None] * (self.curve.position - self._ends[0]) if self.scale_known else draws
+
+    @cached_property
+    def shifts(self) -> Floats:
+        """(N, s) draws of the shift of each series against the first, mm; the nominal ones where they are known exactly."""
+        nominal = np.tile(self.series.shifts, (len(self.sigma), 1))
+        if self.series.u_shift > 0:
+            nominal[:, 1:] += self.coefficients.columns[:, : len(self.series.shifts) - 1]
+        return nominal
+
+    @property
+    def sigma(self) -> Floats:
+        """(N,) draws of the standard uncertainty of one reading, mm."""
+        return self.coefficients.sigma
+
+    @cached_property
+    def artefact(self) -> Floats:
+        """(N, p) draws of the distances of the points from the first along the artefact, mm."""
+        flat, columns = self.coefficients.flat, self.coefficients.columns
+        places = flat @ _point_columns(self.series, self.known).T
+        if self.known is not None:
+            places[:, self.known.last] += self.known.length
+            if self.known.u > 0:
+                places[:, self.known.last] += columns[:, -1]
+        return np.asarray(places - places[:, :1])
+
+    @cached_property
+    def residuals(self) -> tuple[Floats, Floats]:
+        """(n,) what does not fit, mm: with no error of the machine but its scale, and with the curve."""
+        count = len(self.series.reading)
+        before = self.coefficients.model.without_functions(float(self.sigma.mean()))
+        return before[:count], self.coefficients.left[:count]
+
+
+def estimate_curve(
+    series: ShiftedSeries,
+    known: KnownSpan | None = None,
+    *,
+    sigma: float | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> CurveEstimate:
+    """Fit all readings at once.
+
+    ``sigma`` standard uncertainty of one reading, mm; from repeats and residuals when left out.
+    """
+    model = _model(series, known, sigma)
+    if len(series.reading) - model.flat.shape[1] < 1:
+        raise CmmUqError(f"{len(series.reading)} readings of {len(series.numbers)} points leave nothing to compare",
+                         fix="Read more points in both placings, or a third placing")  # fmt: skip
+    coefficients, chains = sampled(model, seed, progress)
+    return CurveEstimate(series, known, coefficients, chains, seed, known is not None or series.u_shift == 0)
+
+
+def _point_columns(series: ShiftedSeries, known: KnownSpan | None) -> Floats:
+    """(p, q) which flat coefficient, the slope last, is the place of each point: a known length lends two points one."""
+    count = len(series.numbers)
+    same = np.arange(count)
+    if known is not None:
+        same[known.last] = known.first
+    own, index = np.unique(same, return_inverse=True)
+    columns = np.zeros((count, len(own) + 1))
+    columns[np.arange(count), index] = 1.0
+    return columns
+
+
+def _model(series: ShiftedSeries, known: KnownSpan | None, sigma: float | None) -> SmoothModel:
+    low, high = series.span
+    cosine = series.cosine[series.series]
+    flat = cosine[:, None] * _point_columns(series, known)[series.point]
+    start = series.reading[series.series == 0][0]
+    flat[:, -1] = start - series.reading
+    observed = series.reading - series.shifts[series.series]
+    columns, sd = [], []
+    if series.u_shift > 0:
+        columns += [(series.series == s).astype(np.float64) for s in range(1, len(series.shifts))]
+        sd += [series.u_shift] * (len(series.shifts) - 1)
+    if series.time is not None:
+        columns.append((series.time - series.time[series.series == 0].mean()) / HOUR)
+        sd.append(_DRIFT)
+    if known is not None:
+        ends = cosine * (series.point == known.last)
+        observed = observed - known.length * ends
+        if known.u > 0:
+            columns.append(ends)
+            sd.append(known.u)
+    shortest = max(FINEST * (high - low), 0.5 * series.pitch)
+    smooth = SmoothFunction(
+        f"linearity_{series.axis}", low, high, shortest, series.reading, -np.ones(len(series.reading)), _TYPICAL
+    )
+    model = SmoothModel(
+        observed, series.noise_scale, flat, np.column_stack(columns) if columns else np.zeros((len(observed), 0)),
+        np.array(sd, dtype=np.float64), (smooth,), None if sigma is not None else series.scatter, sigma,
+    )  # fmt: skip
+    return (
+        model if series.drift is None else _with_drift_seen(model, series.drift, series.u_shift > 0, len(series.shifts))
+    )
+
+
+def _with_drift_seen(model: SmoothModel, seen: RepeatedDrift, shifts_free: bool, count: int) -> SmoothModel:
+    """One observation more: the drift that repeats show, of the column that stands after those of the shifts."""
+    row = np.zeros((1, model.columns.shape[1]))
+    row[0, count - 1 if shifts_free else 0] = 1.0
+    smooth = model.functions[0]
+    nowhere = replace(smooth, position=np.r_[smooth.position, smooth.low], factor=np.r_[smooth.factor, 0.0])
+    return replace(
+        model, observed=np.r_[model.observed, seen.rate], noise_scale=np.r_[model.noise_scale, seen.noise_scale],
+        flat=np.vstack([model.flat, np.zeros((1, model.flat.shape[1]))]), columns=np.vstack([model.columns, row]),
+        functions=(nowhere,),
+    )  # fmt: skip
+
+
+KNOWN = "job.toml [artefact] known"
+_FINE = 101
+_MISREAD = 0.02  # part of a known length by which the readings may differ from it
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftResult(ShiftFound):
+    """All that is known of a shift job after its analysis; see also :class:`~cmm_uq.artefacts.shift.result.ShiftFound`."""
+
+    estimate: CurveEstimate
+    undetermined: Undetermined  # what no reading shows
+    # the paper's integrations of two complete series, by method; empty otherwise
+    integrated: dict[Method, IntegratedCurve]
+
+    @property
+    def axis(self) -> str:
+        return self.estimate.series.axis
+
+    @cached_property
+    def fine(self) -> Curve:
+        """The curve at evenly spaced positions over what was read."""
+        return self.estimate.at(np.linspace(*self.estimate.series.span, _FINE))
+
+    @cached_property
+    def table(self) -> ErrorMap:
+        return correction_table(self.axis, self.fine, self.job.points.machine)
+
+    @cached_property
+    def scale(self) -> Quantity | None:
+        """Mean sensitivity error, ppm; ``None`` where nothing determines it."""
+        if not self.estimate.scale_known:
+            return None
+        scale = Quantity.of_draws(self.estimate.scale / PPM, unit("ppm"))
+        return self.stating.stated(f"{SCALE[self.axis].name}.ppm", scale)
+
+    @cached_property
+    def linearity(self) -> Quantity:
+        """Linearity error: peak to valley of the curve about the line through its ends at the first series, µm."""
+        found = peak_to_valley(self.estimate.about_the_ends)
+        return self.stating.stated(f"linearity_{self.axis}.peak_to_valley_um", found)
+
+    @cached_property
+    def reported(self) -> Reported:
+        sizes = np.ptp(self.estimate.about_the_ends, axis=1) / MICROMETRE
+        found = {f"linearity_{self.axis}.peak_to_valley_um": (sizes, "µm")}
+        if self.estimate.scale_known:
+            found[f"{SCALE[self.axis].name}.ppm"] = self.estimate.scale / PPM, "ppm"
+        return found
+
+    @cached_property
+    def listed(self) -> Reported:
+        estimate = self.estimate
+        shifts = estimate.shifts.T if estimate.series.u_shift > 0 else ()
+        return {
+            **{f"shifts[{i}].mm": (draws, "mm") for i, draws in enumerate(shifts) if i > 0},
+            **listed_draws(f"curves.linearity_{self.axis}.error_um", estimate.curve.draws / MICROMETRE, "µm"),
+            **(listed_draws("artefact.distance_mm", estimate.artefact, "mm") if estimate.scale_known else {}),
+        }
+
+    @cached_property
+    def shifts(self) -> tuple[Quantity, ...]:
+        return tuple(Quantity.of_draws(draws, unit("mm")) for draws in self.estimate.shifts.T)
+
+    @cached_property
+    def distances(self) -> tuple[Floats, Floats, Floats] | None:
+        """Of the artefact's points from the first, (p,) mm, with u and U of each; ``None`` without a scale."""
+        draws = self.estimate.artefact
+        mean, u = draws.mean(axis=0), draws.std(axis=0, ddof=1)
+        return (mean, u, expanded_of(draws, mean)) if self.estimate.scale_known else None
+
+    @cached_property
+    def beside_integrations(self) -> Curve | None:
+        """The curve at the positions of the integrations; ``None`` where there are none."""
+        first = next(iter(self.integrated.values()), None)
+        return None if first is None else self.estimate.at(first.position)
+
+
+def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) -> ShiftResult:
+    stated = job.facts.recording.u_coordinate_um
+    series, known = checked_series(job)
+    estimate = estimate_curve(
+        series, known, sigma=None if stated is None else stated * MICROMETRE, seed=seed, progress=progress
+    )
+    return ShiftResult(
+        job, estimate, undetermined(series, scale_known=estimate.scale_known), _integrated(series, estimate, known)
+    )
+
+
+def checked_series(job: Job) -> tuple[ShiftedSeries, KnownSpan | None]:
+    check_facts(job)
+    facts = shift_facts(job)
+    series = recorded_series(facts, job.points, job.recording_path)
+    return series, None if facts.known is None else _known(facts.known, series)
+
+
+def recorded_series(facts: ShiftFacts, points: Points, where: str) -> ShiftedSeries:
+    if facts.axis is None:
+        raise CmmUqError("neither axis nor plane", where="job.toml [artefact]",
+                         fix='Name the axis shifted along, axis = "x", or a plate\'s plane, plane = "xy"')  # fmt: skip
+    if not facts.shifts_mm:
+        raise CmmUqError("is missing", where="job.toml [artefact] shifts_mm",
+                         fix="Give one shift a series, 0.0 for the first")  # fmt: skip
+    return shifted_series(
+        points, facts.axis, np.array(facts.shifts_mm, dtype=np.float64), facts.u_shift_um * MICROMETRE, where
+    )
+
+
+def check_facts(job: Job) -> None:
+    facts, aside = job.facts, job.facts.recording.measurements_aside
+    if facts.model.effects:
+        raise CmmUqError("a shift job estimates errors as free functions, not by effects",
+                         where="job.toml [model] effects", fix="Write effects = []")  # fmt: skip
+    if facts.conformity:
+        raise CmmUqError("no standard here decides on curves of errors", where="job.toml [[conformity]]",
+                         fix="Leave it out; the certificate states the errors with their uncertainty")  # fmt: skip
+
+    if unknown := set(aside) - set(job.points.measurement.tolist()):
+        raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
+                         fix="Name measurements that the recording has")  # fmt: skip
+    if aside:
+        raise CmmUqError("a series cannot be set aside", where="job.toml [recording] set_aside",
+                         fix="Take the series out of the recording and its shift out of shifts_mm")  # fmt: skip
+
+
+def known_points(given: KnownLength, numbers: Ints) -> tuple[int, int]:
+    """Indices into ``numbers`` of the two points of a known length."""
+    index = {int(number): i for i, number in enumerate(numbers)}
+    for number in (given.from_point, given.to_point):
+        if number not in index:
+            raise CmmUqError(
+                f"there is no point {number}", where=KNOWN, fix=f"Points are {numbers[0]} to {numbers[-1]}"
+            )
+    if given.from_point == given.to_point:
+        raise CmmUqError(f"from and to are both point {given.from_point}", where=KNOWN, fix="Name two points")
+    return index[given.from_point], index[given.to_point]
+
+
+def check_known(given: KnownLength, measured: float) -> None:
+    """Refuse a known length that the readings contradict grossly."""
+    if abs(measured - given.length_mm) > _MISREAD * given.length_mm:
+        raise CmmUqError(f"points {given.from_point} and {given.to_point} read {measured:.6g} mm apart, not "
+                         f"{given.length_mm:g} mm", where=KNOWN, fix="Mend the length or the points")  # fmt: skip
+
+
+def _known(given: KnownLength, series: ShiftedSeries) -> KnownSpan:
+    first, last = known_points(given, series.numbers)
+    mean = [float(np.mean((series.reading - series.shifts[series.series])[series.point == i])) for i in (first, last)]
+    measured = mean[1] - mean[0]
+    check_known(given, abs(measured))
+    return KnownSpan(first, last, float(np.copysign(given.length_mm, measured)), given.u_um * MICROMETRE)
+
+
+def _integrated(
+    series: ShiftedSeries, estimate: CurveEstimate, known: KnownSpan | None
+) -> dict[Method, IntegratedCurve]:
+    if series.pair is None:
+        return {}
+    a, b = series.pair
+    scatter = float(estimate.sigma.mean()) * series.noise_scale
+    u = np.stack([scatter[series.series == 0], scatter[series.series == 1]])
+    shift = float(series.shifts[1] - series.shifts[0]) if series.u_shift == 0 else None
+    methods: tuple[Method, ...] = ("pitch", "improved")
+    return {method: integrated(a, b, u, method=method, shift=shift, known=known) for method in methods}

@@ -1,0 +1,313 @@
+"""What every analysis of shifted artefacts gives, along an axis or in a plane, and what certificates show of it.
+
+The largest difference of a drawn curve is never zero and grows with every uncertainty (JCGM 101:2008, 9.4), so an interval
+of such draws lies above the truth, and never holds a straight curve. Here the differences c_i − c_j between all pairs of
+positions get one factor k, from the draws, that holds them all at once: the largest lies between the largest d_ij − k·u_ij,
+no less than 0, and the largest d_ij + k·u_ij. With 99.5 % it says which pairs can be the largest at all, and with 95.5 % of
+these alone (Bonferroni).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.artefacts.kinds import ShiftFacts
+from cmm_uq.base.messages import Text, Verbatim, day, number, say
+from cmm_uq.base.points import AXES, Floats, Machine
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
+from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
+from cmm_uq.certificate.origin import file_name
+from cmm_uq.certificate.result import StatedUncertainty
+from cmm_uq.certificate.sections.results import SIGN, Left, stated_table
+from cmm_uq.certificate.sections.traceability import artefact_rows, certificate_rows, traceability_section
+from cmm_uq.certificate.wording import Summary, figure_row
+from cmm_uq.jobs.job import Job
+from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, error_map_csv
+from cmm_uq.maths.inference.draws import Draws, by_ensemble
+from cmm_uq.maths.inference.ensembles import Chains
+from cmm_uq.maths.uncertainty.correlation import Covariance
+from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of, nominal, significant
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Draws of e at positions, true = indicated + e."""
+
+    position: Floats  # (m,) mm
+    draws: Floats  # (N, m) mm
+
+    @cached_property
+    def error(self) -> Floats:
+        """(m,) posterior means, mm."""
+        return np.asarray(self.draws.mean(axis=0))
+
+    @cached_property
+    def u(self) -> Floats:
+        """(m,) standard uncertainties, mm."""
+        return np.asarray(self.draws.std(axis=0, ddof=1))
+
+    @cached_property
+    def interval95(self) -> tuple[Floats, Floats]:
+        """Ends of the 95 % interval at each position."""
+        low, high = np.quantile(self.draws, [0.025, 0.975], axis=0)
+        return np.asarray(low), np.asarray(high)
+
+    @cached_property
+    def expanded(self) -> Floats:
+        """(m,) U: at each position the larger distance from the error to an end of its 95 % interval, mm."""
+        return expanded_of(self.draws, self.error)
+
+    @cached_property
+    def band(self) -> Floats:
+        """(m,) half width of the band that holds the whole curve with 95 % probability, mm."""
+        return self.simultaneous_factor * self.u
+
+    @cached_property
+    def simultaneous_factor(self) -> float:
+        """The k for which error ± k·u holds the whole curve in 95 % of draws."""
+        moving = self.u > 1e-9 * max(self.u.max(), 1e-12)
+        if not moving.any():
+            return 0.0
+        away = np.abs(self.draws[:, moving] - self.error[moving]) / self.u[moving]
+        return float(np.quantile(away.max(axis=1), 0.95))
+
+
+_DRAWS = 4000  # for the factor: its quantile is then known to a percent
+_CAN_BE, _HOLDS = 0.995, 0.955
+_POSITIONS = 200  # more are thinned out: a smooth curve has no more to say
+
+
+def peak_to_valley(curve: Floats) -> Quantity:
+    """Largest difference of a curve between two positions, µm.
+
+    ``curve`` (N, m) draws, mm. Gives that of the mean curve, the standard deviation of that of the draws, and the
+    interval of all pairs.
+    """
+    low, high = _ends(curve)
+    sizes, value = np.ptp(curve, axis=1) / MICROMETRE, float(np.ptp(curve.mean(axis=0))) / MICROMETRE
+    return Quantity(value, float(sizes.std(ddof=1)), (low / MICROMETRE, high / MICROMETRE), unit("µm"))
+
+
+def _ends(curve: Floats) -> tuple[float, float]:
+    mean, covariance = curve.mean(axis=0), np.atleast_2d(np.cov(curve, rowvar=False))
+    spread = np.linspace(0, len(mean) - 1, min(_POSITIONS, len(mean))).astype(int)
+    chosen = np.union1d(spread, [mean.argmin(), mean.argmax()])
+    mean, variance = mean[chosen], np.diag(covariance)[chosen]
+    square = variance[:, None] + variance - 2 * covariance[np.ix_(chosen, chosen)]
+    u = np.sqrt(np.where(square > 1e-12 * variance.max(initial=0.0), square, 0.0))
+    draws = curve[np.linspace(0, len(curve) - 1, min(_DRAWS, len(curve))).astype(int)][:, chosen] - mean
+    difference = mean[:, None] - mean
+    within = _factor(draws, u, u > 0, _CAN_BE) * u
+    among = difference + within >= np.max(difference - within)
+    within = _factor(draws, u, among & (u > 0), _HOLDS) * u
+    return float(np.max((difference - within)[among]).clip(0.0)), float(np.max((difference + within)[among]))
+
+
+def _factor(draws: Floats, u: Floats, among: NDArray[np.bool_], level: float) -> float:
+    """The k for which draws (N, m) about their mean keep the differences of some pairs (m, m) within k·u that often."""
+    away = np.zeros(len(draws))
+    for i in np.flatnonzero(among.any(axis=1)):
+        away = np.maximum(away, np.max(np.abs(draws[:, [i]] - draws[:, among[i]]) / u[i, among[i]], axis=1))
+    return float(np.quantile(away, level))
+
+
+Reported = Mapping[str, tuple[Floats, str]]  # draws (N,) of something that is reported, and its unit, by its name
+
+
+_STILL = 1e-9  # part of the largest spread in a list up to which an item does not move but for rounding
+
+
+class Estimated(Protocol):
+    """All that the readings say: chains, draws (N,) of u of one reading, mm, and what does not fit, mm.
+
+    The latter with no error of the machine but its scale, and with what was estimated.
+    """
+
+    @property
+    def chains(self) -> Chains: ...
+    @property
+    def sigma(self) -> Floats: ...
+    @property
+    def residuals(self) -> tuple[Floats, Floats]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftFound(ABC):
+    """What was found."""
+
+    job: Job  # what was analysed
+    estimate: Estimated  # of the machine and the artefact, with its posterior
+
+    @cached_property
+    def disagreement_um(self) -> tuple[float, float]:
+        """Root mean square of what the placings disagree by, without and with the machine's errors, µm."""
+        without, with_errors = (_rms_um(values) for values in self.estimate.residuals)
+        return without, with_errors
+
+    @property
+    @abstractmethod
+    def reported(self) -> Reported:
+        """Draws of every estimate, by its name in results.json without ``estimates``."""
+
+    @property
+    @abstractmethod
+    def listed(self) -> Reported:
+        """Draws of what results.json has in lists, by its place there, such as ``curves.linearity_x.error_um[3]``."""
+
+    @cached_property
+    def covariance(self) -> Covariance:
+        return Covariance.of_draws(self.reported)
+
+    @cached_property
+    def draws(self) -> Draws:
+        """The posterior of every estimate, of the noise where it is estimated, and of what is listed.
+
+        What is zero by definition, as a curve at its first position, is left out.
+        """
+        found = dict(self.reported)
+        if self.job.facts.recording.u_coordinate_um is None:
+            found["noise.coordinate_um"] = self.estimate.sigma / MICROMETRE, unit("µm")
+        found |= self.listed
+        chains = self.estimate.chains
+        values = np.column_stack([draws for draws, _ in found.values()])
+        return Draws(
+            {name: unit for name, (_, unit) in found.items()}, by_ensemble(values, chains.steps, len(chains.draws))
+        )
+
+    @cached_property
+    def stating(self) -> StatedUncertainty:
+        """How quantities are stated: not below the laboratory's capability."""
+        return StatedUncertainty.of(self.job)
+
+    def stated_along(self, curve: Curve, size: float = MICROMETRE, symbol: str = "µm") -> Floats:
+        """(m,) U of a curve by position, in its own unit, not below the laboratory's capability of that travel."""
+        capability = self.stating.capability
+        if capability is None:
+            return curve.expanded
+        travelled = np.abs(curve.position - curve.position[0])
+        least = size * np.array([capability.least(symbol, float(length)) for length in travelled])
+        return np.where(
+            curve.expanded > _STILL * curve.expanded.max(), np.maximum(curve.expanded, least), curve.expanded
+        )
+
+    @property
+    def repeatability(self) -> Quantity:
+        """Standard uncertainty of one reading, µm."""
+        return Quantity.of_draws(self.estimate.sigma / MICROMETRE, unit("µm"))
+
+
+def _rms_um(values: Floats) -> float:
+    return float((values**2).mean() ** 0.5) / MICROMETRE
+
+
+def listed_draws(place: str, draws: Floats, unit: str) -> Reported:
+    """Draws (N, m) of the items of a list of results.json, but those that do not move: they are zero by definition."""
+    spread = np.ptp(draws, axis=0)
+    moving = np.flatnonzero(spread > _STILL * spread.max(initial=0.0))
+    return {f"{place}[{i}]": (draws[:, i], unit) for i in moving.tolist()}
+
+
+Named = Sequence[Left]  # quantities that are stated, each with its place in results.json and its name
+
+
+def shift_facts(job: Job) -> ShiftFacts:
+    return cast("ShiftFacts", job.facts.artefact)
+
+
+def table_file(job: Job) -> str:
+    return file_name("correction_table.csv", job.origin)
+
+
+def figures_section(caption: Text, named: Named, meaning: Text) -> Section:
+    notes = (
+        SIGN,
+        meaning,
+        say("U is the expanded uncertainty for a coverage probability of 95 %, from the posterior distribution."),
+    )
+    return Section(
+        say("Figures of performance"),
+        (stated_table(caption, [(name, quantity) for _, _, name, quantity in named], notes),),
+    )
+
+
+def summary_of(job: Job, what: Text, named: Named, warnings: Iterable[Text]) -> Summary:
+    figures = tuple(figure_row(name, quantity) for _, _, name, quantity in named)
+    return Summary(what, day(job.facts.job.date), figures=figures, warnings=tuple(warnings))
+
+
+def artefact_section(
+    job: Job, otherwise: Text, points: Text, shifts: tuple[tuple[Text, Text], ...], *further: Block
+) -> Section:
+    facts = shift_facts(job)
+    rows = artefact_rows(job, otherwise)
+    if (known := facts.known) is not None:
+        told = say(
+            "{points} {first} to {last}: {length} mm, U = {U} µm (k = 2)",
+            points=points, first=known.from_point, last=known.to_point, length=nominal(known.length_mm),
+            U=significant(2 * known.u_um),
+        )  # fmt: skip
+        rows.append((say("Known length"), told))
+    return traceability_section(job, (*rows, *certificate_rows(facts.certificate), *shifts), *further)
+
+
+def method_section(text: Text, readings: int, chains: Chains, seed: int, *further: Block) -> Section:
+    reached = say(
+        "{reached}: {ess:.0f} effective samples, R-hat {rhat:.4f}, autocorrelation time {time:.1f} of {steps} steps",
+        reached=say("reached") if chains.converged else say("NOT reached"),
+        ess=chains.ess_min,
+        rhat=chains.rhat_max,
+        time=chains.autocorrelation_time,
+        steps=chains.steps,
+    )
+    rows = (
+        (say("Readings (means)"), number(readings)),
+        (say("Sampler"), say("{sampler}, seed {seed}", sampler=Verbatim(chains.sampler), seed=seed)),
+        (say("Convergence"), reached),
+    )
+    return Section(say("Method"), (Paragraph(text), Facts(rows), *further))
+
+
+_DECIMALS = 3  # of the table's µm and ″
+
+
+def correction_table(axis: str, curve: Curve, machine: Machine) -> ErrorMap:
+    """Error map with the curve as displacement of one carriage along itself; everything else zero.
+
+    It reaches over the machine's travel where that is known; beyond what was read it holds the last value, uncalibrated.
+    """
+    column = AXES.index(axis)
+    errors = np.zeros((len(curve.position), 6))
+    errors[:, column] = curve.error
+    return error_map_of({column: (curve.position, errors)}, machine)
+
+
+def error_map_of(found: Mapping[int, tuple[Floats, Floats]], machine: Machine) -> ErrorMap:
+    """Error map of positions and errors (m, 6) of some carriages, rounded as in a table; everything else zero."""
+    x, y, z = (_carriage(machine.travel_mm[a], found.get(a)) for a in range(3))
+    return ErrorMap((x, y, z))
+
+
+def table_text(table: ErrorMap) -> bytes:
+    """The table as the CSV that ``[machine] error_map`` names."""
+    return error_map_csv(table).encode()
+
+
+def _carriage(travel: Floats, found: tuple[Floats, Floats] | None) -> AxisErrors:
+    low, high = (float(v) for v in travel)
+    if found is None:
+        ends = np.array([-1e4, 1e4]) if np.isnan(low) else np.array([low, high])
+        return AxisErrors(ends, np.zeros((2, 6)))
+    unit = np.repeat([MICROMETRE, ARCSECOND], 3)
+    position, errors = found[0], np.round(found[1] / unit, _DECIMALS) * unit
+    if not np.isnan(low) and low < position[0]:
+        position, errors = np.r_[low, position], np.vstack([errors[:1], errors])
+    if not np.isnan(high) and high > position[-1]:
+        position, errors = np.r_[position, high], np.vstack([errors, errors[-1:]])
+    return AxisErrors(position, errors)

@@ -1,1 +1,0 @@
-"""An axis calibrated by an artefact that is read in shifted places."""

@@ -1,1 +1,0 @@
-"""Two axes calibrated by a plate that is shifted and turned."""

@@ -1,0 +1,302 @@
+"""Sphere: points probed on a ball, whose centre is free in each measurement (ISO 10360-5); observed, planned, stated.
+
+A sphere without a certified diameter cannot tell an error of the effective stylus radius from its own size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+
+from cmm_uq.analysis.planning.candidates import MIDDLE, PatternFor, RelocatedCandidates, VolumeCandidates, upright
+from cmm_uq.analysis.planning.set_up import Pattern, SetUp, planned_length
+from cmm_uq.analysis.planning.setting import Planning, Setting
+from cmm_uq.analysis.screening.shape import (
+    ArtefactShape,
+    Screening,
+    ball_misfit,
+    no_references,
+    recentred,
+    rows_by,
+    samples_of,
+    spread,
+)
+from cmm_uq.artefacts.kinds import SphereFacts
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Number, Text, number, say
+from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.certificate.document import Column, Plot, Section, Table
+from cmm_uq.certificate.outcome import Page
+from cmm_uq.certificate.plots.residuals import length_plot, volume_plot
+from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.wording import deviating, numbered
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
+from cmm_uq.machine.model.artefact import Forms, Placings
+from cmm_uq.machine.model.artefact_doubt import form_faults
+from cmm_uq.machine.model.placed import Radial
+from cmm_uq.machine.model.recorded import expansion, place
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.maths.geometry import fit_sphere
+from cmm_uq.maths.uncertainty.quantity import alike, rounded
+
+# between a recorded normal and the direction away from the centre; beyond it the normals belong to something else
+LARGEST_ANGLE = np.radians(20.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ProbedSpheres:
+    """Least-squares spheres of a recording, one for each (measurement, repeat)."""
+
+    measurement: Ints  # measurement, repeat: (q,)
+    repeat: Ints
+    count: Ints  # (q,) points of each
+    form: Floats  # (q,) range of the radial distances, mm (ISO 10360-5:2010, P_Form)
+    # (q,) diameter of the least-squares sphere minus the certified one, mm (P_Size); not finite without a
+    # certificate
+    size: Floats
+    centres: Floats  # (q, 3) of the least-squares spheres, mm
+
+
+class SphereArtefact(Radial):
+    """A probed sphere: ``length_mm`` is its diameter.
+
+    ``facts`` what the job says of the sphere; ``points`` the recording, with ``nx, ny, nz`` where they are known.
+    ``form`` form deviation of the ball by its certificate, mm; 0 when it is not given.
+    """
+
+    kind = "sphere"
+    title = say("Sphere")
+    per_size = 0.5
+    size_title = say("Diameter of the sphere")
+    size_what = say("diameter")
+    plural = "the diameters of the recorded spheres"
+
+    def __init__(self, facts: SphereFacts, points: Points, *, where: str | None = None) -> None:
+        super().__init__(facts, points, Placings.of(points.measurement), expansion(facts, points), where)
+        self._facts = facts
+        self.form = (facts.form_um or 0.0) * MICROMETRE
+        if all(f"n{a}" in points.columns for a in AXES):
+            self._take_normals(where)
+
+    def own_faults(self) -> Iterable[Effect]:
+        return form_faults(self._facts, self._facts.form_um, self.points)
+
+    def probed(self) -> ProbedSpheres:
+        runs = Placings.of(self.points.group)
+        size = self.sizes[0]
+        first, form, diameter, centres = [], [], [], []
+        for rows in runs.rows:
+            ball = fit_sphere(self.points.xyz[rows], u_point=1.0)
+            first.append(rows[0])
+            centres.append(ball.centre)
+            form.append(ball.form_deviation)
+            diameter.append(2 * ball.radius / float(self.expansion[rows].mean()))
+        nominal = size.nominal if size.certified else np.nan
+        return ProbedSpheres(
+            self.points.measurement[first], self.points.repeat[first], runs.sizes, np.array(form),
+            np.array(diameter) - nominal, np.array(centres),
+        )  # fmt: skip
+
+    def forms(self) -> Forms:
+        probed = self.probed()
+        directions = self.directions(self.points.xyz)
+        size = probed.size if self.sizes[0].certified else None
+        return Forms(
+            probed.measurement, probed.repeat, probed.count, probed.form, self.form, directions, size, probed.centres
+        )
+
+    def _take_normals(self, where: str | None) -> None:
+        """Normals as recorded, brought to unit length: the probe's errors act along them, and so they are seen exactly."""
+        normals = np.column_stack([self.points.columns[f"n{a}"] for a in AXES])
+        length = np.linalg.norm(normals, axis=1)
+        geometric = self.directions(self.points.xyz)
+        wrong = np.einsum("ni,ni->n", normals, geometric) < length * np.cos(LARGEST_ANGLE)
+        if np.any(rows := wrong | (length == 0)):
+            inward = np.all(np.einsum("ni,ni->n", normals, geometric) < 0)
+            raise CmmUqError(
+                "nx, ny, nz point into the sphere" if inward else "nx, ny, nz does not point away from the centre",
+                where=place(self.points, rows, where),
+                fix="Give the outward normal at each probed point" + (": turn all signs round" if inward else ""),
+            )
+        self._normals = normals / length[:, None]
+        columns = {f"n{a}": self._normals[:, i] for i, a in enumerate(AXES)}
+        self.points = replace(self.points, columns={**self.points.columns, **columns})
+
+
+_NORMAL = 0.4  # part of the radius by which a recorded normal may miss the point: normals may be nominal, 20° off
+_NORMALS = tuple(f"n{a}" for a in AXES)
+
+
+def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
+    """Spheres, with normals where they are recorded; ``None`` where one has too few points."""
+    rows, radius = rows_by(points.measurement), (facts.length_mm or np.nan) / 2
+    if any(len(r) < 5 for r in rows):
+        return None
+    extent = radius if np.isfinite(radius) else 0.5 * float(np.median([spread(points.xyz[r]) for r in rows]))
+    if not all(name in points.columns for name in _NORMALS):
+        return ArtefactShape(rows, ball_misfit, radius, extent, False, (), no_references(points))
+    normals = np.column_stack([points.columns[name] for name in _NORMALS])
+    return ArtefactShape(rows, _ball_with_normals, radius, extent, False, _NORMALS, normals)
+
+
+def _ball_with_normals(xyz: Floats, normals: Floats, radius: float) -> Floats:
+    """Each normal says where the centre lies; their median does not follow a few."""
+    if np.isnan(radius):
+        i, j = samples_of(len(xyz), 2).T
+        steps = normals[j] - normals[i]
+        squares = np.sum(steps**2, axis=1)
+        if not np.any(wide := squares > 0.5 * squares.max()):
+            return np.zeros(len(xyz))
+        radius = float(np.median(np.sum((xyz[j] - xyz[i]) * steps, axis=1)[wide] / squares[wide]))
+    away = xyz - np.median(xyz - radius * normals, axis=0)
+    away, radius = recentred(away, radius, free=False)  # nominal normals put it astray
+    misses = np.linalg.norm(away - radius * normals, axis=1) - _NORMAL * abs(radius)
+    return np.asarray(np.maximum(np.abs(np.linalg.norm(away, axis=1) - radius), misses), dtype=np.float64)
+
+
+SCREENING = Screening(shape_of)
+
+
+# points over a hemisphere: degrees from the pole, how many, degrees turned. The usual twenty-five of ISO 10360-5
+RINGS = ((0.0, 1, 0.0), (22.5, 4, 0.0), (45.0, 8, 22.5), (67.5, 4, 0.0), (90.0, 8, 22.5))
+
+
+def sphere(facts: ArtefactFacts, plan: PlanFacts) -> Pattern:
+    """Twenty-five points over the upper hemisphere, each probed along its normal."""
+    normals = []
+    for down, count, turn in RINGS:
+        polar = np.radians(down)
+        azimuth = np.radians(turn) + 2 * np.pi * np.arange(count) / count
+        ring = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.full(count, np.cos(polar))]
+        normals.append(np.column_stack(ring))
+    n = np.vstack(normals)
+    one = Pattern(
+        0.5 * planned_length(facts, plan) * n, np.arange(1, len(n) + 1), np.ones(len(n), dtype=np.int64), {},
+        {"normal": n, "approach": -np.where(np.abs(n) > 1e-9, n, 0.0)},
+    )  # fmt: skip
+    return one.repeated(plan.repeats)
+
+
+def sphere_places(setting: Setting) -> tuple[SetUp, ...]:
+    """Once in the middle of the volume."""
+    pattern = sphere(setting.artefact, setting.plan)
+    return (setting.volume.set_up(pattern, np.eye(3), MIDDLE, say("in the middle")),)
+
+
+def _shape(setting: Setting) -> PatternFor:
+    pattern = sphere(setting.artefact, setting.plan)
+    return lambda _: pattern
+
+
+_PLACES = VolumeCandidates(upright, _shape, RelocatedCandidates(lambda volume: []))
+PLANNING = Planning({"ISO 10360-5": sphere_places}, _PLACES.candidates, _PLACES.elsewhere)
+
+
+def deviations_um(sphere: SphereArtefact) -> Floats:
+    """(n,) distance of each point from its best centre minus the certified or mean radius, µm."""
+    radius = sphere.sizes[0].nominal * sphere.per_size * sphere.expansion
+    return np.asarray((sphere.distances(sphere.points.xyz, None) - radius) / MICROMETRE, dtype=np.float64)
+
+
+def about_centre(sphere: SphereArtefact) -> Floats:
+    """(n, 3) places of the points about their centres, on the sphere of the nominal size, mm."""
+    return np.asarray(
+        sphere.size_change() * sphere.sizes[0].nominal * sphere.directions(sphere.points.xyz), dtype=np.float64
+    )
+
+
+def results(result: Result) -> dict[str, Any]:
+    """Form and size errors for results.json."""
+    sphere = cast("SphereArtefact", result.artefact)
+    probed, certified = sphere.probed(), sphere.sizes[0].certified
+    return {
+        "spheres": [
+            {"measurement": int(measurement), "repeat": int(repeat), "points": int(count), "form_error_um": form,
+             "size_error_um": size if certified else None}
+            for measurement, repeat, count, form, size in zip(
+                probed.measurement, probed.repeat, probed.count, (probed.form / MICROMETRE).tolist(),
+                (probed.size / MICROMETRE).tolist(), strict=True,
+            )
+        ]
+    }  # fmt: skip
+
+
+def sections(result: Result) -> list[Section]:
+    sphere = cast("SphereArtefact", result.artefact)
+    return [
+        Section(
+            say("Probing of the sphere"), (_table(result, sphere), _by_point(result, sphere), _over(result, sphere))
+        )
+    ]
+
+
+def _table(result: Result, sphere: SphereArtefact) -> Table:
+    probed, size = sphere.probed(), sphere.sizes[0]
+    noise = result.noise.expanded
+    repeated = probed.repeat.max() > 1
+    rows: list[tuple[Text, ...]] = []
+    for i, measurement in enumerate(probed.measurement):
+        place = numbered(measurement, probed.repeat[i] if repeated else None)
+        form = rounded(float(probed.form[i]) / MICROMETRE, max(sphere.form / MICROMETRE, noise / 10))[0]
+        row: list[Text] = [place, number(probed.count[i]), form]
+        if size.certified:
+            row.append(rounded(float(probed.size[i]) / MICROMETRE, noise)[0])
+        rows.append(tuple(row))
+    columns = [Column(say("Sphere"), numeric=False), Column(say("Points")), Column(say("Form error"), unit("µm"))]
+    notes = [say("Form error: range of the radial distances from the least-squares sphere (ISO 10360-5:2010).")]
+    if size.certified:
+        columns.append(Column(say("Size error"), unit("µm")))
+        u = rounded(0.0, 2 * size.sd / MICROMETRE)[1] if size.sd else Number("0")
+        notes.append(
+            say(
+                "Size error: diameter of the least-squares sphere minus the certified one, whose U is {u} µm (k = 2).",
+                u=u,
+            )
+        )
+    return Table(say("Probing errors"), tuple(columns), tuple(rows), tuple(notes))
+
+
+def _by_point(result: Result, sphere: SphereArtefact) -> Plot:
+    size = sphere.sizes[0]
+    deviations = deviations_um(sphere)
+    residuals, expanded = result.residuals / MICROMETRE, result.noise.expanded
+    name = say("certified radius") if size.certified else say("mean radius")
+    return length_plot(
+        sphere.points.point,
+        deviations,
+        residuals,
+        expanded_before_um=expanded,
+        expanded_after_um=expanded,
+        reference=name,
+        reference_expanded_um=size.sd / MICROMETRE if size.certified else 0.0,
+        flagged=result.flagged,
+        position_label=say("Point on the sphere"),
+        caption=say(
+            "Distance from the centre minus {name}, as recorded and after the fitted model, with U (k = {k}).",
+            name=name,
+            k=number(result.noise.coverage_factor, ".2f"),
+        ),
+        alternative=deviating(
+            say("{count} points: as recorded they deviate", count=len(deviations)),
+            say("from the {name}", name=name), deviations, residuals,
+        ),
+    )  # fmt: skip
+
+
+def _over(result: Result, sphere: SphereArtefact) -> Plot:
+    residuals = result.residuals / MICROMETRE
+    low, high = alike(residuals.min(), residuals.max())
+    return volume_plot(
+        about_centre(sphere),
+        residuals,
+        caption=say("Residuals after the fitted model over the sphere (all spheres, about their centres)."),
+        alternative=say("Three projections of the sphere; residuals of {low} to {high} µm.", low=low, high=high),
+    )
+
+
+PAGE = Page(sections, results)

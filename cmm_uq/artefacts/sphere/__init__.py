@@ -1,1 +1,0 @@
-"""Test sphere, probed all around."""

@@ -1,1 +1,0 @@
-"""Triangle of gauge blocks and cylinders."""
