@@ -15,7 +15,7 @@ from cmm_uq.base.errors import CmmUqError, printable
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.affected import AffectedCertificate, FigureChange
     from cmm_uq.app.commands.certificates.verification import Verification
-    from cmm_uq.jobs.dcc.shown import CertificateView, Grid
+    from cmm_uq.jobs.dcc.figures import CertificateView, Grid
 
 
 FINDINGS_SHOWN = 20  # findings of a verification that are told one by one
@@ -249,7 +249,7 @@ def read(
     Signatures are counted and not verified: cmm-uq verify does.
     """
     from cmm_uq.app.commands.jobs.exchange import read_certificate
-    from cmm_uq.jobs.dcc.shown import data, shown
+    from cmm_uq.jobs.dcc.figures import data, shown
 
     certificates = [(file, read_certificate(file, schema)) for file in files]
     if json:

@@ -1,6 +1,7 @@
-"""PDF signed by PAdES: a revision appended that leaves every byte before it as it is, tagged and fit for the archive.
+"""PDF signed by PAdES, a revision appended that leaves every byte before it as it is; and the signatures of a PDF.
 
-The date of the metadata stays that of the document. The same document, key and time give the same bytes at level B-B.
+The date of the metadata stays that of the document; the same document, key and time give the same bytes at level B-B. Of each
+signature is found which revision it covers, what was appended after it, and its level.
 """
 
 from __future__ import annotations
@@ -8,16 +9,23 @@ from __future__ import annotations
 import datetime as dt
 import io
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.sign.found import Trust, appending, installed, ran
+from cmm_uq.base.files.limits import SIGNED_BYTES
+from cmm_uq.base.messages import Text, Verbatim, commas, plural, say
+from cmm_uq.certificate.sign.found import FileSignature, Trust, appending, installed, ran
 from cmm_uq.certificate.sign.signer import ONE_DIGEST, Signer
 
 if TYPE_CHECKING:
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+    from pyhanko.pdf_utils.reader import PdfFileReader
     from pyhanko.sign.signers import PdfSigner
+    from pyhanko.sign.validation.pdf_embedded import EmbeddedPdfSignature
+
+    from cmm_uq.certificate.sign.chain import Evidence
 
 FIELD = "Signature"  # names of the fields: Signature1, Signature2, …
 
@@ -127,3 +135,227 @@ def signing_time() -> dt.datetime:
         return dt.datetime.fromtimestamp(int(given), dt.UTC)
     except (ValueError, OverflowError, OSError):
         raise CmmUqError(f"{given!r} is no number of seconds since 1970", where=EPOCH, fix="Mend or unset it") from None
+
+
+DIGESTS = frozenset({"sha256", "sha384", "sha512"})
+MECHANISMS = frozenset({"rsassa_pkcs1v15", "rsassa_pss", "ecdsa"})
+PADES = "/ETSI.CAdES.detached"
+WEAK = say("the signature is made with an algorithm that is weak or unknown")
+BROKEN = say("the signature does not fit the file: one of them was changed")
+UNREADABLE = say("the signature cannot be read")
+STAMP_BROKEN = say("the time stamp does not fit the signature")
+NO_PADES = say("the signature is no PAdES signature")
+_TOLD = 6  # kinds of objects that a message names
+
+
+def signatures_of_pdf(data: bytes, trust: Trust, *, where: str = "the PDF") -> tuple[FileSignature, ...]:
+    """Every signature in a PDF, in the order in which they were made; time stamps of the document count with these."""
+    with installed():
+        from pyhanko.pdf_utils.reader import PdfFileReader
+    if len(data) > SIGNED_BYTES.most:
+        raise CmmUqError(f"is larger than the {SIGNED_BYTES.most} bytes that are read of such a file", where=where,
+                         fix="Check that it is the right file")  # fmt: skip
+    try:
+        reader = PdfFileReader(io.BytesIO(data))
+        embedded = reader.embedded_signatures
+        evidence = _evidence(reader)
+    except Exception as error:  # whatever a hostile file makes the library raise
+        raise CmmUqError(f"cannot be read as a PDF: {error}", where=where, fix="Name a PDF that is whole") from None
+    file = _File(data, reader, tuple(embedded), evidence, trust)
+    found = []
+    for signature in embedded:
+        if signature.sig_object.get("/Type") != "/DocTimeStamp":
+            try:
+                found.append(_judged(file, signature))
+            except Exception:  # whatever a hostile file makes the library raise
+                found.append(FileSignature.of_nobody("PDF", [UNREADABLE]))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class _File:
+    data: bytes
+    reader: PdfFileReader
+    embedded: tuple[EmbeddedPdfSignature, ...]
+    evidence: Evidence
+    trust: Trust
+
+
+def _judged(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
+    from cmm_uq.certificate.sign.chain import Evidence, standing
+
+    certificate = embedded.signer_cert
+    evidence = Evidence(
+        (*file.evidence.certificates, *embedded.other_embedded_certs), file.evidence.revocations, file.evidence.answers
+    )
+    stamped, proven = _stamp_of_signature(embedded, evidence, file.trust)
+    at = stamped
+    if not proven:  # what the signer says; a time without its zone is none
+        claimed = embedded.self_reported_timestamp
+        at = claimed.astimezone(dt.UTC) if claimed is not None and claimed.tzinfo is not None else None
+    intact, problems = _intact(file, embedded)
+    if stamped is None and _token(embedded) is not None:
+        problems.append(STAMP_BROKEN)
+    whole, appended = _whole(file, embedded)
+    if embedded.sig_object.get("/SubFilter") != PADES:
+        problems.append(NO_PADES)
+    judged = standing(certificate, evidence, file.trust, at, proven=proven)
+    level = _level(file, embedded, stamped, known=judged.revocation == "good")
+    signed = embedded.byte_range
+    return FileSignature(
+        certificate.subject.human_friendly,
+        str(certificate.subject.native.get("common_name", certificate.subject.human_friendly)),
+        certificate.issuer.human_friendly, f"PAdES B-{level}", at, time_proven=proven,
+        intact=intact, covers_whole_file=intact and whole, trusted=judged.trusted, revocation=judged.revocation,
+        test_key=judged.test_key, problems=(*problems, *appended, *judged.problems),
+        content=file.data[: int(signed[2]) + int(signed[3])] if intact else b"",
+    )  # fmt: skip
+
+
+def _intact(file: _File, embedded: EmbeddedPdfSignature) -> tuple[bool, list[Text]]:
+    """Whether what was signed is what is there, and what is wrong."""
+    from pyhanko.sign.validation.errors import SignatureValidationError
+    from pyhanko.sign.validation.generic_cms import cms_basic_validation
+    from pyhanko.sign.validation.settings import KeyUsageConstraints
+    from pyhanko_certvalidator import ValidationContext
+
+    algorithm = embedded.signer_info["signature_algorithm"]
+    if embedded.md_algorithm not in DIGESTS or algorithm.signature_algo not in MECHANISMS:
+        return False, [WEAK]
+    if not _fits(file.data, embedded):
+        return False, [BROKEN]
+    nobody = ValidationContext(trust_roots=[], allow_fetching=False)  # who signed is judged elsewhere
+    try:
+        status = ran(
+            cms_basic_validation(embedded.signed_data, raw_digest=embedded.compute_digest(), validation_context=nobody,
+                                 key_usage_settings=KeyUsageConstraints(key_usage=set()))
+        )  # fmt: skip
+    except SignatureValidationError:
+        return False, [BROKEN]
+    good = bool(status["intact"] and status["valid"])
+    return good, [] if good else [BROKEN]
+
+
+def _fits(data: bytes, embedded: EmbeddedPdfSignature) -> bool:
+    """Whether all is covered from the first byte on but for the signature itself, and that holds nothing else."""
+    first, before, second, after = (int(each) for each in embedded.byte_range)
+    gap = data[before:second]
+    if first or len(embedded.byte_range) != 4 or second + after > len(data) or gap[:1] != b"<" or gap[-1:] != b">":
+        return False
+    try:
+        held = bytes.fromhex(gap[1:-1].decode("ascii"))
+    except ValueError:
+        return False
+    signature = embedded.signed_data
+    alone = held.rstrip(b"\0") == embedded.pkcs7_content.rstrip(b"\0") and not any(held[_length(held) :])
+    return alone and bool(signature)
+
+
+def _length(der: bytes) -> int:
+    """Bytes of the first DER value."""
+    short = der[1]
+    if short < 0x80:
+        return 2 + short
+    size = short & 0x7F
+    return 2 + size + int.from_bytes(der[2 : 2 + size], "big")
+
+
+def _whole(file: _File, embedded: EmbeddedPdfSignature) -> tuple[bool, list[Text]]:
+    """Whether only time stamps, evidence and further signatures were appended, and else what."""
+    from pyhanko.sign.diff_analysis import DiffResult, ModificationLevel
+
+    from cmm_uq.certificate.sign.pdf_library import POLICY
+
+    embedded.compute_integrity_info(diff_policy=POLICY)
+    result = embedded.diff_result
+    # whether another signature covers what was appended after this one
+    later = any(other.signed_revision > embedded.signed_revision for other in file.embedded)
+    most = ModificationLevel.FORM_FILLING if later else ModificationLevel.LTA_UPDATES
+    if isinstance(result, DiffResult) and result.modification_level <= most:
+        return True, []
+    count = file.reader.total_revisions - 1 - embedded.signed_revision
+    changed = commas([Verbatim(name) for name in _changed(file.reader, embedded.signed_revision)])
+    return False, [
+        plural(count, one=say("{count} revision was appended after it, and changes {what}", count=count, what=changed),
+               many=say("{count} revisions were appended after it, and change {what}", count=count, what=changed))
+    ]  # fmt: skip
+
+
+def _changed(reader: PdfFileReader, signed: int) -> list[str]:
+    """What was added or changed after a revision, by the names that PDF gives its objects."""
+    found: dict[str, None] = {}
+    for revision in range(signed + 1, reader.total_revisions):
+        for reference in sorted(reader.xrefs.explicit_refs_in_revision(revision), key=lambda one: one.idnum):
+            held = reader.get_object(reference, revision=revision)
+            named: Any = held.get("/Subtype", held.get("/Type", "/Object")) if hasattr(held, "get") else "/Object"
+            found[str(named).removeprefix("/")] = None
+    names = list(found) or ["Trailer"]
+    return [*names[:_TOLD], *(["…"] if len(names) > _TOLD else [])]
+
+
+def _token(embedded: EmbeddedPdfSignature) -> Any:
+    """The time stamp of a signature; ``None`` where it has none."""
+    from pyhanko.sign.validation.generic_cms import extract_tst_data_iter
+
+    try:
+        return next(extract_tst_data_iter(embedded.signer_info, signed=False), None)
+    except KeyError:
+        return None
+
+
+def _stamp_of_signature(
+    embedded: EmbeddedPdfSignature, evidence: Evidence, trust: Trust
+) -> tuple[dt.datetime | None, bool]:
+    """Time of the signature's time stamp, where that fits, and whether somebody trusted made it."""
+    from pyhanko.sign.validation.generic_cms import message_imprint_checker
+
+    token = _token(embedded)
+    if token is None:
+        return None, False
+    return _stamp(token, message_imprint_checker(embedded.signer_info), evidence, trust)
+
+
+def _stamp(
+    token: Any, imprint: Callable[[str], bytes], evidence: Evidence, trust: Trust
+) -> tuple[dt.datetime | None, bool]:  # fmt: skip
+    """Time of a time stamp, where it fits what it is to be of, and whether somebody trusted made it."""
+    from pyhanko.sign.validation.generic_cms import validate_tst_signed_data
+
+    from cmm_uq.certificate.sign.chain import context
+
+    at = token["encap_content_info"]["content"].parsed["gen_time"].native
+    status = ran(validate_tst_signed_data(token, context(evidence, trust, at), imprint))
+    if not (status["intact"] and status["valid"]):
+        return None, False
+    return at, bool(status.get("trust_problem_indic") is None and status.get("validation_path") is not None)
+
+
+def _evidence(reader: PdfFileReader) -> Evidence:
+    """What the store of the document holds (ISO 32000-2, 12.8.4.3)."""
+    from asn1crypto import crl, ocsp
+    from pyhanko.sign.validation.dss import DocumentSecurityStore
+    from pyhanko.sign.validation.errors import NoDSSFoundError
+
+    from cmm_uq.certificate.sign.chain import Evidence
+
+    try:
+        store = DocumentSecurityStore.read_dss(reader)
+    except NoDSSFoundError:
+        return Evidence()
+    lists, answers = ([one.get_object().data for one in kept] for kept in (store.crls, store.ocsps))
+    return Evidence(
+        tuple(store.load_certs()), tuple(crl.CertificateList.load(one) for one in lists),
+        tuple(ocsp.OCSPResponse.load(one) for one in answers),
+    )  # fmt: skip
+
+
+def _level(file: _File, embedded: EmbeddedPdfSignature, stamped: dt.datetime | None, *, known: bool) -> str:
+    """B, T, LT or LTA (ETSI EN 319 142-1), as far as it holds."""
+    if stamped is None:
+        return "B"
+    if not known or not (file.evidence.revocations or file.evidence.answers):
+        return "T"
+    later = [one for one in file.embedded if one.sig_object.get("/Type") == "/DocTimeStamp"
+             and one.signed_revision > embedded.signed_revision]  # fmt: skip
+    archived = any(_stamp(one.signed_data, one.compute_digest, file.evidence, file.trust)[1] for one in later)
+    return "LTA" if archived else "LT"

@@ -237,7 +237,7 @@ def check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
 
 def check_schema(inquiry: Inquiry, given: Given, folder: Path) -> None:
     """Keep what the schema of PTB refuses."""
-    from cmm_uq.jobs.dcc.schema import checked_by_schema
+    from cmm_uq.jobs.dcc.xml_file import checked_by_schema
 
     if given.xml is None:
         raise CmmUqError("there is no digital certificate to be held to a schema", where="--schema", fix="Leave it out")

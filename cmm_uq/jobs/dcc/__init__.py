@@ -1,7 +1,6 @@
 """The digital calibration certificate (DCC) of PTB as typed data, read from XML and written as XML; knows no job."""
 
 from cmm_uq.jobs.dcc.certificate import Certificate
-from cmm_uq.jobs.dcc.schema import checked_by_schema
-from cmm_uq.jobs.dcc.xml_file import read, unread, written
+from cmm_uq.jobs.dcc.xml_file import checked_by_schema, read, unread, written
 
 __all__ = ["Certificate", "checked_by_schema", "read", "unread", "written"]

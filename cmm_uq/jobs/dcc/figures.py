@@ -1,4 +1,4 @@
-"""Every quantity of a DCC as figures: where it stands, its values, units and uncertainties, in whichever form it is given.
+"""Every quantity of a DCC as figures, in whichever form it is given, and what a DCC says, for a person and as plain data.
 
 A DCC may state the same thing in many ways: a value by itself, a list in one element or in many, an uncertainty expanded, as
 standard uncertainty or as an interval. Here all are one: a :class:`QuantityFigures` each, numbers as they are printed.
@@ -6,23 +6,14 @@ standard uncertainty or as an interval. Here all are one: a :class:`QuantityFigu
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from cmm_uq.jobs.dcc import quantities as si
-from cmm_uq.jobs.dcc.certificate import (
-    Certificate,
-    Characters,
-    Data,
-    DccQuantity,
-    Latex,
-    Measurement,
-    QuantityList,
-    Rich,
-    StatementMetadata,
-)
+from cmm_uq.base.units import UNITS
+from cmm_uq.jobs.dcc import certificate as dcc, quantities as si
+from cmm_uq.jobs.dcc.certificate import DccQuantity, Measurement, QuantityList, StatementMetadata
 
 Covariance = tuple[tuple[tuple[Decimal, ...], ...], str]  # of the values, row by row, and its unit
 
@@ -74,48 +65,37 @@ class QuantityFigures:
         return " / ".join(filter(None, (*self.place, self.name)))
 
 
-def figures(certificate: Certificate) -> tuple[QuantityFigures, ...]:
+def figures(certificate: dcc.Certificate) -> tuple[QuantityFigures, ...]:
     """Every quantity of the results, in the order of the certificate."""
-    return tuple(
-        quantity
-        for measurement in certificate.measurements
-        for result in measurement.results
-        for quantity in of_data(result.data, (str(measurement.name), str(result.name)))
-    )
+    results = ((str(measurement.name), one) for measurement in certificate.measurements for one in measurement.results)
+    return tuple(each for name, result in results for each in of_data(result.data, (name, str(result.name))))
 
 
-def of_data(data: Data, place: tuple[str, ...]) -> Iterator[QuantityFigures]:
+def of_data(data: dcc.Data, place: tuple[str, ...]) -> Iterator[QuantityFigures]:
     """Of a result or an influence condition."""
-    for part in data.parts:
-        if isinstance(part, DccQuantity | QuantityList):
-            yield from _of(part, place)
-        elif isinstance(part, Rich | Latex):
-            yield QuantityFigures(place, "", words=(_words(part),))
+    for where, part in _walk(data.parts, place):
+        if isinstance(part, DccQuantity):
+            for numbers in _numbers(part.value):
+                yield QuantityFigures(where, str(part.name or ""), part.ref_type, id=part.id, **numbers)
+        elif isinstance(part, dcc.Rich | dcc.Latex):
+            yield QuantityFigures(where, "", words=(_words(part),))
 
 
-def _of(part: DccQuantity | QuantityList, place: tuple[str, ...]) -> Iterator[QuantityFigures]:
-    name = str(part.name or "")
-    if isinstance(part, QuantityList):
-        for inner in part.parts:
-            yield from _of(inner, (*place, name) if name else place)
-    else:
-        for numbers in _numbers(part.value):
-            yield QuantityFigures(place, name, part.ref_type, id=part.id, **numbers)
+def _walk(parts: Iterable[object], place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], object]]:
+    """Parts in their order, each list before what it holds, with the names of the lists that they stand in."""
+    for part in parts:
+        yield place, part
+        if isinstance(part, QuantityList):
+            yield from _walk(part.parts, (*place, *filter(None, (str(part.name or ""),))))
 
 
 def statements(measurement: Measurement) -> Iterator[StatementMetadata]:
     """What is stated of a measurement, and of the lists and quantities of its results."""
     yield from measurement.metadata
     for result in measurement.results:
-        for part in result.data.parts:
+        for _, part in _walk(result.data.parts, ()):
             if isinstance(part, DccQuantity | QuantityList):
-                yield from _statements(part)
-
-
-def _statements(part: DccQuantity | QuantityList) -> Iterator[StatementMetadata]:
-    yield from part.metadata
-    for inner in part.parts if isinstance(part, QuantityList) else ():
-        yield from _statements(inner)
+                yield from part.metadata
 
 
 def _numbers(value: Any) -> Iterator[dict[str, Any]]:
@@ -129,13 +109,9 @@ def _numbers(value: Any) -> Iterator[dict[str, Any]]:
             yield {"values": (value.value,), "units": (value.unit or "",), "uncertainties": stated, "labels": labels}
         case si.RealList():
             count = len(value.values)
-            yield {
-                "values": value.values,
-                "units": _each(value.units, count, ""),
-                "labels": value.labels,
-                "uncertainties": _stated_of_list(value.uncertainty, count),
-                "covariance": _covariance(value.region),
-            }
+            each = _stated_of_list(value.uncertainty, count)
+            yield {"values": value.values, "units": _each(value.units, count, ""), "labels": value.labels,
+                   "uncertainties": each, "covariance": _covariance(value.region)}  # fmt: skip
         case si.Reals(values=reals):
             common = _stated(value.uncertainty and value.uncertainty.stated)
             yield {
@@ -148,7 +124,7 @@ def _numbers(value: Any) -> Iterator[dict[str, Any]]:
         case si.Lists():
             for inner in value.lists:
                 yield from _numbers(inner)
-        case Characters():
+        case dcc.Characters():
             yield {"words": value.words}
         case si.Complex() | si.Complexes():
             yield {"words": ("a complex quantity",)}
@@ -205,4 +181,210 @@ def _covariance(region: si.EllipsoidalRegion | None) -> Covariance | None:
 
 
 def _words(value: Any) -> str:
-    return value.latex or "" if isinstance(value, Latex) else str(value)
+    return value.latex or "" if isinstance(value, dcc.Latex) else str(value)
+
+
+_SYMBOLS = {unit.dsi: str.__str__(unit) for unit in UNITS.values()}
+Rows = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Results that belong together: a column a quantity, a row a value."""
+
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True)
+class CertificateView:
+    """A certificate for a person: particulars; title, rows and tables of each measurement."""
+
+    rows: Rows
+    parts: tuple[tuple[str, Rows, tuple[Grid, ...]], ...]
+
+
+def shown(certificate: dcc.Certificate) -> CertificateView:
+    return CertificateView(_particulars(certificate), tuple(map(_measured, certificate.measurements)))
+
+
+def unit_shown(dsi: str) -> str:
+    r"""A unit as printed: ``µm`` of ``\micro\metre``; in the notation of D-SI where it is not of the table."""
+    return "" if dsi == r"\one" else _SYMBOLS.get(dsi, dsi)
+
+
+def data(certificate: dcc.Certificate) -> dict[str, Any]:
+    """The same as plain data; numbers as text, with the digits that the certificate has."""
+    core, laboratory = certificate.administrative.core, certificate.administrative.laboratory
+    return {
+        "schema": "cmm-uq/dcc/1", "version": certificate.version, "number": core.identifier,
+        "issued": None if core.issued is None else core.issued.isoformat(),
+        "performed": [core.begin.isoformat(), core.end.isoformat()],
+        "laboratory": str(laboratory.contact.name), "customer": str(certificate.administrative.customer.name),
+        "particulars": [list(row) for row in _particulars(certificate)], "signed": bool(certificate.signatures),
+        "quantities": [_quantity(quantity) for quantity in figures(certificate)],
+        "statements": [
+            {"measurement": str(measurement.name), "rows": [list(row) for row in rows]}
+            for measurement in certificate.measurements if (rows := _conformity(measurement))
+        ],
+    }  # fmt: skip
+
+
+def _quantity(quantity: QuantityFigures) -> dict[str, Any]:
+    stated, covariance = quantity.uncertainties, None
+    if quantity.covariance is not None:
+        matrix, unit = quantity.covariance
+        covariance = {"matrix": [[str(value) for value in row] for row in matrix], "unit": unit}
+    return {
+        "place": list(quantity.place), "name": quantity.name, "ref_types": list(quantity.ref_types),
+        "words": list(quantity.words), "values": [str(value) for value in quantity.values], "units": list(quantity.units),
+        "U": [_text(one.expanded) or None for one in stated], "k": [_text(one.factor) or None for one in stated],
+        "p": [_text(one.probability) or None for one in stated],
+        "u": [None if one.u is None else float(one.u) for one in stated],
+        "interval": [None if one.low is None else [str(one.low), _text(one.high) or None] for one in stated],
+        "covariance": covariance,
+    }  # fmt: skip
+
+
+def _text(value: object | None) -> str:
+    return "" if value is None else str(value)
+
+
+def _joined(*parts: object | None, by: str = ", ") -> str:
+    """What there is of the parts."""
+    return by.join(filter(None, map(_text, parts)))
+
+
+def _rows(*rows: tuple[str, str]) -> Rows:
+    return tuple((label, text) for label, text in rows if text)
+
+
+def _particulars(certificate: dcc.Certificate) -> Rows:
+    administrative = certificate.administrative
+    core, signed = administrative.core, "none in the file"
+    if certificate.signatures:
+        signed = f"{len(certificate.signatures)} (not verified here)"
+    performed = _text(core.begin) if core.begin == core.end else f"{core.begin} to {core.end}"
+    return _rows(
+        ("Certificate", core.identifier), ("Schema", f"DCC {certificate.version}"),
+        ("Replaces", "" if core.replaced is None else f"{core.replaced.identifier} ({core.replaced.change})"),
+        ("Previous report", _hashed(core.previous)), ("Laboratory", _contact(administrative.laboratory.contact)),
+        ("Laboratory code", administrative.laboratory.code or ""), ("Customer", _contact(administrative.customer)),
+        *(("Item", _item(item)) for item in administrative.items.items), ("Received", _text(core.received)),
+        ("Calibrated", performed), ("Issued", _text(core.issued)), ("Place", core.location.place),
+        ("Languages", ", ".join(core.languages)),
+        *(("Responsible", _joined(person.person.name, person.role, by=" ")) for person in administrative.persons),
+        *(("Statement", _statement(statement)) for statement in administrative.statements),
+        ("Software", ", ".join(f"{program.name} {program.release}" for program in administrative.software)),
+        ("Signatures", signed),
+    )  # fmt: skip
+
+
+def _measured(measurement: Measurement) -> tuple[str, Rows, tuple[Grid, ...]]:
+    equipment = () if measurement.equipment is None else measurement.equipment.equipment
+    rows = _rows(
+        *(("Method", _joined(method.name, *method.norms, *method.references)) for method in measurement.methods),
+        *(("Equipment", _equipment(piece)) for piece in equipment),
+        *(("Condition", f"{each.name}: {_sentence(of_data(each.data, ()))}") for each in measurement.conditions),
+        *_conformity(measurement),
+    )
+    grids = tuple(_grid(str(result.name), [*of_data(result.data, ())]) for result in measurement.results)
+    return str(measurement.name), rows, grids
+
+
+def _grid(title: str, quantities: Sequence[QuantityFigures]) -> Grid:
+    """Lists side by side, one that has fewer values in the first rows only; quantities of one value each below each other."""
+    if len(quantities) > 1 and all(len(quantity.values) <= 1 for quantity in quantities):
+        return _below_each_other(title, quantities)
+    columns = [column for quantity in quantities for column in _columns(quantity)]
+    count = max((len(cells) for _, cells in columns), default=0)
+    rows = tuple(tuple(cells[i] if i < len(cells) else "" for _, cells in columns) for i in range(count))
+    return Grid(title, tuple(heading for heading, _ in columns), rows)
+
+
+def _below_each_other(title: str, quantities: Sequence[QuantityFigures]) -> Grid:
+    rows = [("Quantity", "Value", "Unit", "U", "k", "u", "Interval")]
+    for quantity in quantities:
+        for value, unit, stated in zip(quantity.values, quantity.units, quantity.uncertainties, strict=True):
+            U, k, u = _text(stated.expanded), _text(stated.factor), _text(stated.standard)
+            rows.append((quantity.shown, str(value), unit_shown(unit), U, k, u, _interval(stated)))
+        if not quantity.values:
+            rows.append((quantity.shown, " ".join(quantity.words), "", "", "", "", ""))
+    used = [i for i in range(len(rows[0])) if any(row[i] for row in rows[1:])]
+    head, *rest = (tuple(row[i] for i in used) for row in rows)
+    return Grid(title, head, tuple(rest))
+
+
+def _columns(quantity: QuantityFigures) -> list[tuple[str, list[str]]]:
+    """Of one quantity: labels, values, U with k, and u where it is given by itself."""
+    if not quantity.values:
+        return [(quantity.shown, list(quantity.words))]
+    unit, values = "", [str(value) for value in quantity.values]
+    if len(set(quantity.units)) != 1:
+        values = [f"{v} {unit_shown(own)}".rstrip() for v, own in zip(values, quantity.units, strict=True)]
+    elif quantity.units[0] and unit_shown(quantity.units[0]):
+        unit = f" / {unit_shown(quantity.units[0])}"
+    stated = quantity.uncertainties
+    further = [
+        (f"U{unit}", [_text(one.expanded) for one in stated]), ("k", [_text(one.factor) for one in stated]),
+        (f"u{unit}", [_text(one.standard) for one in stated]), (f"interval{unit}", [_interval(one) for one in stated]),
+    ]  # fmt: skip
+    labels = [(f"{quantity.shown}: label", list(quantity.labels))] if quantity.labels else []
+    return [*labels, (f"{quantity.shown}{unit}", values), *(column for column in further if any(column[1]))]
+
+
+def _interval(stated: ValueUncertainty) -> str:
+    return "" if stated.low is None else f"{stated.low} to {stated.high}"
+
+
+def _conformity(measurement: Measurement) -> Rows:
+    return _rows(*(("Statement", _statement(statement)) for statement in statements(measurement)))
+
+
+def _statement(statement: StatementMetadata) -> str:
+    decisions = (f"conformity: {word}" for word in (statement.conformity, *statement.conformity_list) if word)
+    return _joined(
+        *(statement.name, *statement.norms, *statement.references, statement.convention, *decisions),
+        *(statement.declaration, statement.description, statement.date, statement.period),
+        None if statement.data is None else _sentence(of_data(statement.data, ())),
+        by="; ",
+    )
+
+
+def _sentence(quantities: Iterable[QuantityFigures]) -> str:
+    """Each quantity with its name."""
+    return "; ".join(
+        _joined(one.name, ", ".join(_value(one, i) for i in range(len(one.values))), *one.words, by=" ")
+        for one in quantities
+    )
+
+
+def _value(quantity: QuantityFigures, i: int) -> str:
+    stated, unit = quantity.uncertainties[i], unit_shown(quantity.units[i])
+    U = "" if stated.expanded is None else f", U = {stated.expanded} (k = {stated.factor})"
+    return f"{quantity.values[i]} {unit}".rstrip() + U
+
+
+def _item(item: dcc.Item) -> str:
+    maker = item.manufacturer and item.manufacturer.name
+    return _joined(item.name, maker, item.model, *_identified(item.identifications))
+
+
+def _equipment(piece: dcc.Equipment) -> str:
+    certificate = piece.certificate and f"certificate {_hashed(piece.certificate)}"
+    return _joined(piece.name, piece.model, *_identified(piece.identifications), certificate)
+
+
+def _identified(identifications: Iterable[dcc.IdentificationNumber]) -> list[str]:
+    return [f"{_text(number.name) or number.issuer} {number.value}" for number in identifications]
+
+
+def _hashed(chain: dcc.Hash | None) -> str:
+    return "" if chain is None else f"{chain.referral_id} ({chain.procedure} {chain.value})"
+
+
+def _contact(contact: dcc.Contact) -> str:
+    place = contact.location
+    streets = (" ".join(pair) for pair in zip(place.street, place.street_number, strict=False))
+    return _joined(contact.name, *streets, " ".join((*place.post_code, *place.city)), *place.country)

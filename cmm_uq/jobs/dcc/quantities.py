@@ -32,9 +32,7 @@ class Expanded(_Si):  # expandedUncType
     distribution: str | None = None
 
 
-class Interval(_Si):
-    """Coverage interval, which need not be symmetric (``coverageIntervalType``)."""
-
+class Interval(_Si):  # Coverage interval, which need not be symmetric (``coverageIntervalType``)
     standard: Annotated[Decimal, Child("standardUnc", UNCERTAINTY)]
     low: Annotated[Decimal, Child("intervalMin")]
     high: Annotated[Decimal, Child("intervalMax")]
@@ -42,9 +40,7 @@ class Interval(_Si):
     distribution: str | None = None
 
 
-class StandardMU(_Si):
-    """Standard uncertainty; it and the other classes whose names end in MU are of D-SI 2.2."""
-
+class StandardMU(_Si):  # Standard uncertainty; it and the other classes whose names end in MU are of D-SI 2.2
     standard: Annotated[Decimal, Child("valueStandardMU", UNCERTAINTY)]
     distribution: str | None = None
 
@@ -60,15 +56,11 @@ class IntervalMU(Interval):
     standard: Annotated[Decimal, Child("valueStandardMU", UNCERTAINTY)]
 
 
-class Univariate(_Si):
-    """Uncertainty of one value (D-SI 2.2)."""
-
+class Univariate(_Si):  # Uncertainty of one value (D-SI 2.2)
     stated: Annotated[StandardMU | ExpandedMU | IntervalMU, Child(("standardMU", "expandedMU", "coverageIntervalMU"))]
 
 
-class Real(_Si):
-    r"""A value (``realQuantityType``); units in D-SI, ``\micro\metre``."""
-
+class Real(_Si):  # A value (``realQuantityType``); units in D-SI, ``\micro\metre``
     label: str | None = None
     value: Decimal
     unit: str
@@ -79,9 +71,7 @@ class Real(_Si):
     ] = None
 
 
-class Constant(_Si):
-    """A constant (``constantQuantityType``); its uncertainty is a standard uncertainty."""
-
+class Constant(_Si):  # A constant (``constantQuantityType``); its uncertainty is a standard uncertainty
     label: str | None = None
     value: Decimal
     unit: str
@@ -99,9 +89,7 @@ class CovarianceColumn(_Si):
     covariances: Annotated[tuple[CovarianceElement, ...], Child("covariance")]
 
 
-class EllipsoidalRegion(_Si):
-    """A region of several values together (``ellipsoidalRegionType``)."""
-
+class EllipsoidalRegion(_Si):  # A region of several values together (``ellipsoidalRegionType``)
     columns: Annotated[tuple[CovarianceColumn, ...], Child("column", within="covarianceMatrix")]
     factor: Factor
     probability: Probability
@@ -115,9 +103,7 @@ class RectangularRegion(EllipsoidalRegion):
 Region = Annotated[EllipsoidalRegion | RectangularRegion | None, Child(("ellipsoidalRegion", "rectangularRegion"))]
 
 
-class Complex(_Si):
-    """A complex value (``complexQuantityType``), by its parts or by magnitude and phase."""
-
+class Complex(_Si):  # A complex value (``complexQuantityType``), by its parts or by magnitude and phase
     label: str | None = None
     real: Annotated[Decimal | None, Child("valueReal")] = None
     imaginary: Annotated[Decimal | None, Child("valueImag")] = None
@@ -129,9 +115,7 @@ class Complex(_Si):
     region: Region = None
 
 
-class ExpandedList(_Si):
-    """Expanded uncertainties of a list: one a value, or one for all."""
-
+class ExpandedList(_Si):  # Expanded uncertainties of a list: one a value, or one for all
     uncertainties: Annotated[Decimals, Child("uncertaintyXMLList", UNCERTAINTY)]
     factors: Factors
     probabilities: Probabilities
@@ -158,15 +142,11 @@ class StandardListMU(_Si):
     distributions: Distributions = ()
 
 
-class UnivariateList(_Si):
-    """Uncertainties of the values of a list, each by itself (D-SI 2.2)."""
-
+class UnivariateList(_Si):  # Uncertainties of the values of a list, each by itself (D-SI 2.2)
     stated: Annotated[StandardListMU | ExpandedListMU, Child(("standardMUXMLList", "expandedMUXMLList"))]
 
 
-class RealList(_Si):
-    """Values with their units (``realListXMLListType``): a unit a value, or one for all."""
-
+class RealList(_Si):  # Values with their units (``realListXMLListType``): a unit a value, or one for all
     labels: Annotated[Strings, Child("labelXMLList")] = ()
     values: Annotated[Decimals, Child("valueXMLList")]
     units: Annotated[Strings, Child("unitXMLList")]
@@ -180,15 +160,11 @@ class RealList(_Si):
     ] = None
 
 
-class ListUncertainty(_Si):
-    """Uncertainty of every value of a list alike (``listUnivariateUncType``)."""
-
+class ListUncertainty(_Si):  # Uncertainty of every value of a list alike (``listUnivariateUncType``)
     stated: Annotated[Expanded | Interval, Child(("expandedUnc", "coverageInterval"))]
 
 
-class RealInList(_Si):
-    """A value in a list; its unit may be the list's."""
-
+class RealInList(_Si):  # A value in a list; its unit may be the list's
     label: str | None = None
     value: Decimal
     unit: str | None = None
@@ -196,9 +172,7 @@ class RealInList(_Si):
     uncertainty: Annotated[Expanded | Interval | None, Child(("expandedUnc", "coverageInterval"))] = None
 
 
-class Reals(_Si):
-    """Values one by one (``realListType``)."""
-
+class Reals(_Si):  # Values one by one (``realListType``)
     label: str | None = None
     time: Time = None
     unit: Annotated[str | None, Child("listUnit")] = None
@@ -207,15 +181,11 @@ class Reals(_Si):
     region: Region = None
 
 
-class Bivariate(_Si):
-    """Region of every value of a list alike (``listBivariateUncType``)."""
-
+class Bivariate(_Si):  # Region of every value of a list alike (``listBivariateUncType``)
     region: Region = None
 
 
-class Complexes(_Si):
-    """Complex values one by one (``complexListType``)."""
-
+class Complexes(_Si):  # Complex values one by one (``complexListType``)
     label: str | None = None
     time: Time = None
     unit: Annotated[str | None, Child("listUnit")] = None
@@ -225,17 +195,13 @@ class Complexes(_Si):
     region: Region = None
 
 
-class Lists(_Si):
-    """Lists of lists (``listType`` of D-SI)."""
-
+class Lists(_Si):  # Lists of lists (``listType`` of D-SI)
     label: str | None = None
     time: Time = None
     lists: Annotated[tuple[Reals | Complexes | Lists, ...], Child(("realList", "complexList", "list"))]
 
 
-class Hybrid(_Si):
-    """The same quantity in several units (``hybridType``); the first is that of the certificate."""
-
+class Hybrid(_Si):  # The same quantity in several units (``hybridType``); the first is that of the certificate
     values: Annotated[
         tuple[Real | Complex | Lists | Reals | RealList | Complexes | Constant, ...],
         Child(("real", "complex", "list", "realList", "realListXMLList", "complexList", "constant")),

@@ -10,7 +10,7 @@ import pytest
 
 from cmm_uq.jobs.dcc import Certificate, read, written
 from cmm_uq.jobs.dcc.certificate import DccQuantity, QuantityList, StatementMetadata, rich, words
-from cmm_uq.jobs.dcc.figures import QuantityFigures, figures, statements
+from cmm_uq.jobs.dcc.figures import QuantityFigures, data, figures, shown, statements, unit_shown
 from cmm_uq.jobs.dcc.quantities import (
     Constant,
     Expanded,
@@ -29,8 +29,7 @@ from cmm_uq.jobs.dcc.quantities import (
     Univariate,
     UnivariateList,
 )
-from cmm_uq.jobs.dcc.schema import checked_by_schema
-from cmm_uq.jobs.dcc.shown import data, shown, unit_shown
+from cmm_uq.jobs.dcc.xml_file import checked_by_schema
 from tests.conftest import ROOT
 from tests.jobs.dcc.artefacts import BALL_BAR, MM, PLATE, SPHERE, STEP_GAUGE, TRIANGLE, issued, value
 

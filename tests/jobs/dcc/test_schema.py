@@ -15,8 +15,8 @@ from cmm_uq.jobs.dcc import checked_by_schema, written
 from cmm_uq.jobs.dcc.certificate import Certificate
 from cmm_uq.jobs.dcc.fields import Attribute, Element, Field, ForeignElements, fields_of
 from cmm_uq.jobs.dcc.quantities import Complex
-from cmm_uq.jobs.dcc.schema import _schema
 from cmm_uq.jobs.dcc.tree import NAMESPACES
+from cmm_uq.jobs.dcc.xml_file import _schema
 from tests.jobs.dcc.certificates import certificate
 from tests.jobs.dcc.schemas import FOLDER, by_lxml
 

@@ -105,7 +105,7 @@ def read_certificate(file: Path, schema: Path | None = None) -> Certificate:
     content = content_of(file, DCC_BYTES, "Name a digital calibration certificate (.xml)")
     certificate = read(content, str(file))
     if schema is not None:
-        from cmm_uq.jobs.dcc.schema import checked_by_schema
+        from cmm_uq.jobs.dcc.xml_file import checked_by_schema
 
         checked_by_schema(content, schema, str(file))
     return certificate
