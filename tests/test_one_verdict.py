@@ -25,6 +25,7 @@ import typer
 
 from cmm_uq.analysis.conformity.decision import decide
 from cmm_uq.analysis.conformity.statement import Decided, Statement
+from cmm_uq.app.cli.options import Ending
 from cmm_uq.app.cli.summary import conclude
 from cmm_uq.app.commands.certificates.release import release
 from cmm_uq.app.commands.files import Written
@@ -203,7 +204,7 @@ def test_results_json_the_terminal_and_exit_codes(seed: int) -> None:
     ended = Written(outcome(seed), b"{}", {})
     code = 0
     try:
-        conclude(ended, json=False, quiet=True, strict=True, verbose=False)
+        conclude(ended, Ending(quiet=True), strict=True)
     except typer.Exit as exit_:
         code = exit_.exit_code
     assert code == (0 if of.overall in ("pass", "none") else 4)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cmm_uq.app.cli import options as opt, terminal
-from cmm_uq.app.cli.options import argument, examples, flag, option
-from cmm_uq.app.cli.terminal import progress, put, put_data, put_json, say
+from cmm_uq.app.cli.options import Ending, argument, examples, flag, option
+from cmm_uq.app.cli.terminal import put, put_data, put_json, say
 from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
@@ -30,24 +30,22 @@ def verify(
         None, "Certificates that you trust, PEM or DER: a file or a folder; again for more.", "FILE|DIR", "nobody"
     ),
     schema: Path | None = option(None, "Folder with PTB's schemas of the DCC, that the XML is held to.", "DIR", "none"),
-    quiet: bool = opt.QUIET,
-    verbose: bool = opt.VERBOSE,
-    json: bool = opt.JSON,
+    end: Ending = opt.END,
 ) -> None:
     """Compare the forms of a certificate with each other, its figures, decisions and inputs, and compute it again.
 
     Exit code 0 where it is verified, 1 where something is wrong, 3 where nothing is but not all could be checked, 2 where a
     file cannot be read.
     """
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
+    with end.progress() as stage:
         from cmm_uq.app.commands.certificates.verify import verify
 
         found = verify(files, rerun=rerun, trust=trust or None, schema=schema, stage=stage or (lambda what, part: None))
     inquiry = found.inquiry
-    if json:
+    if end.json:
         put_data({"schema": "cmm-uq/verification/1", "subject": found.subject, **inquiry.as_data()})
-    elif not quiet:
-        _show_verification(found, verbose=verbose)
+    elif not end.quiet:
+        _show_verification(found, verbose=end.verbose)
     if inquiry.findings:
         raise typer.Exit(terminal.NOT_VERIFIED)
     if inquiry.unchecked:
@@ -80,8 +78,7 @@ def sign(
     trust: list[Path] | None = opt.TRUSTED,
     out: Path | None = option(None, "Folder for signed copies.", "DIR", "signed where they are"),
     records: str | None = opt.RECORDS,
-    quiet: bool = opt.QUIET,
-    json: bool = opt.JSON,
+    end: Ending = opt.BRIEF,
 ) -> None:
     """Sign certificates, so that four eyes may look at them first: PDF by PAdES, XML by XAdES B-B.
 
@@ -91,13 +88,13 @@ def sign(
     from cmm_uq.app.commands.certificates.signing import sign_files
 
     done = sign_files(files, signing, out=out, records=records)
-    if json:
+    if end.json:
         put_data({
             "signer": signing.signer.name, "test_key": signing.signer.test_key, "at": signing.at.isoformat(),
             "level": "B-B" if signing.stamping is None else signing.stamping.level,
             "files": [str(path) for path in done.files], "records": done.records,
         })  # fmt: skip
-    elif not quiet:
+    elif not end.quiet:
         if done.records:
             say(printable(f"Recorded in {done.records}."))
         opt.show_signatures(signing, done.files)
@@ -113,8 +110,7 @@ def release(
     withdraw: bool = flag(False, "--withdraw", "Withdraw it instead."),
     replaced_by: str | None = option(None, "Released certificate that takes its place.", "CERTIFICATE", "none"),
     records: str | None = opt.RECORDS,
-    quiet: bool = opt.QUIET,
-    json: bool = opt.JSON,
+    end: Ending = opt.BRIEF,
 ) -> None:
     """Release a certificate: until then it is a draft. By two persons where [laboratory] four_eyes = true.
 
@@ -131,11 +127,11 @@ def release(
         if withdraw or replaced_by is not None:
             done = releases.withdraw(history, certificate, by=by, reason=reason, replaced_by=replaced_by)
         else:
-            ask = _ask_why if not (quiet or json) and terminal.can_answer() else None
+            ask = _ask_why if not end.silent and terminal.can_answer() else None
             done = releases.release(history, certificate, by=by, reason=reason, despite=despite, ask=ask)
         signatures = history.signatures(done.certificate.entry)
     now = done.certificate
-    if json:
+    if end.json:
         signed = [
             {"what": one.what, "by": one.by, "reason": one.reason, "at": one.at.isoformat()} for one in signatures
         ]
@@ -143,7 +139,7 @@ def release(
             "certificate": now.number, "job": now.job, "entry": now.entry, "state": now.state, "waiting": done.waiting,
             "signatures": signed,
         })  # fmt: skip
-    elif not quiet:
+    elif not end.quiet:
         waits = f"; {done.waiting} more must sign" if done.waiting else ""
         say(printable(f"{now.number} of {now.day} ({now.machine}): {now.state}{waits}"))
 
@@ -162,9 +158,7 @@ def affected(
     only_list: bool = flag(False, "--list", "Only list them; compute nothing again."),
     write: Path | None = option(None, "Folder for a draft in place of each that changed.", "DIR", "none"),
     records: str | None = opt.RECORDS,
-    quiet: bool = opt.QUIET,
-    verbose: bool = opt.VERBOSE,
-    json: bool = opt.JSON,
+    end: Ending = opt.END,
 ) -> None:
     """Find the certificates that corrections touch, compute them again from the inputs in their PDF, compare figure by figure.
 
@@ -172,7 +166,7 @@ def affected(
     """
     if only_list and write is not None:
         raise CmmUqError("nothing is written of what is only listed", where="--list", fix="Leave out --list or --write")
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
+    with end.progress() as stage:
         from cmm_uq import __version__
         from cmm_uq.app.commands.certificates.affected import affected_certificates
         from cmm_uq.app.commands.files import silent
@@ -183,9 +177,9 @@ def affected(
             certificates = list(affected_certificates(
                 history, version, last, recompute=not only_list, out=write, where=str(history.place), stage=stage or silent
             ))  # fmt: skip
-    if json:
+    if end.json:
         put_data({"from": version, "to": last, "certificates": [_affected_data(one) for one in certificates]})
-    elif not quiet:
+    elif not end.quiet:
         for one in certificates:
             _show_affected(one)
         count = len(certificates)
@@ -241,8 +235,7 @@ def read(
     schema: Path | None = option(
         None, "Folder with the schemas of DCC and D-SI (.xsd), to check the files by as well.", "DIR", "own checks"
     ),
-    quiet: bool = opt.QUIET,
-    json: bool = opt.JSON,
+    end: Ending = opt.BRIEF,
 ) -> None:
     """Print digital calibration certificates (DCC). Exit code 2 for a file that is none.
 
@@ -252,10 +245,10 @@ def read(
     from cmm_uq.jobs.dcc.figures import data, shown
 
     certificates = [(file, read_certificate(file, schema)) for file in files]
-    if json:
+    if end.json:
         rows = [{"file": str(file), **data(one)} for file, one in certificates]
         put_data({"schema": "cmm-uq/read/1", "certificates": rows})
-    elif not quiet:
+    elif not end.quiet:
         for file, one in certificates:
             put(_certificate_text(str(file), shown(one)))
 
@@ -303,12 +296,11 @@ keys = opt.group(
 )
 
 
-@keys.command("new", epilog=examples("keys new test.p12 --name 'Calibration laboratory'"))
+@opt.command(keys, "new", "keys new test.p12 --name 'Calibration laboratory'")
 def new_key(
     file: Path = argument(..., "PKCS#12 file to be made.", "FILE"),
     name: str = option("cmm-uq", "Of whom it is for.", "NAME"),
-    quiet: bool = opt.QUIET,
-    json: bool = opt.JSON,
+    end: Ending = opt.BRIEF,
 ) -> None:
     """Make a test key with its certificate, FILE for signing and FILE.pem for whoever is to trust it.
 
@@ -319,11 +311,11 @@ def new_key(
     from cmm_uq.certificate.sign import TEST_NOTE
 
     made = new_test_key(file, name, lambda question: opt.ask_secret(question, twice=True))
-    if json:
-        put_data({"key": str(made.key), "certificate": str(made.certificate), "test_key": True})
-    elif not quiet:
-        say(printable(f"{made.key} signs until {made.until}; {made.certificate} is for whoever is to trust it."))
-        say(f"TEST KEY: whatever it signs says: {TEST_NOTE}")
+    end.put(
+        {"key": str(made.key), "certificate": str(made.certificate), "test_key": True},
+        f"{made.key} signs until {made.until}; {made.certificate} is for whoever is to trust it.",
+        f"TEST KEY: whatever it signs says: {TEST_NOTE}",
+    )
 
 
 def standards(

@@ -11,7 +11,7 @@ from typing import Any
 import typer
 
 from cmm_uq.app.cli import certificates, evaluations, instruments, jobs, laboratory, records
-from cmm_uq.app.cli.options import examples, flag
+from cmm_uq.app.cli.options import examples, flag, with_ending
 from cmm_uq.app.cli.terminal import BAD_INPUT, say
 from cmm_uq.base.errors import CmmUqError
 
@@ -152,7 +152,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, str]] = {
 """By name: the function, what the list of commands says of it, and calls as they are typed."""
 
 for name, (function, short, epilog) in COMMANDS.items():
-    app.command(name, short_help=short, epilog=epilog)(function)
+    app.command(name, short_help=short, epilog=epilog)(with_ending(function))
 for name, group, short in (
     ("instruments", instruments.app, "Instruments: ready profiles, tried at a port, new ones."),
     ("schedule", records.schedule_app, "Scheduled runs: what they go by, whom they tell, what starts them."),

@@ -12,9 +12,9 @@ import typer
 
 from cmm_uq.app.cli import options as opt
 from cmm_uq.app.cli.jobs import show_imported
-from cmm_uq.app.cli.options import argument, flag, job_folder, option
+from cmm_uq.app.cli.options import Ending, argument, flag, job_folder, option
 from cmm_uq.app.cli.summary import conclude, screen_layout, show_summary
-from cmm_uq.app.cli.terminal import NOT_CONFORMING, progress, put_data, put_json, say, show
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, put_data, put_json, say, show
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import ENGLISH, Code
 
@@ -32,9 +32,7 @@ def report(
     seed: int = opt.seed(),
     force: bool = opt.FORCE,
     strict: bool = opt.STRICT,
-    quiet: bool = opt.QUIET,
-    verbose: bool = opt.VERBOSE,
-    json: bool = opt.JSON,
+    end: Ending = opt.END,
     language: Code | None = opt.LANGUAGE,
     records: str | None = opt.RECORDS,
     sign: str | None = opt.SIGN,
@@ -51,7 +49,7 @@ def report(
     dry_run: bool = flag(False, "--dry-run", "With --scheduled: say what would happen, and do nothing."),
 ) -> None:
     """Estimate, decide, and write certificate.html, certificate.pdf, certificate.xml and results.json."""
-    alone = {"--force": force, "--strict": strict, "--verbose": verbose, "--language": language, "--sign": sign}
+    alone = {"--force": force, "--strict": strict, "--verbose": end.verbose, "--language": language, "--sign": sign}
     many = {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run}
     for name, value in (alone if scheduled else many).items():
         if value:
@@ -62,22 +60,22 @@ def report(
         from cmm_uq.app.commands.laboratory.schedule import ScheduledOptions
 
         options = ScheduledOptions(tuple(job), out, schedule, records, seed or None, dry_run)
-        raise typer.Exit(run(options, None if quiet and lines is None else lines or STANDARD_OUTPUT))
+        raise typer.Exit(run(options, None if end.quiet and lines is None else lines or STANDARD_OUTPUT))
     if len(job) > 1:
         raise CmmUqError(f"{len(job)} jobs are named, and a report is of one", where=str(job[1]),
                          fix="Report them one after the other, or with --scheduled")  # fmt: skip
     signing = None if sign is None else opt.open_key(sign, time_server, level, trust)
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
+    with end.progress() as stage:
         from cmm_uq.app.commands.report import write_report
 
         written = write_report(
-            job[0], out, seed=seed, force=force, stage=stage, told=None if quiet or json else show_imported,
+            job[0], out, seed=seed, force=force, stage=stage, told=None if end.silent else show_imported,
             records=records, language=language, signing=signing,
         )  # fmt: skip
     try:
-        conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
+        conclude(written, end, strict=strict)
     finally:
-        if signing is not None and not (quiet or json):
+        if signing is not None and not end.silent:
             opt.show_signatures(signing, [path for path in written.files.values() if path.suffix in (".pdf", ".xml")])
 
 
@@ -91,22 +89,20 @@ def diagnose(
     ),
     force: bool = opt.FORCE,
     strict: bool = opt.STRICT,
-    quiet: bool = opt.QUIET,
-    verbose: bool = opt.VERBOSE,
-    json: bool = opt.JSON,
+    end: Ending = opt.END,
     language: Code | None = opt.LANGUAGE,
     records: str | None = opt.RECORDS,
 ) -> None:
     """Locate a mismatch, name the physics that was left out, and show what modelling it improves."""
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
+    with end.progress() as stage:
         from cmm_uq.app.commands.diagnose import write_diagnosis
 
-        told = None if quiet or json else show_imported
+        told = None if end.silent else show_imported
         written = write_diagnosis(
             job, out, seed=seed, alpha=alpha, against=against, force=force, stage=stage, told=told, language=language,
             records=records,
         )  # fmt: skip
-    conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
+    conclude(written, end, strict=strict)
 
 
 def plan(
@@ -118,17 +114,15 @@ def plan(
     seed: int = option(0, "Seed of the recordings drawn for that.", "N", min=0),
     force: bool = opt.FORCE,
     strict: bool = opt.STRICT,
-    quiet: bool = opt.QUIET,
-    verbose: bool = opt.VERBOSE,
-    json: bool = opt.JSON,
+    end: Ending = opt.END,
     language: Code | None = opt.LANGUAGE,
 ) -> None:
     """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
+    with end.progress() as stage:
         from cmm_uq.app.commands.plans.plan import write_plan
 
         written = write_plan(job, out, power=power, seed=seed, force=force, stage=stage, language=language)
-    conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
+    conclude(written, end, strict=strict)
 
 
 def prove(
@@ -142,9 +136,7 @@ def prove(
     alpha: float = option(0.01, "Rate of false alarms that the diagnosis is asked for.", "P"),
     force: bool = opt.FORCE,
     strict: bool = flag(False, "--strict", "Exit code 4 where the cases show that an acceptance figure is missed."),
-    quiet: bool = opt.QUIET,
-    verbose: bool = opt.VERBOSE,
-    json: bool = opt.JSON,
+    end: Ending = opt.END,
     language: Code | None = opt.LANGUAGE,
 ) -> None:
     """Draw cases with known truth on a job's set-ups, diagnose them, and write what a laboratory files as validation."""
@@ -154,14 +146,14 @@ def prove(
         say(f"Truth sealed: sha256 {sha256}")
         sys.stdout.flush()
 
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
+    with end.progress() as stage:
         from cmm_uq.app.commands.prove import ProofOptions, write_proof
         from cmm_uq.laboratory.schedule.processes import processes
 
         options = ProofOptions(cases, processes() if workers is None else workers, seed, alpha)
-        tell = None if quiet or json else sealed
+        tell = None if end.silent else sealed
         written = write_proof(job, options, out, force=force, stage=stage, sealed=tell, language=language)
-    conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
+    conclude(written, end, strict=strict)
 
 
 def part(
@@ -181,20 +173,18 @@ def part(
         "WHERE", "none"),
     force: bool = opt.FORCE,
     strict: bool = flag(False, "--strict", "Exit code 4 unless every characteristic conforms."),
-    quiet: bool = opt.QUIET,
-    verbose: bool = opt.VERBOSE,
-    json: bool = opt.JSON,
+    end: Ending = opt.END,
     language: Code | None = opt.LANGUAGE,
 ) -> None:  # fmt: skip
     """Verify the machine's certificate, measure the part virtually, and write part.html, part.pdf and results.json."""
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
+    with end.progress() as stage:
         from cmm_uq.app.commands.files import silent
         from cmm_uq.app.commands.parts.documents import write_part
         from cmm_uq.app.commands.parts.part import PartOptions
 
         options = PartOptions(seed, trials, digits, rerun, None if trust is None else tuple(trust), records)
         written = write_part(job, out, options=options, force=force, stage=stage or silent, language=language)
-    conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
+    conclude(written, end, strict=strict)
 
 
 def budget(
@@ -205,21 +195,19 @@ def budget(
     seed: int | None = option(None, "Seed of the Monte Carlo.", "N", "the file's", min=0),
     force: bool = opt.FORCE,
     strict: bool = flag(False, "--strict", "Exit code 4 unless Monte Carlo is stable to the digits asked for."),
-    quiet: bool = opt.QUIET,
-    verbose: bool = opt.VERBOSE,
-    json: bool = opt.JSON,
+    end: Ending = opt.END,
     language: Code | None = opt.LANGUAGE,
 ) -> None:
     """Propagate uncertainty by the GUM and by Monte Carlo, and write budget.html, budget.pdf and results.json."""
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
+    with end.progress() as stage:
         from cmm_uq.app.commands.budget import write_budget
         from cmm_uq.app.commands.files import silent
 
         written = write_budget(file, out, seed=seed, force=force, stage=stage or silent, language=language or ENGLISH)
-    if json:
+    if end.json:
         put_json(written.results.decode())
-    elif not quiet:
-        show_summary(_budget_summary(written.evaluation), written.files, verbose=verbose, name=file.name)
+    elif not end.quiet:
+        show_summary(_budget_summary(written.evaluation), written.files, verbose=end.verbose, name=file.name)
     if strict and not written.evaluation.stable:
         raise typer.Exit(NOT_CONFORMING)
 

@@ -44,7 +44,7 @@ def _alone(context: typer.Context) -> None:
         list_all(json=False)
 
 
-@app.command("list", epilog=examples("instruments list", "instruments list --json"))
+@opt.command(app, "list", "instruments list", "instruments list --json")
 def list_all(json: bool = opt.JSON) -> None:
     """List the ready profiles and the serial ports of this computer."""
     from cmm_uq.app.commands.laboratory.instruments import ready_profiles
@@ -65,9 +65,7 @@ def list_all(json: bool = opt.JSON) -> None:
         say("No serial port is here.")
 
 
-@app.command(
-    "test", epilog=examples("instruments test fluke-1502a /dev/ttyUSB0", "instruments test table_top --job my-job")
-)
+@opt.command(app, "test", "instruments test fluke-1502a /dev/ttyUSB0", "instruments test table_top --job my-job")
 def try_out(
     profile: str = PROFILE,
     port: str = PORT,
@@ -99,7 +97,7 @@ def try_out(
     say(f"{trial.messages} messages, {trial.with_values} with values, {trial.wrong} with something wrong")
 
 
-@app.command("watch", epilog=examples("instruments watch line-logger socket://logger:4001"))
+@opt.command(app, "watch", "instruments watch line-logger socket://logger:4001")
 def watch(profile: str = PROFILE, port: str = PORT, job: Path | None = JOB, seconds: float | None = SECONDS) -> None:
     """Show each message beside what is understood of it, gaps and returns too, until it is interrupted."""
     from cmm_uq.app.commands.laboratory.instruments import Attempt
@@ -117,12 +115,11 @@ class Parity(StrEnum):
     NONE, EVEN, ODD = "none", "even", "odd"
 
 
-@app.command(
+@opt.command(
+    app,
     "new",
-    epilog=examples(
-        "instruments new my-gauge.toml",
-        "instruments new my-gauge.toml --line 'T=20.13 C<CR><LF>' --quantity temp_c=1 --ask 'T?<CR>'",
-    ),
+    "instruments new my-gauge.toml",
+    "instruments new my-gauge.toml --line 'T=20.13 C<CR><LF>' --quantity temp_c=1 --ask 'T?<CR>'",
 )
 def new(
     file: Path = argument(..., "New file: NAME.toml.", "FILE"),
@@ -155,7 +152,7 @@ def new(
     say(f"Try it: cmm-uq instruments test {file} PORT")
 
 
-@app.command("simulate", epilog=examples("instruments simulate fluke-1502a", "instruments simulate ipp"))
+@opt.command(app, "simulate", "instruments simulate fluke-1502a", "instruments simulate ipp")
 def simulate(
     profile: str = argument(..., "Ready profile.", "PROFILE", autocompletion=opt.profiles),
     way: str = option("", "pty (a port of this computer), socket or rfc2217.", "WAY", "pty"),

@@ -12,9 +12,9 @@ import typer
 
 from cmm_uq.app.cli import options as opt
 from cmm_uq.app.cli.asking import job_answers, part_answers, value_of
-from cmm_uq.app.cli.options import argument, flag, job_folder, option
+from cmm_uq.app.cli.options import Ending, argument, flag, job_folder, option
 from cmm_uq.app.cli.summary import conclude_derived, put_manifest, screen_layout
-from cmm_uq.app.cli.terminal import BAD_INPUT, can_answer, progress, put, put_data, say, show
+from cmm_uq.app.cli.terminal import BAD_INPUT, can_answer, put, put_data, say, show
 from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
@@ -49,8 +49,7 @@ def new(
               "a part from a QIF plan or a DMIS program.", "FILE", "simulated readings", "--from"),
     column: list[str] | None = COLUMN,
     key: list[str] | None = KEY,
-    quiet: bool = opt.QUIET,
-    json: bool = opt.JSON,
+    end: Ending = opt.BRIEF,
 ) -> None:  # fmt: skip
     """Begin a job: job.toml with every key explained, and a simulated recording to be replaced by your own.
 
@@ -62,12 +61,12 @@ def new(
     from cmm_uq.app.commands.parts.new import PART
 
     if not kind:
-        if json:
+        if end.json:
             put_data({"kinds": titles()})
         else:
             put("".join(f"{name}  {title}\n" for name, title in titles().items()))
         return
-    target, silent = folder or Path(kind), quiet or json
+    target, silent = folder or Path(kind), end.silent
     check_empty(target)
     if kind == PART and (column or key):
         raise CmmUqError(
@@ -87,9 +86,9 @@ def new(
             tables = job_answers(kind)
         answers = part_answers() if kind == PART and not (export or tables or silent) and can_answer() else None
         files = write_new(kind, target, tables, drawing=export, answers=answers)
-    if json:
+    if end.json:
         put_manifest(files)
-    elif not quiet:
+    elif not end.quiet:
         say(f"{target}: {', '.join(name for name in files if '/' not in name and name != 'manifest.json')}")
         if export is None or kind == PART:
             say(f"What to do next: {target / 'README.md'}. What is missing or wrong: cmm-uq check {target}")
@@ -172,8 +171,7 @@ def show_imported(job: Job) -> None:
 def check(
     jobs: list[Path] = argument(..., "Job folders.", "JOB...", autocompletion=opt.job_folders),
     clauses: bool = flag(False, "--clauses", "Every clause of ISO/IEC 17025:2017, 7.8, and what of it is stated."),
-    quiet: bool = opt.QUIET,
-    json: bool = opt.JSON,
+    end: Ending = opt.BRIEF,
 ) -> None:
     """Say all that is wrong with each job at once: file, line, key, fix. Exit code 2 when something would stop report.
 
@@ -182,9 +180,9 @@ def check(
     from cmm_uq.app.commands.jobs.check import check_job
 
     checks = [check_job(job) for job in jobs]
-    if json:
+    if end.json:
         put_data({"schema": "cmm-uq/check/1", "jobs": [each.as_data() for each in checks]})
-    elif not quiet:
+    elif not end.quiet:
         for each in checks:
             show(screen_layout(verbose=True).screen(_check_summary(each)))
             if clauses:
@@ -230,15 +228,13 @@ def simulate(
     out: Path = option(..., "Folder for the simulated job.", "DIR"),
     seed: int | None = option(None, "Seed of everything random.", "N", "the truth's", min=0),
     force: bool = opt.FORCE,
-    quiet: bool = opt.QUIET,
-    verbose: bool = opt.VERBOSE,
-    json: bool = opt.JSON,
+    end: Ending = opt.END,
 ) -> None:
     """Draw a recording from the same model that report fits, as a job folder of its own."""
     from cmm_uq.app.commands.jobs.simulate import write_simulation
 
     files = write_simulation(job, truth, out, seed=seed, force=force)
-    conclude_derived(files, f"A recording of {job}, drawn from {truth}", json=json, quiet=quiet, verbose=verbose)
+    conclude_derived(files, f"A recording of {job}, drawn from {truth}", end)
 
 
 def compensate(
@@ -251,9 +247,7 @@ def compensate(
         None, "Cloud of a digitizer to correct instead: .csv, .parquet, .npy or a folder of them.", "FILE",
         "the job's recording"),
     force: bool = opt.FORCE,
-    quiet: bool = opt.QUIET,
-    verbose: bool = opt.VERBOSE,
-    json: bool = opt.JSON,
+    end: Ending = opt.END,
 ) -> None:  # fmt: skip
     """Correct a recording by its machine's error maps, as a job folder of its own."""
     from cmm_uq.app.commands.jobs.compensate import write_compensated, write_compensated_cloud
@@ -265,8 +259,8 @@ def compensate(
     elif map_text is not None:
         raise CmmUqError("--map-text goes with a recording, not with --cloud", fix="Leave out one of them")
     else:
-        with progress(quiet=quiet or json, verbose=verbose) as stage:
+        with end.progress() as stage:
             part = None if stage is None else partial(stage, f"Compensating {cloud.name}")
             files = write_compensated_cloud(job, cloud, out, beyond=beyond, force=force, progress=part)
     what = f"{'The recording' if cloud is None else cloud.name} of {job}, compensated by its error maps"
-    conclude_derived(files, what, json=json, quiet=quiet, verbose=verbose, is_job=cloud is None)
+    conclude_derived(files, what, end, is_job=cloud is None)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import typer
 
 from cmm_uq.app.cli import options as opt
-from cmm_uq.app.cli.options import argument, flag, option
+from cmm_uq.app.cli.options import Ending, argument, flag, option
 from cmm_uq.app.cli.summary import COLOURS, HEADING, folder_of, screen_layout, show_summary
-from cmm_uq.app.cli.terminal import BAD_INPUT, NOT_CONFORMING, Line, progress, put_data, say_now, show
+from cmm_uq.app.cli.terminal import BAD_INPUT, NOT_CONFORMING, Line, put_data, say_now, show
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output.interruption import keeping
 
@@ -72,21 +72,19 @@ def batch(
     seed: int = opt.seed(),
     force: bool = opt.FORCE,
     strict: bool = opt.STRICT,
-    quiet: bool = opt.QUIET,
-    verbose: bool = opt.VERBOSE,
-    json: bool = opt.JSON,
+    end: Ending = opt.END,
     records: str | None = opt.RECORDS,
 ) -> None:
     """Write the report of every job as `report` does; one that fails never stops the others. Exit code 2 when one failed."""
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
+    with end.progress() as stage:
         from cmm_uq.app.commands.laboratory.batch import BatchOptions, write_batch
 
         options = BatchOptions(workers, scheduler, results_only, seed, resume, force, time_limit, tries)
         done = write_batch(folders, out, options, parquet=parquet, stage=stage, records=records)
-    if json:
+    if end.json:
         put_data(done.as_data())
-    elif not quiet:
-        show(screen_layout(verbose=verbose).screen(_batch_summary(done, verbose=verbose)))
+    elif not end.quiet:
+        show(screen_layout(verbose=end.verbose).screen(_batch_summary(done, verbose=end.verbose)))
     if done.failed:
         raise typer.Exit(BAD_INPUT)
     if strict and done.not_conforming:
@@ -137,17 +135,16 @@ def due(
     out: Path | None = option(None, "Folder for due.html and due.json.", "DIR", "none"),
     force: bool = opt.FORCE,
     strict: bool = flag(False, "--strict", "Exit code 4 where anything is overdue."),
-    quiet: bool = opt.QUIET,
-    json: bool = opt.JSON,
+    end: Ending = opt.BRIEF,
 ) -> None:
     """Say which machines and artefacts are due for calibration, when, and why."""
     from cmm_uq.app.commands.laboratory.due import what_is_due, write_due
 
     found = what_is_due(records, machines or (), on=opt.day_of(on), within=opt.time_of(within), fleet=fleet)
     files = {} if out is None else write_due(found, out, force=force)
-    if json:
+    if end.json:
         put_data(found.data())
-    elif not quiet:
+    elif not end.quiet:
         from cmm_uq.certificate.pages.due import counts, due_row
 
         text, standing = counts(found.items, found.on, found.within)
@@ -167,22 +164,19 @@ def fleet(
     seed: int = opt.seed(1),
     force: bool = opt.FORCE,
     strict: bool = flag(False, "--strict", "Exit code 4 where a machine does not belong."),
-    quiet: bool = opt.QUIET,
-    verbose: bool = opt.VERBOSE,
-    json: bool = opt.JSON,
+    end: Ending = opt.END,
 ) -> None:
     """Learn from all machines of the records what drift is usual for models and places, and which do not belong."""
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
-        from cmm_uq.app.commands.files import silent
+    with end.progress() as stage:
         from cmm_uq.app.commands.laboratory.due import fleet, write_fleet
         from cmm_uq.certificate.pages.fleet_summary import fleet_data, fleet_summary
 
-        found = fleet(records, name or (), seed=seed, stage=stage or silent)
+        found = fleet(records, name or (), seed=seed, stage=stage)
         files = {} if out is None else write_fleet(found, out, force=force)
-    if json:
+    if end.json:
         put_data(fleet_data(found))
-    elif not quiet:
-        show_summary(fleet_summary(found), files, verbose=verbose)
+    elif not end.quiet:
+        show_summary(fleet_summary(found), files, verbose=end.verbose)
     if strict and found.outsiders:
         raise typer.Exit(NOT_CONFORMING)
 
@@ -194,9 +188,7 @@ def history(
     fleet: Path | None = opt.FLEET,
     out: Path | None = option(None, "Folder for history.html, with pictures, and history.json.", "DIR", "none"),
     force: bool = opt.FORCE,
-    quiet: bool = opt.QUIET,
-    verbose: bool = opt.VERBOSE,
-    json: bool = opt.JSON,
+    end: Ending = opt.END,
 ) -> None:
     """Say how every error factor and figure of a machine has gone, what changed last, and when a limit will be crossed."""
     from cmm_uq.app.commands.laboratory.due import history_of, write_history
@@ -204,16 +196,16 @@ def history(
 
     found = history_of(machine, records, on=opt.day_of(on), fleet=fleet)
     files = {} if out is None else write_history(found, out, force=force)
-    if json:
+    if end.json:
         put_data(history_data(found))
-    elif not quiet:
+    elif not end.quiet:
         serial = "" if found.machine.by_name else f", serial number {found.machine.serial}"
         count = len(found.certificates)
         recordings = "one recording" if count == 1 else f"{count} recordings"
         head = ((f"{found.machine.name}{serial}", HEADING), (f": {recordings} up to {found.on.isoformat()}", ""))
         notes: list[Line] = [((terminal_note(found), ""),)] if found.values else []
         notes += [((text, COLOURS["open"]),) for text in found.remarks]
-        _show_table(head, [summary_row(found, one) for one in found.values], notes, files, verbose=verbose)
+        _show_table(head, [summary_row(found, one) for one in found.values], notes, files, verbose=end.verbose)
 
 
 def _show_table(

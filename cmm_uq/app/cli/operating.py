@@ -15,8 +15,8 @@ from cmm_uq.base.output.interruption import speaking
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from cmm_uq.app.commands.laboratory.acquire import Acquisition
     from cmm_uq.base.messages import Text
+    from cmm_uq.laboratory.live.running import Acquisition
     from cmm_uq.laboratory.live.screen import SessionView as View
 
 PROMPT = "> "

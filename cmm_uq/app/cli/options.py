@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import datetime as dt
+import inspect
 import os
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 
-from cmm_uq.app.cli.terminal import on_terminal, say
+from cmm_uq.app.cli.terminal import on_terminal, progress, put_data, say
 from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.signing import Signing
+    from cmm_uq.app.commands.files import Stage
 
 JOB_FILE = "job.toml"
 DEEP = 3  # folders below the one that is typed
@@ -102,6 +106,63 @@ def of_environment(text: str, metavar: str, name: str, variable: str, shown: str
 
 def seed(default: int = 0) -> Any:
     return option(default, "Seed of everything random; the same seed gives the same bytes.", "N", min=0)
+
+
+class Ending(NamedTuple):
+    """How a command ends: with nothing but errors, with everything whole, or with one JSON object."""
+
+    quiet: bool = False
+    verbose: bool = False
+    json: bool = False
+
+    @property
+    def silent(self) -> bool:
+        return self.quiet or self.json
+
+    def progress(self) -> AbstractContextManager[Stage | None]:
+        return progress(quiet=self.silent, verbose=self.verbose)
+
+    def put(self, data: Mapping[str, Any], *lines: str) -> None:
+        """The data where JSON is asked for, else the lines."""
+        if self.json:
+            put_data(data)
+        for line in () if self.silent else lines:
+            say(printable(line))
+
+
+END: Any = ("quiet", "verbose", "json")  # options of a command's end
+BRIEF: Any = ("quiet", "json")
+
+
+def with_ending(function: Callable[..., None]) -> Callable[..., None]:
+    """A command with the options of its ``end`` spelt out in its place."""
+    signature = inspect.signature(function, eval_str=True)
+    if "end" not in signature.parameters:
+        return function
+    options = {"quiet": QUIET, "verbose": VERBOSE, "json": JSON}
+    names = signature.parameters["end"].default
+
+    @wraps(function)
+    def called(**given: Any) -> None:
+        end = Ending(**{name: given.pop(name) for name in names})
+        function(**given, end=end)
+
+    parameters: list[inspect.Parameter] = []
+    for one in signature.parameters.values():
+        spelt = [one.replace(name=name, default=options[name], annotation=bool) for name in names]
+        parameters += spelt if one.name == "end" else [one]
+    called.__dict__["__signature__"] = signature.replace(parameters=parameters)
+    return called
+
+
+def command(app: typer.Typer, name: str, *calls: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Of a group of commands, with calls of it as they are typed."""
+
+    def add(function: Callable[..., None]) -> Callable[..., None]:
+        app.command(name, epilog=examples(*calls))(with_ending(function))
+        return function
+
+    return add
 
 
 def group(text: str, epilog: str) -> typer.Typer:

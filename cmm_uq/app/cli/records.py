@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from cmm_uq.app.cli import options as opt
-from cmm_uq.app.cli.options import argument, examples, flag, option
+from cmm_uq.app.cli.options import Ending, argument, examples, flag, option
 from cmm_uq.app.cli.terminal import NEEDS_A_PERSON, NOT_CONFORMING, closed, put, put_data, put_json, say
 from cmm_uq.base.errors import CmmUqError, OutputError, printable
 
@@ -32,7 +32,7 @@ def _entries(count: int) -> str:
     return "1 entry" if count == 1 else f"{count} entries"
 
 
-@app.command("verify", epilog=examples("records verify", "records verify --head 5f2c… --no-files"))
+@opt.command(app, "verify", "records verify", "records verify --head 5f2c… --no-files")
 def verify(
     records: str | None = opt.RECORDS,
     head: str | None = option(None, "Hash that records head printed, filed elsewhere.", "HASH", "none", "--head"),
@@ -64,7 +64,7 @@ def verify(
         raise typer.Exit(NOT_CONFORMING)
 
 
-@app.command("head", epilog=examples("records head"))
+@opt.command(app, "head", "records head")
 def head(records: str | None = opt.RECORDS, json: bool = opt.JSON) -> None:
     """Print number and hash of the last entry, to be filed elsewhere: on paper, in a mail, on another machine."""
     from cmm_uq.laboratory.records import open_records
@@ -77,12 +77,11 @@ def head(records: str | None = opt.RECORDS, json: bool = opt.JSON) -> None:
         say(f"{number} {last}")
 
 
-@app.command("import", epilog=examples("records import reports", "records import /archive/2025 --records lab.db"))
+@opt.command(app, "import", "records import reports", "records import /archive/2025 --records lab.db")
 def import_reports(
     folders: list[Path] = argument(..., "Folders that hold reports, at any depth.", "FOLDER…"),
     records: str | None = opt.RECORDS,
-    quiet: bool = opt.QUIET,
-    json: bool = opt.JSON,
+    end: Ending = opt.BRIEF,
 ) -> None:
     """Record reports and diagnoses that were written before; what is recorded already is passed over."""
     from cmm_uq.app.commands.laboratory import records as commands
@@ -91,13 +90,13 @@ def import_reports(
     reports = commands.reports_in(folders)  # before records are made for them
     with open_records(records, create=True) as opened:
         done = commands.import_reports(opened, reports)
-    if json:
+    if end.json:
         put_data({
             "recorded": len(done.added), "recorded_before": len(done.known),
             "without_inputs": [str(path) for path in done.bare],
             "refused": [{"report": str(path), "error": str(error)} for path, error in done.refused],
         })  # fmt: skip
-    elif not quiet:
+    elif not end.quiet:
         say(f"{len(done.added)} recorded, {len(done.known)} recorded before, {len(done.refused)} refused")
         for path in done.bare:
             say(printable(f"{path}: the inputs of its job cannot be read, so only results.json was gone by"))
@@ -107,12 +106,11 @@ def import_reports(
         raise done.refused[0][1]
 
 
-@app.command("backup", epilog=examples("records backup records-2026-11-22.db"))
+@opt.command(app, "backup", "records backup records-2026-11-22.db")
 def backup(
     file: Path = argument(..., "New file of the backup.", "FILE"),
     records: str | None = opt.RECORDS,
-    quiet: bool = opt.QUIET,
-    json: bool = opt.JSON,
+    end: Ending = opt.BRIEF,
 ) -> None:
     """Write everything into one new SQLite file, while others go on writing, and verify its chain."""
     from cmm_uq.laboratory.records import open_records
@@ -120,10 +118,8 @@ def backup(
 
     with open_records(records) as opened:
         number, last = back_up(opened, file)
-    if json:
-        put_data({"backup": str(file), "entries": number, "head": last})
-    elif not quiet:
-        say(f"{_entries(number)} in {file}; the last has the hash {last}")
+    data = {"backup": str(file), "entries": number, "head": last}
+    end.put(data, f"{_entries(number)} in {file}; the last has the hash {last}")
 
 
 def _place(records: str | None) -> str | Path:
@@ -135,12 +131,11 @@ def _place(records: str | None) -> str | Path:
     return place
 
 
-@app.command("restore", epilog=examples("records restore records-2026-11-22.db --records reports/records.db"))
+@opt.command(app, "restore", "records restore records-2026-11-22.db --records reports/records.db")
 def restore(
     file: Path = argument(..., "File of a backup.", "FILE"),
     records: str | None = opt.RECORDS,
-    quiet: bool = opt.QUIET,
-    json: bool = opt.JSON,
+    end: Ending = opt.BRIEF,
 ) -> None:
     """Make records of a backup whose chain holds; a file in its place is kept as NAME.before-restore."""
     from cmm_uq.laboratory.records import backup as backups
@@ -148,19 +143,16 @@ def restore(
 
     place = _place(records)
     number, last = backups.restore(file, place)
-    if json:
-        put_data({"records": shown(place), "entries": number, "head": last})
-    elif not quiet:
-        say(f"{_entries(number)} restored; the last has the hash {last}")
+    data = {"records": shown(place), "entries": number, "head": last}
+    end.put(data, f"{_entries(number)} restored; the last has the hash {last}")
 
 
-@app.command("retain", epilog=examples("records retain --keep-years 10 --dry-run"))
+@opt.command(app, "retain", "records retain --keep-years 10 --dry-run")
 def retain(
     keep_years: int = option(..., "Years for which files are kept.", "N", min=1, max=1000),
     records: str | None = opt.RECORDS,
     dry_run: bool = flag(False, "--dry-run", "Only say what would be removed."),
-    quiet: bool = opt.QUIET,
-    json: bool = opt.JSON,
+    end: Ending = opt.BRIEF,
 ) -> None:
     """Remove the files of older reports; what they stated stays in the records, and so does what was removed.
 
@@ -174,27 +166,20 @@ def retain(
         if not dry_run:
             remove_retained(opened, found, keep_years)
     paths, count = [str(path) for path in found.files], len(found.certificates)
-    if json:
-        put_data({"removed": not dry_run, "files": paths, "certificates": count})
-    elif not quiet:
-        for path in paths:
-            say(printable(path))
-        say(f"{len(paths)} files of {count} reports {'would be removed' if dry_run else 'removed'}")
+    last = f"{len(paths)} files of {count} reports {'would be removed' if dry_run else 'removed'}"
+    end.put({"removed": not dry_run, "files": paths, "certificates": count}, *paths, last)
 
 
-@app.command("migrate", epilog=examples("records backup before.db", "records migrate"))
-def migrate(records: str | None = opt.RECORDS, quiet: bool = opt.QUIET, json: bool = opt.JSON) -> None:
+@opt.command(app, "migrate", "records backup before.db", "records migrate")
+def migrate(records: str | None = opt.RECORDS, end: Ending = opt.BRIEF) -> None:
     """Bring the tables of an older version to this one; entries stay as they are. Back up first."""
     from cmm_uq.laboratory.records import backup as backups
     from cmm_uq.laboratory.records.place import shown
 
     place = _place(records)
     before, after = backups.migrate(place)
-    if json:
-        put_data({"records": shown(place), "from": before, "to": after})
-    elif not quiet:
-        change = f"are of revision {after} already" if before == after else f"brought from revision {before} to {after}"
-        say(f"{shown(place)}: {change}")
+    change = f"are of revision {after} already" if before == after else f"brought from revision {before} to {after}"
+    end.put({"records": shown(place), "from": before, "to": after}, f"{shown(place)}: {change}")
 
 
 STANDARD_OUTPUT = Path("-")  # in place of a file for the lines
@@ -206,7 +191,7 @@ schedule_app = opt.group(
 SCHEDULE = option(None, "File schedule.toml.", "FILE", "that in the first FOLDER", "--schedule")
 
 
-@schedule_app.command("new", epilog=examples("schedule new jobs/schedule.toml"))
+@opt.command(schedule_app, "new", "schedule new jobs/schedule.toml")
 def new(file: Path = argument(Path("schedule.toml"), "New file: schedule.toml.", "FILE")) -> None:
     """Write a schedule.toml with every key explained; never over anything."""
     from cmm_uq.app.commands.laboratory.schedule import write_schedule
@@ -216,7 +201,7 @@ def new(file: Path = argument(Path("schedule.toml"), "New file: schedule.toml.",
     say(f"Whom it tells: [[email]] or [[webhook]] in it, then cmm-uq schedule test --schedule {file}")
 
 
-@schedule_app.command("test", epilog=examples("schedule test jobs", "schedule test --schedule jobs/schedule.toml"))
+@opt.command(schedule_app, "test", "schedule test jobs", "schedule test --schedule jobs/schedule.toml")
 def try_out(
     folders: list[Path] | None = argument(None, "Folders with jobs.", "FOLDER", "none"),
     schedule: Path | None = SCHEDULE,
@@ -234,9 +219,11 @@ def try_out(
         raise typer.Exit(NEEDS_A_PERSON)
 
 
-@schedule_app.command(
+@opt.command(
+    schedule_app,
     "print",
-    epilog=examples("schedule print cron jobs", "schedule print systemd jobs --at 06:15 --days MON,THU --out units"),
+    "schedule print cron jobs",
+    "schedule print systemd jobs --at 06:15 --days MON,THU --out units",
 )
 def ready(
     scheduler: str = argument(..., "cron, systemd or windows.", "SCHEDULER"),

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Protocol
 import typer
 from rich.cells import cell_len
 
+from cmm_uq.app.cli.options import Ending
 from cmm_uq.app.cli.terminal import NOT_CONFORMING, Line, columns, folded, on_terminal, put_data, put_json, say, show
 from cmm_uq.base.errors import printable
 from cmm_uq.base.output import MANIFEST
@@ -207,33 +208,31 @@ class CommandResult(Protocol):
     def recorded(self) -> str: ...
 
 
-def conclude(result: CommandResult, *, json: bool, quiet: bool, strict: bool, verbose: bool) -> None:
+def conclude(result: CommandResult, end: Ending, *, strict: bool) -> None:
     """How a command ends that wrote an outcome: results.json or a summary; exit code 4 if strict, when not all is well."""
-    if json:
+    if end.json:
         put_json(result.results.decode())
-    elif not quiet:
+    elif not end.quiet:
         from cmm_uq.certificate.origin import BANNERS
 
         banner = BANNERS.get(result.origin, "")
-        show_summary(result.summary, result.files, verbose=verbose, name=result.name, banner=banner)
+        show_summary(result.summary, result.files, verbose=end.verbose, name=result.name, banner=banner)
         if result.recorded:
             say(result.recorded)
     if strict and not result.conforming:
         raise typer.Exit(NOT_CONFORMING)
 
 
-def conclude_derived(
-    files: Mapping[str, Path], what: str, *, json: bool, quiet: bool, verbose: bool, is_job: bool = True
-) -> None:
+def conclude_derived(files: Mapping[str, Path], what: str, end: Ending, *, is_job: bool = True) -> None:
     """How a command ends that wrote a recording made from another one: its manifest, or where it is and what to do next."""
-    if json:
+    if end.json:
         put_manifest(files)
-    elif not quiet:
+    elif not end.quiet:
         from cmm_uq.base.messages import Verbatim, say
         from cmm_uq.certificate.wording import Summary
 
         further = (say("Next: cmm-uq report {folder}", folder=Verbatim(folder_of(files))),) if is_job else ()
-        show_summary(Summary(Verbatim(what), remarks=further), files, verbose=verbose)
+        show_summary(Summary(Verbatim(what), remarks=further), files, verbose=end.verbose)
 
 
 def put_manifest(files: Mapping[str, Path]) -> None:

@@ -7,23 +7,9 @@ from collections import Counter
 from collections.abc import Mapping
 from http import HTTPStatus
 
-from cmm_uq.app.serve import page as p
+from cmm_uq.app.serve import page as p, view as v
 from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, bad
-from cmm_uq.app.serve.page import Cell, Chooser, FormField, PageNotice, PageSection, WebPage, address
 from cmm_uq.app.serve.trends import trends
-from cmm_uq.app.serve.view import (
-    GROUPS,
-    PER_PAGE,
-    SOON,
-    MachineStanding,
-    SiteView,
-    certificate_cell,
-    certificates_table,
-    machine_cell,
-    paged,
-    pager,
-    problem_of,
-)
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, listed, number, plural, say
 from cmm_uq.laboratory.records import facts
@@ -34,7 +20,7 @@ _ANY = ("", say("Any"))
 _KEYS = ("text", "machine", "artefact", "origin", "state", "decision", "since", "until", "page")
 
 
-def certificates_page(view: SiteView, request: WebRequest) -> WebPage:
+def certificates_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     """Certificates and interim checks."""
     request.only(_KEYS)
     text, machine, artefact = (request.text(name) for name in ("text", "machine", "artefact"))
@@ -47,18 +33,18 @@ def certificates_page(view: SiteView, request: WebRequest) -> WebPage:
         decisions=(decision,) if decision else (), since=since, until=until,
     )  # fmt: skip
     page = request.count("page")
-    rows, total = paged(view.records, choice, page)
+    rows, total = v.paged(view.records, choice, page)
     count = plural(total, one=say("1 certificate"), many=say("{count} certificates", count=number(total, ",d")))
     fields = (
-        FormField("text", say("Number, job or machine"), text),
-        FormField("state", say("State"), state, (_ANY, *_options(p.STATES)), "select"),
-        FormField("decision", say("Decision"), decision, (_ANY, *_options(p.DECISIONS)), "select"),
-        FormField("origin", say("Recording"), origin, tuple(p.ORIGINS.items()), "select"),
+        p.FormField("text", say("Number, job or machine"), text),
+        p.FormField("state", say("State"), state, (_ANY, *_options(p.STATES)), "select"),
+        p.FormField("decision", say("Decision"), decision, (_ANY, *_options(p.DECISIONS)), "select"),
+        p.FormField("origin", say("Recording"), origin, tuple(p.ORIGINS.items()), "select"),
         *_date_fields(request),
     )
     kept = tuple((name, request.text(name)) for name in ("machine", "artefact") if request.text(name))
     narrowed = any(request.text(name) for name in _KEYS if name != "page")
-    clear = Cell(say("Show all"), "/certificates") if narrowed else None
+    clear = p.Cell(say("Show all"), "/certificates") if narrowed else None
     empty = say("No certificate is as chosen.") if narrowed else say("No certificate of a measurement is recorded yet.")
     lead = say("Newest first.")
     if machine:
@@ -66,18 +52,18 @@ def certificates_page(view: SiteView, request: WebRequest) -> WebPage:
     elif artefact:
         lead = say("Made with artefact {serial}, newest first.", serial=Verbatim(artefact))
     warning = p.NOT_MEASURED.get(origin)
-    return WebPage(
+    return p.WebPage(
         say("Certificates"), "/certificates", lead=lead,
         blocks=(
-            Chooser(say("Choose certificates"), "/certificates", fields, say("Show"), clear, kept),
+            p.Chooser(say("Choose certificates"), "/certificates", fields, say("Show"), clear, kept),
             *((p.PageNotice(warning, "open"),) if warning else ()),
-            certificates_table(rows, count, empty),
-            *pager(request, total, page, count),
+            v.certificates_table(rows, count, empty),
+            *v.pager(request, total, page, count),
         ),
     )  # fmt: skip
 
 
-def diagnoses_page(view: SiteView, request: WebRequest) -> WebPage:
+def diagnoses_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     """Verdicts of certificates and of diagnoses on whether a recording agrees with its model."""
     request.only(("text", "verdict", "since", "until", "page"))
     verdict, text = request.one_of("verdict", (*p.VERDICTS, "all")), request.text("text")
@@ -87,12 +73,12 @@ def diagnoses_page(view: SiteView, request: WebRequest) -> WebPage:
     since, until = _dates(request)
     choice = CertificateFilter(text=text, command="", verdicts=verdicts, since=since, until=until)
     page = request.count("page")
-    rows, total = paged(view.records, choice, page)
+    rows, total = v.paged(view.records, choice, page)
     count = plural(total, one=say("1 recording"), many=say("{count} recordings", count=number(total, ",d")))
     cells = tuple(
-        (certificate_cell(one), p.cell_of(p.VERDICTS, one.diagnosis), machine_cell(one.machine, one.machine_name),
+        (v.certificate_cell(one), p.cell_of(p.VERDICTS, one.diagnosis), v.machine_cell(one.machine, one.machine_name),
          p.day_cell(one.day),
-         p.cell_of(p.STATES, one.state) if one.command == "report" else Cell(DASH))
+         p.cell_of(p.STATES, one.state) if one.command == "report" else p.Cell(DASH))
         for one in rows
     )  # fmt: skip
     headings = p.columns(
@@ -100,19 +86,19 @@ def diagnoses_page(view: SiteView, request: WebRequest) -> WebPage:
     )
     options = (("", say("Not consistent")), *_options(p.VERDICTS), ("all", say("All")))
     fields = (
-        FormField("text", say("Number, job or machine"), text),
-        FormField("verdict", say("Verdict"), verdict, options, "select"),
+        p.FormField("text", say("Number, job or machine"), text),
+        p.FormField("verdict", say("Verdict"), verdict, options, "select"),
         *_date_fields(request),
     )
     narrowed = any(request.text(name) for name in ("text", "verdict", "since", "until"))
-    clear = Cell(say("Show what is not consistent"), "/diagnoses") if narrowed else None
-    return WebPage(
+    clear = p.Cell(say("Show what is not consistent"), "/diagnoses") if narrowed else None
+    return p.WebPage(
         say("Diagnoses"), "/diagnoses",
         lead=say("Measured recordings that contradict the model of their machine, newest first.") if not verdict else NOTHING,
         blocks=(
-            Chooser(say("Choose diagnoses"), "/diagnoses", fields, say("Show"), clear),
+            p.Chooser(say("Choose diagnoses"), "/diagnoses", fields, say("Show"), clear),
             p.PageTable(count, headings, cells, say("There is none.")),
-            *pager(request, total, page, count),
+            *v.pager(request, total, page, count),
         ),
     )  # fmt: skip
 
@@ -128,9 +114,9 @@ def _dates(request: WebRequest) -> tuple[dt.date | None, dt.date | None]:
     return since, until
 
 
-def _date_fields(request: WebRequest) -> tuple[FormField, ...]:
+def _date_fields(request: WebRequest) -> tuple[p.FormField, ...]:
     ends = (("since", say("From")), ("until", say("To")))
-    return tuple(FormField(name, label, request.text(name), sort="date") for name, label in ends)
+    return tuple(p.FormField(name, label, request.text(name), sort="date") for name, label in ends)
 
 
 ARTEFACT_COLUMNS = p.columns(
@@ -139,7 +125,7 @@ ARTEFACT_COLUMNS = p.columns(
 )  # fmt: skip
 
 
-def artefacts_page(view: SiteView, request: WebRequest) -> WebPage:
+def artefacts_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     """All artefacts."""
     request.only(("text", "page"))
     text, page = request.text("text"), request.count("page")
@@ -150,31 +136,31 @@ def artefacts_page(view: SiteView, request: WebRequest) -> WebPage:
     ]
     count = plural(len(found), one=say("1 artefact"), many=say("{count} artefacts", count=number(len(found), ",d")))
     rows = tuple(
-        (Cell(p.shown(one.serial)), _state(one, view.today), p.day_cell(one.due), p.day_cell(one.calibrated),
-         Cell(p.shown(one.certificate)), Cell(p.shown(one.laboratory)), Cell(p.shown(one.kind)),
-         Cell(say("Show them"), p.address("/certificates", artefact=one.serial)))
-        for one in found[(page - 1) * PER_PAGE : page * PER_PAGE]
+        (p.Cell(p.shown(one.serial)), _state(one, view.today), p.day_cell(one.due), p.day_cell(one.calibrated),
+         p.Cell(p.shown(one.certificate)), p.Cell(p.shown(one.laboratory)), p.Cell(p.shown(one.kind)),
+         p.Cell(say("Show them"), p.address("/certificates", artefact=one.serial)))
+        for one in found[(page - 1) * v.PER_PAGE : page * v.PER_PAGE]
     )  # fmt: skip
-    clear = Cell(say("Show all"), "/artefacts") if text else None
-    field = FormField("text", say("Serial, certificate or laboratory"), text)
-    chooser = (Chooser(say("Choose artefacts"), "/artefacts", (field,), say("Show"), clear),) if known else ()
+    clear = p.Cell(say("Show all"), "/artefacts") if text else None
+    field = p.FormField("text", say("Serial, certificate or laboratory"), text)
+    chooser = (p.Chooser(say("Choose artefacts"), "/artefacts", (field,), say("Show"), clear),) if known else ()
     empty = say("No artefact is as chosen.") if known else say("No artefact is recorded yet.")
     table = p.PageTable(count, ARTEFACT_COLUMNS, rows, empty)
     lead = say("On {day}, first what is out of date: no certificate can rest on that.", day=day(view.today))
-    return WebPage(
-        say("Artefacts"), "/artefacts", lead=lead, blocks=(*chooser, table, *pager(request, len(found), page, count))
+    return p.WebPage(
+        say("Artefacts"), "/artefacts", lead=lead, blocks=(*chooser, table, *v.pager(request, len(found), page, count))
     )
 
 
-def _state(one: ArtefactRow, today: dt.date) -> Cell:
+def _state(one: ArtefactRow, today: dt.date) -> p.Cell:
     if one.due is None:
         note = NOTHING if one.certificate else say("no certificate is recorded of it")
-        return Cell(say("No due date stated"), standing="open", note=note)
+        return p.Cell(say("No due date stated"), standing="open", note=note)
     if one.due < today:
-        return Cell(say("Out of date"), standing="bad")
-    if one.due <= today + SOON:
-        return Cell(say("Due soon"), standing="open")
-    return Cell(say("Valid"), standing="good")
+        return p.Cell(say("Out of date"), standing="bad")
+    if one.due <= today + v.SOON:
+        return p.Cell(say("Due soon"), standing="open")
+    return p.Cell(say("Valid"), standing="good")
 
 
 MOST_PLACES = 40  # places that are offered to choose from; more are searched for by name
@@ -187,51 +173,51 @@ COLUMNS = p.columns(
 )  # fmt: skip
 
 
-def machines_page(view: SiteView, request: WebRequest) -> WebPage:
+def machines_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     """All machines, or those that were chosen."""
     request.only(("text", "state", "place", "page"))
-    text, state, place = request.text("text"), request.one_of("state", tuple(GROUPS)), request.text("place")
+    text, state, place = request.text("text"), request.one_of("state", tuple(v.GROUPS)), request.text("place")
     page, machines = request.count("page"), view.standing()
     found = [one for one in machines if _has(one, text.casefold(), state, place)]
     counts = Counter(group for one in machines for group in one.groups)
     tally = tuple(
-        p.Count(counts[name], group.count, "/" if name == state else address("/", state=name), group.standing, name == state)
-        for name, group in GROUPS.items() if counts[name] or name in ("overdue", "failing", "due", "order")
+        p.Count(counts[name], group.count, "/" if name == state else p.address("/", state=name), group.standing, name == state)
+        for name, group in v.GROUPS.items() if counts[name] or name in ("overdue", "failing", "due", "order")
     )  # fmt: skip
-    rows = tuple(_row(one) for one in found[(page - 1) * PER_PAGE : page * PER_PAGE])
+    rows = tuple(_row(one) for one in found[(page - 1) * v.PER_PAGE : page * v.PER_PAGE])
     count = plural(len(found), one=say("1 machine"), many=say("{count} machines", count=number(len(found), ",d")))
     empty = say("No machine is as chosen.") if machines else say("No machine is recorded yet.")
     places = sorted({one.newest.machine.place for one in machines} - {""})
-    states = (("", say("Any")), *((name, group.word) for name, group in GROUPS.items()))
+    states = (("", say("Any")), *((name, group.word) for name, group in v.GROUPS.items()))
     fields = [
-        FormField("text", say("Serial, name, model or place"), text),
-        FormField("state", say("State"), state, states, "select"),
+        p.FormField("text", say("Serial, name, model or place"), text),
+        p.FormField("state", say("State"), state, states, "select"),
     ]
     if 1 < len(places) <= MOST_PLACES:
         options = (("", say("Any")), *((one, Verbatim(one)) for one in places))
-        fields.append(FormField("place", say("Place"), place, options, "select"))
-    clear = Cell(say("Show all"), "/") if text or state or place else None
-    return WebPage(
+        fields.append(p.FormField("place", say("Place"), place, options, "select"))
+    clear = p.Cell(say("Show all"), "/") if text or state or place else None
+    return p.WebPage(
         say("Machines"), "/",
         lead=say("On {day}, the most urgent first.", day=day(view.today)),
         blocks=(
             p.Tally(say("By state"), tally),
             *_overdue_artefacts(view),
-            Chooser(say("Choose machines"), "/", tuple(fields), say("Show"), clear),
+            p.Chooser(say("Choose machines"), "/", tuple(fields), say("Show"), clear),
             p.PageTable(count, COLUMNS, rows, empty),
-            *pager(request, len(found), page, count),
+            *v.pager(request, len(found), page, count),
         ),
     )  # fmt: skip
 
 
-def _has(one: MachineStanding, text: str, state: str, place: str) -> bool:
+def _has(one: v.MachineStanding, text: str, state: str, place: str) -> bool:
     machine = one.newest.machine
     names = (machine.serial, machine.name, machine.manufacturer, machine.model, machine.place)
     chosen = (not state or state in one.groups) and (not place or place == machine.place)
     return chosen and (not text or any(text in name.casefold() for name in names))
 
 
-def _overdue_artefacts(view: SiteView) -> tuple[PageNotice, ...]:
+def _overdue_artefacts(view: v.SiteView) -> tuple[p.PageNotice, ...]:
     overdue = [
         (one.serial, one.due) for one in view.records.artefacts() if one.due is not None and one.due < view.today
     ]
@@ -244,31 +230,31 @@ def _overdue_artefacts(view: SiteView) -> tuple[PageNotice, ...]:
     )  # fmt: skip
     named = [say("{serial} since {day}", serial=p.shown(serial), day=day(due)) for serial, due in overdue[:MOST_NAMED]]
     more = [say("{count} more", count=number(count - MOST_NAMED))] if count > MOST_NAMED else []
-    return (PageNotice(head, "bad", (Cell(listed([*named, *more])), Cell(say("All artefacts"), "/artefacts"))),)
+    return (p.PageNotice(head, "bad", (p.Cell(listed([*named, *more])), p.Cell(say("All artefacts"), "/artefacts"))),)
 
 
-def due_cell(one: MachineStanding, *, why: bool = True) -> Cell:
+def due_cell(one: v.MachineStanding, *, why: bool = True) -> p.Cell:
     """When a machine is due, and why."""
     if one.due is None:
-        return Cell(DASH)
-    return Cell(DASH if one.due.day is None else day(one.due.day), note=one.due.why if why else NOTHING)
+        return p.Cell(DASH)
+    return p.Cell(DASH if one.due.day is None else day(one.due.day), note=one.due.why if why else NOTHING)
 
 
-def _row(one: MachineStanding) -> tuple[Cell, ...]:
+def _row(one: v.MachineStanding) -> tuple[p.Cell, ...]:
     machine, certificate = one.newest.machine, one.newest.certificate
-    first, *others = (GROUPS[name] for name in one.groups)
-    newest = (Cell(NOTHING), Cell(NOTHING), Cell(NOTHING)) if certificate is None else (
-        certificate_cell(certificate), p.day_cell(certificate.day), p.cell_of(p.DECISIONS, certificate.decision)
+    first, *others = (v.GROUPS[name] for name in one.groups)
+    newest = (p.Cell(NOTHING), p.Cell(NOTHING), p.Cell(NOTHING)) if certificate is None else (
+        v.certificate_cell(certificate), p.day_cell(certificate.day), p.cell_of(p.DECISIONS, certificate.decision)
     )  # fmt: skip
     return (
-        machine_cell(machine.serial, machine.name),
-        Cell(first.word, standing=first.standing, note=commas(group.word for group in others)),
+        v.machine_cell(machine.serial, machine.name),
+        p.Cell(first.word, standing=first.standing, note=commas(group.word for group in others)),
         due_cell(one, why=False), *newest,
-        Cell(p.shown(" ".join(filter(None, (machine.manufacturer, machine.model))))), Cell(p.shown(machine.place)),
+        p.Cell(p.shown(" ".join(filter(None, (machine.manufacturer, machine.model))))), p.Cell(p.shown(machine.place)),
     )  # fmt: skip
 
 
-def machine_page(view: SiteView, request: WebRequest) -> WebPage:
+def machine_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     """The machine that the address names, by serial or by name."""
     request.only(("serial",))
     serial = request.text("serial")
@@ -277,40 +263,40 @@ def machine_page(view: SiteView, request: WebRequest) -> WebPage:
     try:
         machine = view.records.machine(serial)
     except CmmUqError as error:
-        raise RefusedRequest(HTTPStatus.NOT_FOUND, *problem_of(error)) from None
+        raise RefusedRequest(HTTPStatus.NOT_FOUND, *v.problem_of(error)) from None
     standing = next((one for one in view.standing() if one.serial == machine.serial), None)
     facts = [
-        (say("Manufacturer"), Cell(p.shown(machine.manufacturer))), (say("Model"), Cell(p.shown(machine.model))),
-        (say("Place"), Cell(p.shown(machine.place))),
+        (say("Manufacturer"), p.Cell(p.shown(machine.manufacturer))), (say("Model"), p.Cell(p.shown(machine.model))),
+        (say("Place"), p.Cell(p.shown(machine.place))),
     ]  # fmt: skip
     if machine.adjusted:
-        facts.append((say("Adjusted on"), Cell(commas(day(one) for one in machine.adjusted))))
-    notices: tuple[PageNotice, ...] = ()
+        facts.append((say("Adjusted on"), p.Cell(commas(day(one) for one in machine.adjusted))))
+    notices: tuple[p.PageNotice, ...] = ()
     if standing is not None:
         head, *lines = (_group_words(standing, name) for name in standing.groups)
-        notices = (PageNotice(head, GROUPS[standing.groups[0]].standing, tuple(map(Cell, lines))),)
+        notices = (p.PageNotice(head, v.GROUPS[standing.groups[0]].standing, tuple(map(p.Cell, lines))),)
         facts.append((say("Due"), due_cell(standing)))
         if (newest := standing.newest.certificate) is not None:
-            facts.append((say("Newest certificate"), certificate_cell(newest)))
+            facts.append((say("Newest certificate"), v.certificate_cell(newest)))
     listed, count = chosen(view.records, CertificateFilter(machine=machine.serial), LISTED)
     caption = say("The newest {shown} of {count}", shown=number(len(listed)), count=number(count, ",d"))
-    every = Cell(say("All certificates of this machine"), address("/certificates", machine=machine.serial))
-    table = certificates_table(listed, caption, say("No measured certificate is recorded."), machine=False)
+    every = p.Cell(say("All certificates of this machine"), p.address("/certificates", machine=machine.serial))
+    table = v.certificates_table(listed, caption, say("No measured certificate is recorded."), machine=False)
     lead = say("Serial number {serial}", serial=Verbatim(machine.serial))
     if machine.by_name:
         lead = say("Recognised by its name: its jobs state no serial number.")
-    return WebPage(
+    return p.WebPage(
         Verbatim(machine.name or machine.serial), "/", lead=lead,
-        above=(Cell(say("Machines"), "/"),),
+        above=(p.Cell(say("Machines"), "/"),),
         blocks=(*notices, p.PageFacts(tuple(facts))),
         sections=(
-            PageSection(say("Trends"), trends(view.records, machine)),
-            PageSection(say("Certificates"), (table, p.Links((every,)))),
+            p.PageSection(say("Trends"), trends(view.records, machine)),
+            p.PageSection(say("Certificates"), (table, p.Links((every,)))),
         ),
     )  # fmt: skip
 
 
-def _group_words(one: MachineStanding, name: str) -> Text:
+def _group_words(one: v.MachineStanding, name: str) -> Text:
     """A group of a machine, with the date or the decision that put it there."""
     due, certificate = one.due, one.newest.certificate
     if due is not None and due.day is not None:
@@ -321,5 +307,5 @@ def _group_words(one: MachineStanding, name: str) -> Text:
             return dated[name]
     if certificate is not None and name in ("failing", "open"):
         decision = p.DECISIONS.get(certificate.decision, (Verbatim(certificate.decision), None))[0]
-        return say("{what}: its newest certificate says {decision:small}", what=GROUPS[name].word, decision=decision)
-    return GROUPS[name].word
+        return say("{what}: its newest certificate says {decision:small}", what=v.GROUPS[name].word, decision=decision)
+    return v.GROUPS[name].word

@@ -7,11 +7,10 @@ already; an address is a path of this site with its query, quoted.
 from __future__ import annotations
 
 import datetime as dt
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from http import HTTPStatus
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 from urllib.parse import urlencode
 
 from cmm_uq.base.messages import DASH, NOTHING, Day, Text, Verbatim, day, say
@@ -30,18 +29,14 @@ def address(path: str, **query: object) -> str:
     return f"{path}?{urlencode(stated)}" if stated else path
 
 
-@dataclass(frozen=True)
-class Cell:
-    """A text in a table or a list of facts, where it leads, and how it is to be taken: by a sign and a colour beside it.
-
-    ``download``: whether the address gives a file to keep rather than to look at.
-    """
+class Cell(NamedTuple):
+    """A text in a table or a list of facts, where it leads, and how it is to be taken: by a sign and a colour beside it."""
 
     text: Text
     address: str = ""
     standing: Standing | None = None
     note: Text = NOTHING
-    download: bool = False
+    download: bool = False  # whether the address gives a file to keep rather than to look at
 
 
 class Block:
@@ -50,11 +45,10 @@ class Block:
     kind: ClassVar[str]
 
     def __init_subclass__(cls) -> None:
-        cls.kind = re.sub("^Page(?=[A-Z])", "", cls.__name__).lower()
+        cls.kind = cls.__name__.removeprefix("Page").lower()
 
 
-@dataclass(frozen=True)
-class PageColumn:
+class PageColumn(NamedTuple):
     """Heading of a column; figures stand to the right under each other, a date is never broken."""
 
     heading: Text
@@ -89,11 +83,10 @@ class PageFacts(Block):
     wide: bool = False
 
 
-@dataclass(frozen=True)
-class Count:
+class Count(NamedTuple):
     """How many of something there are, and where they are listed."""
 
-    count: int
+    number: int
     what: Text
     address: str
     standing: Standing | None = None
@@ -125,8 +118,7 @@ class PageParagraph(Block):
     tone: Literal["plain", "note"] = "plain"
 
 
-@dataclass(frozen=True)
-class FormField:
+class FormField(NamedTuple):
     """A field of a form: a line of text, a date, or one of several options ``(value, text)``."""
 
     name: str
@@ -158,8 +150,7 @@ class Pager(Block):
     after: Cell | None = None
 
 
-@dataclass(frozen=True)
-class Chart:
+class Chart(NamedTuple):
     """A picture with the sentence that replaces it for whoever cannot see it."""
 
     title: Text
@@ -202,16 +193,14 @@ class Press(Block):
     button: Text
 
 
-@dataclass(frozen=True)
-class PageSection:
+class PageSection(NamedTuple):
     """A titled part of a page."""
 
     title: Text
     blocks: tuple[Block, ...]
 
 
-@dataclass(frozen=True)
-class WebPage:
+class WebPage(NamedTuple):
     """What a reader gets: below one line of ``lead``, under an entry (``place``) of the contents and the pages ``above``."""
 
     title: Text
@@ -220,7 +209,7 @@ class WebPage:
     blocks: tuple[Block, ...] = ()
     sections: tuple[PageSection, ...] = ()
     above: tuple[Cell, ...] = ()
-    status: HTTPStatus = field(default=HTTPStatus.OK, compare=False)
+    status: HTTPStatus = HTTPStatus.OK
 
 
 Word = tuple[Text, Standing | None]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -25,24 +26,15 @@ _JUMP_S = 0.5
 """By which the wall clock leaves the monotonic one before it is said; a clock that is kept right is moved by far less."""
 
 
-class Blocks:
-    """Readings that came since the last commit, by instrument."""
-
-    def __init__(self) -> None:
-        self._open: dict[str, list[Reading]] = {}
-
-    def add(self, reading: Reading) -> None:
-        self._open.setdefault(reading.source, []).append(reading)
-
-    def put(self, journal: RecordingJournal, moment: Moment) -> None:
-        """Move everything into a journal, a record for each instrument and run of numbers that follow each other."""
-        for source, readings in self._open.items():
-            start = 0
-            for i in range(1, len(readings) + 1):
-                if i == len(readings) or readings[i].number != readings[i - 1].number + 1:
-                    journal.append(READINGS, _as_data(source, readings[start:i]), moment)
-                    start = i
-        self._open.clear()
+def put_blocks(readings: Iterable[Reading], journal: RecordingJournal, moment: Moment) -> None:
+    """Readings into a journal, a record for each instrument and run of numbers that follow each other."""
+    by_source: dict[str, list[Reading]] = {}
+    for reading in readings:
+        by_source.setdefault(reading.source, []).append(reading)
+    for source, of in by_source.items():
+        ends = [i for i in range(1, len(of)) if of[i].number != of[i - 1].number + 1]
+        for start, end in pairwise((0, *ends, len(of))):
+            journal.append(READINGS, _as_data(source, of[start:end]), moment)
 
 
 def _as_data(source: str, readings: list[Reading]) -> dict[str, Any]:
@@ -79,7 +71,8 @@ class Recorder:
     ) -> None:
         self._journals, self._clock, self._max_gap_s = journals, clock, max_gap_s
         self._declared = {source.name: source for source in sources}
-        self._blocks, self._identities = Blocks(), dict[str, Identity]()
+        self._came: list[Reading] = []  # since the last commit
+        self._identities: dict[str, Identity] = {}
         self._open: list[int] = []  # records of points that not every stream has answered
         start = journals.story.session.start
         self._between = start.utc_ns - start.monotonic_ns
@@ -149,7 +142,8 @@ class Recorder:
     def commit(self, *, streams: bool = True) -> bool:
         """Put everything on the disk, with or without streams; if not possible, it waits, and :attr:`stalled` says why."""
         if streams:
-            self._blocks.put(self._journals.streams, self.now)
+            put_blocks(self._came, self._journals.streams, self.now)
+            self._came.clear()
         try:
             self._journals.events.commit()
             if streams:
@@ -201,7 +195,7 @@ class Recorder:
 
     def column(self, source: str, quantity: str) -> str:
         """Column of the recording that a quantity of an instrument goes into."""
-        return _column(self._declared, source, quantity)
+        return self._declared[source].values.get(quantity, quantity) if source in self._declared else quantity
 
     def latency_ns(self, source: str) -> int:
         """From the measurement to the arrival of its last byte."""
@@ -209,7 +203,7 @@ class Recorder:
         return round(declared.latency_ms * 1e6) if declared else 0
 
     def _reading(self, reading: Reading) -> Reading | None:
-        self._blocks.add(reading)
+        self._came.append(reading)
         source = reading.source
         self.counts[source] = self.counts.get(source, 0) + 1
         if reading.status is not None:
@@ -226,12 +220,15 @@ class Recorder:
     def _stream(self, source: str, quantity: str) -> Stream:
         """In the column of the quantity; with the instrument's name before it where another one fills that."""
         if (source, quantity) not in self._fed:
-            column = self.column(source, quantity)
-            if column in self.streams:
-                column = f"{re.sub(r'[^A-Za-z0-9]', '_', source)}_{column}"
-            stream = Stream(column, source, latency_s=self.latency_ns(source) * NS, max_gap_s=self._max_gap_s)
-            self.streams[column] = self._fed[source, quantity] = stream
+            stream = self._new_stream(source, quantity)
+            if stream.column in self.streams:
+                stream.column = f"{re.sub(r'[^A-Za-z0-9]', '_', source)}_{stream.column}"
+            self.streams[stream.column] = self._fed[source, quantity] = stream
         return self._fed[source, quantity]
+
+    def _new_stream(self, source: str, quantity: str) -> Stream:
+        latency_s = self.latency_ns(source) * NS
+        return Stream(self.column(source, quantity), source, latency_s=latency_s, max_gap_s=self._max_gap_s)
 
     def _settle(self, number: int, now_ns: int | None) -> bool:
         """Join a point; whether every stream has answered."""
@@ -246,42 +243,31 @@ class Recorder:
                 answers[column] = answer
         self.told += [say("{column}: {why}", column=Verbatim(column), why=why)
                       for column, why in answers.items() if not isinstance(why, Joined)]  # fmt: skip
-        self.say("joined", **_answers_data(number, answers))
+        self._say_joined(number, answers)
         return True
 
+    def settle_earlier(self) -> int:
+        """Join what earlier sessions left open; how many points that were."""
+        session = self.story.session.number
+        left = [point for point in self.story.points.values() if not point.settled and point.session != session]
+        for point in left:
+            moment_ns = point.moment.monotonic_ns
+            streams = {(one.name, quantity): self._new_stream(one.name, quantity)
+                       for one in self._declared.values() for quantity in one.values}  # fmt: skip
+            path = self._journals.folder / STREAMS.format(point.session)
+            for reading in _about(path, moment_ns, round(3e9 * self._max_gap_s)):
+                for quantity, value in reading.values.items():
+                    key = (reading.source, quantity)
+                    streams.setdefault(key, self._new_stream(*key)).add(reading.monotonic_ns, value)
+            skipped = (*point.columns, *COORDINATES)
+            answers = {one.column: one.at(moment_ns, None) for one in streams.values() if one.column not in skipped}
+            self._say_joined(point.record, answers)
+        return len(left)
 
-def _column(declared: Mapping[str, DeclaredSource], source: str, quantity: str) -> str:
-    return declared[source].values.get(quantity, quantity) if source in declared else quantity
-
-
-def _answers_data(number: int, answers: Mapping[str, Joined | Text | None]) -> dict[str, Any]:
-    values = {name: [one.value, one.u] for name, one in answers.items() if isinstance(one, Joined)}
-    missing = {name: str.__str__(one) for name, one in answers.items() if one and not isinstance(one, Joined)}
-    return {"of": number, "values": values, "missing": missing}
-
-
-def settle_earlier(journals: Journals, sources: Iterable[DeclaredSource], max_gap_s: float, now: Moment) -> int:
-    """Join what earlier sessions left open; how many points that were."""
-    story, declared = journals.story, {source.name: source for source in sources}
-    left = [point for point in story.points.values() if not point.settled and point.session != story.session.number]
-    for point in left:
-        moment_ns = point.moment.monotonic_ns
-        streams = {(source.name, quantity): _stream(declared, source.name, quantity, max_gap_s)
-                   for source in declared.values() for quantity in source.values}  # fmt: skip
-        path = journals.folder / STREAMS.format(point.session)
-        for reading in _about(path, moment_ns, round(3e9 * max_gap_s)):
-            for quantity, value in reading.values.items():
-                key = (reading.source, quantity)
-                streams.setdefault(key, _stream(declared, *key, max_gap_s)).add(reading.monotonic_ns, value)
-        skipped = (*point.columns, *COORDINATES)
-        answers = {one.column: one.at(moment_ns, None) for one in streams.values() if one.column not in skipped}
-        journals.say("joined", _answers_data(point.record, answers), now)
-    return len(left)
-
-
-def _stream(declared: Mapping[str, DeclaredSource], source: str, quantity: str, max_gap_s: float) -> Stream:
-    latency_s = declared[source].latency_ms * 1e-3 if source in declared else 0.0
-    return Stream(_column(declared, source, quantity), source, latency_s=latency_s, max_gap_s=max_gap_s)
+    def _say_joined(self, number: int, answers: Mapping[str, Joined | Text | None]) -> None:
+        values = {name: [one.value, one.u] for name, one in answers.items() if isinstance(one, Joined)}
+        missing = {name: str.__str__(one) for name, one in answers.items() if one and not isinstance(one, Joined)}
+        self.say("joined", of=number, values=values, missing=missing)
 
 
 def _about(path: Path, moment_ns: int, near_ns: int) -> Iterator[Reading]:

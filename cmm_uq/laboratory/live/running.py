@@ -10,17 +10,19 @@ import contextlib
 import queue
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.output import interruption
 from cmm_uq.laboratory.live.conducting import Conductor
 from cmm_uq.laboratory.live.instruments.source import SYSTEM, Clock, Event, Gap, LiveSource
 from cmm_uq.laboratory.live.screen import SessionView
+from cmm_uq.laboratory.live.story import Journals
 
 STILL_S = 1.0  # for which a file must not change
 _UNFINISHED = (".tmp", ".part", ".crdownload", ".swp", "~")
@@ -31,8 +33,7 @@ _LOOK_S = 0.5
 _AT_ONCE = 2000  # events that are taken before the disk and the screen have their turn again
 
 
-@dataclass(frozen=True)
-class DroppedFile:
+class DroppedFile(NamedTuple):
     path: Path
     content: bytes
     utc_ns: int
@@ -63,7 +64,8 @@ class WatchedFolder:
                 self._seen[path.name] = (*state, now)
             elif now - since >= STILL_S * 1e9:
                 self._done[path.name] = state
-                still += self._content(path, *state)
+                if (content := self._content(path, state[0])) is not None:
+                    still.append(DroppedFile(path, content, state[1]))
         return sorted(still, key=lambda file: (file.utc_ns, file.path.name))
 
     def again(self, path: Path) -> None:
@@ -72,29 +74,26 @@ class WatchedFolder:
 
     def _files(self) -> list[Path]:
         try:
-            paths = [
-                path for path in self.folder.iterdir()
-                if path.is_file() and not path.name.startswith(".") and not path.name.endswith(_UNFINISHED)
-            ]  # fmt: skip
+            paths = [path for path in self.folder.iterdir() if path.is_file()]
         except OSError as error:
             if self._readable:
                 self.trouble.append(say("the folder {folder} cannot be read: {why}", folder=Verbatim(str(self.folder)),
                                         why=Verbatim(str(error.strerror))))  # fmt: skip
-            paths, self._readable = [], False
-        else:
-            self._readable = True
-        return paths
+            self._readable = False
+            return []
+        self._readable = True
+        return [path for path in paths if not path.name.startswith(".") and not path.name.endswith(_UNFINISHED)]
 
-    def _content(self, path: Path, size: int, changed: int) -> list[DroppedFile]:
+    def _content(self, path: Path, size: int) -> bytes | None:
         try:
             content = content_of(path, TABLE_BYTES, "Export it again")
         except CmmUqError as error:
             self.trouble.append(Verbatim(str(error)))
-            return []
+            return None
         if len(content) != size:  # it went on growing between the look and the reading
             self.again(path)
-            return []
-        return [DroppedFile(path, content, changed)]
+            return None
+        return content
 
 
 class Screen(Protocol):
@@ -103,91 +102,92 @@ class Screen(Protocol):
     def show(self, view: SessionView) -> None: ...
 
 
-@dataclass(frozen=True)
-class OperatorLine:
+class OperatorLine(NamedTuple):
     """A line of the operator; the end of what is typed where it is ``None``."""
 
     text: str | None
 
 
-Item = Event | OperatorLine
+@dataclass(frozen=True)
+class Acquisition:
+    """A session that is ready to be run: sources, each with a thread of its own, and the one thread that writes."""
 
+    conductor: Conductor
+    sources: Sequence[LiveSource]
+    clock: Clock
+    journals: Journals
+    folder: Path  # of the job
+    watched: WatchedFolder | None = None  # into which results are dropped
+    dropped: Callable[[DroppedFile], None] = lambda file: None  # takes them
+    items: queue.Queue[Event | OperatorLine] = field(
+        default_factory=queue.Queue
+    )  # what they say; the operator's lines too
 
-class Listening:
-    """Sources, each with a thread of its own."""
-
-    def __init__(self, sources: Sequence[LiveSource], items: queue.Queue[Item]) -> None:
-        self.sources, self._items, self._stop = tuple(sources), items, threading.Event()
-        self._threads = [threading.Thread(target=self._listen, args=(source,), daemon=True) for source in sources]
-
-    def start(self) -> None:
-        for thread in self._threads:
+    def run(self, screen: Screen) -> None:
+        """Run it until the operator ends it; between events each thing is done in its own time."""
+        with interruption.placing(self.folder):
+            pass  # from here on a signal says that what was accepted is written
+        stop = threading.Event()
+        threads = [threading.Thread(target=self._listen, args=(source, stop), daemon=True) for source in self.sources]
+        for thread in threads:
             thread.start()
-
-    def stop(self) -> None:
-        """End it, and give the ports back."""
-        self._stop.set()
-        for thread in self._threads:
-            thread.join(timeout=2.0)
-        for source in self.sources:
-            source.close()
-
-    def _listen(self, source: LiveSource) -> None:
         try:
-            for event in source.events(self._stop):
-                self._items.put(event)
-                if self._stop.is_set():
+            try:
+                self._until_ended(screen)
+            finally:
+                stop.set()
+                for thread in threads:
+                    thread.join(timeout=2.0)
+                for source in self.sources:
+                    source.close()
+            while not self.items.empty():
+                self._take()
+            self.conductor.finish()
+            self._show(screen)
+        finally:
+            self.journals.close()
+
+    def _until_ended(self, screen: Screen) -> None:
+        committed = looked = drawn = self.clock.monotonic_ns()
+        while not self.conductor.ended:
+            self._take()
+            now = self.clock.monotonic_ns()
+            if self.watched is not None and now - looked >= _LOOK_S * 1e9:
+                looked = now
+                for file in self.watched.look():
+                    self.dropped(file)
+                while self.watched.trouble:
+                    self.conductor.tell(self.watched.trouble.pop(0))
+            if now - committed >= COMMIT_S * 1e9:
+                committed = now
+                for source in self.sources:
+                    self.conductor.recorder.identified(source.identity())
+                self.conductor.tick()
+            if self.conductor.said or now - drawn >= COMMIT_S * 1e9:
+                drawn = now
+                self._show(screen)
+
+    def _listen(self, source: LiveSource, stop: threading.Event) -> None:
+        try:
+            for event in source.events(stop):
+                self.items.put(event)
+                if stop.is_set():
                     break
         except Exception as error:  # whatever is wrong with a source, its silence is said
             why = say("the program's own part that listens to it failed: {what}", what=Verbatim(repr(error)))
-            self._items.put(Gap(source.name, SYSTEM.utc_ns(), SYSTEM.monotonic_ns(), why))
+            self.items.put(Gap(source.name, SYSTEM.utc_ns(), SYSTEM.monotonic_ns(), why))
 
+    def _show(self, screen: Screen) -> None:
+        while self.conductor.said:
+            screen.tell(self.conductor.said.popleft())
+        screen.show(self.conductor.view())
 
-def run(
-    conductor: Conductor, listening: Listening, items: queue.Queue[Item], screen: Screen, clock: Clock, *,
-    watched: WatchedFolder | None = None, dropped: Callable[[DroppedFile], None] | None = None,
-) -> None:  # fmt: skip
-    """Run a session to its end; between events each thing is done in its own time."""
-    kept = looked = drawn = clock.monotonic_ns()
-    listening.start()
-    try:
-        while not conductor.ended:
-            _take(conductor, items)
-            now = clock.monotonic_ns()
-            if watched is not None and dropped is not None and now - looked >= _LOOK_S * 1e9:
-                looked = now
-                for file in watched.look():
-                    dropped(file)
-                while watched.trouble:
-                    conductor.tell(watched.trouble.pop(0))
-            if now - kept >= COMMIT_S * 1e9:
-                kept = now
-                for source in listening.sources:
-                    conductor.recorder.identified(source.identity())
-                conductor.tick()
-            if conductor.said or now - drawn >= COMMIT_S * 1e9:
-                drawn = now
-                _show(conductor, screen)
-    finally:
-        listening.stop()
-    while not items.empty():
-        _take(conductor, items)
-    conductor.finish()
-    _show(conductor, screen)
-
-
-def _show(conductor: Conductor, screen: Screen) -> None:
-    while conductor.said:
-        screen.tell(conductor.said.popleft())
-    screen.show(conductor.view())
-
-
-def _take(conductor: Conductor, items: queue.Queue[Item]) -> None:
-    """Everything that is there by now, or the first that comes."""
-    with contextlib.suppress(queue.Empty):
-        for number in range(_AT_ONCE):
-            item = items.get_nowait() if number else items.get(timeout=COMMIT_S)
-            if isinstance(item, OperatorLine):
-                conductor.line("quit" if item.text is None else item.text)
-            else:
-                conductor.event(item)
+    def _take(self) -> None:
+        """Everything that is there by now, or the first that comes."""
+        with contextlib.suppress(queue.Empty):
+            for number in range(_AT_ONCE):
+                item = self.items.get_nowait() if number else self.items.get(timeout=COMMIT_S)
+                if isinstance(item, OperatorLine):
+                    self.conductor.line("quit" if item.text is None else item.text)
+                else:
+                    self.conductor.event(item)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from cmm_uq.app.commands.laboratory.acquire import Acquisition, begin_acquisition
+from cmm_uq.app.commands.laboratory.acquire import begin_acquisition
 from cmm_uq.laboratory.live.conducting import Conductor
 from cmm_uq.laboratory.live.instruments.source import Reading
+from cmm_uq.laboratory.live.running import Acquisition
 
 JOB = """
 [job]

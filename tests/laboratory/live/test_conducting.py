@@ -381,7 +381,7 @@ def test_a_machine_goes_on_after_an_error_once_the_operator_says_so(tmp_path: Pa
     machine = SimulatedIppServer()
     more = f'[[acquire.source]]\nname = "cmm"\nprofile = "ipp-position"\nport = "{machine.url}"\n'
     taking = begin_acquisition(job_folder(tmp_path / "job", more))
-    (source,) = taking.listening.sources
+    (source,) = taking.sources
     stop = threading.Event()
     try:
         machine.trip()

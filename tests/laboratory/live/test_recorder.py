@@ -9,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 from cmm_uq.base.messages import Verbatim
 from cmm_uq.laboratory.live.instruments.source import Moment, Reading
 from cmm_uq.laboratory.live.journal import RecordingJournal, opened
-from cmm_uq.laboratory.live.recorder import Blocks, readings_of
+from cmm_uq.laboratory.live.recorder import put_blocks, readings_of
 
 NOW = Moment(1, 2)
 READING = st.builds(
@@ -23,10 +23,8 @@ READING = st.builds(
 @settings(max_examples=50, deadline=None)
 def test_every_reading_comes_back_with_its_bytes_values_and_clocks(tmp_path_factory, readings: list[Reading]) -> None:  # type: ignore[no-untyped-def]
     path: Path = tmp_path_factory.mktemp("b") / "j"
-    journal, blocks = RecordingJournal(path), Blocks()
-    for reading in readings:
-        blocks.add(reading)
-    blocks.put(journal, NOW)
+    journal = RecordingJournal(path)
+    put_blocks(readings, journal, NOW)
     journal.commit()
     journal.close()
     found = [reading for record in opened(path).records for reading in readings_of(record.data)]

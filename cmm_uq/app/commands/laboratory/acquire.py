@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import queue
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +18,6 @@ from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.messages import Verbatim
-from cmm_uq.base.output import interruption
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE
@@ -39,10 +36,10 @@ from cmm_uq.laboratory.live.instruments.source import SYSTEM, Clock, LiveSource,
 from cmm_uq.laboratory.live.journal import made_folder, written_whole
 from cmm_uq.laboratory.live.judging import Judge
 from cmm_uq.laboratory.live.lead import Lead, LiveRecording, titles_of
-from cmm_uq.laboratory.live.recorder import Recorder, settle_earlier
-from cmm_uq.laboratory.live.running import DroppedFile, Item, Listening, Screen, WatchedFolder, run
+from cmm_uq.laboratory.live.recorder import Recorder
+from cmm_uq.laboratory.live.running import Acquisition, DroppedFile, WatchedFolder
 from cmm_uq.laboratory.live.simulated import SimulatedMachine, simulated
-from cmm_uq.laboratory.live.story import FOLDER, Journals, Story, begin, read_story, sessions_in
+from cmm_uq.laboratory.live.story import FOLDER, Story, begin, read_story
 from cmm_uq.machine.model.kind import Observe
 from cmm_uq.machine.physics.catalogue import effects
 
@@ -109,41 +106,6 @@ def _imported(content: bytes, where: str, keys: ImportKeys) -> ImportedTable:
         return imported(content, where, keys.model_copy(update={"points_per_measurement": "all"}))
 
 
-@dataclass(frozen=True)
-class Acquisition:
-    """A session that is ready to be run.
-
-    ``items``: what they say; lines of the operator are put here; ``watched, dropped``: a folder that results are
-    dropped into, and what takes them.
-    """
-
-    conductor: Conductor
-    listening: Listening
-    items: queue.Queue[Item]
-    clock: Clock
-    journals: Journals
-    watched: WatchedFolder | None
-    dropped: Callable[[DroppedFile], None] | None
-    folder: Path
-
-    def run(self, screen: Screen) -> None:
-        """Run it until the operator ends it."""
-        with interruption.placing(self.folder):
-            pass  # from here on a signal says that what was accepted is written
-        try:
-            run(
-                self.conductor,
-                self.listening,
-                self.items,
-                screen,
-                self.clock,
-                watched=self.watched,
-                dropped=self.dropped,
-            )
-        finally:
-            self.journals.close()
-
-
 @naming_package()
 def begin_acquisition(
     folder: Path, *, simulate: bool = False, seed: int = 0, skip_damaged: bool = False, clock: Clock = SYSTEM
@@ -152,38 +114,32 @@ def begin_acquisition(
     job = read_job(folder, recorded=False)
     _check_origin(job, simulate=simulate)
     sessions = job.folder / FOLDER
-    story = read_story(sessions, skip_damaged=skip_damaged) if sessions_in(sessions) else Story()
+    story = read_story(sessions, skip_damaged=skip_damaged)
     plan, titles = _plan(job, story)
-    recording = Path(job.recording_path)
-    table = LiveRecording(recording, sessions, simulated=simulate)
-    lead = _lead(job, plan, titles)
-    judge = _judge(job)
+    table = LiveRecording(Path(job.recording_path), sessions, simulated=simulate)
+    lead, judge = _lead(job, plan, titles), _judge(job)
     _check_columns(job)
     facts = job.facts.acquire
     watched = None if facts.folder is None or simulate else WatchedFolder(job.folder / facts.folder, clock)
     sources, machine = _sources(job, simulate=simulate, seed=seed, clock=clock)
     try:
-        now = Moment(clock.utc_ns(), clock.monotonic_ns())
-        journals = begin(
-            sessions, _said(job, plan, titles, simulate, first=not story.sessions), now, skip_damaged=skip_damaged
-        )
+        now, beginning = Moment.now(clock), _said(job, plan, titles, simulate, first=not story.sessions)
+        journals = begin(sessions, beginning, now, skip_damaged=skip_damaged)
     except BaseException:
         for source in sources:
             source.close()
         raise
-    settle_earlier(journals, facts.source, facts.max_gap_s, now)
-    recorder = Recorder(
-        journals, () if simulate and not facts.source else facts.source, max_gap_s=facts.max_gap_s, clock=clock
-    )
-    items: queue.Queue[Item] = queue.Queue()
+    recorder = Recorder(journals, facts.source, max_gap_s=facts.max_gap_s, clock=clock)
+    recorder.settle_earlier()
     conductor = Conductor(
         recorder, lead, judge, table, facts, soak_k_per_h=facts.soak_k_per_h or job.facts.rated_conditions.change_k_per_h,
         machine=None if machine is None else machine.measure,
         clear=[source.clear_errors for source in sources if isinstance(source, IppMachine)],
     )  # fmt: skip
     conductor.tick()
-    dropped = None if watched is None else Taking(job, watched, conductor, clock)
-    return Acquisition(conductor, Listening(sources, items), items, clock, journals, watched, dropped, job.folder)
+    if watched is None:
+        return Acquisition(conductor, sources, clock, journals, job.folder)
+    return Acquisition(conductor, sources, clock, journals, job.folder, watched, Taking(job, watched, conductor, clock))
 
 
 def plan_file(job: Job) -> dict[str, bytes]:

@@ -17,17 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.app.commands.files import REPORTS, RESULTS, Stage, ledger_of, opened, silent
-from cmm_uq.app.commands.laboratory.batch_jobs import (
-    PROGRAM,
-    BatchJob,
-    BatchOutput,
-    Task,
-    check_parquet,
-    conforming,
-    jobs_in,
-    results_of,
-    write_table,
-)
+from cmm_uq.app.commands.laboratory import batch_jobs
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import REPORT
 from cmm_uq.base.errors import CmmUqError, OutputError
@@ -134,7 +124,8 @@ class BatchRun:
     """One batch on its way: what came of it so far, with the ``records`` that each report is recorded in."""
 
     def __init__(
-        self, listed: list[BatchJob], options: BatchOptions, output: BatchOutput, batch: Batch, records: Records | None,
+        self, listed: list[batch_jobs.BatchJob], options: BatchOptions, output: batch_jobs.BatchOutput, batch: Batch,
+        records: Records | None,
         tell: Stage,
     ) -> None:  # fmt: skip
         self.listed, self.options, self.output, self.batch, self.records = listed, options, output, batch, records
@@ -176,14 +167,14 @@ class BatchRun:
 
     def _answers(self) -> Generator[TaskAnswer, None, None]:
         options = self.options
-        work = WorkerTask(PROGRAM, (options.seed, options.results_only), options.seconds, options.tries)
+        work = WorkerTask(batch_jobs.PROGRAM, (options.seed, options.results_only), options.seconds, options.tries)
         if options.scheduler is None:
             return answers(work, self._tasks(), processes() if options.workers is None else options.workers)
         from cmm_uq.laboratory.schedule.cluster import cluster_answers
 
         return cluster_answers(options.scheduler, work, self._tasks(), len(self.listed))
 
-    def _tasks(self) -> Iterator[tuple[int, Task]]:
+    def _tasks(self) -> Iterator[tuple[int, batch_jobs.Task]]:
         """Jobs to be computed; what is there already, or cannot be, is counted."""
         for number, one in enumerate(self.listed):
             try:
@@ -229,7 +220,7 @@ class BatchRun:
                 self._count(results)
 
     def _count(self, results: dict[str, Any], *, computed: bool = True) -> None:
-        self.batch.not_conforming += not conforming(results)
+        self.batch.not_conforming += not batch_jobs.conforming(results)
         self._pace.add(computed=computed)
         self._progress()
 
@@ -250,18 +241,20 @@ def write_batch(
     """
     options, tell, place = options or BatchOptions(), stage or silent, out or REPORTS
     if parquet is not None:
-        check_parquet(parquet, force=options.force)
+        batch_jobs.check_parquet(parquet, force=options.force)
     tell("Looking for jobs", 0.0)
-    listed, planned = jobs_in(folders, place)
+    listed, planned = batch_jobs.jobs_in(folders, place)
     batch = Batch(place, len(listed), planned)
     with opened(records, None if out is None else out / "job") as history:
-        output = BatchOutput(place, options.seed, options.results_only, options.force)
+        output = batch_jobs.BatchOutput(place, options.seed, options.results_only, options.force)
         run = BatchRun(listed, options, output, batch, history, tell)
         batch.records = "" if history is None else history.shown
         with interruption.keeping(run.kept):
             run.through()
             if parquet is not None:
                 tell("Writing the table", 1.0)
-                write_table(parquet, filter(None, map(results_of, run.folders())), force=options.force)
+                batch_jobs.write_table(
+                    parquet, filter(None, map(batch_jobs.results_of, run.folders())), force=options.force
+                )
                 batch.parquet = parquet
     return batch

@@ -5,21 +5,19 @@ from __future__ import annotations
 import datetime as dt
 import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
-from cmm_uq.laboratory.due.drift import history
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, in_order, machine_due
-from cmm_uq.laboratory.due.fleet import FleetMember, FleetResult, fit_fleet, judged
 from cmm_uq.laboratory.due.history import MachineHistory, machine_history
 from cmm_uq.laboratory.due.rule import CompletedInterval, Pool, Rule, calibrations, ended_intervals, part_used
 from cmm_uq.laboratory.records import open_records
@@ -29,20 +27,12 @@ from cmm_uq.laboratory.records.listing import outcomes_of
 if TYPE_CHECKING:
     import pandas as pd
 
+    from cmm_uq.app.commands.files import Stage
+    from cmm_uq.certificate.document import Document
     from cmm_uq.laboratory.due.drift import DriftPrior as Prior
+    from cmm_uq.laboratory.due.fleet import FleetMember, FleetResult
     from cmm_uq.laboratory.due.fleet_model import FleetPrior
     from cmm_uq.laboratory.records.store import Records
-
-
-@dataclass(frozen=True, eq=False)
-class FleetFile:
-    """Priors of the machines of a fleet; of none where nothing was read."""
-
-    fleets: Mapping[str, FleetPrior] = field(default_factory=dict)
-
-    def of(self, machine: RecordedMachine) -> dict[str, Prior]:
-        """Of a machine, by value; its model and place may be new to the fleet."""
-        return {name: _prior(fleet, machine.model, machine.place) for name, fleet in self.fleets.items()}
 
 
 @lru_cache(maxsize=1000)
@@ -50,13 +40,15 @@ def _prior(fleet: FleetPrior, model: str, place: str) -> Prior:
     return fleet.prior(model, place)
 
 
-def read_fleet(file: Path | None) -> FleetFile:
-    """Read a fleet's file.
+def _priors(fleets: Mapping[str, FleetPrior], machine: RecordedMachine) -> dict[str, Prior]:
+    """Of a machine, by value; its model and place may be new to the fleet."""
+    return {name: _prior(fleet, machine.model, machine.place) for name, fleet in fleets.items()}
 
-    ``file``: ``None`` for no fleet.
-    """
+
+def read_fleet(file: Path | None) -> dict[str, FleetPrior]:
+    """Priors of the machines of a fleet, by value; none where no file is named."""
     if file is None:
-        return FleetFile()
+        return {}
     from cmm_uq.laboratory.due.fleet_model import FleetPrior
 
     fix = "Make it: cmm-uq fleet --out DIR, and name DIR/fleet.json"
@@ -65,12 +57,11 @@ def read_fleet(file: Path | None) -> FleetFile:
         values = [(str(value["name"]), value["prior"]) for value in data["values"]]
     except (ValueError, KeyError, TypeError, RecursionError):
         raise CmmUqError("is no fleet.json", where=str(file), fix=fix) from None
-    return FleetFile({name: FleetPrior.from_data(prior, str(file)) for name, prior in values})
+    return {name: FleetPrior.from_data(prior, str(file)) for name, prior in values}
 
 
 SCHEMA = "cmm-uq/due/1"
 WITHIN = dt.timedelta(days=90)  # how far ahead something is due and no longer later, where nothing is said
-FILES = ("due.html", "due.json")
 
 
 @dataclass(frozen=True)
@@ -110,20 +101,25 @@ def what_is_due(
     fleet: Path | None = None,
 ) -> WhatIsDue:
     """What is due for calibration when, and why."""
-    day = on or dt.datetime.now().astimezone().date()
-    learnt = read_fleet(fleet)
+    day, learnt = on or _today(), read_fleet(fleet)
     with open_records(where, read_only=True) as records:
         found = due_in(records, machines, day, learnt)
     kept = found if within is None else [one for one in found if one.due is None or one.due - day <= within]
     return WhatIsDue(day, WITHIN if within is None else within, tuple(kept))
 
 
-def due_in(records: Records, machines: Collection[str], on: dt.date, fleet: FleetFile | None = None) -> list[DueItem]:
+def _today() -> dt.date:
+    return dt.datetime.now().astimezone().date()
+
+
+def due_in(
+    records: Records, machines: Collection[str], on: dt.date, fleets: Mapping[str, FleetPrior] = MappingProxyType({})
+) -> list[DueItem]:
     artefacts = {one.serial: one for one in records.artefacts()}
     asked = {one.serial: one for one in map(records.machine, machines)}.values() if machines else records.machines()
     if not asked and not artefacts:
         raise CmmUqError("no machine is recorded yet", where="records", fix="Record one: cmm-uq report JOB")
-    reading = _Reading(records, on, fleet or FleetFile(), whole=bool(machines))
+    reading = _Reading(records, on, fleets, whole=bool(machines))
     found = [machine_due(reading.known(one), artefacts, on, reading.pool(one)) for one in asked]
     used = {one.artefact for one in found} if machines else set(artefacts)
     return in_order([*found, *(artefact_due(artefacts[serial]) for serial in used if serial in artefacts)])
@@ -136,11 +132,8 @@ class _Reading:
     that are asked for.
     """
 
-    def __init__(self, records: Records, on: dt.date, fleet: FleetFile, *, whole: bool) -> None:
-        self.records = records
-        self._fleet = fleet
-        self._late = records.dated_after(on)
-        self._on = on
+    def __init__(self, records: Records, on: dt.date, fleets: Mapping[str, FleetPrior], *, whole: bool) -> None:
+        self.records, self._on, self._fleets, self._late = records, on, fleets, records.dated_after(on)
         self._newest: dict[str, RecordedCertificate] = {}
         self._checked: dict[str, RecordedCertificate] = {}
         self._without: set[int] = set()
@@ -161,7 +154,7 @@ class _Reading:
             return CalibrationRecord(machine, rule, [newest], newest.entry not in self._without, late)
         past = self._past(machine.serial)
         limited = any(part_used(one) is not None or one.decision != "none" for one in calibrations(past)[-1:])
-        priors = self._fleet.of(machine) if rule.method == "drift" else {}
+        priors = _priors(self._fleets, machine) if rule.method == "drift" else {}
         return CalibrationRecord(machine, rule, past, limited, late, priors)
 
     def pool(self, machine: RecordedMachine) -> Pool:
@@ -186,59 +179,62 @@ class _Reading:
         return self._pasts[serial]
 
 
-def write_due(found: WhatIsDue, folder: Path, *, force: bool = False) -> dict[str, Path]:
-    """Write ``due.html`` and ``due.json``, all or none."""
+def _write(
+    name: str, owner: str, folder: Path, document: Document, data: Mapping[str, Any], *, force: bool, **further: bytes
+) -> dict[str, Path]:
+    """Write ``NAME.html``, ``NAME.json`` and what else there is, by the ends of names, all or none."""
     from cmm_uq.base.output import Owner, staged
-    from cmm_uq.certificate.pages.due import due_document
     from cmm_uq.certificate.render.html import render_html
     from cmm_uq.certificate.results.plain import as_json
 
-    with staged(folder, Owner("due", "records"), force=force, expected=FILES) as place:
-        page = render_html(due_document(found.items, found.on, found.within)).encode()
-        return place.write({"due.html": page, "due.json": as_json(found.data())})
+    files = [f"{name}.{end}" for end in ("html", "json", *further)]
+    with staged(folder, Owner(name, owner), force=force, expected=files) as place:
+        contents = (render_html(document).encode(), as_json(data), *further.values())
+        return place.write(dict(zip(files, contents, strict=True)))
+
+
+def write_due(found: WhatIsDue, folder: Path, *, force: bool = False) -> dict[str, Path]:
+    """Write ``due.html`` and ``due.json``, all or none."""
+    from cmm_uq.certificate.pages.due import due_document
+
+    document = due_document(found.items, found.on, found.within)
+    return _write("due", "records", folder, document, found.data(), force=force)
 
 
 def _iso(day: dt.date | None) -> str | None:
     return None if day is None else day.isoformat()
 
 
-HISTORY_FILES = ("history.html", "history.json")
-
-
 def history_of(
     machine: str, where: str | Path | None = None, *, on: dt.date | None = None, fleet: Path | None = None
 ) -> MachineHistory:
     """The history of a machine."""
-    day = on or dt.datetime.now().astimezone().date()
-    learnt = read_fleet(fleet)
+    day, learnt = on or _today(), read_fleet(fleet)
     with open_records(where, read_only=True) as records:
         found = records.machine(machine)
         certificates = records.certificates(found.serial, values=False)
         series = records.series(found.serial)
         entries = (one.entry[one.day <= day.toordinal()] for one in series.values())
         stated = outcomes_of(records, {int(until[-1]) for until in entries if len(until)})
-        return machine_history(found, certificates, series, day, learnt.of(found), stated)
+        return machine_history(found, certificates, series, day, _priors(learnt, found), stated)
 
 
 def write_history(found: MachineHistory, folder: Path, *, force: bool = False) -> dict[str, Path]:
     """Write ``history.html`` and ``history.json``, all or none."""
-    from cmm_uq.base.output import Owner, staged
     from cmm_uq.certificate.pages.history import history_data, history_document
-    from cmm_uq.certificate.render.html import render_html
-    from cmm_uq.certificate.results.plain import as_json
 
-    with staged(folder, Owner("history", found.machine.serial), force=force, expected=HISTORY_FILES) as place:
-        page = render_html(history_document(found)).encode()
-        return place.write({"history.html": page, "history.json": as_json(history_data(found))})
-
-
-FLEET_FILES = ("fleet.html", "fleet.json", "fleet.csv")
+    document, data = history_document(found), history_data(found)
+    return _write("history", found.machine.serial, folder, document, data, force=force)
 
 
 def fleet(
-    where: str | Path | None = None, names: Collection[str] = (), *, seed: int = 1, stage: Stage = silent
+    where: str | Path | None = None, names: Collection[str] = (), *, seed: int = 1, stage: Stage | None = None
 ) -> FleetResult:
     """Learn what drift is usual for the machines of the records, and which of them do not belong."""
+    from cmm_uq.app.commands.files import silent
+    from cmm_uq.laboratory.due.fleet import fit_fleet, judged
+
+    tell = stage or silent
     with open_records(where, read_only=True) as records:
         frame = records.all_series(names or None)
         adjusted = {one.serial: one.adjusted[-1].toordinal() for one in records.machines() if one.adjusted}
@@ -259,13 +255,13 @@ def fleet(
         quantity, unit = called.get(name, (name, ""))
 
         def told(part: float, i: int = i, quantity: str = quantity) -> None:
-            stage(f"Sampling: {quantity}", (i + part) / len(wanted))
+            tell(f"Sampling: {quantity}", (i + part) / len(wanted))
 
         if not members:
             fix = "Choose another --name"
             raise CmmUqError("no certificate states this value with an uncertainty", where=name, fix=fix)
         learnt.append((name, quantity, unit, members, fit_fleet(members, seed, told), len(rows) - len(usable)))
-    stage("Done", 1.0)
+    tell("Done", 1.0)
     return judged(learnt, seed)
 
 
@@ -289,6 +285,9 @@ def _members(
     rows: pd.DataFrame, adjusted: Mapping[str, int], stated: Mapping[int, Mapping[str, str]]
 ) -> Iterator[FleetMember]:
     """Machines with what their certificates say; the newest limit, model and place count, and the newest adjustment."""
+    from cmm_uq.laboratory.due.drift import history
+    from cmm_uq.laboratory.due.fleet import FleetMember
+
     for machine, of in rows.groupby("machine", sort=True):
         last, known = of.iloc[-1], history(_Columns(of), adjusted.get(str(machine)))
         limits = of["limit"].dropna()
@@ -312,13 +311,8 @@ class _Columns:
 
 def write_fleet(found: FleetResult, folder: Path, *, force: bool = False) -> dict[str, Path]:
     """Write ``fleet.html``, ``fleet.json`` and ``fleet.csv``, all or none."""
-    from cmm_uq.base.output import Owner, staged
     from cmm_uq.certificate.pages.fleet import fleet_document
     from cmm_uq.certificate.pages.fleet_summary import fleet_csv, fleet_data
-    from cmm_uq.certificate.render.html import render_html
-    from cmm_uq.certificate.results.plain import as_json
 
-    with staged(folder, Owner("fleet", "records"), force=force, expected=FLEET_FILES) as place:
-        page = render_html(fleet_document(found)).encode()
-        data = fleet_data(found)
-        return place.write({"fleet.html": page, "fleet.json": as_json(data), "fleet.csv": fleet_csv(data)})
+    data = fleet_data(found)
+    return _write("fleet", "records", folder, fleet_document(found), data, force=force, csv=fleet_csv(data))

@@ -13,22 +13,14 @@ from pathlib import Path
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.output.new_file import write_new
 from cmm_uq.jobs.tables.plan import DeclaredSource
+from cmm_uq.laboratory.live.instruments import library
 from cmm_uq.laboratory.live.instruments.instrument import open_source
-from cmm_uq.laboratory.live.instruments.library import (
-    ENDING,
-    ProfileDraft,
-    Trial,
-    drafted,
-    profile_named,
-    profile_of,
-    ready,
-)
 from cmm_uq.laboratory.live.instruments.source import Event, LiveSource
 
 
 def ready_profiles() -> list[tuple[str, str, str]]:
     """Name, title and what it was tried on, of each."""
-    profiles = map(profile_named, ready())
+    profiles = map(library.profile_named, library.ready())
     return [(profile.name, profile.title, profile.facts.tried) for profile in profiles]
 
 
@@ -38,7 +30,7 @@ def declared(what: str, port: str, job: Path | None) -> tuple[DeclaredSource, Pa
     port : at which it is; empty where the job says it.
     """
     if job is None:
-        name = re.sub(r"[^A-Za-z0-9._-]", "_", Path(what).name.removesuffix(ENDING))
+        name = re.sub(r"[^A-Za-z0-9._-]", "_", Path(what).name.removesuffix(library.ENDING))
         return DeclaredSource.model_construct(name=name or "instrument", profile=what, port=port), Path()
     from cmm_uq.app.commands.reading import read_job
 
@@ -58,7 +50,7 @@ class Attempt:
 
     def __init__(self, what: str, port: str, job: Path | None) -> None:
         source, folder = declared(what, port, job)
-        self.trial = Trial(profile_named(source.profile, folder), source.port)
+        self.trial = library.Trial(library.profile_named(source.profile, folder), source.port)
         self.source: LiveSource = open_source(source, folder=folder)
         self._stop = threading.Event()
 
@@ -78,12 +70,12 @@ class Attempt:
             self.source.close()
 
 
-def write_profile(out: Path, wanted: ProfileDraft) -> None:
+def write_profile(out: Path, wanted: library.ProfileDraft) -> None:
     """Write a new profile that reads its own example."""
-    if out.suffix != ENDING:
+    if out.suffix != library.ENDING:
         raise CmmUqError("a profile's file ends in .toml", where=str(out), fix=f"Name it {out.stem or 'my-gauge'}.toml")
-    content = drafted(wanted)
-    profile_of(content, out)
+    content = library.drafted(wanted)
+    library.profile_of(content, out)
     write_new(out, content)
 
 
@@ -95,7 +87,7 @@ def simulated_instrument(profile: str, way: str) -> Iterator[str]:
     """
     from cmm_uq.laboratory.live.instruments.simulated_line import SPEAKERS, WAYS, SimulatedLine
 
-    if profile_named(profile).protocol == "ipp":
+    if library.profile_named(profile).protocol == "ipp":
         from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer as SimulatedMachine
 
         machine = SimulatedMachine()

@@ -25,17 +25,8 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.schema import commented
 from cmm_uq.laboratory.due.history import machine_history
 from cmm_uq.laboratory.records.place import NONE, beside, is_url, place_of
+from cmm_uq.laboratory.schedule import notices
 from cmm_uq.laboratory.schedule.jobs import REPORTED, JobFolder, JobReporting
-from cmm_uq.laboratory.schedule.notices import (
-    Channel,
-    Notice,
-    Outbox,
-    OutgoingMessage,
-    UndeliveredError,
-    of_drift,
-    of_due,
-    of_error,
-)
 from cmm_uq.laboratory.schedule.run import RunClock, ScheduledRun
 from cmm_uq.laboratory.schedule.schedulers import DAYS, READY, ScheduledCall, encoded
 from cmm_uq.laboratory.schedule.settings import FILE, ScheduleFile, channels, read_schedule
@@ -68,7 +59,7 @@ class Schedule:
         given = self.facts.run.records
         return given if not given or given == NONE or is_url(given) else str(self.home / given)
 
-    def channels(self) -> list[Channel]:
+    def channels(self) -> list[notices.Channel]:
         return channels(self.facts, self.home)
 
 
@@ -101,11 +92,11 @@ def send_trial(found: Schedule, clock: RunClock = CLOCK) -> list[Tried]:
     text = say("A trial: messages of scheduled runs will come this way.")
     told = []
     for channel in found.channels():
-        notice = Notice("error", "trial", say("trial"), text, clock.moment())
+        notice = notices.Notice("error", "trial", say("trial"), text, clock.moment())
         try:
-            remark = channel.send(OutgoingMessage.of(notice, channel.name, clock.moment()))
+            remark = channel.send(notices.OutgoingMessage.of(notice, channel.name, clock.moment()))
             told.append(Tried(channel.name, True, remark))
-        except (UndeliveredError, CmmUqError) as error:
+        except (notices.UndeliveredError, CmmUqError) as error:
             told.append(Tried(channel.name, False, str(error)))
     return told
 
@@ -184,7 +175,7 @@ def opened(place: str | Path | None, *, dry: bool) -> Iterator[Records | None]:
         yield records
 
 
-def due_notices(records: Records | None, on: dt.date, within: dt.timedelta) -> Iterable[Notice]:
+def due_notices(records: Records | None, on: dt.date, within: dt.timedelta) -> Iterable[notices.Notice]:
     """What is to be calibrated soon, or should have been."""
     if records is None:
         return
@@ -193,10 +184,10 @@ def due_notices(records: Records | None, on: dt.date, within: dt.timedelta) -> I
         return
     for one in due_in(records, (), on):
         if one.due is not None and one.due <= on + within:
-            yield of_due(one.item, one.serial, one.due, on, one.why, beyond=one.beyond)
+            yield notices.of_due(one.item, one.serial, one.due, on, one.why, beyond=one.beyond)
 
 
-def drift_notices(records: Records | None, job: str, on: dt.date) -> Iterable[Notice]:
+def drift_notices(records: Records | None, job: str, on: dt.date) -> Iterable[notices.Notice]:
     """Whether a machine changed by more than chance since the recording before that of a job."""
     newest = [] if records is None else records.certificates(job=job, limit=1, values=False)
     if records is None or not newest:
@@ -208,7 +199,7 @@ def drift_notices(records: Records | None, job: str, on: dt.date) -> Iterable[No
     changed = [Verbatim(one.series.quantity) for one in history.values if history.significant(one)
                and int(one.series.entry[-1]) == newest[-1].entry]  # fmt: skip
     if changed:
-        yield of_drift(machine.serial, changed, newest[-1].entry)
+        yield notices.of_drift(machine.serial, changed, newest[-1].entry)
 
 
 def _check_clock(records: Records, on: dt.date) -> None:
@@ -258,7 +249,7 @@ def run_scheduled(asked: ScheduledOptions, tell: Tell = lambda told: None, clock
             if not asked.dry:
                 Problems(reports).mended(_RUN)
             state = FolderState(reports) if records is None else RecordsState(records, reports)
-            outbox = Outbox(reports, ways, state, clock.moment)
+            outbox = notices.Outbox(reports, ways, state, clock.moment)
             seed = facts.run.seed if asked.seed is None else asked.seed
             work = JobReporting(reports, state, lambda job: _reported(job, reports, seed, place or NONE), outbox.add,
                         lambda job: drift_notices(records, job.id, clock.now().date()))  # fmt: skip
@@ -279,7 +270,7 @@ def run_scheduled(asked: ScheduledOptions, tell: Tell = lambda told: None, clock
                 return run.through()
     except CmmUqError as error:  # of the records: without them nothing is made, and somebody has to hear of that too
         if not asked.dry:
-            _send_alone(error, Outbox(reports, ways, FolderState(reports), clock.moment), log, clock)
+            _send_alone(error, notices.Outbox(reports, ways, FolderState(reports), clock.moment), log, clock)
         raise
 
 
@@ -288,10 +279,10 @@ def _kept(run: ScheduledRun) -> str:
     return str(plural(count, one=say("1 report was written"), many=say("{count} reports were written", count=count)))
 
 
-def _send_alone(error: CmmUqError, outbox: Outbox, log: Log, clock: RunClock) -> None:
+def _send_alone(error: CmmUqError, outbox: notices.Outbox, log: Log, clock: RunClock) -> None:
     """Tell of an error that ended the whole run."""
     log.write(f"{clock.moment()} nothing was done: {error}")
-    notice = of_error(error, _RUN, Problems(outbox.out).since(_RUN, str(error), clock.moment()))
+    notice = notices.of_error(error, _RUN, Problems(outbox.out).since(_RUN, str(error), clock.moment()))
     try:
         outbox.add([notice])
         outbox.deliver(patience_s=0.0)
