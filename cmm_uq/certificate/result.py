@@ -20,8 +20,8 @@ from cmm_uq.base.messages import Text, at_key, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.reading import sha256
 from cmm_uq.jobs.recording.prediction import SimulationFacts
+from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.tables.identification import Capability
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.machine.model import Estimate, RecordingModel

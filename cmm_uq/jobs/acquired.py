@@ -13,10 +13,11 @@ from math import hypot
 from pathlib import PurePosixPath
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, names, plural, say, sentences
+from cmm_uq.jobs.reports import ResultsPart
 from cmm_uq.jobs.tables.circumstances import TestUncertainty
 from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED
 
@@ -25,11 +26,7 @@ ARTEFACT, TIME = "temp_artefact_c", "time_s"
 _NAMED = 5  # gaps and points that a certificate names one by one
 
 
-class _Said(BaseModel):
-    model_config = ConfigDict(strict=True, extra="ignore", frozen=True, allow_inf_nan=False, defer_build=True)
-
-
-class Instrument(_Said):
+class Instrument(ResultsPart):
     """One that readings came from: what it said itself, and what the job says of it."""
 
     name: str
@@ -41,8 +38,20 @@ class Instrument(_Said):
     columns: dict[str, str] = {}
     latency_ms: float = 0.0
 
+    @property
+    def sentence(self) -> Text:
+        """What identifies it."""
+        parts: list[Text] = names(filter(None, (self.name, " ".join(filter(None, (self.maker, self.model))))))
+        if self.serial:
+            parts.append(say("serial number {serial}", serial=Verbatim(self.serial)))
+        if self.firmware:
+            parts.append(say("firmware {firmware}", firmware=Verbatim(self.firmware)))
+        number = self.certificate
+        stated = say("certificate {number}", number=Verbatim(number)) if number else say("no certificate stated")
+        return commas([*parts, stated])
 
-class Silence(_Said):
+
+class Silence(ResultsPart):
     """When an instrument gave nothing: since the start of the job, and for how long; to the end of its session without."""
 
     instrument: str
@@ -50,16 +59,38 @@ class Silence(_Said):
     lasted_s: float | None = None
     why: str
 
+    @property
+    def sentence(self) -> Text:
+        instrument, why = Verbatim(self.instrument), Verbatim(self.why)
+        if self.lasted_s is None:
+            return say("{instrument} from {since:.0f} s on: {why}", instrument=instrument, since=self.since_s, why=why)
+        return say("{instrument} from {since:.0f} s for {lasted:.3g} s: {why}", instrument=instrument, since=self.since_s,
+                   lasted=self.lasted_s, why=why)  # fmt: skip
 
-class JoinedColumn(_Said):
+
+class JoinedColumn(ResultsPart):
     """A column that was joined by time: rms and largest standard uncertainty of interpolation, and the points without it."""
 
     u: float
     u_largest: float
     missing: list[tuple[int, int, int]] = []
 
+    def sentence(self, name: str) -> Text:
+        """What the joining adds to the column's uncertainty, and what is missing of it."""
+        joined = say("{name}: not known of every point", name=Verbatim(name)) if name == TIME else say(
+            "{name}: u = {u:.2g} by interpolation in time, {largest:.2g} at most", name=Verbatim(name), u=self.u,
+            largest=self.u_largest,
+        )  # fmt: skip
+        if not self.missing:
+            return joined
+        points: list[Text] = [say("{m}/{p}/{r}", m=m, p=p, r=r) for m, p, r in self.missing[:_NAMED]]
+        if (more := len(self.missing) - _NAMED) > 0:
+            points.append(say("{more} more", more=more))
+        return say("{told}; without a value, and so not used: measurement/point/repeat {points}", told=joined,
+                   points=commas(points))  # fmt: skip
 
-class Withdrawal(_Said):
+
+class Withdrawal(ResultsPart):
     """A point that was taken back."""
 
     measurement: int
@@ -68,7 +99,7 @@ class Withdrawal(_Said):
     reason: str
 
 
-class AcquisitionSession(_Said):
+class AcquisitionSession(ResultsPart):
     """One run of the program, and its journal."""
 
     number: int
@@ -77,7 +108,7 @@ class AcquisitionSession(_Said):
     sha256: str
 
 
-class AcquisitionRecord(_Said):
+class AcquisitionRecord(ResultsPart):
     """All of ``NAME.acquired.json``."""
 
     schema_: str = Field(SCHEMA, alias="schema")
@@ -145,18 +176,16 @@ class Provenance:
 
     @property
     def instruments(self) -> list[Text]:
-        """Each instrument with what identifies it."""
-        return [_instrument(instrument) for instrument in self.said.instruments]
+        return [instrument.sentence for instrument in self.said.instruments]
 
     @property
     def joins(self) -> list[Text]:
-        """Each column that was joined by time, with what that adds to its uncertainty, and what is missing of it."""
-        return [_join(name, column) for name, column in self.said.columns.items()]
+        return [column.sentence(name) for name, column in self.said.columns.items()]
 
     @property
     def gaps(self) -> list[Text]:
         """When instruments were silent, the first of them one by one; and jumps of the clock."""
-        gaps = [_silence(gap) for gap in self.said.gaps[:_NAMED]]
+        gaps = [gap.sentence for gap in self.said.gaps[:_NAMED]]
         if (more := len(self.said.gaps) - _NAMED) > 0:
             gaps.append(say("{more} further gaps are in the journal", more=more))
         return [*gaps, *(say("the computer's clock was moved by {s:.3g} s", s=s) for s in self.said.clock_jumps_s)]
@@ -208,38 +237,3 @@ def provenance_of(content: bytes, recording: bytes, origin: str, where: str) -> 
 def as_file(said: Mapping[str, Any]) -> bytes:
     """The bytes of such a file."""
     return (AcquisitionRecord.model_validate(said).model_dump_json(indent=2, by_alias=True) + "\n").encode()
-
-
-def _instrument(instrument: Instrument) -> Text:
-    model = " ".join(filter(None, (instrument.maker, instrument.model)))
-    parts: list[Text] = [Verbatim(instrument.name), *names(filter(None, (model,)))]
-    if instrument.serial:
-        parts.append(say("serial number {serial}", serial=Verbatim(instrument.serial)))
-    if instrument.firmware:
-        parts.append(say("firmware {firmware}", firmware=Verbatim(instrument.firmware)))
-    number = instrument.certificate
-    stated = say("certificate {number}", number=Verbatim(number)) if number else say("no certificate stated")
-    return commas([*parts, stated])
-
-
-def _join(name: str, column: JoinedColumn) -> Text:
-    joined: Text = say("{name}: u = {u:.2g} by interpolation in time, {largest:.2g} at most", name=Verbatim(name), u=column.u,
-                       largest=column.u_largest)  # fmt: skip
-    if name == TIME:
-        joined = say("{name}: not known of every point", name=Verbatim(name))
-    if not column.missing:
-        return joined
-    points = [say("{m}/{p}/{r}", m=m, p=p, r=r) for m, p, r in column.missing[:_NAMED]]
-    more = len(column.missing) - _NAMED
-    listed = commas([*points, *([say("{more} more", more=more)] if more > 0 else [])])
-    return say(
-        "{told}; without a value, and so not used: measurement/point/repeat {points}", told=joined, points=listed
-    )
-
-
-def _silence(gap: Silence) -> Text:
-    instrument, why = Verbatim(gap.instrument), Verbatim(gap.why)
-    if gap.lasted_s is None:
-        return say("{instrument} from {since:.0f} s on: {why}", instrument=instrument, since=gap.since_s, why=why)
-    return say("{instrument} from {since:.0f} s for {lasted:.3g} s: {why}", instrument=instrument, since=gap.since_s,
-               lasted=gap.lasted_s, why=why)  # fmt: skip

@@ -1,7 +1,8 @@
-"""Jobs made from another: job.toml of a derived recording, and a job beside another prediction than its own."""
+"""Jobs made from another: job.toml of a derived recording, the truth that one is drawn from, a job beside a prediction."""
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import tomllib
@@ -9,14 +10,18 @@ from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import tomlkit
+from pydantic import Field, field_validator
 from tomlkit.exceptions import TOMLKitError
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import COLUMNS, EFFECTS
+from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Uncertainty, key, required
 from cmm_uq.jobs.acquired import provenance_name
+from cmm_uq.jobs.columns import REQUIRED, largest
 from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.recording.prediction import (
@@ -28,6 +33,7 @@ from cmm_uq.jobs.recording.prediction import (
     read_prediction,
 )
 from cmm_uq.jobs.recording.references import reference_file
+from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.tables.origin import DERIVING, MEASURED, SIMULATED
 
 PROGRAM = f"cmm-uq {__version__}"
@@ -36,9 +42,7 @@ LONGEST_ID = 100
 OF_THE_CERTIFICATE = ("number", "replaces", "received", "issued", "recalibration_agreed", "as_found", "interim")
 OF_THE_RECORDED_MACHINE = ("short_gauge", "simulation")  # tables of it as it was, not of one simulated or compensated
 DERIVED_RECORDING = "recording.csv"  # name of a recording that was made from one in another format
-IN_THE_RECORDING = (
-    "temperature_log",
-)  # keys of [machine] whose figures stand in every recording that a command writes
+IN_THE_RECORDING = ("temperature_log",)  # keys of [machine] whose figures stand in every recording that is written
 
 
 def recording_name(job: Job) -> str:
@@ -64,26 +68,24 @@ def kept_inputs(job: Job) -> dict[str, bytes]:
 
 def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tuple[str, ...] = ()) -> bytes:
     """job.toml for a recording that a command made from a job; a simulated one stays simulated whatever is made from it."""
-    text, written = job.inputs["job.toml"].decode("utf-8-sig"), _hashes(files)
+    text, written = job.inputs["job.toml"].decode("utf-8-sig"), sha256(files)
     # an id that no other recording has: that of the job, what was done, and the beginning of a hash of what came out
     end = f"-{DERIVING[by]}-{hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()[:8]}"
     changes = {
         "id": job.facts.job.id[: LONGEST_ID - len(end)] + end,
         "origin": SIMULATED if job.origin == SIMULATED else DERIVING[by],
         "derived_from": {
-            "job": job.facts.job.id, "by": by, "program": PROGRAM, "inputs": _hashes(job.inputs), "files": written,
+            "job": job.facts.job.id, "by": by, "program": PROGRAM, "inputs": sha256(job.inputs), "files": written,
         },
     }  # fmt: skip
     file = recording_name(job) if _was_imported(job) else None
-    wanted = _changed(tomllib.loads(text), changes, without, file, job.certified)
-    try:
-        document = _changed(tomlkit.parse(text), changes, without, file, job.certified)
-        kept = tomlkit.dumps(document)
-        if tomllib.loads(kept) == wanted:
-            return kept.encode()
-    except (TOMLKitError, tomllib.TOMLDecodeError, KeyError, ValueError, TypeError):
-        pass  # a layout that the library cannot keep: comments are lost, no value is
-    return tomlkit.dumps(wanted).encode()
+    plain = _changed(tomllib.loads(text), changes, without, file, job.certified)
+    # in a layout that the library cannot keep comments are lost, no value is
+    with contextlib.suppress(TOMLKitError, tomllib.TOMLDecodeError, KeyError, ValueError, TypeError):
+        commented = tomlkit.dumps(_changed(tomlkit.parse(text), changes, without, file, job.certified))
+        if tomllib.loads(commented) == plain:
+            return commented.encode()
+    return tomlkit.dumps(plain).encode()
 
 
 def _was_imported(job: Job) -> bool:
@@ -97,8 +99,8 @@ def _changed(
 ) -> Any:
     table = document["job"]
     _drop(table, (*OF_THE_CERTIFICATE, *changes))
-    for key, value in changes.items():
-        table[key] = _inline(value) if isinstance(document, tomlkit.TOMLDocument) else deepcopy(value)
+    for name, value in changes.items():
+        table[name] = _inline(value) if isinstance(document, tomlkit.TOMLDocument) else deepcopy(value)
     _drop(document, OF_THE_RECORDED_MACHINE)
     _drop(document["machine"], without)
     # certified values stand in every recording that is written
@@ -112,31 +114,27 @@ def _changed(
 
 
 def _drop(table: Any, keys: Iterable[str]) -> None:
-    for key in keys:
-        if key in table:
-            del table[key]
+    for name in keys:
+        if name in table:
+            del table[name]
 
 
 def _state(table: Any, certified: Mapping[str, Any]) -> None:
     """What the digital certificate said, which the derived job does not have."""
-    for key, value in certified.items():
-        if isinstance(value, Mapping) and key in table:
-            _state(table[key], value)
+    for name, value in certified.items():
+        if isinstance(value, Mapping) and name in table:
+            _state(table[name], value)
         else:
-            table[key] = deepcopy(value)
+            table[name] = deepcopy(value)
 
 
 def _inline(value: Any) -> Any:
     if not isinstance(value, dict):
         return value
     table = tomlkit.inline_table()
-    for key, item in value.items():
-        table.append(key, _inline(item))
+    for name, item in value.items():
+        table.append(name, _inline(item))
     return table
-
-
-def _hashes(files: Mapping[str, bytes]) -> dict[str, str]:
-    return {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
 
 
 def is_compensated(job: Job) -> bool:
@@ -186,3 +184,71 @@ def _refuse_beside_a_simulation(facts: JobFile, where: str) -> None:
     if facts.recording.earlier is not None:
         raise CmmUqError("the change between two dates is not what a simulation predicts", where=where,
                          fix="Leave [recording] earlier out, and compare each date by itself")  # fmt: skip
+
+
+class ByAxis(JobTable):
+    """One number for each axis."""
+
+    x: Uncertainty = required("Along x.")
+    y: Uncertainty = required("Along y.")
+    z: Uncertainty = required("Along z.")
+
+
+class NoiseFacts(JobTable):
+    """``[noise]``: standard deviations of a coordinate."""
+
+    coordinate_um: Uncertainty | ByAxis = 0.0
+    """Standard deviation of each reading, of every coordinate or by axis."""
+    placing_um: Uncertainty = 0.0
+    """Standard deviation of the offset of each point of each placing, which its repeats share."""
+    growth_um: Uncertainty = 0.0
+    """Standard deviation of what is added at the longest distance in a placing, in proportion to the distance."""
+    slow_um: Uncertainty = key(0.0, "Standard deviation of slow noise; needs `time_s` in the recording.")
+    slow_time_s: Annotated[float, Field(gt=0, le=1e9)] | Literal["never"] = 600.0
+    """Time over which slow noise forgets; `"never"` for a random walk from the first reading on, of which `slow_um` is
+    then the root mean square over the recording."""
+    tails_dof: Annotated[float, Field(gt=2, le=1000)] | None = None
+    """Degrees of freedom of readings with Student's t distribution of the same standard deviation; normal by
+    default."""
+    resolution_um: Uncertainty = key(0.0, "Step of the display.")
+
+    @property
+    def coordinates_um(self) -> tuple[float, float, float]:
+        given = self.coordinate_um
+        return (given.x, given.y, given.z) if isinstance(given, ByAxis) else (given, given, given)
+
+
+class Truth(JobTable):
+    """All of truth.toml.
+
+    What a simulated recording is drawn from:
+
+    [effects.squareness_xy]
+    angle_arcsec = -173.0
+    [artefact]
+    length_mm = 404.236
+    [noise]
+    coordinate_um = 1.2
+    placing_um = 0.5
+    [columns]
+    temp_x_c = 22.5
+    """
+
+    effects: Annotated[dict[str, dict[str, AnyFloat]], Field(max_length=EFFECTS.most)] = {}
+    """True parameters of each effect that acts, by the effect's name, whatever the job's model names."""
+    artefact: dict[str, AnyFloat] = {}
+    """True sizes of the artefact, by name, such as `length_mm`; as certified by default."""
+    noise: NoiseFacts = key(NoiseFacts(), "Noise of the simulated readings.")
+    columns: Annotated[dict[Column, AnyFloat], Field(max_length=COLUMNS.most)] = {}
+    """Columns of the recording at a value that holds for every row, such as temperatures."""
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = key(0, "Seed of the random numbers.")
+
+    @field_validator("columns")
+    @classmethod
+    def _of_a_recording(cls, columns: dict[str, float]) -> dict[str, float]:
+        for name, value in columns.items():
+            if name in (*REQUIRED, "repeat"):
+                raise ValueError(f"{name} comes from the job's own recording")
+            if abs(value) > largest(name):
+                raise ValueError(f"{name} = {value:g} is more than anything that is measured")
+        return columns

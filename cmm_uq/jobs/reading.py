@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,11 +24,10 @@ from cmm_uq.jobs.importing.recording import read_recording_file
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logo import checked_logo
 from cmm_uq.jobs.recording import references
-from cmm_uq.jobs.recording.digitizer import calibration_file
 from cmm_uq.jobs.recording.references import EXPANDED, OF_POINTS, reference_file
 from cmm_uq.jobs.recording.short_gauge import KEY as SHORT_GAUGE, ShortGauge, short_gauge_of
 from cmm_uq.jobs.recording.temperature_log import KEY, log_of, with_logged
-from cmm_uq.jobs.reports import as_found_of, results_named
+from cmm_uq.jobs.reports import as_found_of, calibration_file, results_named
 from cmm_uq.jobs.source import FilesInFolder, FilesInMemory, JobFiles, check_distinct
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.tables.conformity import Standards, clause_files, forms_of, needed, uncertainty_missing
@@ -54,17 +52,30 @@ class Nameable:
 
 def read_job(folder: Path, nameable: Nameable, *, recorded: bool = True) -> Job:
     """Read and check a job; one still to be measured has no points, where it need not be ``recorded``."""
-    path = folder if folder.suffix == ".toml" else folder / "job.toml"
-    finish_interrupted(path.parent)
-    return _beside_replaced(_read(FilesInFolder(path), nameable, recorded=recorded), FilesInFolder(path))
+    return _read(_in_folder(folder), nameable, recorded=recorded)
 
 
 def job_of(files: Mapping[str, bytes], nameable: Nameable, *, recorded: bool = True) -> Job:
     """Read and check a job that lies in no folder yet."""
-    return _beside_replaced(_read(FilesInMemory(files), nameable, recorded=recorded), FilesInMemory(files))
+    return _read(FilesInMemory(files), nameable, recorded=recorded)
+
+
+def _in_folder(folder: Path) -> FilesInFolder:
+    path = folder if folder.suffix == ".toml" else folder / "job.toml"
+    finish_interrupted(path.parent)
+    return FilesInFolder(path)
 
 
 def _read(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
+    """With what the records had of the certificate that it replaces, where that lies beside it: its last input."""
+    job = _read_alone(source, nameable, recorded=recorded)
+    replaces = job.facts.job.replaces
+    if replaces is None or replaces.results is not None or not source.has(REPLACED):
+        return job
+    return replace(job, inputs={**job.inputs, **_contents(source, [REPLACED], TABLE_BYTES, written=True)})
+
+
+def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     path, folder = source.toml, source.toml.parent
     content, facts, says = _facts(source, nameable)
     inputs = {"job.toml": content}
@@ -129,9 +140,8 @@ def _read(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     found = as_found_of(before, inputs, folder, facts.job.origin, facts.machine.name, facts.machine.serial)
     gauge = _short_gauge(facts, inputs, folder, machine)
     prediction = prediction_of(facts.simulation, inputs, folder)
-    how = tuple(filter(None, told))
-    return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge, prediction, imported=how,
-               acquired=acquired, certified={} if says is None else says.table, clauses=clauses)  # fmt: skip
+    return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge, prediction, acquired=acquired,
+               imported=tuple(filter(None, told)), certified={} if says is None else says.table, clauses=clauses)  # fmt: skip
 
 
 def _certified_points(
@@ -168,18 +178,9 @@ def _refuse_unstated(facts: JobFile, points: Points, standards: Standards, path:
     if not artefact.with_references or artefact.u_um is not None or not points.columns.keys().isdisjoint(OF_POINTS):
         return
     for wish in facts.conformity:
-        key = uncertainty_missing(wish, artefact, facts.test_uncertainty, standards)
-        if key is not None:
+        if key := uncertainty_missing(wish, artefact, facts.test_uncertainty, standards):
             problem, fix = needed(key, wish)
             raise CmmUqError(problem, where=f"{path}: [[conformity]]", fix=fix)
-
-
-def _beside_replaced(job: Job, source: JobFiles) -> Job:
-    """The job with what the records had of the certificate that it replaces, where that lies beside it: its last input."""
-    replaces = job.facts.job.replaces
-    if replaces is None or replaces.results is not None or not source.has(REPLACED):
-        return job
-    return replace(job, inputs={**job.inputs, **_contents(source, [REPLACED], TABLE_BYTES, written=True)})
 
 
 def _acquired(facts: JobFile, source: JobFiles, inputs: dict[str, bytes]) -> Provenance | None:
@@ -215,15 +216,13 @@ def _refuse_what_needs_a_recording(facts: JobFile, path: Path) -> None:
 
 def read_machine(folder: Path, nameable: Nameable) -> Job:
     """A job for its machine alone: job.toml, error maps and temperature log, whatever its recording is."""
-    path = folder if folder.suffix == ".toml" else folder / "job.toml"
-    finish_interrupted(path.parent)
-    source = FilesInFolder(path)
+    source = _in_folder(folder)
     content, facts, _ = _facts(source, nameable)
     maps, logs, calibrations = _of_the_machine(facts.machine)
-    check_distinct([*maps, *logs, *calibrations], str(path))
+    check_distinct([*maps, *logs, *calibrations], str(source.toml))
     inputs = {"job.toml": content} | _contents(source, maps, MAP_BYTES) | _contents(source, logs, TABLE_BYTES)
     inputs |= _contents(source, calibrations, TABLE_BYTES, written=True)
-    return Job(path.parent, facts, _no_points(_machine(facts.machine)), inputs)
+    return Job(source.toml.parent, facts, _no_points(_machine(facts.machine)), inputs)
 
 
 def _facts(source: JobFiles, nameable: Nameable) -> tuple[bytes, JobFile, CertifiedValues | None]:
@@ -238,9 +237,10 @@ def _facts(source: JobFiles, nameable: Nameable) -> tuple[bytes, JobFile, Certif
         says.append(found)
         return {**data, "artefact": found.beside(data["artefact"])}
 
-    facts = checked(
-        content, source.toml, lambda data: _model_for(data, nameable, source.toml), nameable.standards, beside=beside
-    )
+    def model_for(data: dict[str, Any]) -> type[JobFile]:
+        return _model_for(data, nameable, source.toml)
+
+    facts = checked(content, source.toml, model_for, nameable.standards, beside=beside)
     places = says[0].places if says else None
     if places is not None and isinstance(facts.artefact, ReferencedFacts):
         largest = max(float(values.max()) for values in places.u.values())
@@ -271,11 +271,8 @@ def _certified(data: dict[str, Any], source: JobFiles, nameable: Nameable) -> Ce
 
 def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str], list[str]]:
     """Files of its error maps, of its temperature log, and of its digitizer's calibration."""
-    calibration = calibration_file(facts.digitizer)
-    return (
-        [given.file for given in facts.error_map], [facts.temperature_log.file] if facts.temperature_log else [],
-        [] if calibration is None else [calibration],
-    )  # fmt: skip
+    calibration, log = calibration_file(facts.digitizer), facts.temperature_log
+    return [given.file for given in facts.error_map], [log.file] if log else [], [calibration] if calibration else []
 
 
 def _model_for(data: dict[str, Any], nameable: Nameable, path: Path) -> type[JobFile]:
@@ -292,11 +289,6 @@ def _model_for(data: dict[str, Any], nameable: Nameable, path: Path) -> type[Job
         names: Any = Literal[tuple(nameable.kinds())]
         table = create_model("ArtefactFacts", __base__=ArtefactFacts, kind=(names, ...))
     return job_file_of(table)
-
-
-def sha256(inputs: Mapping[str, bytes]) -> dict[str, str]:
-    """SHA-256 of every input, by its name."""
-    return {name: hashlib.sha256(content).hexdigest() for name, content in inputs.items()}
 
 
 def _contents(source: JobFiles, names: Sequence[str], limit: Limit, *, written: bool = False) -> dict[str, bytes]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import unicodedata
@@ -29,6 +30,7 @@ _REPORTED = re.compile(r"results\.json|posterior.*\.npz|certificate.*\.pdf", re.
 _DEVICE = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])(\..*)?", re.IGNORECASE)
 """Windows takes these for devices, with any ending."""
 
+_COPY = "Copy the file into the folder and name it there: a job must be complete by itself"
 _FORBIDDEN = frozenset('<>:"|?*')  # on Windows
 
 
@@ -43,8 +45,7 @@ def inside(folder: Path, name: str, where: str, *, written: bool = False) -> Pat
         raise CmmUqError(f"file {name!r} cannot be read: {reason}", where=where,
                          fix="Copy the file itself into the folder") from None  # fmt: skip
     if not within:
-        raise CmmUqError(f"file {name!r} is not inside the job folder", where=where,
-                         fix="Copy the file into the folder and name it there: a job must be complete by itself")  # fmt: skip
+        raise CmmUqError(f"file {name!r} is not inside the job folder", where=where, fix=_COPY)
     return path
 
 
@@ -64,20 +65,22 @@ def check_distinct(names: Iterable[str], where: str) -> None:
                              fix="Rename one of them")  # fmt: skip
 
 
+def sha256(inputs: Mapping[str, bytes]) -> dict[str, str]:
+    """SHA-256 of every input, by its name."""
+    return {name: hashlib.sha256(content).hexdigest() for name, content in inputs.items()}
+
+
 def device_name(name: str) -> bool:
     """Whether Windows takes the name for a device."""
     return _DEVICE.fullmatch(name) is not None
 
 
 def _name_problem(name: str, written: bool) -> tuple[str, str] | None:
-    rename, outside = (
-        "Rename the file",
-        "Copy the file into the folder and name it there: a job must be complete by itself",
-    )
+    rename = "Rename the file"
     if PurePosixPath(name).is_absolute() or PureWindowsPath(name).drive or name.startswith("\\"):
         return f"file {name!r} is an absolute name", "Name it relative to job.toml, and keep it beside it"
     if not name or name.startswith("../"):
-        return f"file {name!r} is not inside the job folder", outside
+        return f"file {name!r} is not inside the job folder", _COPY
     if "\\" in name:
         return f"file {name!r} has a backslash in it", "Separate folders by /"
     if len(name) > FILE_NAME.most:

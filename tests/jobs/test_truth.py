@@ -12,7 +12,7 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import checked
-from cmm_uq.jobs.truth import Truth
+from cmm_uq.jobs.derived_job import Truth
 
 
 @pytest.mark.parametrize(

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
-from cmm_uq.app.api.outcomes import DiagnosisOutcome, PlanOutcome, ProofOutcome, Report
+from cmm_uq.app.api.outcomes import DiagnosisOutcome, Part, PlanOutcome, ProofOutcome, Report
 from cmm_uq.app.commands.diagnose import diagnosis_outcome
 from cmm_uq.app.commands.jobs.check import JobCheck, check_job, check_read
 from cmm_uq.app.commands.jobs.folder import KEPT, PLAN
 from cmm_uq.app.commands.jobs.new import new_job, new_plan
-from cmm_uq.app.commands.reading import compared_with, in_language, job_of, read_job
+from cmm_uq.app.commands.reading import compared_with, compared_with_frame, in_language, job_of, read_job
 from cmm_uq.app.commands.report import report_outcome
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code
@@ -22,7 +22,6 @@ from cmm_uq.jobs.job import Job
 if TYPE_CHECKING:
     import pandas as pd
 
-    from cmm_uq.app.api.outcomes import Part
     from cmm_uq.jobs.part.job import PartJob
     from cmm_uq.machine.physics.map_interpolation import Beyond
     from cmm_uq.maths.uncertainty.distributions import Distribution
@@ -50,18 +49,11 @@ def read(folder: str | Path) -> Job:
 
 
 def job(
-    points: pd.DataFrame | None = None,
-    *,
-    machine: Mapping[str, Any] | str,
-    artefact: Mapping[str, Any] | str,
-    effects: Sequence[str],
-    id: str = "job",  # noqa: A002
-    date: dt.date | str | None = None,
-    recording: Mapping[str, Any] | None = None,
-    conformity: Sequence[Mapping[str, Any]] = (),
-    files: Mapping[str, pd.DataFrame] | None = None,
-    **tables: Mapping[str, Any],
-) -> Job:
+    points: pd.DataFrame | None = None, *, machine: Mapping[str, Any] | str, artefact: Mapping[str, Any] | str,
+    effects: Sequence[str], id: str = "job", date: dt.date | str | None = None,  # noqa: A002
+    recording: Mapping[str, Any] | None = None, conformity: Sequence[Mapping[str, Any]] = (),
+    files: Mapping[str, pd.DataFrame] | None = None, **tables: Mapping[str, Any],
+) -> Job:  # fmt: skip
     """A job from DataFrames, checked as a job folder is. ``job.write(folder)`` makes it one.
 
     Parameters
@@ -87,22 +79,17 @@ def job(
     >>> cmm_uq.job(frame, machine="DEA Iota 1102", artefact="ballbar", effects=["squareness_xy"])
     <Job job: ballbar on DEA Iota 1102, 40 points, measured>
     """
-    told = {
-        **tables,
-        "job": {
-            "id": id,
-            "date": dt.date.fromisoformat(date) if isinstance(date, str) else date,
-            **tables.get("job", {}),
-        },
-        "machine": {"name": machine} if isinstance(machine, str) else machine,
-        "artefact": {"kind": artefact} if isinstance(artefact, str) else artefact,
-        "recording": recording,
-        "model": {"effects": list(effects), **tables.get("model", {})},
-        "conformity": list(conformity),
-    }
     from cmm_uq.app.commands.reading import job_from_frames
 
-    return job_from_frames(points, told, files or {})
+    day = dt.date.fromisoformat(date) if isinstance(date, str) else date
+    stated = {
+        **tables, "job": {"id": id, "date": day, **tables.get("job", {})},
+        "machine": {"name": machine} if isinstance(machine, str) else machine,
+        "artefact": {"kind": artefact} if isinstance(artefact, str) else artefact,
+        "recording": recording, "model": {"effects": list(effects), **tables.get("model", {})},
+        "conformity": list(conformity),
+    }  # fmt: skip
+    return job_from_frames(points, stated, files or {})
 
 
 def report(job: Job | str | Path, *, seed: int = 0, language: Code | None = None) -> Report:
@@ -131,13 +118,9 @@ def report(job: Job | str | Path, *, seed: int = 0, language: Code | None = None
 
 
 def diagnose(
-    job: Job | str | Path,
-    *,
-    seed: int = 0,
-    alpha: float = FALSE_ALARMS,
-    against: pd.DataFrame | str | Path | None = None,
+    job: Job | str | Path, *, seed: int = 0, alpha: float = FALSE_ALARMS, against: pd.DataFrame | str | Path | None = None,
     language: Code | None = None,
-) -> DiagnosisOutcome:
+) -> DiagnosisOutcome:  # fmt: skip
     """Say where recording and model differ, and what was left out.
 
     Parameters
@@ -154,14 +137,10 @@ def diagnose(
     CmmUqError : the job cannot be diagnosed as it stands, or the prediction is none of its recording.
     """
     read = in_language(_job(job), language)
-    if against is not None:
-        from cmm_uq.app.commands.reading import compared_with_frame
-
-        read = (
-            compared_with(read, Path(against))
-            if isinstance(against, str | Path)
-            else compared_with_frame(read, against)
-        )
+    if isinstance(against, str | Path):
+        read = compared_with(read, Path(against))
+    elif against is not None:
+        read = compared_with_frame(read, against)
     return DiagnosisOutcome(diagnosis_outcome(read, seed=seed, alpha=alpha))
 
 
@@ -185,16 +164,9 @@ def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0, language: 
 
 
 def part(
-    job: PartJob | str | Path,
-    *,
-    seed: int = 0,
-    trials: int | None = None,
-    digits: int | None = None,
-    rerun: bool = False,
-    trust: Sequence[str | Path] | None = None,
-    records: str | Path | None = None,
-    language: Code | None = None,
-) -> Part:
+    job: PartJob | str | Path, *, seed: int = 0, trials: int | None = None, digits: int | None = None, rerun: bool = False,
+    trust: Sequence[str | Path] | None = None, records: str | Path | None = None, language: Code | None = None,
+) -> Part:  # fmt: skip
     """The uncertainty of what is measured on a part, and whether it conforms.
 
     Parameters
@@ -218,12 +190,11 @@ def part(
     >>> cmm_uq.part("examples/part-plate-simulated")  # doctest: +SKIP
     <Part of part-plate-simulated: 5 characteristics, pass>
     """
-    from cmm_uq.app.api.outcomes import Part
-    from cmm_uq.app.commands.parts.documents import in_language as told_in
+    from cmm_uq.app.commands.parts.documents import in_language as in_its_language
     from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
     from cmm_uq.jobs.part.job import PartJob, read_part
 
-    read = told_in(job if isinstance(job, PartJob) else read_part(Path(job)), language)
+    read = in_its_language(job if isinstance(job, PartJob) else read_part(Path(job)), language)
     trusted = None if trust is None else tuple(map(Path, trust))
     return Part(evaluate_part(read, PartOptions(seed, trials, digits, rerun, trusted, records)))
 
@@ -297,16 +268,10 @@ def compensate(job: Job | str | Path, *, beyond: Beyond = "refuse") -> Job:
 
 
 def budget(
-    model: str | Path | Callable[..., Any],
-    inputs: Mapping[str, Distribution | tuple[float, float]] | None = None,
-    *,
-    outputs: Sequence[str] = ("y",),
-    correlation: Mapping[tuple[str, str], float] | None = None,
-    method: str = "auto",
-    coverage: float = 0.95,
-    digits: int = 2,
-    seed: int | None = None,
-) -> Evaluation:
+    model: str | Path | Callable[..., Any], inputs: Mapping[str, Distribution | tuple[float, float]] | None = None, *,
+    outputs: Sequence[str] = ("y",), correlation: Mapping[tuple[str, str], float] | None = None, method: str = "auto",
+    coverage: float = 0.95, digits: int = 2, seed: int | None = None,
+) -> Evaluation:  # fmt: skip
     """The uncertainty of a measurement model: of a file, or of a function of its inputs by name.
 
     Parameters

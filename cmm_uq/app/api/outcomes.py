@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from cmm_uq.app.commands.diagnose import DIAGNOSE
 from cmm_uq.app.commands.files import Form
@@ -37,10 +37,7 @@ QUANTITY = ("value", "u", "lower", "upper", "unit")
 def quantities(results: Mapping[str, Any], units: Mapping[str, str]) -> pd.DataFrame:
     """Estimates of results.json: of effects and other errors, of the artefact's sizes, of the noise where it is estimated.
 
-    Parameters
-    ----------
-    results : contents of results.json.
-    units : as printed, by name; of what is missing there, the unit is that in which its name ends.
+    ``units``: as printed, by name; of what is missing there, the unit is that in which its name ends.
     """
     owners: dict[str, Any] = {**results.get("estimates", {}), "artefact": results.get("artefact", {})}
     stated = {key: item for key, item in results.get("noise", {}).items() if _is_quantity(item) and item["u"] > 0}
@@ -73,14 +70,24 @@ def shown(frame: pd.DataFrame) -> Iterator[tuple[str, ...]]:
         yield str(name), f"{text} ± {expanded}", str(unit)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Found:
-    """What a call found; nothing is written before :meth:`write`.
+class _Shown(Protocol):
+    """What a notebook shows: a line, tables and warnings."""
 
-    Parameters
-    ----------
-    outcome : the figures and the document.
-    """
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What must be known before a figure is used."""
+
+    def _tables(self) -> list[str]:
+        """Tables of HTML."""
+
+    def _repr_html_(self) -> str:
+        warned = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)
+        return f"<p>{escape(repr(self))}</p>{''.join(self._tables())}" + (f"<ul>{warned}</ul>" if warned else "")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Found(_Shown):
+    """What a call found, the figures and the document; nothing is written before :meth:`write`."""
 
     outcome: Outcome
     form: ClassVar[Form]
@@ -139,13 +146,8 @@ class Found:
         return "conforming" if self.conforming else "not conforming"
 
     def _tables(self) -> list[str]:
-        """Tables of HTML."""
         short = self.outcome.summary
         return [html_table("Summary", (), short.rows), html_table("Details", (), short.details)]
-
-    def _repr_html_(self) -> str:
-        warned = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)
-        return f"<p>{escape(repr(self))}</p>{''.join(self._tables())}" + (f"<ul>{warned}</ul>" if warned else "")
 
 
 class Report(Found):
@@ -291,13 +293,8 @@ class ProofOutcome(Found):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Part:
-    """What was found of a part; nothing is written before :meth:`write`.
-
-    Parameters
-    ----------
-    found : all of it.
-    """
+class Part(_Shown):
+    """What was found of a part; nothing is written before :meth:`write`."""
 
     found: PartMeasurement
 
@@ -369,11 +366,8 @@ class Part:
         said = [f"{len(self.found.stated)} characteristics", *filter(None, [self.found.outcome])]
         return f"<Part of {self.job.facts.job.id}: {', '.join(said)}>"
 
-    def _repr_html_(self) -> str:
-        short = part_summary(self.found)
-        warned = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)
-        table = html_table("Summary", (), short.rows)
-        return f"<p>{escape(repr(self))}</p>{table}" + (f"<ul>{warned}</ul>" if warned else "")
+    def _tables(self) -> list[str]:
+        return [html_table("Summary", (), part_summary(self.found).rows)]
 
 
 Diagnosis, Plan, Proof = DiagnosisOutcome, PlanOutcome, ProofOutcome  # names of version 0.15, for one release more

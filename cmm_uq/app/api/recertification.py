@@ -21,12 +21,7 @@ _DUE = ("item", "serial", "name", "model", "place", "state", "due", "last", "why
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DueList:
-    """What ``due`` found.
-
-    Parameters
-    ----------
-    found : machines and artefacts, by the day on which they are due.
-    """
+    """What ``due`` found: machines and artefacts, by the day on which they are due."""
 
     found: WhatIsDue
 
@@ -38,13 +33,7 @@ class DueList:
         return pd.DataFrame(self.found.data()["items"], columns=list(_DUE))
 
     def write(self, folder: str | Path, *, force: bool = False) -> dict[str, Path]:
-        """Write ``due.html`` and ``due.json`` to a folder, as ``cmm-uq due --out`` does.
-
-        Parameters
-        ----------
-        folder : where to.
-        force : keep what stands in the way as ``NAME.previous`` instead of refusing.
-        """
+        """Write ``due.html`` and ``due.json`` to a folder, as ``cmm-uq due --out`` does; ``force`` as of its ``--force``."""
         return write_due(self.found, Path(folder), force=force)
 
     def __repr__(self) -> str:
@@ -60,12 +49,7 @@ class DueList:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class History:
-    """What ``history`` found.
-
-    Parameters
-    ----------
-    found : the machine, its certificates and its values.
-    """
+    """What ``history`` found: the machine, its certificates and its values."""
 
     found: MachineHistory
 
@@ -105,20 +89,14 @@ class History:
                 series.interim,
             )
             found += [
-                {"name": series.name, "date": _date(int(day)), "value": float(value), "u": float(u),
+                {"name": series.name, "date": dt.date.fromordinal(int(day)), "value": float(value), "u": float(u),
                  "u_artefact": float(common), "artefact": str(artefact), "entry": int(entry), "interim": bool(interim)}
                 for day, value, u, common, artefact, entry, interim in zip(*columns, strict=True)
             ]  # fmt: skip
         return pd.DataFrame(found)
 
     def write(self, folder: str | Path, *, force: bool = False) -> dict[str, Path]:
-        """Write ``history.html`` and ``history.json`` to a folder, as ``cmm-uq history --out`` does.
-
-        Parameters
-        ----------
-        folder : where to.
-        force : keep what stands in the way as ``NAME.previous`` instead of refusing.
-        """
+        """Write ``history.html`` and ``history.json`` to a folder, as ``cmm-uq history --out`` does; ``force`` likewise."""
         return write_history(self.found, Path(folder), force=force)
 
     def __repr__(self) -> str:
@@ -132,13 +110,9 @@ class History:
 
 
 def due(
-    machines: Collection[str] | str = (),
-    *,
-    records: str | Path | None = None,
-    on: dt.date | str | None = None,
-    within: dt.timedelta | None = None,
-    fleet: str | Path | None = None,
-) -> DueList:
+    machines: Collection[str] | str = (), *, records: str | Path | None = None, on: dt.date | str | None = None,
+    within: dt.timedelta | None = None, fleet: str | Path | None = None,
+) -> DueList:  # fmt: skip
     """What is due for calibration when, and why.
 
     Parameters
@@ -160,11 +134,7 @@ def due(
 
 
 def history(
-    machine: str,
-    *,
-    records: str | Path | None = None,
-    on: dt.date | str | None = None,
-    fleet: str | Path | None = None,
+    machine: str, *, records: str | Path | None = None, on: dt.date | str | None = None, fleet: str | Path | None = None
 ) -> History:
     """Every error factor and figure of performance of a machine over its certificates and interim checks.
 
@@ -182,7 +152,3 @@ def history(
 
 def _day(on: dt.date | str | None) -> dt.date | None:
     return dt.date.fromisoformat(on) if isinstance(on, str) else on
-
-
-def _date(ordinal: int) -> dt.date:
-    return dt.date.fromordinal(ordinal)

@@ -26,8 +26,8 @@ from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.outcome import Outcome, OwnAnalysis
 from cmm_uq.certificate.proof.sections import DiagnosisProof
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.reading import sha256
 from cmm_uq.jobs.recording.prediction import KEY
+from cmm_uq.jobs.source import sha256
 from cmm_uq.laboratory.proving.answers import RECORDS, AnswersFolder, Record, answer_tasks
 from cmm_uq.laboratory.proving.cases import Case, sha256_of, truth_file
 from cmm_uq.laboratory.proving.design import Design

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from cmm_uq.base.errors import OutputError
 from cmm_uq.base.output import interruption
-from cmm_uq.base.output.placing import free_name
+from cmm_uq.base.output.manifest import free_name
 
 
 @contextlib.contextmanager

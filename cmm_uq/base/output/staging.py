@@ -24,9 +24,19 @@ from typing import Protocol
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import interruption
-from cmm_uq.base.output.manifest import MANIFEST, Manifest, Owner, plain_name
+from cmm_uq.base.output.manifest import (
+    JOURNAL,
+    MANIFEST,
+    NEW,
+    Journal,
+    Manifest,
+    Owner,
+    journal_for,
+    place,
+    plain_name,
+    rolled_back,
+)
 from cmm_uq.base.output.new_file import writing_to
-from cmm_uq.base.output.placing import JOURNAL, NEW, Journal, journal_for, place, rolled_back
 
 
 def locked(path: Path, *, create: bool) -> int | None:

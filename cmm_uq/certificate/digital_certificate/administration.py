@@ -25,7 +25,7 @@ from cmm_uq.jobs.chain import holds_on, right
 from cmm_uq.jobs.dcc import certificate as dcc
 from cmm_uq.jobs.dcc.quantities import Expanded, Hybrid, Real, RealList
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.tables.artefact import CertificateFile, Traceability
 from cmm_uq.jobs.tables.origin import MEASURED
 

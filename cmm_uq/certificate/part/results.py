@@ -25,7 +25,7 @@ from cmm_uq.certificate.part.other_methods import methods_data
 from cmm_uq.certificate.results.keys import RESULTS
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.verdicts import Verdicts
 
 SCHEMA = "cmm-uq/part/1"

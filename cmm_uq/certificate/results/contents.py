@@ -21,7 +21,7 @@ from cmm_uq.certificate.result import JobDiagnosis, Result
 from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.sections.findings import corrections, periods_data, withheld_data
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.maths.uncertainty.budget_results import budget_data
 from cmm_uq.maths.uncertainty.correlation import Covariance

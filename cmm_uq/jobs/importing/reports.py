@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
@@ -20,10 +21,29 @@ _CALYPSO = ("idsymbol", "actual", "featureid")
 _CALYPSO_AXES = {"xvalue": "X", "yvalue": "Y", "zvalue": "Z"}
 
 
-def _facts(encoding: str, key: str = "", label: Text | None = None, count: int = 0) -> tuple[Fact, ...]:
+class Report(Format):
+    """A report in lines of text, known by what its head shows."""
+
+    shows: Sequence[re.Pattern[str]]
+
+    def recognises(self, head: bytes) -> bool:
+        text = head_text(head)
+        return all(pattern.search(text) for pattern in self.shows)
+
+    def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
+        text, encoding = decoded(content, where, keys.encoding)
+        return self.sheets(
+            report_lines(text, where), where, keys, Fact("encoding", say("Encoding"), Verbatim(encoding))
+        )
+
+    @abstractmethod
+    def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
+        """Sheets of its lines."""
+
+
+def _facts(encoding: Fact, key: str, label: Text, count: int) -> tuple[Fact, ...]:
     """The encoding, and how much of the report is not used."""
-    facts = (Fact("encoding", say("Encoding"), Verbatim(encoding)),)
-    return (*facts, Fact(key, label, number(count))) if label is not None and count else facts
+    return (encoding, Fact(key, label, number(count))) if count else (encoding,)
 
 
 @dataclass
@@ -42,7 +62,7 @@ class _Place:
         return self.sort.lower(), [self.feature, *(self.xyz[axis] for axis in _AXES)], self.line
 
 
-class Calypso(Format):
+class Calypso(Report):
     """``…_chr.txt``, a characteristic a line; ``…_fet.txt``, a feature a line; ``…_hdr.txt``, the head.
 
     Of the characteristics those are taken whose ``idsymbol`` is the value of a coordinate (``xValue``, ``yValue``,
@@ -51,17 +71,13 @@ class Calypso(Format):
 
     name = "calypso"
     title = say("Calypso table of characteristics (chr.txt)")
+    shows = (re.compile(r"\A\ufeff*[^\S\n]*planid\tpartnb", re.IGNORECASE),)
 
-    def recognises(self, head: bytes) -> bool:
-        line = head_text(head).lstrip("\ufeff").partition("\n")[0].strip().casefold()
-        return line.startswith("planid\tpartnb")
-
-    def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        text, encoding = decoded(content, where, keys.encoding)
-        rows = [[cell.strip() for cell in line.split("\t")] for line in report_lines(text, where)]
+    def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
+        rows = [[cell.strip() for cell in line.split("\t")] for line in lines]
         if keys.columns:
-            lines = [i for i, row in enumerate(rows, 1) if any(row)]
-            return [Sheet("", [rows[i - 1] for i in lines], lines, facts=_facts(encoding))]
+            filled = [i for i, row in enumerate(rows, 1) if any(row)]
+            return [Sheet("", [rows[i - 1] for i in filled], filled, facts=(encoding,))]
         if not set(_CALYPSO) <= set(rows[0]):
             if len(rows) <= 3:
                 raise CmmUqError("is the head of a Calypso table (hdr.txt), which has no measured value", where=where,
@@ -81,9 +97,8 @@ class Calypso(Format):
             raise CmmUqError(f"coordinates are in {first} and in {second}: the file mixes units",
                              where=f"{where} line {units[second]}", fix="Export it in one unit")  # fmt: skip
         facts = _facts(encoding, "characteristics_not_used", say("Characteristics that are no coordinate"), others)
-        return sheets_of(
-            [place.row for place in places], _WITH_DIRECTION[:4], unit=next(iter(units), None), facts=facts
-        )
+        rows_of = [place.row for place in places]
+        return sheets_of(rows_of, _WITH_DIRECTION[:4], unit=next(iter(units), None), facts=facts)
 
 
 def _characteristics(rows: Sequence[Sequence[str]], where: str) -> tuple[list[_Place], dict[str, int], int]:
@@ -122,7 +137,7 @@ _FIGURES = re.compile(r"^\s*(?P<axis>[A-Z][A-Z0-9]?)\s+[-+\d.]", re.IGNORECASE)
 _NUMBER = re.compile(r"(?<!\S)[-+]?\d*[.,]?\d+(?!\S)")
 
 
-class PcDmis(Format):
+class PcDmis(Report):
     """The places of features, as ``LOCATION OF SPHERE SPH1`` with its lines X, Y and Z.
 
     The figures stand below the words of a heading line (``AX NOMINAL +TOL -TOL MEAS DEV OUTTOL``), flushed right; which are
@@ -131,14 +146,10 @@ class PcDmis(Format):
 
     name = "pc-dmis"
     title = say("PC-DMIS text report")
+    shows = (_HEADING, re.compile(r"^[ \t]*DIM\s|UNITS\s*=", re.MULTILINE))
 
-    def recognises(self, head: bytes) -> bool:
-        text = head_text(head)
-        return bool(_HEADING.search(text) and re.search(r"^[ \t]*DIM\s|UNITS\s*=", text, re.MULTILINE))
-
-    def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        text, encoding = decoded(content, where, keys.encoding)
-        every, others = _places(text, where)
+    def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
+        every, others = _places(lines, where)
         located = {place.sort.upper() for place in every if len(place.xyz) == len(_AXES)}
         places = [place for place in every if place.xyz and place.sort.upper() in located]
         odd = [place for place in places or every if 0 < len(place.xyz) < len(_AXES)]
@@ -160,12 +171,12 @@ class PcDmis(Format):
         return sheets_of([place.row for place in places], _WITH_DIRECTION[:4], unit=places[0].unit, facts=facts)
 
 
-def _places(text: str, where: str) -> tuple[list[_Place], int]:
+def _places(lines: Sequence[str], where: str) -> tuple[list[_Place], int]:
     """Locations of features, and the number of other dimensions."""
     places: list[_Place] = []
     others, ends = 0, dict[str, int]()
     current: _Place | None = None
-    for line, content in enumerate(report_lines(text, where), 1):
+    for line, content in enumerate(lines, 1):
         if _HEADING.match(content):
             ends = {word[0].upper(): word.end() for word in re.finditer(r"\S+", content)}
         elif _DIMENSION.match(content):
@@ -218,19 +229,16 @@ _DMIS = re.compile(
 )
 
 
-class Dmis(Format):
+class Dmis(Report):
     """Output of DMIS programs (ANSI/CAM-I 105.0): the actual features, ``FA(SPH1)=FEAT/SPHERE,OUTER,CART,x,y,z,d``."""
 
     name = "dmis"
     title = say("DMIS output (ISO 22093)")
+    shows = (_DMIS,)
 
-    def recognises(self, head: bytes) -> bool:
-        return _DMIS.search(head_text(head)) is not None
-
-    def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        text, encoding = decoded(content, where, keys.encoding)
+    def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
         unit, rows, others = None, [], 0
-        for line, statement in statements(report_lines(text, where), where):
+        for line, statement in statements(lines, where):
             if match := _UNIT.match(statement):
                 unit = _one_unit(unit, match[1], f"{where} line {line}")
             elif match := _ACTUAL.match(statement):
@@ -238,10 +246,9 @@ class Dmis(Format):
                 rows += [row] if row else []
                 others += row is None
         if not rows:
-            none = (
-                f"{others} actual features, none of them a sphere, point or circle" if others else "no actual feature"
-            )
-            raise CmmUqError(f"holds {none} (FA)", where=where, fix="Put the spheres or points out: OUTPUT/FA(…)")
+            counted = f"{others} actual features, none of them a sphere, point or circle"
+            raise CmmUqError(f"holds {counted if others else 'no actual feature'} (FA)", where=where,
+                             fix="Put the spheres or points out: OUTPUT/FA(…)")  # fmt: skip
         facts = _facts(encoding, "features_not_used", say("Features that are no place"), others)
         return sheets_of(rows, _WITH_DIRECTION, unit=unit, decimal=".", facts=facts)
 
@@ -296,11 +303,11 @@ def _feature(match: re.Match[str], line: int, where: str) -> Row | None:
 
 _LINE = re.compile(r"(?:^|[\s>\]:])(?P<tag>[E\d]\d{4})\s+(?P<what>[#&%!]|[A-Za-z]\w*\s*\()\s*(?P<rest>.*)$")
 _TERM = re.compile(r"\b(X|Y|Z|IJK)\s*\(([^)]*)\)")
-_IPP = re.compile(r"\b\d{5}[ \t]+(?:StartSession[ \t]*\(|PtMeas[ \t]*\(|[&%#])", re.MULTILINE)
+_IPP = re.compile(r"(?:\b\d{5}[ \t]+(?:StartSession[ \t]*\(|PtMeas[ \t]*\(|[&%#])(?s:.*?)){2}")
 _Answer = tuple[str, dict[str, str], int]  # tag, terms, line
 
 
-class Ipp(Format):
+class Ipp(Report):
     """I++ DME 1.4 to 1.7: the answers to ``PtMeas``, as ``00169 # X(12.5), Y(0), Z(-3), IJK(0, 0, 1)``, in mm.
 
     An answer to ``Get`` looks like one to ``PtMeas``, so a trace without the requests is read only where all its answers
@@ -309,13 +316,10 @@ class Ipp(Format):
 
     name = "ipp"
     title = say("I++ DME trace")
+    shows = (_IPP,)
 
-    def recognises(self, head: bytes) -> bool:
-        return len(_IPP.findall(head_text(head))) >= 2
-
-    def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        text, encoding = decoded(content, where, keys.encoding)
-        requests, answers, others = _dialogue(report_lines(text, where))
+    def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
+        requests, answers, others = _dialogue(lines)
         if not answers:
             scans = sum(name.startswith(("ScanOn", "ScanIn", "ScanUnknown")) for _, name in requests)
             unread = f", and {scans} scans, which are not read" if scans else ""

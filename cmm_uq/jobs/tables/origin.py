@@ -6,7 +6,6 @@ tells: the first line of the recording, and the manifest beside it.
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,6 +16,7 @@ from pydantic import Field
 from cmm_uq.base.errors import CmmUqError, Gathered
 from cmm_uq.base.files.table import JobTable, required
 from cmm_uq.base.output import MANIFEST, read_manifest
+from cmm_uq.jobs.source import sha256
 
 Origin = Literal["measured", "simulated", "compensated"]
 MEASURED: Final = "measured"
@@ -65,9 +65,8 @@ def check_mark(folder: Path, origin: str, recording: bytes, where: str) -> None:
         made, problem, place = DERIVING[manifest.owner.command], "the recording was", str(folder / MANIFEST)
     else:
         return
-    raise CmmUqError(
-        f"{problem} {made}, and job.toml says measured", where=place, fix=f'Write origin = "{made}" in [job]'
-    )
+    fix = f'Write origin = "{made}" in [job]'
+    raise CmmUqError(f"{problem} {made}, and job.toml says measured", where=place, fix=fix)
 
 
 def check_examples(toml: bytes, origin: str, where: str) -> None:
@@ -91,5 +90,5 @@ def altered(derived: DerivedFrom | None, inputs: Mapping[str, bytes]) -> tuple[s
     """Names of files that were changed after a command wrote them."""
     if derived is None:
         return ()
-    hashes = {name: hashlib.sha256(content).hexdigest() for name, content in inputs.items()}
+    hashes = sha256(inputs)
     return tuple(name for name, digest in derived.files.items() if hashes.get(name, digest) != digest)

@@ -15,7 +15,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import evaluate_job as analyse_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.truth import Truth
+from cmm_uq.jobs.derived_job import Truth
 from tests.analysis.conformity.recorded import SEVEN, gauge
 from tests.app.commands.test_planning import planned
 

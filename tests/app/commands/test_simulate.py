@@ -11,7 +11,7 @@ from cmm_uq.app.commands.jobs.simulate import simulate, write_simulation
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import analyse
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.truth import NoiseFacts, Truth
+from cmm_uq.jobs.derived_job import NoiseFacts, Truth
 
 TRUTH = """
 seed = 7

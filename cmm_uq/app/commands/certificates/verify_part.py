@@ -26,7 +26,7 @@ from cmm_uq.certificate.verify.given import RESULTS, Given, language_of
 from cmm_uq.certificate.verify.stated import check_part_stated
 from cmm_uq.certificate.verify.views import squashed, without_foot
 from cmm_uq.jobs.part.job import PartJob, part_of
-from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.source import sha256
 
 TRUSTED = "whose signature the machine's certificate has"
 

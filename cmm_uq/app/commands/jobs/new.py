@@ -36,10 +36,9 @@ from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.beginning import MACHINE, Beginning
-from cmm_uq.jobs.derived_job import PROGRAM
+from cmm_uq.jobs.derived_job import PROGRAM, Truth
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED, Origin, first_line
-from cmm_uq.jobs.truth import Truth
 from cmm_uq.machine.model.kind import Kind
 
 __all__ = [

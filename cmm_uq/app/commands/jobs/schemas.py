@@ -11,9 +11,9 @@ from typing import Any
 from cmm_uq.artefacts import names, table_of
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.plugins import EFFECTS, KINDS, STANDARDS, Plugin, naming_package, offered
+from cmm_uq.jobs.derived_job import Truth
 from cmm_uq.jobs.schema import DRAFT, Schema, chosen_by, job_schema, schema_of
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.jobs.truth import Truth
 from cmm_uq.laboratory.live.instruments.profile import ProfileFile
 from cmm_uq.laboratory.schedule.settings import ScheduleFile
 

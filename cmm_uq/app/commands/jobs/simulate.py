@@ -26,10 +26,9 @@ from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.origin import program
-from cmm_uq.jobs.derived_job import IN_THE_RECORDING, derived_toml, kept_inputs, recording_name
+from cmm_uq.jobs.derived_job import IN_THE_RECORDING, NoiseFacts, Truth, derived_toml, kept_inputs, recording_name
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.origin import PLANNED, first_line
-from cmm_uq.jobs.truth import NoiseFacts, Truth
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import effects

@@ -24,10 +24,10 @@ from cmm_uq.app.commands.report import REPORT, report_outcome
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.output import read_manifest, sha256_of
+from cmm_uq.base.output.manifest import journal_for
 from cmm_uq.base.output.new_file import new_file, refuse_taken
-from cmm_uq.base.output.placing import journal_for
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.content import values
 from cmm_uq.laboratory.schedule.jobs import job_folders

@@ -32,7 +32,7 @@ from cmm_uq.certificate.part.measurement import CertificateStatus, Source, Verif
 from cmm_uq.certificate.verify.given import Given, given_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.jobs.reading import sha256 as hashes
+from cmm_uq.jobs.source import sha256 as hashes
 from cmm_uq.jobs.tables.origin import COMPENSATED, MEASURED, SIMULATED
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.draws import Draws
