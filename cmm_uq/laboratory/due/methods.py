@@ -9,9 +9,9 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, foreign, number, say
-from cmm_uq.laboratory.due.attributes import interval_test, staircase
 from cmm_uq.laboratory.due.crossing import crossing
 from cmm_uq.laboratory.due.drift import DriftPrior
+from cmm_uq.laboratory.due.intervals import LastValue, fitted_drift, interval_of_reliability, interval_test, staircase
 from cmm_uq.laboratory.due.reliability import grouped, reliability_regression
 from cmm_uq.laboratory.due.rule import (
     Pool,
@@ -22,7 +22,6 @@ from cmm_uq.laboratory.due.rule import (
     is_of_machine,
     months_of,
 )
-from cmm_uq.laboratory.due.variables import LastValue, fitted_drift, interval_of_reliability
 from cmm_uq.laboratory.records.facts import RecordedCertificate, Series
 
 

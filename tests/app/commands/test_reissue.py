@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.app.commands.certificates.reissue import compared, refuse_denied
+from cmm_uq.app.commands.certificates.release import compared, refuse_denied
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.tables.identification import ReplacedCertificate as Replaced, denies_a_change
 from tests.app.cli.laboratory import PLACE, reported

@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 from scipy.stats import beta, binomtest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.due.attributes import interval_test, reliability_range, staircase, steps
+from cmm_uq.laboratory.due.intervals import interval_test, reliability_range, staircase, steps
 from cmm_uq.laboratory.due.rule import IntervalBounds
 
 PRINTED = [

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.stats import norm
 
-from cmm_uq.laboratory.due.change import ComparedValue, ValueChange, change, each_of
+from cmm_uq.laboratory.due.checks import ComparedValue, ValueChange, change, each_of
 
 PART = st.floats(0, 0.999)
 U = st.floats(1e-3, 1e3)

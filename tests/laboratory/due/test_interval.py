@@ -7,10 +7,9 @@ import datetime as dt
 import numpy as np
 import pytest
 
-from cmm_uq.laboratory.due.attributes import interval_test
 from cmm_uq.laboratory.due.due import interval_by
+from cmm_uq.laboratory.due.intervals import LastValue, fitted_drift, interval_of_reliability, interval_test
 from cmm_uq.laboratory.due.rule import DAYS_A_MONTH, CompletedInterval, Rule, ended_intervals
-from cmm_uq.laboratory.due.variables import LastValue, fitted_drift, interval_of_reliability
 from cmm_uq.laboratory.records.facts import RecordedCertificate
 from tests.laboratory.due.histories import FIRST_of_made, certificate, value
 

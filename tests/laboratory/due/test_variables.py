@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm, t
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.due.variables import DriftPolynomial, LastValue, fitted_drift, interval_of_reliability
+from cmm_uq.laboratory.due.intervals import DriftPolynomial, LastValue, fitted_drift, interval_of_reliability
 
 DAYS = np.array([70.0, 86, 104, 135, 167, 173])
 CHANGES = np.array([0.1, 0.11, 0.251, 0.299, 0.403, 0.615])

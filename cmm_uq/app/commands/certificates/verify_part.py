@@ -8,17 +8,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cmm_uq import __version__
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import plan_of
-from cmm_uq.app.commands.certificates.verification import Recomputation, as_attached, plugins_missing, recomputed
-from cmm_uq.app.commands.files import Finished, Stage
+from cmm_uq.app.commands.certificates.verify import Recomputation, as_attached, compute_again, job_of_inputs, recomputed
+from cmm_uq.app.commands.files import Stage
 from cmm_uq.app.commands.parts.documents import contents_of, in_language
 from cmm_uq.app.commands.parts.drift import FILE as HISTORY
 from cmm_uq.app.commands.parts.machine import CALIBRATION, attached_calibration, standing_of, verified, with_history
 from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.verify.again import check_part_job, check_results, check_standing, compare_again, inputs_of
+from cmm_uq.certificate.verify.again import Again, check_part_job, check_results, check_standing
 from cmm_uq.certificate.verify.decisions import check_part_decisions
 from cmm_uq.certificate.verify.figures import check_part_figures, check_verdicts
 from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Inquiry, VerificationFinding
@@ -34,33 +33,11 @@ TRUSTED = "whose signature the machine's certificate has"
 def examine_part(
     inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable[Path] | None, stage: Stage
 ) -> Recomputation | None:
-    """The report of a part; see :func:`cmm_uq.app.commands.certificates.verification.verify_given`."""
-    if (job := compare_part(inquiry, given, rerun=rerun, trust=trust)) is None:
+    """The report of a part; see :func:`cmm_uq.app.commands.certificates.verify.verify_given`."""
+    if (job := compare_part(inquiry, given, rerun=rerun, trust=trust)) is None or given.results is None:
         return None
-    return Recomputation(lambda: _compute_again(inquiry, given, job, trust, stage))
-
-
-def _compute_again(inquiry: Inquiry, given: Given, job: PartJob, trust: Iterable[Path] | None, stage: Stage) -> bool:
-    """Everything computed from the inputs, by this version: whether the documents are the same to the byte."""
-    if given.results is None:
-        return False
-    data = given.results[1]
-    made = str(data["software"]["version"])
-    if plugins_missing(inquiry, data):
-        return False
-    if made != __version__:
-        inquiry.left(AGAIN, f"made by version {made}, and this is {__version__}: install that")
-        return False
-    kept: list[str] = []
-    try:
-        written = part_again(inquiry, job, data, partial(as_attached, given, kept), trust=trust, stage=stage)
-    except CmmUqError as error:
-        inquiry.wrong("again", given.results[0], "", f"cannot be computed again: {error}")
-        return False
-    if written is None:
-        return False
-    files, beside = written
-    return compare_again(inquiry, given, recomputed(given, files, kept, beside))
+    computed = partial(part_again, inquiry, given, job, given.results[1], trust=trust, stage=stage)
+    return Recomputation(lambda: compute_again(inquiry, given, computed))
 
 
 def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable[Path] | None) -> PartJob | None:
@@ -74,14 +51,7 @@ def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable
         check_part_decisions(inquiry, data, name)
         check_verdicts(inquiry, data, name)
         _check_stated(inquiry, given, data, name)
-    inputs = inputs_of(inquiry, given)
-    if inputs is None:
-        inquiry.left(f"the machine's certificate and {AGAIN}", "the inputs are not there as results.json names them")
-        return None
-    try:
-        job = part_job(inputs, data)
-    except CmmUqError as error:
-        inquiry.wrong("inputs", "inputs", "", f"are no job that this version reads: {error}")
+    if (job := job_of_inputs(inquiry, given, part_job, "the machine's certificate")) is None:
         return None
     try:
         _check_job(inquiry, job, data, name)
@@ -178,12 +148,9 @@ def _merge(inquiry: Inquiry, inner: Inquiry, where: str) -> None:
 
 
 def part_again(
-    inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], finished: Finished, *, trust: Iterable[Path] | None, stage: Stage
-) -> tuple[dict[str, bytes], tuple[str, ...]] | None:  # fmt: skip
-    """Files that the inputs of a part's report give, by name, and which of them are not inside the PDF.
-
-    ``None`` where that cannot be known, with the reason kept.
-    """
+    inquiry: Inquiry, given: Given, job: PartJob, data: Mapping[str, Any], *, trust: Iterable[Path] | None, stage: Stage
+) -> Again | None:  # fmt: skip
+    """What the inputs of a part's report give; ``None`` where that cannot be known, with the reason kept."""
     said, simulation = data["machine"], data["simulation"]
     held = bool(said["signatures_held_to_trusted"])
     if held and trust is None:
@@ -194,17 +161,15 @@ def part_again(
         inquiry.notes.append(
             "The machine's changes since its calibration follow from its history inside, as records had it."
         )
-    asked = PartOptions(
-        _whole(simulation["seed"], "seed"), _whole(simulation["asked"], "asked"), simulation["digits"],
-        _asked_again(said), tuple(trust or ()) if held else None, None, history,
+    # whether the machine's certificate was to be computed again, with --rerun; another version may have made it
+    rerun = {"what": AGAIN, "why": NOT_ASKED} not in said["not_checked"]
+    options = PartOptions(
+        _whole(simulation["seed"], "seed"), _whole(simulation["asked"], "asked"), simulation["digits"], rerun,
+        tuple(trust or ()) if held else None, None, history,
     )  # fmt: skip
-    found = evaluate_part(job, asked, stage)
-    return contents_of(found, stage, finished=finished), tuple(found.files)
-
-
-def _asked_again(said: Mapping[str, Any]) -> bool:
-    """Whether the machine's certificate was to be computed again, with ``--rerun``; another version may have made it."""
-    return {"what": AGAIN, "why": NOT_ASKED} not in said["not_checked"]
+    found, kept = evaluate_part(job, options, stage), list[str]()
+    files = contents_of(found, stage, finished=partial(as_attached, given, kept))
+    return recomputed(given, files, kept, tuple(found.files))
 
 
 def _whole(value: Any, key: str) -> int:
