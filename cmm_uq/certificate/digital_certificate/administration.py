@@ -16,7 +16,6 @@ from cmm_uq.base.messages import Day, Number, Text, Verbatim, day, say
 from cmm_uq.base.units import MICROMETRE, UNITS
 from cmm_uq.certificate.certificate import TEMPERATURES
 from cmm_uq.certificate.clauses import DRAFT, NOT_OURS, STATEMENTS, certifies, draft, replaced_certificate
-from cmm_uq.certificate.digital_certificate.quantities import P_STANDARD
 from cmm_uq.certificate.origin import BANNERS
 from cmm_uq.certificate.results.reissue import Reissue
 from cmm_uq.certificate.sections.results import SIGN, UNCERTAINTY
@@ -30,6 +29,7 @@ from cmm_uq.jobs.tables.artefact import CertificateFile, Traceability
 from cmm_uq.jobs.tables.origin import MEASURED
 
 NOT_STATED = say("not stated")
+P_STANDARD = Decimal("0.6827")  # probability of a normal distribution within one standard deviation
 UNKNOWN_COUNTRY = "ZZ"  # of no country: ISO 3166-1 leaves this code to users, and CLDR takes it for an unknown one
 _INTERIM = say("INTERIM CHECK, not a calibration certificate")
 _NOBODY = say("nobody: nothing is certified")

@@ -22,10 +22,11 @@ from cmm_uq.base.units import UNITS
 from cmm_uq.certificate.clauses import certifies
 from cmm_uq.certificate.digital_certificate import administration
 from cmm_uq.certificate.digital_certificate.administration import Languages, english, mark_of, one_line
-from cmm_uq.certificate.digital_certificate.figures import DigitalFigures, Part
-from cmm_uq.certificate.digital_certificate.quantities import (
+from cmm_uq.certificate.digital_certificate.figures import (
     ONE,
     P95,
+    DigitalFigures,
+    Part,
     decimal,
     decimals,
     dsi_of,

@@ -7,19 +7,198 @@ interval is not symmetric, to the two digits that are printed of U, a second qua
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal
+from itertools import chain, count
 from types import MappingProxyType
 from typing import Any
 
 from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.base.units import Unit
-from cmm_uq.certificate.digital_certificate import quantities as plain
-from cmm_uq.certificate.digital_certificate.administration import Languages, english
-from cmm_uq.certificate.digital_certificate.quantities import decimal, decimals, dsi_of, is_number, is_quantity
+from cmm_uq.base.units import PRINTED, UNITS, Unit
+from cmm_uq.certificate.digital_certificate.administration import P_STANDARD, Languages, english
 from cmm_uq.certificate.wording import effect_of, effect_title, parameter_title
 from cmm_uq.jobs.dcc.certificate import Characters, DccQuantity, QuantityList, StatementMetadata
-from cmm_uq.jobs.dcc.quantities import IntervalList, Real, RealList
+from cmm_uq.jobs.dcc.quantities import Expanded, ExpandedList, Interval, IntervalList, Real, RealList
+
+ONE = UNITS["1"]
+_ENDINGS: Mapping[str, Unit] = MappingProxyType({**PRINTED, "deg": UNITS["°"], "mm2": UNITS["mm²"]})
+_PLAIN = ("k", "probability", "p_value", "share", "dof", "draws", "repeat", "measurement", "point", "points")
+"""Keys of what has no unit, also where the key above them has one."""
+
+_FACTOR = re.compile(r"((?:\\(?:nano|micro|milli|centi|kilo))?\\[a-z]+)(?:\\tothe\{(-?\d+)\})?")
+"""A unit with its prefix, and the power of both; those of the table."""
+
+_SHORT = 4  # numbers of a list that stand in columns of their own: a point, a direction
+_ILLEGAL = re.compile(r"[^A-Za-z0-9_.\-]")
+_BUDGET = {"value", "u", "U", "k", "dof", "unit", "budget"}
+_LINE = {"input", "value", "u", "unit", "distribution", "dof", "sensitivity", "contribution", "share", "source"}
+P95 = Decimal("0.95")
+POSTERIOR = "posterior"  # in place of a named distribution: that of the draws in posterior.npz.
+
+
+def unit_of(key: str, above: Unit | None) -> Unit:
+    if key in _PLAIN or key.endswith("_probability"):
+        return ONE
+    return named_unit(key) or above or ONE
+
+
+def named_unit(key: str) -> Unit | None:
+    """The unit that a key ends in: µm of ``b89_range_um``."""
+    fitting = [ending for ending in _ENDINGS if key == ending or key.endswith(f"_{ending}")]
+    return _ENDINGS[max(fitting, key=len)] if fitting else None
+
+
+def without_unit(key: str) -> str:
+    """A key in words: ``b89 range``."""
+    longest = max((f"_{ending}" for ending in _ENDINGS if key.endswith(f"_{ending}")), key=len, default="")
+    return key.removesuffix(longest).replace("_", " ")
+
+
+def dsi_of(symbol: str) -> str:
+    """A unit of results.json in D-SI; of another package, which D-SI does not know, after the bar that marks such units."""
+    return UNITS[symbol].dsi if symbol in UNITS else _foreign(symbol)
+
+
+def _foreign(text: str) -> str:
+    """Without spaces, which would part it where it stands in a list."""
+    return "|" + "_".join(text.replace("|", "").split())
+
+
+def product(a: str, b: str) -> str:
+    if "|" in a + b:
+        return _foreign(f"{a}·{b}")
+    return b if a == ONE.dsi else a if b == ONE.dsi else a + b
+
+
+def ratio(a: str, b: str) -> str:
+    if "|" in a + b:
+        return _foreign(f"{a}/({b})")
+    if a == b:
+        return ONE.dsi
+    powers = [] if b == ONE.dsi else [(name, -int(power or 1)) for name, power in _FACTOR.findall(b)]
+    return product(a, "".join(name if power == 1 else rf"{name}\tothe{{{power}}}" for name, power in powers) or ONE.dsi)
+
+
+def decimal(value: float) -> Decimal:
+    return Decimal(repr(value)) if isinstance(value, float) else Decimal(value)
+
+
+def decimals(values: Sequence[float]) -> tuple[Decimal, ...]:
+    return tuple(map(decimal, values))
+
+
+def plain_name(text: str) -> str:
+    return _ILLEGAL.sub("_", text)
+
+
+def is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def are_numbers(values: object, count: int | None = None) -> bool:
+    """Whether it is a list of numbers, of so many where that is said."""
+    return isinstance(values, list) and all(map(is_number, values)) and (count is None or len(values) == count)
+
+
+def is_quantity(value: object) -> bool:
+    """Whether it has a value with its uncertainty, and is no budget."""
+    if not isinstance(value, Mapping) or not {"value", "u"} <= value.keys() or "budget" in value:
+        return False
+    sizes, interval = [value["u"], value.get("U"), value.get("k")], value.get("interval95")
+    return (
+        (value["value"] is None or is_number(value["value"]))
+        and all(size is None or (is_number(size) and size >= 0) for size in sizes)
+        and (interval is None or (are_numbers(interval, 2) and interval[0] <= interval[1]))
+    )
+
+
+def is_budget(data: Mapping[str, Any]) -> bool:
+    """Whether it is a budget of uncertainty, with its lines."""
+    lines = data.get("budget")
+    return (
+        data.keys() >= _BUDGET and isinstance(lines, list) and bool(lines)
+        and all(isinstance(line, Mapping) and line.keys() >= _LINE for line in lines)
+    )  # fmt: skip
+
+
+def is_matrix(data: Mapping[str, Any]) -> bool:
+    """Whether it is a covariance matrix with names and units of its rows."""
+    if data.keys() != {"parameters", "units", "matrix"} or not all(isinstance(rows, list) for rows in data.values()):
+        return False
+    return [are_numbers(row, len(data["units"])) for row in data["matrix"]] == [True] * len(data["units"])
+
+
+def is_curve(value: Any, u: Any, interval: Any) -> bool:
+    """Whether these are the points of a curve with u and interval of each."""
+    if not are_numbers(value) or not value or not isinstance(interval, list) or len(interval) != 2:
+        return False
+    low, high = interval
+    return (
+        all(are_numbers(series, len(value)) for series in (u, low, high))
+        and min(u) >= 0 and all(a <= b for a, b in zip(low, high, strict=True))
+    )  # fmt: skip
+
+
+def plain_cell(value: Any) -> bool:
+    """Whether a table can have it in one column, or in one for each number of a point."""
+    if isinstance(value, list):
+        return 0 < len(value) <= _SHORT and are_numbers(value)
+    return not isinstance(value, Mapping) or (is_quantity(value) and value["value"] is not None)
+
+
+def expanded_of(data: Mapping[str, Any]) -> Expanded | None:
+    """U with k and 95 %; where only u is known, that with k = 1; None where there is none that D-SI takes."""
+    u, U, k = data["u"], data.get("U"), data.get("k")
+    if not u:
+        return None
+    if U is None:
+        return Expanded(uncertainty=decimal(u), factor=Decimal(1), probability=P_STANDARD, distribution="normal")
+    if k is None or k < 1:
+        return None
+    distribution = POSTERIOR if "interval95" in data else None
+    return Expanded(uncertainty=decimal(U), factor=decimal(k), probability=P95, distribution=distribution)
+
+
+def interval_of(data: Mapping[str, Any]) -> Interval | None:
+    """The 95 % coverage interval."""
+    if not data.get("interval95") or data["u"] is None:
+        return None
+    u, low, high = decimals((data["u"], *data["interval95"]))
+    return Interval(standard=u, low=low, high=high, probability=P95, distribution=POSTERIOR)
+
+
+def symmetric(data: Mapping[str, Any]) -> bool:
+    """Whether both sides of the interval are the same to the two digits that are printed of U."""
+    value, (low, high), U = data["value"], data["interval95"], data.get("U")
+    if not U:
+        return bool(U == 0)
+    step = 10.0 ** (math.floor(math.log10(U)) - 1)
+    return bool(round((high - value) / step) == round((value - low) / step))
+
+
+def spread_of(values: Sequence[Mapping[str, Any]]) -> ExpandedList | IntervalList | None:
+    """Uncertainties of a column: U with k of each, or the interval of each; None where neither is known of all."""
+    none = Expanded(uncertainty=Decimal(0), factor=Decimal(1), probability=P95)  # of what is known without one
+    stated = [expanded_of(value) or (none if not value["u"] else None) for value in values]
+    known = [(each.uncertainty, each.factor, each.probability) for each in stated if each is not None]
+    if len(known) < len(stated):
+        return intervals_of(values)
+    uncertainties, factors, chances = zip(*known, strict=True)
+    return ExpandedList(uncertainties=uncertainties, factors=factors, probabilities=chances)
+
+
+def intervals_of(values: Sequence[Mapping[str, Any]]) -> IntervalList | None:
+    """The interval of each; None where it is not known of all. What has no uncertainty is an interval of no width."""
+    known = [(each.standard, each.low, each.high) for each in map(interval_of, values) if each is not None]
+    if len(known) < len(values):
+        return None
+    standards, lows, highs = zip(*known, strict=True)
+    return IntervalList(standards=standards, lows=lows, highs=highs, probabilities=(P95,))
+
 
 Path = tuple[str, ...]
 Part = DccQuantity | QuantityList
@@ -29,23 +208,19 @@ _NO_RESULT = ("noise", "least_squares")
 """Keys of what is there for comparison, which nobody who looks for measured values should find."""
 
 
+@dataclass(frozen=True)
 class DigitalFigures:
-    """Makes quantities.
+    """Makes quantities."""
 
-    ``free``: paths of estimates that the recording does not determine: what is known of them is no result; ``stated``: what
-    is stated of estimates, ``scale_x.ppm``; it stands with each.
-    """
-
-    def __init__(
-        self, texts: Languages, free: Collection[str] = (), stated: Mapping[str, StatementMetadata] = MappingProxyType({})
-    ) -> None:  # fmt: skip
-        self.texts, self.free, self.stated = texts, free, stated
-        self._ids: set[str] = set()
+    texts: Languages
+    free: Collection[str] = ()  # paths of estimates that the recording does not determine: what is known is no result
+    stated: Mapping[str, StatementMetadata] = field(default_factory=dict)  # of estimates, ``scale_x.ppm``, by name
+    _ids: set[str] = field(default_factory=set)
 
     def parts(self, path: Path, value: Any, above: Unit | None = None) -> Iterator[Part]:
         if value is None or value in ({}, []):
             return
-        unit = plain.unit_of(path[-1], above) if not path[-1].isdecimal() else above or plain.ONE
+        unit = unit_of(path[-1], above) if not path[-1].isdecimal() else above or ONE
         if is_number(value):
             yield self._quantity(path, Real(value=decimal(value), unit=unit.dsi))
         elif isinstance(value, str | bool):
@@ -54,30 +229,26 @@ class DigitalFigures:
             yield from self._list(path, value, unit)
         elif is_quantity(value):
             yield from self._with_uncertainty(path, value, unit)
-        elif plain.is_budget(value):
+        elif is_budget(value):
             yield from self._parts_of(path, self._budget(path, value))
-        elif plain.is_matrix(value):
+        elif is_matrix(value):
             units = [dsi_of(symbol) for symbol in value["units"]]
             yield from self._parts_of(path, self._matrix((*path, "matrix"), value["matrix"], units))
         else:
-            yield from self._parts_of(path, self._keys(path, value, plain.named_unit(path[-1]) or above))
+            yield from self._parts_of(path, self._keys(path, value, named_unit(path[-1]) or above))
 
     def id_of(self, path: Path) -> str:
-        name = plain.plain_name(".".join(path))
-        name = id_ = name if name[0].isalpha() or name[0] == "_" else f"_{name}"
-        count = 1
-        while id_ in self._ids:
-            count += 1
-            id_ = f"{name}_{count}"
+        name = plain_name(".".join(path))
+        name = name if name[0].isalpha() or name[0] == "_" else f"_{name}"
+        id_ = next(each for each in chain((name,), (f"{name}_{i}" for i in count(2))) if each not in self._ids)
         self._ids.add(id_)
         return id_
 
     def title(self, path: Path) -> Text:
-        if path[-1] in TITLES:
-            return TITLES[path[-1]]
-        if len(path) > 1 and effect_of(path[-2]) is not None:
+        if path[-1] not in TITLES and len(path) > 1 and effect_of(path[-2]) is not None:
             return parameter_title(path[-2], path[-1])
-        return effect_title(path[-1]) if effect_of(path[-1]) is not None else Verbatim(plain.without_unit(path[-1]))
+        own = effect_title(path[-1]) if effect_of(path[-1]) is not None else Verbatim(without_unit(path[-1]))
+        return TITLES.get(path[-1], own)
 
     def _quantity(self, path: Path, value: Any, *, name: Text | None = None) -> DccQuantity:
         label = self.texts.words(name or self.title(path))
@@ -94,10 +265,10 @@ class DigitalFigures:
         if data["value"] is None or (path[0] in _ESTIMATED and ".".join(path[-2:]) in self.free):
             yield self._quantity(path, self.texts.rich(NOT_DETERMINED))
             return
-        value, interval = decimal(data["value"]), plain.interval_of(data) if data["u"] else None
-        stated = plain.expanded_of(data) or interval
+        value, interval = decimal(data["value"]), interval_of(data) if data["u"] else None
+        stated = expanded_of(data) or interval
         yield self._quantity(path, Real(value=value, unit=unit.dsi, uncertainty=stated))
-        if interval is not None and interval is not stated and not plain.symmetric(data):
+        if interval is not None and interval is not stated and not symmetric(data):
             yield self._interval(path, Real(value=value, unit=unit.dsi, uncertainty=interval))
         for key, further in data.items():
             if key not in ("value", "u", "U", "k", "interval95"):
@@ -110,17 +281,17 @@ class DigitalFigures:
             ending = key.removeprefix("error_")
             u: Any = data.get(f"u_{ending}")
             interval: Any = data.get(f"interval95_{ending}")
-            if key != ending and plain.is_curve(value, u, interval):
+            if key != ending and is_curve(value, u, interval):
                 low, high = map(decimals, interval)
-                stated = IntervalList(standards=decimals(u), lows=low, highs=high, probabilities=(plain.P95,))
-                dsi = plain.unit_of(key, unit).dsi
+                stated = IntervalList(standards=decimals(u), lows=low, highs=high, probabilities=(P95,))
+                dsi = unit_of(key, unit).dsi
                 yield self._quantity((*path, key), RealList(values=decimals(value), units=(dsi,), uncertainty=stated))
                 taken |= {f"u_{ending}", f"interval95_{ending}"}
             elif key not in taken:
                 yield from self.parts((*path, key), value, unit)
 
     def _list(self, path: Path, values: Sequence[Any], unit: Unit) -> Iterator[Part]:
-        if plain.are_numbers(values):
+        if are_numbers(values):
             yield self._quantity(path, RealList(values=decimals(values), units=(unit.dsi,)))
         elif all(isinstance(value, str | bool) for value in values):
             yield self._quantity(path, _texts(values))
@@ -137,20 +308,17 @@ class DigitalFigures:
 
     def _table(self, path: Path, rows: Sequence[Mapping[str, Any]]) -> Iterator[Part]:
         """A table by its columns; row by row where a cell holds more than a figure, a text or a point."""
-        if not all(plain.plain_cell(value) for row in rows for value in row.values()):
-            for i, row in enumerate(rows):
-                yield from self.parts((*path, str(i)), dict(row))
+        if not all(plain_cell(value) for row in rows for value in row.values()):
+            yield from (part for i, row in enumerate(rows) for part in self.parts((*path, str(i)), dict(row)))
         else:
             for key in dict.fromkeys(key for row in rows for key in row):
                 yield from self._column((*path, key), [row.get(key) for row in rows])
 
     def _column(self, path: Path, cells: Sequence[Any]) -> Iterator[Part]:
         """A column; cells without a figure are left out, and labels then say which rows, from 1, the others are."""
-        rows = [row for row, cell in enumerate(cells) if cell is not None]
-        if not rows:
+        if not (rows := [row for row, cell in enumerate(cells) if cell is not None]):
             return
-        labels = tuple(str(row + 1) for row in rows) if len(rows) < len(cells) else ()
-        values, unit = [cells[row] for row in rows], plain.unit_of(path[-1], None)
+        labels, values, unit = _labels(rows, cells), [cells[row] for row in rows], unit_of(path[-1], None)
         if all(map(is_number, values)):
             yield self._quantity(path, RealList(labels=labels, values=decimals(values), units=(unit.dsi,)))
         elif all(map(is_quantity, values)):
@@ -167,50 +335,52 @@ class DigitalFigures:
     ) -> Iterator[Part]:
         """With the uncertainty of each, or one by one where D-SI has no list for what is known of them."""
         quantities = list(rows.values())
-        uncertainty, intervals = plain.spread_of(quantities), plain.intervals_of(quantities)
+        uncertainty, intervals = spread_of(quantities), intervals_of(quantities)
         if uncertainty is None:
             for row, quantity in rows.items():
                 yield from self._with_uncertainty((*path, str(row)), quantity, unit)
             return
-        values = decimals([quantity["value"] for quantity in quantities])
+        values = decimals([each["value"] for each in quantities])
         column = RealList(labels=labels, values=values, units=(unit.dsi,), uncertainty=uncertainty)
         yield self._quantity(path, column)
-        if intervals is not None and not all(map(plain.symmetric, quantities)):
+        if intervals is not None and not all(map(symmetric, quantities)):
             yield self._interval(path, column.with_changes(uncertainty=intervals))
 
     def _matrix(self, path: Path, rows: Sequence[Sequence[float]], units: Sequence[str]) -> Iterator[Part]:
         """A covariance matrix, row by row, each element in the product of its units."""
         for i, (row, unit) in enumerate(zip(rows, units, strict=True)):
-            elements = tuple(plain.product(unit, other) for other in units)
+            elements = tuple(product(unit, other) for other in units)
             yield self._quantity((*path, str(i)), RealList(values=decimals(row), units=elements))
 
     def _budget(self, path: Path, data: Mapping[str, Any]) -> Iterator[Part]:
         unit = dsi_of(data["unit"])
         if data["value"] is not None:
-            value = Real(value=decimal(data["value"]), unit=unit, uncertainty=plain.expanded_of(data))
+            value = Real(value=decimal(data["value"]), unit=unit, uncertainty=expanded_of(data))
             yield self._quantity((*path, "value"), value)
-        for key in ("u", "U"):
-            yield self._quantity((*path, key), Real(value=decimal(data[key]), unit=unit))
-        for key in ("k", "dof"):
-            yield from self.parts((*path, key), data[key])
+        yield from (self._quantity((*path, key), Real(value=decimal(data[key]), unit=unit)) for key in ("u", "U"))
+        yield from (part for key in ("k", "dof") for part in self.parts((*path, key), data[key]))
         yield from self._parts_of((*path, "budget"), self._lines(path, data["budget"], unit), say("Uncertainty budget"))
 
     def _lines(self, path: Path, lines: Sequence[Mapping[str, Any]], unit: str) -> Iterator[Part]:
         """Of a budget, column by column."""
         for key in ("input", "distribution", "source"):
             yield self._quantity((*path, "budget", key), _texts([line[key] for line in lines]))
-        inputs, ones = [dsi_of(line["unit"]) for line in lines], [plain.ONE.dsi] * len(lines)
+        inputs, ones = [dsi_of(line["unit"]) for line in lines], [ONE.dsi] * len(lines)
         columns: Mapping[str, Sequence[str]] = {
-            "value": inputs, "u": inputs, "sensitivity": [plain.ratio(unit, dsi) for dsi in inputs],
+            "value": inputs, "u": inputs, "sensitivity": [ratio(unit, dsi) for dsi in inputs],
             "contribution": [unit] * len(lines), "share": ones, "dof": ones,
         }  # fmt: skip
         for key, units in columns.items():
             rows = [i for i, line in enumerate(lines) if line[key] is not None]
             if rows:
-                labels = tuple(str(i + 1) for i in rows) if len(rows) < len(lines) else ()
-                values = decimals([lines[i][key] for i in rows])
-                column = RealList(labels=labels, values=values, units=tuple(units[i] for i in rows))
+                values, chosen = decimals([lines[i][key] for i in rows]), tuple(units[i] for i in rows)
+                column = RealList(labels=_labels(rows, lines), values=values, units=chosen)
                 yield self._quantity((*path, "budget", key), column)
+
+
+def _labels(rows: Sequence[int], whole: Sequence[object]) -> tuple[str, ...]:
+    """Numbers of rows, from 1, where they are not all."""
+    return tuple(str(row + 1) for row in rows) if len(rows) < len(whole) else ()
 
 
 def _texts(values: Sequence[Any]) -> Any:

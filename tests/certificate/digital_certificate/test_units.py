@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from cmm_uq.base.units import UNITS, unit
-from cmm_uq.certificate.digital_certificate.quantities import dsi_of, product, ratio, unit_of
+from cmm_uq.certificate.digital_certificate.figures import dsi_of, product, ratio, unit_of
 
 UNIT = st.sampled_from(sorted(UNITS))
 
