@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
 from cmm_uq.app.commands.certificates.verify import Verification, verify
-from cmm_uq.app.commands.certificates.verify_part import _asked_again
+from cmm_uq.app.commands.certificates.verify_part import to_rerun
 from cmm_uq.app.commands.parts.documents import contents_of, write_part, written
 from cmm_uq.app.commands.parts.machine import state_machine
 from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
@@ -212,4 +212,4 @@ def test_a_report_that_was_to_compute_its_machine_again_is_made_again_so(rerun: 
     """Whether or not that could be done: the report says of both what was asked."""
     said = standing_data(state_machine(plate_of(by_results(), **THERE), rerun=rerun).standing)
     assert not said["computed_again"]
-    assert _asked_again(said) == rerun
+    assert to_rerun(said) == rerun

@@ -161,15 +161,18 @@ def part_again(
         inquiry.notes.append(
             "The machine's changes since its calibration follow from its history inside, as records had it."
         )
-    # whether the machine's certificate was to be computed again, with --rerun; another version may have made it
-    rerun = {"what": AGAIN, "why": NOT_ASKED} not in said["not_checked"]
     options = PartOptions(
-        _whole(simulation["seed"], "seed"), _whole(simulation["asked"], "asked"), simulation["digits"], rerun,
+        _whole(simulation["seed"], "seed"), _whole(simulation["asked"], "asked"), simulation["digits"], to_rerun(said),
         tuple(trust or ()) if held else None, None, history,
     )  # fmt: skip
     found, kept = evaluate_part(job, options, stage), list[str]()
     files = contents_of(found, stage, finished=partial(as_attached, given, kept))
     return recomputed(given, files, kept, tuple(found.files))
+
+
+def to_rerun(said: Mapping[str, Any]) -> bool:
+    """Whether the machine's certificate was to be computed again, with ``--rerun``; another version may have made it."""
+    return {"what": AGAIN, "why": NOT_ASKED} not in said["not_checked"]
 
 
 def _whole(value: Any, key: str) -> int:
