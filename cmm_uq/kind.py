@@ -16,8 +16,7 @@ from cmm_uq.base.messages import number, say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import METRE, MICROMETRE, unit
 from cmm_uq.certificate.document import Column, Section, Table
-from cmm_uq.certificate.outcome import Page
-from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.result import Page, Result
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.machine.model.artefact import Artefact, Size

@@ -18,7 +18,7 @@ from cmm_uq.app.commands.jobs.schemas import SCHEMAS, as_text, schema_named
 from cmm_uq.artefacts import kind_named
 from cmm_uq.base.files.table import unit_of
 from cmm_uq.certificate.part.results import PART_RESULTS
-from cmm_uq.certificate.proof.results import KEYS as PROOF, RATE
+from cmm_uq.certificate.proof.page import KEYS as PROOF, RATE
 from cmm_uq.certificate.results.keys import QUANTITY, RESULTS
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS, REQUIRED

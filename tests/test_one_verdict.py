@@ -36,14 +36,13 @@ from cmm_uq.app.serve.view import by_rule, groups
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.certificate import certified
 from cmm_uq.certificate.digital_certificate.certificate import digital_certificate
-from cmm_uq.certificate.outcome import Outcome, Page
+from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.pages.history import overview_of
 from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.certificate.result import Outcome, Page, Result
 from cmm_uq.certificate.results.qif_file import qif
-from cmm_uq.certificate.sections import first_page
-from cmm_uq.certificate.sections.first_page import subject_of
+from cmm_uq.certificate.sections import results as first_page
+from cmm_uq.certificate.sections.results import subject_of
 from cmm_uq.certificate.verify.figures import check_verdicts
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.jobs.dcc import written

@@ -20,8 +20,8 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say, s
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.wording import expanded
 from cmm_uq.machine.physics.effects.rigid_body import SCALE, SQUARENESS
 from cmm_uq.machine.physics.kinematics import KinematicChain, axis_directions

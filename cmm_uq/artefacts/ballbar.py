@@ -37,10 +37,9 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Column, Section, Table
-from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.pages.budget import budget_blocks
 from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
-from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import deviating, numbered, refusal
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts

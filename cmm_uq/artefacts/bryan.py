@@ -22,9 +22,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, number, say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.certificate.document import Section
-from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
-from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import deviating, refusal
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings

@@ -14,10 +14,9 @@ from cmm_uq.base.messages import DASH, Text, Verbatim, number, say, semicolons, 
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
-from cmm_uq.certificate.outcome import Page
+from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.residuals import length_plot
-from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.results.plain import quantity_data
+from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import expanded
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.digitizer import three_alignment_offset

@@ -14,9 +14,8 @@ from cmm_uq.base.messages import NOTHING, Text, listed, number, say, semicolons,
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, PPM, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
-from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
-from cmm_uq.certificate.result import AtLeast, Result
+from cmm_uq.certificate.result import AtLeast, Page, Result
 from cmm_uq.certificate.wording import deviating
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.maths.inference.doubt import Doubt

@@ -22,9 +22,8 @@ from cmm_uq.base.messages import Text, in_a_row, number, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Section, Table
-from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
-from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.result import Page, Result
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size

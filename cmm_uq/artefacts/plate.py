@@ -25,10 +25,9 @@ from cmm_uq.base.messages import Text, Verbatim, day, number, say, sentences
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, PPM, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, text_columns
-from cmm_uq.certificate.outcome import Page
+from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.vectors import vector_plot
-from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.results.plain import quantity_data
+from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import expanded
 from cmm_uq.jobs.recording.references import NOISE_RATIO
 from cmm_uq.jobs.tables.artefact import ArtefactFacts

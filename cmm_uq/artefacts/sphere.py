@@ -30,9 +30,8 @@ from cmm_uq.base.messages import Number, Text, number, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Column, Plot, Section, Table
-from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.plots.residuals import length_plot, volume_plot
-from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import deviating, numbered
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts

@@ -25,9 +25,8 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, semicolon
 from cmm_uq.base.points import AXES, Floats, Ints
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
 from cmm_uq.certificate.document import Block, Paragraph, Plot, Section, Table, figure_columns, text_columns
-from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.plots.residuals import length_plot
-from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import deviating, expanded, refusal
 from cmm_uq.machine.model.artefact import Placings
 from cmm_uq.machine.physics.catalogue import every

@@ -10,23 +10,31 @@ from cmm_uq.base.units import unit
 from cmm_uq.certificate import clauses
 from cmm_uq.certificate.diagnosis.page import diagnosis_sections
 from cmm_uq.certificate.document import Document, Facts, Overview, Section, Signature, with_each_text
-from cmm_uq.certificate.origin import CERTIFICATE, DIGITAL, came_about, file_name, program
-from cmm_uq.certificate.outcome import Outcome, Page
-from cmm_uq.certificate.result import Result, StatedUncertainty
+from cmm_uq.certificate.origin import (
+    CERTIFICATE,
+    DIGITAL,
+    came_about,
+    file_name,
+    posterior_file,
+    posterior_name,
+    program,
+)
+from cmm_uq.certificate.result import Outcome, Page, Result, StatedUncertainty
 from cmm_uq.certificate.results.contents import results
-from cmm_uq.certificate.results.plain import posterior_file, posterior_name
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.certificate.results.reissue import COMPARED, NOT_COMPARED
 from cmm_uq.certificate.sections.conformity import conformity_section
-from cmm_uq.certificate.sections.first_page import overview_of, summary, with_first
 from cmm_uq.certificate.sections.method import method, posterior_section, warnings
 from cmm_uq.certificate.sections.results import (
     as_found_data,
     as_found_section,
     error_factors,
+    overview_of,
     performance,
     quantities_left,
+    summary,
     tolerance_sections,
+    with_first,
 )
 from cmm_uq.certificate.sections.traceability import claimed, traceability
 from cmm_uq.jobs.job import Job
@@ -144,7 +152,6 @@ def identified(
 
 
 def performed(job: Identification) -> tuple[Row, ...]:
-    """How, by whom, and with whose data anything was measured."""
     return (
         (say("Method"), job.procedure),
         (say("Deviations from the method"), job.deviations),

@@ -28,8 +28,7 @@ Status = Literal["stated", "missing", "not applicable", "laboratory"]
 STATEMENTS = (
     say("The results relate only to the item named above, in its condition and place at the time of the measurement."),
     say(
-        "This certificate shall not be reproduced except in full without the written approval of the "
-        "issuing laboratory."
+        "This certificate shall not be reproduced except in full without the written approval of the issuing laboratory."
     ),
 )
 """ISO/IEC 17025:2017, 7.8.2.1 l) and the note to 7.8.2.1."""
@@ -101,7 +100,6 @@ def clauses_data(job: Job) -> dict[str, Any]:
 
 
 def draft(job: Job) -> bool:
-    """Whether a certificate of the job is a draft only."""
     return certifies(job) and bool(missing(job))
 
 

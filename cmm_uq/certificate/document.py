@@ -114,6 +114,18 @@ class Table:
                 raise ValueError(f"table {self.caption!r}: {len(row)} cells under {len(self.columns)} headings: {row}")
 
 
+def table(
+    caption: Text, headings: Iterable[Text | Column], rows: Iterable[tuple[Text, ...]], *notes: Text
+) -> Table | None:
+    """A table where there are rows; a heading by itself is of a column of text, a :class:`Column` of figures."""
+    cells = tuple(rows)
+    return Table(caption, columns(headings), cells, notes) if cells else None
+
+
+def columns(headings: Iterable[Text | Column]) -> tuple[Column, ...]:
+    return tuple(one if isinstance(one, Column) else Column(one, numeric=False) for one in headings)
+
+
 @dataclass(frozen=True)
 class Plot:
     """A picture as SVG, with the sentence that replaces it for whoever cannot see it, and the texts lettered in it."""
@@ -159,12 +171,14 @@ Block = Paragraph | Facts | Table | Plot | DecisionBlock | Overview
 
 @dataclass(frozen=True)
 class Section:
-    """A titled part of the document."""
-
     title: Text
     blocks: tuple[Block, ...]
     opinion: bool = False  # interprets the results and belongs in the annex
     first: bool = False  # stands on the first page of a document that decides there
+
+
+def section(title: Text, *blocks: Block | None) -> Section:
+    return Section(title, tuple(block for block in blocks if block is not None))
 
 
 @dataclass(frozen=True)
@@ -177,8 +191,6 @@ class Signature:
 
 @dataclass(frozen=True, kw_only=True)
 class Document:
-    """A certificate or report."""
-
     title: Text  # what it is, such as "Calibration certificate"
     number: Text  # unique identification, shown on every page
     subject: Text  # one line under the title: the machine and the date

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,19 +16,19 @@ from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
 from cmm_uq.analysis.planning.advice import NextPlan, Suggestion
 from cmm_uq.analysis.screening.columns import Finding
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, at_key, say
 from cmm_uq.base.points import Floats
-from cmm_uq.base.units import MICROMETRE
+from cmm_uq.certificate.document import Document, Section
+from cmm_uq.certificate.plots.style import lettered_in
+from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.recording.prediction import SimulationFacts
-from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.tables.identification import Capability
-from cmm_uq.jobs.verdicts import Verdicts
+from cmm_uq.jobs.tables.origin import Origin
+from cmm_uq.jobs.verdicts import NO_VERDICTS, Verdicts
 from cmm_uq.machine.model import Estimate, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.artefact_doubt import growth
-from cmm_uq.machine.model.predicted_errors import PredictedErrors
-from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.doubt import Cause, Doubt
 from cmm_uq.maths.inference.draws import Draws
 from cmm_uq.maths.inference.least_squares import LeastSquares
@@ -40,8 +40,6 @@ from cmm_uq.maths.uncertainty.type_a import factor_of_noise
 
 @dataclass(frozen=True, eq=False)
 class SimulatedTwin:
-    """The simulation that a recording was compared with."""
-
     files: Mapping[str, str]  # SHA-256 by name
     program: str
     maps: bool
@@ -55,21 +53,6 @@ class SimulatedTwin:
     farthest_mm: float  # from a recorded point to the predicted one
     rms_predicted_um: float  # in the observations
 
-    @classmethod
-    def of(
-        cls, facts: SimulationFacts, job: Job, found: PredictedErrors, named: Sequence[Effect], model: RecordingModel
-    ) -> SimulatedTwin:
-        files = [given.file for given in facts.map] if facts.file is None else [facts.file]
-        hashes = sha256(job.inputs)
-        contains = tuple(effect.name for effect in named)
-        shown = model.artefact.project(model.artefact.points.xyz, found.errors[:, :, None])[model.used, 0]
-        return cls(
-            {name: hashes[name] for name in files}, facts.program, bool(facts.map),
-            _rms_um(found.u), facts.u_common_um, _rms_um(found.turned), contains,
-            contains if facts.refit else (), tuple(float(v) for v in found.frame.shift),
-            float(np.degrees(found.frame.angle)), found.apart, _rms_um(shown),
-        )  # fmt: skip
-
     def data(self, corrections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
         return {
             "files_sha256": dict(self.files), "program": self.program, "kind": "map" if self.maps else "prediction",
@@ -78,10 +61,6 @@ class SimulatedTwin:
             "refitted": dict(corrections), "frame": {"shift_mm": list(self.shift_mm), "turn_deg": self.turn_deg},
             "farthest_mm": self.farthest_mm, "rms_predicted_um": self.rms_predicted_um,
         }  # fmt: skip
-
-
-def _rms_um(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2))) / MICROMETRE
 
 
 AtLeast = Callable[..., tuple[float, float]]
@@ -113,23 +92,22 @@ class StatedUncertainty:
         return cls(job.facts.laboratory.cmc, length_mm or longest)
 
     def stated(self, name: str, quantity: Quantity) -> Quantity:
-        least = self._least(quantity.unit, self.length_mm)
-        if quantity.expanded < least:
-            self.raised[name] = {"evaluated_U": quantity.expanded, "U": least}
+        least = self._raised(name, quantity.expanded, quantity.unit, self.length_mm)
         return quantity.at_least(least)
 
-    def _least(self, of: str, length_mm: float) -> float:
-        return self.capability.least(of, length_mm) if self.capability else 0.0
+    def _raised(self, name: str, expanded: float, unit: str, length_mm: float) -> float:
+        """The least U of a unit at a length, which is noted where that is more than was evaluated."""
+        least = self.capability.least(unit, length_mm) if self.capability else 0.0
+        if expanded < least:
+            self.raised.setdefault(name, {"evaluated_U": expanded, "U": least})
+        return least
 
     def raised_to(
-        self, name: str, expanded: float, factor: float, unit_: str, length_mm: float | None = None
+        self, name: str, expanded: float, factor: float, unit: str, length_mm: float | None = None
     ) -> tuple[float, float]:
         """U and k of a figure that is no :class:`Quantity`, U not below the capability, k = 2 where it is that."""
-        least = self._least(unit_, self.length_mm if length_mm is None else length_mm)
-        if expanded >= least:
-            return expanded, factor
-        self.raised.setdefault(name, {"evaluated_U": expanded, "U": least})
-        return least, CAPABILITY_FACTOR
+        least = self._raised(name, expanded, unit, self.length_mm if length_mm is None else length_mm)
+        return (expanded, factor) if expanded >= least else (least, CAPABILITY_FACTOR)
 
     def all(self, group: str, quantities: Mapping[str, Quantity]) -> dict[str, Quantity]:
         return {name: self.stated(f"{group}.{name}", one) for name, one in quantities.items()}
@@ -284,15 +262,8 @@ class Result:
 
     @cached_property
     def undetermined(self) -> tuple[tuple[tuple[str, str], ...], ...]:
-        """Keys of the parameters in each combination that the recording leaves free."""
-        keys = [unknown.key for unknown in self.least_squares.unknowns]
-        free = self.least_squares.null_space.T
+        keys, free = [unknown.key for unknown in self.least_squares.unknowns], self.least_squares.null_space.T
         return tuple(tuple(key for key, part in zip(keys, column, strict=True) if part) for column in free)
-
-    @cached_property
-    def free(self) -> frozenset[str]:
-        """Effects that the recording does not determine by themselves, or contradicts."""
-        return frozenset(effect for effect, _ in self.not_given)
 
     @cached_property
     def not_given(self) -> frozenset[tuple[str, str]]:
@@ -300,15 +271,19 @@ class Result:
         free = (key for combination in self.undetermined for key in combination)
         return frozenset((*free, *(one.key for one in self.contradictions)))
 
+    @cached_property
+    def free(self) -> frozenset[str]:
+        """Effects that the recording does not determine by themselves, or contradicts."""
+        return frozenset(effect for effect, _ in self.not_given)
+
     def differences(self, combination: tuple[tuple[str, str], ...]) -> tuple[ParameterDifference, ...]:
         """Of parameters in one unit that the recording leaves free together; U not below the laboratory's capability."""
-        columns = {unknown.key: i for i, unknown in enumerate(self.posterior.unknowns)}
-        units = {unknown.key: unknown.unit for unknown in self.posterior.unknowns}
-        alike = [key for key in combination if units[key] == units[combination[0]]]
-        stating, found, each = StatedUncertainty.of(self.job), [], np.eye(len(columns))
+        columns = {unknown.key: (i, unknown.unit) for i, unknown in enumerate(self.posterior.unknowns)}
+        unit, stating, each = columns[combination[0]][1], StatedUncertainty.of(self.job), np.eye(len(columns))
+        alike, found = [key for key in combination if columns[key][1] == unit], []
         for first, second in zip(alike, alike[1:] + alike[:1] if len(alike) > 2 else alike[1:], strict=False):
-            one, other = columns[second], columns[first]
-            quantity = Quantity.of_draws(self.values[:, one] - self.values[:, other], units[first])
+            one, other = columns[second][0], columns[first][0]
+            quantity = Quantity.of_draws(self.values[:, one] - self.values[:, other], unit)
             if self.causes:
                 quantity = self.doubt.larger(quantity, each[one] - each[other])
             found.append(ParameterDifference(second, first, stating.stated("differences", quantity)))
@@ -345,3 +320,74 @@ class Result:
         i = [u.key for u in self.posterior.unknowns].index(key)
         prior = self.posterior.unknowns[i].prior_sd
         return float(min(1.0, self.posterior.covariance[i, i] / prior**2)) if prior > 0 else 1.0
+
+
+class AnalysisResult(Protocol):
+    """What an analysis found, in the kind's own terms; of most kinds a :class:`~cmm_uq.certificate.result.Result`."""
+
+    @property
+    def job(self) -> Job: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    found: AnalysisResult  # in the kind's own terms
+    composed: Callable[[], Document]  # makes the certificate or page; its pictures take longer than its figures
+    results: Mapping[str, Any]  # contents of results.json
+    summary: Summary  # for the end of a command
+    warnings: tuple[Text, ...] = ()  # what the reader must know before using a figure
+    files: Mapping[str, bytes] = field(default_factory=dict)  # further ones, by name
+    verdicts: Verdicts = NO_VERDICTS  # every statement of conformity
+    in_order: bool = True  # the recording agrees with the model that the job names, a plan meets its conditions
+    draws: Draws | None = None  # of the posterior of all that is reported, where the kind's analysis draws from one
+
+    @property
+    def conforming(self) -> bool:
+        return self.verdicts.conforming and self.in_order
+
+    @cached_property
+    def document(self) -> Document:
+        """Certificate, or page of a diagnosis; composed when it is first asked for."""
+        with lettered_in(self.found.job.facts.job.language):
+            return self.composed()
+
+    @property
+    def origin(self) -> Origin:
+        return self.found.job.origin
+
+    @property
+    def provenance(self) -> Mapping[str, Any]:
+        """``software`` with plugins, ``job`` with the hashes of its inputs, and ``seed`` where a posterior was sampled."""
+        sampling = self.results.get("sampling", {})
+        of_results = {key: self.results[key] for key in ("software", "job") if key in self.results}
+        return of_results | {key: sampling[key] for key in ("seed",) if key in sampling}
+
+
+@dataclass(frozen=True)
+class Page:
+    sections: Callable[[Result], list[Section]]  # after those that every certificate has
+    results: Callable[[Result], Mapping[str, Any]] | None = None  # further keys of results.json
+
+    def with_further(self, result: Result, data: Mapping[str, Any]) -> dict[str, Any]:
+        """Contents of results.json that every result has, and the kind's further keys."""
+        further = {} if self.results is None else self.results(result)
+        if clash := sorted(set(further) & set(data)):
+            raise CmmUqError(f"a kind's own results cannot be named {clash[0]!r}, which every result has",
+                             fix="Mend the package that the kind comes from")  # fmt: skip
+        return {**data, **further}
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A kind's own way from a job to its outcome."""
+
+    analyse: Callable[..., AnalysisResult]  # ``(job, *, seed, progress)``, of a diagnosis also ``alpha``
+    outcome: Callable[[Any, int], Outcome]  # of what was found and the seed
+
+
+@dataclass(frozen=True)
+class OwnAnalysis:
+    """What a kind does by itself, because its errors are no list of effects."""
+
+    report: Recipe | None = None
+    diagnose: Recipe | None = None

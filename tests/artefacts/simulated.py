@@ -18,9 +18,8 @@ from cmm_uq.app.commands.plans.plan import plan_outcome
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.certificate.document import Block, Document, Table
-from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.certificate.origin import as_json
+from cmm_uq.certificate.result import Outcome, Result
 from tests.conftest import ROOT
 
 SCALE = {"scale_x": 9.0, "scale_y": -6.0, "scale_z": 14.0}

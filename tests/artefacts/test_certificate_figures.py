@@ -16,7 +16,7 @@ import pytest
 from cmm_uq.app.commands.report import outcome_of
 from cmm_uq.artefacts.shift.plane_page import EVERY
 from cmm_uq.certificate.document import Document, Table
-from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.certificate.origin import as_json
 from tests.artefacts.reading import tables
 from tests.artefacts.simulated import analysed, document
 from tests.conftest import MACHINE_JOBS

@@ -24,7 +24,7 @@ from cmm_uq.app.commands.report import REPORT, write_report
 from cmm_uq.artefacts import BUILT_IN, kind_named, names
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.origin import file_name
-from cmm_uq.certificate.outcome import OwnAnalysis, Page
+from cmm_uq.certificate.result import OwnAnalysis, Page
 from cmm_uq.jobs.dcc import read as read_dcc
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact

@@ -1,19 +1,31 @@
-"""What a certificate shows of statements of conformity: the formula of the limit, every value, the picture, the risks."""
+"""Statements of conformity, their budget, and the machine as found and as left."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
-from cmm_uq.certificate.document import DecisionBlock, Plot, Table
-from cmm_uq.certificate.sections.conformity import conformity_section, decision_block, formula
+from cmm_uq.app.commands.report import outcome_of
+from cmm_uq.base.messages import say
+from cmm_uq.base.units import unit
+from cmm_uq.certificate.document import DecisionBlock, Document, Plot, Table
+from cmm_uq.certificate.result import Outcome, Result
+from cmm_uq.certificate.sections.conformity import budget_table, conformity_section, decision_block, formula
+from cmm_uq.jobs.reports import AsFound
 from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError, Prior
 from cmm_uq.machine.model.kind import BARS, LENGTHS
+from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Budget, BudgetLine
+from cmm_uq.maths.uncertainty.budgets.machine import length_test_uncertainty
 from tests.analysis.conformity.recorded import STATED, gauge
+from tests.artefacts.reading import tables
+from tests.artefacts.simulated import analysed
+from tests.jobs.test_reports import FOUND
 
 MPE = MaximumPermissibleError(a_um=2.5, k=300.0)
 ERRORS = {(1, 2, 20.0): 2.40, (1, 3, 800.0): -4.99, (2, 1, 400.0): 6.5}
@@ -109,3 +121,126 @@ def test_values_of_one_length_have_no_picture() -> None:
         ConformityFacts(standard="ISO 10360-2:2009", mpe=MPE), artefact, {}, "[[conformity]] 1", (LENGTHS,)
     )
     assert not any(isinstance(block, Plot) for block in conformity_section([found]).blocks)
+
+
+def headings(table: Table) -> list[str]:
+    return [column.heading for column in table.columns]
+
+
+def test_a_calibration_alone_is_one_line_in_micrometres_and_nothing_else() -> None:
+    table = budget_table(say("x"), length_test_uncertainty(800.0, 0.4e-3))
+    assert headings(table) == ["Cause", "Contribution", "Origin"]
+    assert table.columns[1].unit == unit("µm")
+    assert table.rows == (("calibration of the artefact", "0.40", "certificate"),)
+    assert [note for note in table.notes if "alignment of the artefact" in note]
+
+
+def test_what_acts_through_a_temperature_has_its_own_unit_and_sensitivity() -> None:
+    """800 mm · 11.5e-6 /K · 0.05 K = 0.46 µm; 800 mm · 3 K · 0.6e-6 /K = 1.44 µm; with 0.4 and 0.3 µm: u = 1.592 µm."""
+    budget = length_test_uncertainty(
+        800.0,
+        0.4e-3,
+        temperature_c=23.0,
+        cte_per_k=11.5e-6,
+        u_cte_per_k=0.6e-6,
+        u_temperature_k=0.05,
+        u_alignment_mm=0.3e-3,
+    )
+    table = budget_table(say("x"), budget)
+    assert headings(table) == ["Cause", "Standard uncertainty", "Sensitivity", "Contribution", "Share", "Origin"]
+    shown = {row[0]: row[1:4] for row in table.rows}
+    assert shown == {
+        "calibration of the artefact": ("0.40 µm", "1", "0.40"),
+        "expansion coefficient of the artefact": ("0.60 10⁻⁶ /K", "2.4 µm per 10⁻⁶ /K", "1.4"),
+        "temperature of the artefact": ("0.050 K", "9.2 µm per K", "0.46"),
+        "alignment of the artefact": ("0.30 µm", "1", "0.30"),
+    }
+    assert [row[4] for row in table.rows] == ["6.3 %", "81.8 %", "8.3 %", "3.6 %"]
+    assert table.notes[0] == "Combined: u = 1.6 µm."
+
+
+def test_a_budget_in_micrometres_stays_in_them() -> None:
+    two = BudgetLine(say("alignment, twice"), 0.5, JUDGEMENT, unit=unit("µm"), sensitivity=2**0.5)
+    table = budget_table(say("x"), Budget(say("x"), [two], unit=unit("µm")))
+    assert (table.rows[0][1], table.rows[0][3]) == ("0.50 µm", "0.71")
+    assert float(table.rows[0][2]) == pytest.approx(2**0.5, abs=1e-3)
+
+
+def adjusted(found: Any, before: dict[str, Any]) -> Outcome:
+    """The certificate of a machine that showed something else before."""
+    values = {field.name: getattr(found, field.name) for field in fields(found)}
+    return outcome_of(type(found)(**values | {"job": replace(found.job, as_found=AsFound.model_validate(before))}))
+
+
+@pytest.fixture(scope="module")
+def outcome() -> Outcome:
+    found = analysed("iota-1102-20C")
+    assert isinstance(found, Result)
+    return adjusted(found, FOUND)
+
+
+def titles(document: Document) -> list[str]:
+    return [section.title for section in document.sections]
+
+
+def test_what_was_found_stands_beside_what_is_left_each_with_its_uncertainty(outcome: Outcome) -> None:
+    """U as found is the larger distance to an end of the interval: 141 − 120 = 21 and 540 − 500 = 40."""
+    left = {row[0]: row[1:3] for name in ("Figures of performance", "Error factors of the machine")
+            for row in tables(outcome.document)[name].rows}  # fmt: skip
+    name = "Range of the lengths, on average over repeats"
+    assert tables(outcome.document)["The machine as found and as left"].rows == (
+        (name, "500", "40", *left[name], "µm"),
+        ("Scale error of X", "120", "21", *left["Scale error of X"], "ppm"),
+    )
+    assert tables(outcome.document)["Statements of conformity as found and as left"].rows == (
+        ("ASME B89.4.1-1997, volumetric performance", "fail", "fail"),
+    )
+
+
+def test_what_nothing_determined_before_is_not_set_beside_what_is_left() -> None:
+    free = FOUND | {"identifiability": {"undetermined": [{"scale_x.ppm": 0.7, "scale_y.ppm": 0.7}]}}
+    rows = tables(adjusted(analysed_iota(), free).document)["The machine as found and as left"].rows
+    assert "Scale error of X" not in [row[0] for row in rows]
+    assert len(rows) == 1
+
+
+def test_its_figures_stand_in_results_json(outcome: Outcome) -> None:
+    found = outcome.results["as_found"]
+    assert found["job"]["id"] == "before"
+    assert found["estimates"]["scale_x"]["ppm"]["value"] == 120.0
+    assert found["accuracy_uncertainty"]["b89_range_um"]["interval95"] == [460.0, 540.0]
+
+
+def test_it_comes_before_what_the_results_rest_on(outcome: Outcome) -> None:
+    order = titles(outcome.document)
+    assert (
+        order.index("Statements of conformity")
+        < order.index("As found and as left")
+        < order.index("Artefact and traceability")
+    )
+
+
+def test_a_machine_found_after_it_was_left_is_told() -> None:
+    """The key of the job stands beside it for the laboratory, not on the certificate."""
+    late = FOUND | {"job": {**FOUND["job"], "date": "2004-09-02"}}
+    outcome = adjusted(analysed_iota(), late)
+    said = "Dates out of order: the machine was found as it was after it was left, 2004-09-01 against 2004-09-02"
+    assert f"{said}." in outcome.document.warnings
+    assert f"{said} ([job] as_found)." in outcome.warnings
+
+
+def analysed_iota() -> Any:
+    return analysed("iota-1102-20C")
+
+
+@pytest.mark.parametrize(("job", "group", "title"), [
+    ("shift-simulated", "scale_x", "Mean sensitivity error of axis x"), ("shift-plate-simulated", "scale_x", "Scale of X"),
+])  # fmt: skip
+def test_an_axis_calibrated_by_shifting_has_it_too(job: str, group: str, title: str) -> None:
+    before = FOUND | {"job": {"id": "before", "origin": "simulated"}}
+    (row,) = tables(adjusted(analysed(job), before).document)["The machine as found and as left"].rows
+    assert row[:3] == (title, "120", "21")
+
+
+def test_without_it_there_is_no_such_section() -> None:
+    assert "As found and as left" not in titles(outcome_of(analysed_iota()).document)

@@ -9,8 +9,7 @@ from matplotlib.textpath import TextPath
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.plots.corner import corner_plot
-from cmm_uq.certificate.plots.labels import farthest_right
-from cmm_uq.certificate.plots.style import ACCENT, INK, MUTED
+from cmm_uq.certificate.plots.style import ACCENT, INK, MUTED, farthest_right
 from tests.certificate.svg import Drawing, area, outlines, strokes
 
 WORDS = {"caption": "Posterior.", "alternative": "a"}

@@ -1,17 +1,21 @@
-"""The HTML view: one file, safe with any text, readable without seeing it."""
+"""A document as data and as HTML, and where its templates lie."""
 
 from __future__ import annotations
 
 import itertools
+import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import jinja2
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from cmm_uq.certificate.document import Document, Section
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.document import Column, Document, Section, Table
+from cmm_uq.certificate.render import html as templates
 from cmm_uq.certificate.render.html import render_html
 from tests.certificate.samples import HOSTILE, document_of, plots
 
@@ -155,3 +159,61 @@ def test_a_block_that_lacks_something_is_an_error_not_a_gap(
     monkeypatch.setattr(Document, "as_data", lambda self: data)
     with pytest.raises(jinja2.UndefinedError):
         render_html(certificate)
+
+
+def test_the_folder_holds_both_views() -> None:
+    names = {path.name for path in templates.template_folder().iterdir()}
+    assert {"document.html", "document.css", "document.typ"} <= names
+
+
+def test_an_installed_package_has_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "cmm_uq" / "templates").mkdir(parents=True)
+    (tmp_path / "cmm_uq" / "templates" / "document.html").touch()
+    monkeypatch.setattr(templates, "__file__", str(tmp_path / "cmm_uq" / "certificate" / "render" / "html.py"))
+    assert templates.template_folder() == tmp_path / "cmm_uq" / "templates"
+
+
+def test_a_package_without_them_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(templates, "__file__", str(tmp_path / "cmm_uq" / "certificate" / "render" / "html.py"))
+    with pytest.raises(CmmUqError, match="Install cmm-uq again"):
+        templates.template_folder()
+
+
+def test_every_document_is_json(certificate: Document) -> None:
+    assert json.loads(json.dumps(certificate.as_data()))["date"] == "2004-06-03"
+
+
+@given(text=st.text(st.characters()))
+def test_no_control_character_surrogate_or_private_character_reaches_a_view(text: str) -> None:
+    shown = document_of(text).as_data()["title"]
+    shown.encode("utf-8")
+    assert all(character == "\n" or character.isprintable() or ord(character) > 0x9F for character in shown)
+    assert not any("\ue000" <= character <= "\uf8ff" for character in shown)
+
+
+def test_marks_that_turn_figures_round_are_left_out() -> None:
+    assert document_of("\u202e1.25\u202c").as_data()["title"] == "1.25"
+
+
+def test_text_without_such_characters_is_kept_as_it_is() -> None:
+    text = "Müller & Söhne <GmbH>\n中文 שלום µ ″ ± − ×"
+    assert document_of(text).as_data()["title"] == text
+
+
+def test_tables_and_figures_are_counted_through_the_document(certificate: Document) -> None:
+    blocks = [block for section in certificate.as_data()["sections"] for block in section["blocks"]]
+    assert [block["label"] for block in blocks if "label" in block] == [
+        "Table 1", "Figure 1", "Figure 2", "Table 2", "Figure 3"
+    ]  # fmt: skip
+
+
+def test_a_row_has_as_many_cells_as_the_table_has_columns() -> None:
+    with pytest.raises(ValueError, match="2 cells under 1 headings"):
+        Table("Lengths", (Column("Length", "mm"),), (("404.2", "1.0"),))
+
+
+def test_what_is_longer_than_any_figure_is_set_as_text() -> None:
+    document = document_of("a sentence that is much longer than any figure")
+    table = next(b for b in document.as_data()["sections"][0]["blocks"] if b["kind"] == "table")
+    assert [column["numeric"] for column in table["columns"]] == [False, True]
+    assert table["columns"][0]["need"] == 46

@@ -22,11 +22,10 @@ from cmm_uq.base.languages.translation import LANGUAGES, Code, Translation as Sa
 from cmm_uq.base.messages import Day, Message, Number, Text, Verbatim, commas, say
 from cmm_uq.certificate.document import Document, Paragraph, Plot, Section, translated
 from cmm_uq.certificate.plots import style as fonts
-from cmm_uq.certificate.plots.labels import NAMES_MM, width_mm
 from cmm_uq.certificate.plots.plans import _edge, _size, _title
 from cmm_uq.certificate.plots.residuals import budget_bars
-from cmm_uq.certificate.plots.style import SMALL, TINY, lettered_in
-from cmm_uq.certificate.render import fitting
+from cmm_uq.certificate.plots.style import NAMES_MM, SMALL, TINY, lettered_in, width_mm
+from cmm_uq.certificate.render import html as fitting
 from cmm_uq.certificate.render.html import render_html
 from cmm_uq.certificate.render.pdf import render_pdf
 from cmm_uq.certificate.results.contents import head

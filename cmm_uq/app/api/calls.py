@@ -11,8 +11,7 @@ from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.app.api.outcomes import DiagnosisOutcome, Part, PlanOutcome, ProofOutcome, Report
 from cmm_uq.app.commands.diagnose import diagnosis_outcome
 from cmm_uq.app.commands.jobs.check import JobCheck, check_job, check_read
-from cmm_uq.app.commands.jobs.folder import KEPT, PLAN
-from cmm_uq.app.commands.jobs.new import new_job, new_plan
+from cmm_uq.app.commands.jobs.new import KEPT, PLAN, new_job, new_plan
 from cmm_uq.app.commands.reading import compared_with, compared_with_frame, in_language, job_of, read_job
 from cmm_uq.app.commands.report import report_outcome
 from cmm_uq.base.errors import CmmUqError

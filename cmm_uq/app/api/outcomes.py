@@ -18,10 +18,10 @@ from cmm_uq.app.commands.report import REPORT
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import html_table
 from cmm_uq.base.units import printed_unit
-from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.part.figures import part_summary
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.results import part_results
+from cmm_uq.certificate.result import Outcome
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.laboratory.records.place import NONE
@@ -116,7 +116,7 @@ class Found(_Shown):
 
     @property
     def provenance(self) -> Mapping[str, Any]:
-        """Program and plugins, hashes of the inputs, seed; see :class:`cmm_uq.certificate.outcome.Outcome`."""
+        """Program and plugins, hashes of the inputs, seed; see :class:`cmm_uq.certificate.result.Outcome`."""
         return self.outcome.provenance
 
     @property

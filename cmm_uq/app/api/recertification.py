@@ -41,7 +41,7 @@ class DueList:
         return f"<Due on {self.found.on.isoformat()}: {counts}>"
 
     def _repr_html_(self) -> str:
-        from cmm_uq.certificate.pages.due import due_row
+        from cmm_uq.certificate.pages.fleet import due_row
 
         rows = [due_row(one, self.found.on, self.found.within) for one in self.found.items]
         return html_table(repr(self)[1:-1], ("Due", "State", "", "What", "Why"), rows)

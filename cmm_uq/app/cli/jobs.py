@@ -56,8 +56,7 @@ def new(
     On a terminal it asks for machine, artefact and limits, of a part for the machine's certificate, features, datums and
     tolerances, unless one of the options gives something.
     """
-    from cmm_uq.app.commands.jobs.folder import BUDGET
-    from cmm_uq.app.commands.jobs.new import check_empty, known, titles, write_new
+    from cmm_uq.app.commands.jobs.new import BUDGET, check_empty, known, titles, write_new
     from cmm_uq.app.commands.parts.new import PART
 
     if not kind:

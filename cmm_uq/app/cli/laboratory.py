@@ -145,7 +145,7 @@ def due(
     if end.json:
         put_data(found.data())
     elif not end.quiet:
-        from cmm_uq.certificate.pages.due import counts, due_row
+        from cmm_uq.certificate.pages.fleet import counts, due_row
 
         text, standing = counts(found.items, found.on, found.within)
         head = ((f"{found.on.isoformat()}: ", HEADING), (text, COLOURS[standing]))

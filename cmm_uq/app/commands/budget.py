@@ -28,14 +28,9 @@ class WrittenBudget:
 
 
 def write_budget(
-    file: Path,
-    out: Path | None = None,
-    *,
-    seed: int | None = None,
-    force: bool = False,
-    stage: Stage = silent,
+    file: Path, out: Path | None = None, *, seed: int | None = None, force: bool = False, stage: Stage = silent,
     language: Code = ENGLISH,
-) -> WrittenBudget:
+) -> WrittenBudget:  # fmt: skip
     """Evaluate a model file and write ``budget.html``, ``budget.pdf`` and ``results.json``, all or none."""
     fonts_of(language)  # refused before anything is computed
     model = read_model_file(file)
@@ -48,11 +43,11 @@ def write_budget(
         evaluation = model.evaluate(seed)
         stage("Rendering", 0.7)
         from cmm_uq.certificate.document import translated as said
+        from cmm_uq.certificate.origin import as_json
         from cmm_uq.certificate.pages.budget import budget_document
         from cmm_uq.certificate.plots.style import lettered_in
         from cmm_uq.certificate.render.html import render_html
         from cmm_uq.certificate.render.pdf import render_pdf
-        from cmm_uq.certificate.results.plain import as_json
         from cmm_uq.maths.uncertainty.budget_results import results_of
 
         data = as_json({**results_of(evaluation), **model.further(), "inputs_sha256": {file.name: model.sha256},

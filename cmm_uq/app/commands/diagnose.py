@@ -16,10 +16,16 @@ from cmm_uq.analysis.planning.advice import DetectionGoal, suggestions
 from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.planning.suggestion import next_plan
 from cmm_uq.analysis.screening.columns import Finding
-from cmm_uq.app.commands.against import Against, against_simulation
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.files import Form, Stage, Told, Written, silent
-from cmm_uq.app.commands.model import OVERFLOW_FIX, recipe_of, recorded_model, refuse_planned
+from cmm_uq.app.commands.model import (
+    OVERFLOW_FIX,
+    Against,
+    against_simulation,
+    recipe_of,
+    recorded_model,
+    refuse_planned,
+)
 from cmm_uq.app.commands.reading import compared_with, in_language, read_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
@@ -28,8 +34,7 @@ from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.diagnosis.page import diagnosed_outcome
 from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
-from cmm_uq.certificate.outcome import AnalysisResult, Outcome, Recipe
-from cmm_uq.certificate.result import JobDiagnosis
+from cmm_uq.certificate.result import AnalysisResult, JobDiagnosis, Outcome, Recipe
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.prediction import KEY
 from cmm_uq.laboratory.records.place import NONE
@@ -52,7 +57,6 @@ def diagnose_read(
 def diagnose_job(
     folder: Path, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
 ) -> JobDiagnosis:
-    """Diagnose a recording of an artefact; see :func:`diagnose_read`."""
     _check_rate(alpha)
     return _diagnose(read_job(folder), seed=seed, alpha=alpha, progress=progress)
 
@@ -131,7 +135,6 @@ def detection_goals(job: Job, diagnosis: Diagnosis, unseen: Sequence[SmallestEff
 
 
 def outcome_of(result: AnalysisResult, seed: int = 0) -> Outcome:
-    """What there is to write of what :func:`diagnose_read` found."""
     return _recipe(result.job).outcome(result, seed)
 
 

@@ -62,10 +62,8 @@ def without_outliers(model: RecordingModel) -> tuple[RecordingModel, list[Findin
             continue
         cause = next((each for each in causes if rows[i] in each[0]), None)
         if cause is None:
-            what = artefact.words_of(i)
-            why = say(
-                "{what} is {times:.1f} of its standard deviations off what the others say", what=what, times=times
-            )
+            why = say("{what} is {times:.1f} of its standard deviations off what the others say",
+                      what=artefact.words_of(i), times=times)  # fmt: skip
             findings.append(replace(finding("outlier", points, artefact.rows[i], why), set_aside=True))
             continue
         together, words, aside = cause
@@ -96,7 +94,7 @@ def parameters(model: RecordingModel, values: Floats) -> dict[str, dict[str, Qua
 
 def named_draws(
     model: RecordingModel, components: Components, posterior: NoisyPosterior, values: Floats, *, mixture: bool
-) -> Draws:  # fmt: skip
+) -> Draws:
     """Draws of all that is reported: of each effect, of the artefact's sizes, and of the noise.
 
     ``values`` (N, k) of the model's unknowns are the posterior's, row by row, or a ``mixture``'s, row after row independent:
@@ -117,7 +115,6 @@ def named_draws(
 
 
 def sizes(model: RecordingModel, values: Floats) -> dict[str, Quantity]:
-    """Sizes of the artefact, by name, of draws (N, k) of the unknowns."""
     return _quantities(model, values).get(ARTEFACT, {})
 
 
@@ -148,7 +145,6 @@ def noise(
     stated_um: float | None,
     p_value: float | None,
 ) -> RecordingNoise:
-    """What the noise is, by component, and what it does to the uncertainties."""
     found = {
         name: NoiseComponent(Quantity.of_draws(values / MICROMETRE, unit("µm")), float(np.mean(values > 0)))
         for name, values in sizes_of_noise(components, posterior).items()
@@ -165,7 +161,7 @@ def noise(
 
 def with_doubt(
     model: RecordingModel, estimate: Estimate, posterior: NoisyPosterior, draws: Floats, causes: Sequence[Cause]
-) -> tuple[Floats, Doubt]:  # fmt: skip
+) -> tuple[Floats, Doubt]:
     """Draws (N, k) of the model's unknowns with what is in doubt about all observations together; as they are without."""
     if not causes:
         return draws, Doubt(())
@@ -176,7 +172,7 @@ def with_doubt(
 
 def contradictions(
     model: RecordingModel, estimate: Estimate, posterior: NoisyPosterior, averaged: Floats
-) -> tuple[Contradiction, ...]:  # fmt: skip
+) -> tuple[Contradiction, ...]:
     """Averaged scales of axes that lines along these deny: of each the line that does most.
 
     An average may give to a scale what another explanation takes away from it again. Nobody may use the scale without that,

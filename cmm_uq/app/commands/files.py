@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.output import Ledger, Owner, staged
-from cmm_uq.certificate.outcome import AnalysisResult, Outcome
 from cmm_uq.certificate.plots.style import fonts_of
+from cmm_uq.certificate.result import AnalysisResult, Outcome
 from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.content import certificate_content, folder_from, kind_of_entry
@@ -52,7 +52,7 @@ def ledger_of(
 
 def content_of(
     records: Records, results: bytes, job: Job | None, command: str, folder: Path, files: Mapping[str, str]
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Content of the entry of a results.json; see :func:`cmm_uq.laboratory.records.content.certificate_content`."""
     return certificate_content(
         json.loads(results), None if job is None else job.facts, command=command, folder=folder_from(records.home, folder),
@@ -86,7 +86,6 @@ Finished = Callable[[str, bytes], bytes]  # what becomes of a document that was 
 
 
 def unchanged(name: str, content: bytes) -> bytes:
-    """A document as it was made."""
     return content
 
 
@@ -118,11 +117,9 @@ class Written:
     @property
     def recorded(self) -> str:
         """Where it was recorded, in a sentence; empty where it was not."""
-        if not self.records:
-            return ""
-        named = self.found.job.facts.machine.serial
-        nameless = "" if named else "; the machine has no [machine] serial and is known by its name"
-        return f"Recorded in {self.records}{nameless}."
+        serial = self.found.job.facts.machine.serial
+        nameless = "" if serial else "; the machine has no [machine] serial and is known by its name"
+        return f"Recorded in {self.records}{nameless}." if self.records else ""
 
     @property
     def summary(self) -> Summary:
@@ -185,9 +182,9 @@ class Form:
 
     def contents(
         self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False, finished: Finished = unchanged
-    ) -> dict[str, bytes]:  # fmt: skip
+    ) -> dict[str, bytes]:
         """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted."""
-        from cmm_uq.certificate.results.plain import as_json
+        from cmm_uq.certificate.origin import as_json
 
         if results_only:
             return {RESULTS: as_json(outcome.results)}

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,15 +13,20 @@ from cmm_uq.analysis.screening.shape import Screening
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import FREEDOMS, OBSERVATIONS
-from cmm_uq.base.messages import Verbatim, say
-from cmm_uq.base.points import AXES
+from cmm_uq.base.messages import Text, Verbatim, in_a_row, plural, say, signed
+from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.outcome import OwnAnalysis, Recipe
+from cmm_uq.certificate.result import OwnAnalysis, Recipe, SimulatedTwin
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.recording.prediction import KEY, SimulationFacts
+from cmm_uq.jobs.source import sha256
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import LAST_DIGIT, Artefact
-from cmm_uq.machine.model.kind import Kind
+from cmm_uq.machine.model.kind import Kind, Observe
+from cmm_uq.machine.model.machine_maps import maps_named
+from cmm_uq.machine.model.predicted_errors import SAME, PredictedErrors, predicted_errors
 from cmm_uq.machine.model.recorded import NANOMETRE, display_step
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.least_squares import RANK_TOLERANCE
@@ -36,7 +41,6 @@ OVERFLOW_FIX = (  # where figures leave the range of numbers
 
 
 def model_of(job: Job, artefact: Artefact) -> RecordingModel:
-    """The model that the job names."""
     if len(artefact.noise_scale) > OBSERVATIONS.most:
         raise CmmUqError(
             f"{len(artefact.noise_scale)} observations are more than are estimated from at once",
@@ -168,7 +172,7 @@ def refuse_unmeasured(job: Job) -> None:
 
 def recipe_of(
     job: Job, own: Callable[[OwnAnalysis], Recipe | None], usual: Callable[[Kind], Recipe], what: str
-) -> Recipe:  # fmt: skip
+) -> Recipe:
     """How a job is analysed: in its kind's own way, or as observations that named effects explain."""
     refuse_unmeasured(job)
     kind = kind_of(job)
@@ -178,3 +182,147 @@ def recipe_of(
         return recipe
     kind.observing(what)
     return usual(kind)
+
+
+_FAR = 1.0  # mm from a recorded point to the predicted one, from which on it is said
+_NO_NOISE = 1e-7  # mm: residuals below it are digits of the files
+_LEAST_WEIGHT = 0.05  # least noise of a point over that of all together: nothing is known without limit
+_STEP = 0.05  # of the logarithm of that ratio: points that are about as uncertain are sampled together
+
+
+@dataclass(frozen=True, eq=False)
+class Against:
+    """What is left of a recording once its simulation is taken off.
+
+    model : of the difference; its effects are those that are fitted anew.
+    findings : of the screening, and what is odd about the prediction.
+    observe : makes the artefact of points, with the uncertainty of what is predicted.
+    stated_um : of a coordinate of the difference, where the job states it for the recording.
+    simulated : for the page.
+    """
+
+    model: RecordingModel
+    findings: tuple[Finding, ...]
+    observe: Observe
+    stated_um: float | None
+    simulated: SimulatedTwin
+
+
+def against_simulation(job: Job, facts: SimulationFacts) -> Against:
+    """Join what the simulation leaves of a recording with the model of what it could lack."""
+    recorded, findings = recorded_model(job)
+    artefact, where = recorded.artefact, job.recording_path
+    if facts.map:
+        found = _of_maps(job, facts, artefact.points)
+    elif job.prediction is not None:
+        found = predicted_errors(artefact, job.prediction, where, length_mm=facts.length_mm)
+    else:
+        raise CmmUqError(
+            "the prediction was not read", where=f"job.toml {KEY} file", fix="Read the job with its recording"
+        )
+    points = artefact.points.at(artefact.points.xyz - found.errors)
+    named = effects(facts.effects, where=f"job.toml {KEY} effects")
+    observe = kind_of(job).observing("compared with a simulation")
+    plain = replace(
+        recorded, artefact=observe(job.facts.artefact, points, where=where), effects=named if facts.refit else ()
+    )
+    if plain.estimate().least_squares.sigma_of_residuals < _NO_NOISE:
+        raise CmmUqError(
+            "prediction and recording differ by no noise at all: one of them is made of the other",
+            where=f"job.toml {KEY}" if job.prediction is None else job.prediction.where,
+            fix="Name the file that the simulation wrote, and the recording that the machine made",
+        )
+    stated = job.facts.recording.u_coordinate_um
+    every = np.hypot(found.u, found.turned)
+    u = float(np.sqrt(np.mean(every**2)))
+    ratio = _ratios(plain, every, u, stated)
+    weighed = _weighing(observe, points, ratio, facts.u_common_um * MICROMETRE)
+    # repeats share what is predicted wrongly: their mean is no better known
+    places = np.unique(np.column_stack([points.measurement, points.point]), axis=0)
+    least = u * float(np.sqrt(len(points) / len(places)))
+    together = None if stated is None else float(np.hypot(stated, least / MICROMETRE))
+    model = replace(
+        plain, artefact=weighed(job.facts.artefact, points, where=where), least_noise=least,
+        sigma=None if together is None else together * MICROMETRE,
+    )  # fmt: skip
+    hashes, contains = sha256(job.inputs), tuple(effect.name for effect in named)
+    shown = artefact.project(artefact.points.xyz, found.errors[:, :, None])[recorded.used, 0]
+    simulated = SimulatedTwin(
+        {name: hashes[name] for name in ([one.file for one in facts.map] if facts.file is None else [facts.file])},
+        facts.program, bool(facts.map), _rms_um(found.u), facts.u_common_um, _rms_um(found.turned), contains,
+        contains if facts.refit else (), tuple(float(v) for v in found.frame.shift), float(np.degrees(found.frame.angle)),
+        found.apart, _rms_um(shown),
+    )  # fmt: skip
+    return Against(model, (*findings, *_odd(found)), weighed, together, simulated)
+
+
+def _rms_um(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2))) / MICROMETRE
+
+
+def _of_maps(job: Job, facts: SimulationFacts, points: Points) -> PredictedErrors:
+    from cmm_uq.machine.physics.compensation import compensate_points, machine_compensation
+    from cmm_uq.machine.physics.map_interpolation import ErrorMaps
+
+    where = f"job.toml {KEY} map"
+    compensation = machine_compensation(points, ErrorMaps(maps_named(job, facts.map, None, where)))
+    try:
+        errors = points.xyz - compensate_points(points, compensation).xyz
+    except CmmUqError as error:
+        at = ", ".join(part for part in (job.recording_path, error.where) if part)
+        raise CmmUqError(error.problem, where=at, fix=error.fix) from error
+    exact = np.zeros(len(points))
+    return PredictedErrors(errors, exact + facts.u_um * MICROMETRE, exact, SAME, 0.0, 0)
+
+
+def _ratios(model: RecordingModel, u: Floats, usual: float, stated_um: float | None) -> Floats:
+    """Uncertainty (n,) of each point, recorded and predicted, over that of a typical one."""
+    if np.ptp(u) == 0:
+        return np.ones(len(u))
+    residual = model.estimate().least_squares.sigma_of_residuals
+    own = np.sqrt(max(residual**2 - usual**2, 0.0)) if stated_um is None else stated_um * MICROMETRE
+    ratio = np.maximum(np.hypot(own, u) / np.hypot(own, usual), _LEAST_WEIGHT)
+    return np.asarray(np.exp(_STEP * np.round(np.log(ratio) / _STEP)))
+
+
+def _weighing(observe: Observe, points: Points, ratio: Floats, u_common: float) -> Observe:
+    """Makes artefacts whose observations are as uncertain as recorded and predicted points are together."""
+    keys = zip(points.measurement.tolist(), points.point.tolist(), points.repeat.tolist(), strict=True)
+    known: Mapping[tuple[int, int, int], float] = dict(zip(keys, ratio.tolist(), strict=True))
+
+    def made(facts: ArtefactFacts, some: Points, *, where: str | None = None) -> Artefact:
+        artefact = observe(facts, some, where=where)
+        own = artefact.points
+        keys = zip(own.measurement.tolist(), own.point.tolist(), own.repeat.tolist(), strict=True)
+        each = np.array([known.get(key, 1.0) for key in keys])
+        artefact.noise_scale = artefact.noise_scale * np.sqrt(np.mean(each[artefact.rows] ** 2, axis=1))
+        if u_common and artefact.sizes and artefact.sizes[0].certified:
+            first = replace(artefact.sizes[0], sd=float(np.hypot(artefact.sizes[0].sd, u_common)))
+            artefact.sizes = (first, *artefact.sizes[1:])
+        return artefact
+
+    return made
+
+
+def _odd(found: PredictedErrors) -> list[Finding]:
+    """What must be known of a prediction before it is believed."""
+    told: list[Text] = []
+    if found.unused:
+        told.append(plural(
+            found.unused,
+            one=say("one row of the prediction is of no point of the recording, and was not used"),
+            many=say("{count} rows of the prediction are of no point of the recording, and were not used", count=found.unused),
+        ))  # fmt: skip
+    if not found.frame.is_the_same:
+        told.append(say(
+            "the prediction is in another frame; it was turned by {angle:.3g}° and shifted by {shift} mm",
+            angle=float(np.degrees(found.frame.angle)),
+            shift=in_a_row(signed(float(one), ".2f") for one in found.frame.shift),
+        ))  # fmt: skip
+    if found.apart > _FAR:
+        turned = float(found.turned.max()) / MICROMETRE
+        told.append(say(
+            "points were recorded up to {apart:.1f} mm from where they are predicted; that the artefact was turned counts "
+            "as a standard uncertainty of up to {turned:.2g} µm", apart=found.apart, turned=turned,
+        ))  # fmt: skip
+    return [Finding("simulation", (), (), text) for text in told]

@@ -1,9 +1,13 @@
-"""From a job to the proof of its diagnosis: draw, seal, diagnose and judge, then write."""
+"""From a job to the proof of its diagnosis: draw, seal, diagnose and judge, then write.
+
+``python -m cmm_uq.app.commands.prove`` is a process that diagnoses sealed cases, begun by ``answers``. What it says of a case
+is what the diagnosis says of a recording, screening included, and nothing of the truth.
+"""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -11,20 +15,22 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq import __version__
+from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.planning.setting import Setting
+from cmm_uq.app.commands.diagnose import diagnose_read
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.files import REPORTS, Form, Stage, Written, silent
-from cmm_uq.app.commands.model import OVERFLOW_FIX, recorded_model
-from cmm_uq.app.commands.prove_case import CaseSetting, model_on
-from cmm_uq.app.commands.reading import in_language, read_job
+from cmm_uq.app.commands.model import OVERFLOW_FIX, model_of, recorded_model
+from cmm_uq.app.commands.reading import in_language, job_of, read_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.output import interruption
 from cmm_uq.base.overflow import refusing_overflow
-from cmm_uq.base.plugins import naming_package
-from cmm_uq.certificate.outcome import Outcome, OwnAnalysis
+from cmm_uq.base.plugins import BrokenPluginError, naming_package
+from cmm_uq.base.points import Floats, Points
 from cmm_uq.certificate.proof.sections import DiagnosisProof
+from cmm_uq.certificate.result import JobDiagnosis, Outcome, OwnAnalysis
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.prediction import KEY
 from cmm_uq.jobs.source import sha256
@@ -32,14 +38,15 @@ from cmm_uq.laboratory.proving.answers import RECORDS, AnswersFolder, Record, an
 from cmm_uq.laboratory.proving.cases import Case, sha256_of, truth_file
 from cmm_uq.laboratory.proving.design import Design
 from cmm_uq.laboratory.proving.judgement import ANSWER, REFUSED, ProofJudgement, judge
-from cmm_uq.laboratory.schedule.processes import check_workers
+from cmm_uq.laboratory.schedule.processes import check_workers, serve
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.catalogue import every, plugins
 from cmm_uq.maths.inference.posterior import sample_with_noise
+from cmm_uq.maths.uncertainty.quantity import Quantity
 
 CASES, FEWEST, MOST = 200, 1, 20_000
-_PROGRAM = "cmm_uq.app.commands.prove_case"
+_PROGRAM = "cmm_uq.app.commands.prove"
 _OF_ARTEFACT = "artefact"  # mechanism of effects that a fault of the artefact may be called
 Sealed = Callable[[str], None]  # told the SHA-256 of the truth, before anything is diagnosed
 
@@ -124,16 +131,8 @@ def _records(
 
     points = design.model.artefact.points
     points = replace(points, columns=dict(points.columns))  # without what it remembers, which cannot be sent
-    setting = CaseSetting(
-        dict(job.inputs),
-        points,
-        design.values,
-        design.noise,
-        design.cte_per_k,
-        design.dates,
-        options.seed,
-        options.alpha,
-    )
+    values, noise, cte = design.values, design.noise, design.cte_per_k
+    setting = CaseSetting(dict(job.inputs), points, values, noise, cte, design.dates, options.seed, options.alpha)
     tell()
     with contextlib.ExitStack() as stack:
         if answers is not None:
@@ -167,7 +166,7 @@ def design_of(job: Job) -> tuple[Job, Design]:
             "nothing is measured and no noise is stated, so that there is nothing to draw cases with",
             where="job.toml [recording] u_coordinate_um",
             fix="State the standard uncertainty of a coordinate, or name an earlier recording in [plan] noise_from",
-        )  # fmt: skip
+        )
     points = job.points
     if not len(points):
         from cmm_uq.app.commands.plans.planning import make_plan
@@ -189,23 +188,20 @@ def _recorded_noise(model: RecordingModel) -> Noise:
     x, y, z = sizes.reading[0].tolist()
     time = model.artefact.points.columns.get("time_s")
     duration = 0.0 if time is None else float(np.ptp(time))
-    slow = float(sizes.slow[0]) if duration > 0 else 0.0
-    rate = float(sizes.rate[0])
+    slow, rate = float(sizes.slow[0]) if duration > 0 else 0.0, float(sizes.rate[0])
     forgets = (duration / rate if rate else inf) if slow else Noise().slow_time_s
-    return Noise(
-        (x, y, z), float(sizes.placing[0]), float(sizes.growth[0]), slow, forgets, resolution=components.display
-    )
+    set_up, growth = float(sizes.placing[0]), float(sizes.growth[0])
+    return Noise((x, y, z), set_up, growth, slow, forgets, resolution=components.display)
 
 
 def true_values(design: Design) -> dict[str, float]:
-    """True values of what the job names, ``effect.parameter``."""
-    values: dict[str, float] = {}
-    first = 0
+    values, first = dict[str, float](), 0
     for effect in design.model.effects:
         own = design.coefficients[first : first + len(effect.coefficients)]
-        first += len(effect.coefficients)
-        reported = effect.to_reported(own, np.zeros(0))
-        values |= {f"{effect.name}.{name}": float(value) for name, value in reported.items()}
+        first += len(own)
+        values |= {
+            f"{effect.name}.{name}": float(value) for name, value in effect.to_reported(own, np.zeros(0)).items()
+        }
     return values
 
 
@@ -219,7 +215,7 @@ def prove_outcome(
     kept: list[AnswersFolder] | None = None,
 ) -> Outcome:  # fmt: skip
     """Prove the diagnosis on the set-ups of a job that was read; nothing is written but the answers that are ``kept``."""
-    from cmm_uq.certificate.proof.results import proof_outcome
+    from cmm_uq.certificate.proof.page import proof_outcome
 
     proof, answers = prove_job(job, options, folder=folder, stage=stage, sealed=sealed)
     stage("Composing the page", 0.94)
@@ -255,3 +251,100 @@ def write_proof(
     for answers in kept:
         answers.remove()
     return written
+
+
+_DIGITS = 9  # significant digits that are kept: what differs beyond them says nothing
+
+
+@dataclass(frozen=True, eq=False)
+class CaseSetting:
+    """What every process is told first.
+
+    ``files`` of the job, by name; ``points`` the set-ups; ``values``, ``noise``, ``cte_per_k``, ``dates`` see
+    :class:`~cmm_uq.laboratory.proving.design.Design`; ``seed``, ``alpha`` of the cases, and rate of false alarms.
+    """
+
+    files: dict[str, bytes]
+    points: Points
+    values: Floats
+    noise: Noise
+    cte_per_k: float
+    dates: int
+    seed: int
+    alpha: float
+
+
+def model_on(job: Job, points: Points) -> RecordingModel:
+    artefact = kind_of(job).observing("proved")(job.facts.artefact, points, where=job.recording_path)
+    return model_of(job, artefact)
+
+
+def begin(setting: CaseSetting) -> Callable[[int, Case], Record]:
+    job = replace(job_of(setting.files, recorded=False), points=setting.points, planned=False)
+    design = Design(model_on(job, setting.points), setting.values, setting.noise, setting.cte_per_k, setting.dates)
+    return lambda number, case: diagnosed_case(job, design, case, setting)
+
+
+def diagnosed_case(job: Job, design: Design, case: Case, setting: CaseSetting) -> Record:
+    """What is said of a case; what the diagnosis refuses, or breaks on, is an answer too."""
+    points = design.recording(case, setting.seed, every())
+    seed = int(np.random.SeedSequence(setting.seed, spawn_key=(case.number, 2)).generate_state(1)[0])
+    try:
+        found = diagnose_read(replace(job, points=points), seed=seed, alpha=setting.alpha)
+    except BrokenPluginError:
+        raise
+    except CmmUqError as error:
+        return {"number": case.number, REFUSED: str(error)}
+    except Exception as error:
+        return {"number": case.number, REFUSED: f"{type(error).__name__}: {error}"}
+    if not isinstance(found, JobDiagnosis):
+        kind = job.facts.artefact.kind
+        raise CmmUqError(f"a diagnosis of a job of kind {kind!r} names no effects", where="job.toml [artefact] kind",
+                         fix="Prove a job whose recording is explained by effects")  # fmt: skip
+    d = found.diagnosis
+    return {
+        "number": case.number, "verdict": d.verdict, "p_value": _rounded(d.p_value),
+        "effects": [
+            {"effect": str.__str__(each.effect), "probability": _rounded(each.probability),
+             "together": _rounded(each.together), "parameters": _intervals(each.parameters)}
+            for each in d.effects
+        ],
+        "groups": [[str.__str__(name) for name in group] for group in d.indistinguishable],
+        "named": _intervals(_named(d)),
+        "heldout_um": [_rounded(d.improvement.heldout_rms_before_um), _rounded(d.improvement.heldout_rms_after_um)],
+        "elpd_gain": [_rounded(d.improvement.elpd_gain), _rounded(d.improvement.elpd_gain_se)],
+    }  # fmt: skip
+
+
+def _named(d: Diagnosis) -> dict[str, Quantity]:
+    """What the job names, as the model with all that was found estimates it, where the recording determines it."""
+    posterior = d.posterior
+    columns = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
+    found = d.after.estimate().least_squares
+    fixed = {unknown.key for unknown, known in zip(found.unknowns, found.determined, strict=True) if known}
+    told = {}
+    for effect in d.before.effects:
+        keys = [(effect.name, c.name) for c in effect.coefficients]
+        if not set(keys) <= fixed:
+            continue
+        draws = posterior.draws[:, [columns[key] for key in keys]]
+        units = {parameter.name: parameter.unit for parameter in effect.reported}
+        for name, values in effect.to_reported(draws, np.zeros((len(draws), 0))).items():
+            told[f"{effect.name}.{name}"] = Quantity.of_draws(values, units[name])
+    return told
+
+
+def _intervals(quantities: Mapping[str, Quantity]) -> dict[str, list[float | None]]:
+    return {name: [_rounded(each) for each in (one.value, *one.interval95)] for name, one in quantities.items()}
+
+
+def _rounded(value: float) -> float | None:
+    return float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None
+
+
+def main() -> None:
+    serve(begin)
+
+
+if __name__ == "__main__":
+    main()

@@ -29,8 +29,7 @@ from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.certificate import certified
 from cmm_uq.certificate.origin import DIGITAL
-from cmm_uq.certificate.outcome import AnalysisResult, Outcome, Page, Recipe
-from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.result import AnalysisResult, Outcome, Page, Recipe, Result
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.place import NONE
@@ -118,7 +117,6 @@ def analyse(folder: Path, *, seed: int = 0, progress: Progress | None = None) ->
 
 
 def outcome_of(found: AnalysisResult, seed: int = 0) -> Outcome:
-    """What there is to write of what :func:`evaluate_job` found."""
     return report_recipe(found.job).outcome(found, seed)
 
 

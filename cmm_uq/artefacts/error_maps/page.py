@@ -25,11 +25,11 @@ from cmm_uq.certificate.document import (
     text_columns,
     working_page,
 )
-from cmm_uq.certificate.outcome import Outcome, OwnAnalysis, Recipe
+from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.residuals import curve_with_band
 from cmm_uq.certificate.plots.style import lettered_in
+from cmm_uq.certificate.result import Outcome, OwnAnalysis, Recipe
 from cmm_uq.certificate.results.contents import effect_data, false_alarms, finding_data, head, improvement_data
-from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.sections.findings import improvement_table
 from cmm_uq.certificate.wording import effect_of, effect_title, probability, size_of, titles
 

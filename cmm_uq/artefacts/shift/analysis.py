@@ -13,8 +13,8 @@ from cmm_uq.base.messages import Text, Verbatim, names, say
 from cmm_uq.certificate.certificate import certificate_of
 from cmm_uq.certificate.clauses import clauses_data, formal_warnings
 from cmm_uq.certificate.document import Document
-from cmm_uq.certificate.outcome import Outcome, OwnAnalysis, Recipe
-from cmm_uq.certificate.results.plain import posterior_file
+from cmm_uq.certificate.origin import posterior_file
+from cmm_uq.certificate.result import Outcome, OwnAnalysis, Recipe
 from cmm_uq.certificate.sections.results import as_found_data, as_found_section
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.ensembles import Progress

@@ -21,9 +21,9 @@ from cmm_uq.base.messages import Number, Text, Verbatim, in_a_row, number, plura
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.residuals import curve_with_band, length_plot
 from cmm_uq.certificate.results.contents import covariance_data, head
-from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.sections.method import not_converged
 from cmm_uq.certificate.sections.results import SIGN, Left
 from cmm_uq.certificate.wording import Summary

@@ -33,10 +33,10 @@ from cmm_uq.base.messages import (
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
+from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.residuals import curve_with_band
 from cmm_uq.certificate.plots.vectors import vector_plot
 from cmm_uq.certificate.results.contents import covariance_data, head
-from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.sections.method import not_converged
 from cmm_uq.certificate.sections.results import SIGN, Left
 from cmm_uq.certificate.wording import Summary

@@ -13,14 +13,8 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, c
 from cmm_uq.certificate.diagnosis.sections import explanation, next_sentence, without_power
 from cmm_uq.certificate.document import Overview, Standing
 from cmm_uq.certificate.result import JobDiagnosis
-from cmm_uq.certificate.sections.findings import (
-    VERDICTS as AGAINST,
-    by_columns,
-    contained,
-    other_periods,
-    place_words,
-    sentences as withheld_sentences,
-)
+from cmm_uq.certificate.sections import findings
+from cmm_uq.certificate.sections.findings import contained, other_periods
 from cmm_uq.certificate.wording import Headline, Summary, effect_of, effect_title, probability, size_of, titles
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.machine.physics.effect import Effect
@@ -36,9 +30,29 @@ VERDICT_TITLES: Mapping[str, Text] = {
     "partial": say("Partly explained: a cause is found, and there is more"),
     "unexplained": say("Unexplained: something is wrong that no known effect accounts for"),
 }
+VERDICTS: Mapping[str, Text] = {
+    "consistent": say("The recording agrees with the model that the job names."),
+    "explained": say("The recording does not agree with the model that the job names; what was left out is found."),
+    "partial": say("Something that was left out is found, but structure remains that no known effect accounts for."),
+    "unexplained": say(
+        "The recording does not agree with the model that the job names, and no known effect accounts for it."
+    ),
+}
 
+# A verdict in a word
+VERDICT_WORDS: Mapping[str, Text] = {
+    "consistent": say("consistent"), "explained": say("explained"), "partial": say("partial"),
+    "unexplained": say("unexplained"),
+}  # fmt: skip
+
+# The same, to begin a summary with
+VERDICTS_IN_SHORT: Mapping[str, Text] = {
+    "consistent": say("CONSISTENT"), "explained": say("EXPLAINED"), "partial": say("PARTIAL"),
+    "unexplained": say("UNEXPLAINED"),
+}  # fmt: skip
 _RAREST = 1e-4  # probability below which only this is told
 _TOLD = 0.05  # probability from which another explanation is told beside what is asserted
+_SAME = 0.01  # difference of two probabilities that is not worth telling
 
 
 def overview_of(result: JobDiagnosis) -> Overview:
@@ -62,21 +76,18 @@ def _found(result: JobDiagnosis) -> Text:
             return say("Nothing beyond the effects that the job names: what they leave is noise.")
         return say("Nothing beyond the simulation: what it leaves is noise.")
     if not d.effects:
-        return lines((say("A misfit that no known effect accounts for."), *withheld_sentences(d.withheld)))
-    told = [_one(result, item) for item in d.effects]
+        return lines((say("A misfit that no known effect accounts for."), *findings.withheld_words(d.withheld)))
+    texts: list[Text] = []
+    for item in d.effects:
+        size = size_of(effect_of(item.effect, d.after.effects), item.parameters, factors=False)
+        told = say("{title}: {size}.", title=item.title, size=size)
+        if others := _instead(d, item):
+            small = alternatives(say("{title:small}", title=title) for title in titles(others, d.after.effects))
+            told = say("{told} It could as well be: {others}.", told=told, others=small)
+        texts.append(after(told, contained(result.simulated, item.effect)))
     if d.verdict == "partial":
-        told.append(say("And more that no known effect accounts for."))
-    return lines(told)
-
-
-def _one(result: JobDiagnosis, item: OmittedEffect) -> Text:
-    d = result.diagnosis
-    effect = effect_of(item.effect, d.after.effects)
-    told = say("{title}: {size}.", title=item.title, size=size_of(effect, item.parameters, factors=False))
-    if others := _instead(d, item):
-        small = alternatives(say("{title:small}", title=title) for title in titles(others, d.after.effects))
-        told = say("{told} It could as well be: {others}.", told=told, others=small)
-    return after(told, contained(result.simulated, item.effect))
+        texts.append(say("And more that no known effect accounts for."))
+    return lines(texts)
 
 
 def _instead(d: Diagnosis, item: OmittedEffect) -> list[str]:
@@ -89,32 +100,28 @@ def _instead(d: Diagnosis, item: OmittedEffect) -> list[str]:
 def _where(d: Diagnosis) -> Text:
     if d.verdict == "consistent":
         return say("No place, direction or time stands out.")
-    if not d.where and (told := by_columns(d)):
-        return told
     if not d.where:
-        return say("Spread over the recording: no reading or direction by itself stands out.")
-    return say("{places:capital}.", places=semicolons([place_words(place) for place in d.where[:2]]))
+        return findings.by_columns(d) or say("Spread over the recording: no reading or direction by itself stands out.")
+    return say("{places:capital}.", places=semicolons([findings.place_words(place) for place in d.where[:2]]))
 
 
 def _sure(result: JobDiagnosis) -> Text:
     d = result.diagnosis
-    if d.verdict == "consistent":
-        told = say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
-        return lines(text for text in (told, without_power(result)) if text)
     by_chance = say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
+    if d.verdict == "consistent":
+        return lines(filter(None, (by_chance, without_power(result))))
     if not d.effects:
         return by_chance
-    probable = semicolons([_probable(item) for item in d.effects])
-    each = (by_chance, say("Probability: {each}.", each=probable), _otherwise(d), gained(d.improvement))
-    return lines(text for text in each if text)
+    probable = say("Probability: {each}.", each=semicolons(map(_probable, d.effects)))
+    return lines(filter(None, (by_chance, probable, _otherwise(d), gained(d.improvement))))
 
 
 def _otherwise(d: Diagnosis) -> Text:
     asserted = {item.effect for item in d.effects}
-    others = [one for one in d.remaining.rivals if one.probability >= _TOLD and not asserted <= set(one.effects)]
     each = [
-        say("{title} {probability}", title=explanation(one), probability=probability(one.probability)) for one in others
-    ]
+        say("{title} {probability}", title=explanation(one), probability=probability(one.probability))
+        for one in d.remaining.rivals if one.probability >= _TOLD and not asserted <= set(one.effects)
+    ]  # fmt: skip
     return say("Otherwise: {each}.", each=semicolons(each)) if each else NOTHING
 
 
@@ -147,9 +154,9 @@ def share_of(p_value: float) -> Text:
 
 
 def _to_do(result: JobDiagnosis) -> Text:
-    d = result.diagnosis
+    d, further = result.diagnosis, result.next_plan is not None
     told: list[Text] = []
-    if result.next_plan is not None and d.verdict != "consistent":
+    if further and d.verdict != "consistent":
         told.append(say("First measure the set-ups that are told below, to part what this recording cannot."))
     told += [_look_at(d, item) for item in d.effects]
     if d.verdict in ("partial", "unexplained"):
@@ -159,71 +166,35 @@ def _to_do(result: JobDiagnosis) -> Text:
     if d.verdict == "explained":
         told.append(say("Then measure again."))
     if d.verdict == "consistent":
-        told.append(_nothing_to_do(result.findings))
-        if result.next_plan is not None:
+        warned = say("Nothing on account of the machine; see the warnings on the recording.")
+        told.append(warned if result.findings else say("Nothing on account of this recording."))
+        if further:
             told.append(say("To see what it could not have shown, measure the set-ups that are told below."))
     return lines(dict.fromkeys(told))
 
 
 def _look_at(d: Diagnosis, item: OmittedEffect) -> Text:
     """The cause to look at; of effects that cannot be told apart, that of each on a line."""
-    own = d.after.effects
-    others = [effect_of(name, own) for name in _instead(d, item)]
-    named = [effect for effect in others if effect is not None]
-    if not named:
+    others = [effect_of(name, d.after.effects) for name in _instead(d, item)]
+    causes = [(item.title, item.points_to), *((one.title, one.points_to) for one in others if one is not None)]
+    if len(causes) == 1:
         return say("{what:capital}.", what=item.points_to)
-    causes = [(item.title, item.points_to), *((effect.title, effect.points_to) for effect in named)]
     return lines(say("If it is {title:small}: {what}.", title=title, what=what) for title, what in causes)
 
 
-def _nothing_to_do(findings: Sequence[Finding]) -> Text:
-    if findings:
-        return say("Nothing on account of the machine; see the warnings on the recording.")
-    return say("Nothing on account of this recording.")
-
-
-_SAME = 0.01  # difference of two probabilities that is not worth telling
-
-VERDICTS: Mapping[str, Text] = {
-    "consistent": say("The recording agrees with the model that the job names."),
-    "explained": say("The recording does not agree with the model that the job names; what was left out is found."),
-    "partial": say("Something that was left out is found, but structure remains that no known effect accounts for."),
-    "unexplained": say(
-        "The recording does not agree with the model that the job names, and no known effect accounts for it."
-    ),
-}
-
-# A verdict in a word
-VERDICT_WORDS: Mapping[str, Text] = {
-    "consistent": say("consistent"), "explained": say("explained"), "partial": say("partial"),
-    "unexplained": say("unexplained"),
-}  # fmt: skip
-
-# The same, to begin a summary with
-VERDICTS_IN_SHORT: Mapping[str, Text] = {
-    "consistent": say("CONSISTENT"), "explained": say("EXPLAINED"), "partial": say("PARTIAL"),
-    "unexplained": say("UNEXPLAINED"),
-}  # fmt: skip
-
-
 def verdict_of(result: JobDiagnosis) -> Text:
-    told = VERDICTS if result.simulated is None else AGAINST
-    return told[result.diagnosis.verdict]
+    return (VERDICTS if result.simulated is None else findings.VERDICTS)[result.diagnosis.verdict]
 
 
 def summary_lines(result: JobDiagnosis) -> list[Text]:
-    """Verdict, the overview and what else follows, a sentence or two each."""
     d = result.diagnosis
-    own = d.after.effects
     said = [
         verdict_of(result),
         *(say("{label}: {text}", label=label, text=text) for label, text in overview_of(result).rows),
-        *withheld_sentences(d.withheld),
+        *findings.withheld_words(d.withheld),
+        *(ambiguous(titles(group, d.after.effects)) for group in d.indistinguishable),
     ]
-    said += [ambiguous(titles(group, own)) for group in d.indistinguishable]
-    if told := next_sentence(result):
-        said.append(told)
-    return said + list(noise_words(d, stated_um(result)))
+    return [*said, *filter(None, (next_sentence(result),)), *noise_words(d, stated_um(result))]
 
 
 def ambiguous(group: Sequence[Text]) -> Text:
@@ -232,12 +203,8 @@ def ambiguous(group: Sequence[Text]) -> Text:
 
 def stated_um(result: JobDiagnosis) -> float | None:
     """Standard uncertainty of a coordinate, µm, that the job states; with that of the prediction that it is compared with."""
-    stated = result.job.facts.recording.u_coordinate_um
-    return (
-        stated
-        if stated is None or result.simulated is None
-        else math.hypot(stated, result.simulated.u_um, result.simulated.u_turned_um)
-    )
+    stated, simulated = result.job.facts.recording.u_coordinate_um, result.simulated
+    return stated if stated is None or simulated is None else math.hypot(stated, simulated.u_um, simulated.u_turned_um)
 
 
 def sentence(item: OmittedEffect, gain: Improvement, effects: Iterable[Effect] = ()) -> Text:
@@ -251,15 +218,13 @@ def sentence(item: OmittedEffect, gain: Improvement, effects: Iterable[Effect] =
 
 
 def sure(item: OmittedEffect) -> Text:
-    """How probable an effect is, and how much of the misfit it explains."""
-    alike = item.together > item.probability + _SAME
     share = probability(item.probability)
     if item.probability < ASSERTED:
         share = say(
             "{share}, {together} that it is this or one that this recording cannot tell from it: {group}",
             share=share, together=probability(item.together), group=commas(effect_title(name) for name in item.group),
         )  # fmt: skip
-    elif alike:
+    elif item.together > item.probability + _SAME:
         share = say("{share} ({together} of it or one that cannot be told from it)",
                     share=share, together=probability(item.together))  # fmt: skip
     return say(
@@ -278,32 +243,24 @@ def held_out(gain: Improvement) -> Text:
 
 
 def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[Text, ...]:
-    noise = diagnosis.noise
+    noise, value = diagnosis.noise, diagnosis.noise.coordinate.value
     low, high = noise.coordinate.interval95
-    texts = [
-        say(
-            "Standard uncertainty of a coordinate {value:.2g} µm (95 % interval {low:.2g} to {high:.2g} µm).",
-            value=noise.coordinate.value,
-            low=low,
-            high=high,
-        )
-    ]
-    if noise.contradicts_stated and stated_um is not None:
-        texts.append(say("This contradicts the stated {stated_um:g} µm.", stated_um=stated_um))
-    if noise.placing.value > 0.3 * noise.coordinate.value:
-        texts.append(
-            say("Each set-up is off by about {value:.2g} µm that its repeats share.", value=noise.placing.value)
-        )
-    if noise.correlated_in_time:
-        texts.append(say("Neighbouring readings are correlated in time."))
-    if noise.heavy_tails:
-        texts.append(say("The scatter has heavier tails than a normal distribution."))
-    return tuple(texts)
+    coordinate = say("Standard uncertainty of a coordinate {value:.2g} µm (95 % interval {low:.2g} to {high:.2g} µm).",
+                     value=value, low=low, high=high)  # fmt: skip
+    texts = (
+        (noise.contradicts_stated and stated_um is not None,
+         say("This contradicts the stated {stated_um:g} µm.", stated_um=stated_um or 0.0)),
+        (noise.placing.value > 0.3 * value,
+         say("Each set-up is off by about {value:.2g} µm that its repeats share.", value=noise.placing.value)),
+        (noise.correlated_in_time, say("Neighbouring readings are correlated in time.")),
+        (noise.heavy_tails, say("The scatter has heavier tails than a normal distribution.")),
+    )  # fmt: skip
+    return (coordinate, *(text for holds, text in texts if holds))
 
 
-def summary_of(facts: JobFile, verdict: str, sentences: Sequence[Text], findings: Iterable[Finding]) -> Summary:
+def summary_of(facts: JobFile, verdict: str, sentences: Sequence[Text], found: Iterable[Finding]) -> Summary:
     """Verdict and everything that follows from it, and what the screening found, for the end of a command."""
     first = Headline(VERDICTS_IN_SHORT[verdict], STANDING[verdict], sentences[0], ())
-    warned = tuple(say("{why:capital}.", why=finding.why) for finding in findings)
+    warned = tuple(say("{why:capital}.", why=one.why) for one in found)
     machine = Verbatim(facts.machine.name)
     return Summary(machine, day(facts.job.date), (first,), remarks=tuple(sentences[1:]), warnings=warned)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
-
-import numpy as np
+from collections.abc import Iterator
 
 from cmm_uq.analysis.conformity.accuracy import TITLES, UNITS
-from cmm_uq.analysis.diagnosis.model_average import EffectParameters, Rival
+from cmm_uq.analysis.diagnosis.model_average import Rival
 from cmm_uq.analysis.diagnosis.power import ALLOWED
 from cmm_uq.analysis.diagnosis.smallest import POWER, PeriodRange, SmallestEffect
 from cmm_uq.analysis.diagnosis.visibility import PLACES
-from cmm_uq.analysis.planning.advice import ODDS, DetectionChange, NextPlan, odds_words, rounded
+from cmm_uq.analysis.planning.advice import ODDS, NextPlan, odds_words, rounded
 from cmm_uq.base.messages import (
     DASH,
     NOTHING,
@@ -28,10 +25,9 @@ from cmm_uq.base.messages import (
     together,
 )
 from cmm_uq.base.units import Unit
-from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
 from cmm_uq.certificate.plots.plans import placing_pictures
 from cmm_uq.certificate.result import JobDiagnosis
-from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.wording import (
     OUTCOME_WORDS,
     effect_title,
@@ -44,7 +40,6 @@ from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.maths.uncertainty.quantity import Quantity
 
 _PARTED = 3.0  # odds from which on two are parted at all
 TO_FILL_IN = "next_plan.csv"  # file that a diagnosis writes the set-ups to
@@ -54,13 +49,22 @@ def next_section(result: JobDiagnosis) -> Section:
     """The set-ups that would part what this recording cannot, or show what it could not have shown."""
     title, plan = say("What to measure next"), result.next_plan
     if plan is None:
-        return Section(title, ())
-    blocks: list[Block] = [Paragraph(_what(result, plan)), _set_ups(plan)]
-    if plan.partings:
-        blocks.append(_partings(plan))
-    if plan.shown:
-        blocks.append(_shown(plan, result.diagnosis.after.artefact))
-    return Section(title, (*blocks, *placing_pictures(plan.placings, plan.box, plan.first)))
+        return section(title)
+    set_ups = (
+        (number(plan.first + i), placing.title, placing.ends, number(plan.repeats))
+        for i, placing in enumerate(plan.placings)
+    )
+    heads = (
+        Column(say("Measurement")),
+        say("Set-up"),
+        say("First and last point, scale readings / mm"),
+        Column(say("Repeats")),
+    )
+    note = say("A CSV to fill in comes with this page.")
+    return section(
+        title, Paragraph(_what(result, plan)), table(say("Set-ups to measure"), heads, set_ups, note), _partings(plan),
+        _shown(plan, result.diagnosis.after.artefact), *placing_pictures(plan.placings, plan.box, plan.first),
+    )  # fmt: skip
 
 
 def next_sentence(result: JobDiagnosis) -> Text:
@@ -72,24 +76,22 @@ def next_sentence(result: JobDiagnosis) -> Text:
     told = say(
         "Measure next: {what} First and last point in scale readings: {ends}.", what=_what(result, plan), ends=ends
     )
-    if not plan.partings:
-        return told
     odds = [parting.after for parting in plan.partings]
-    if max(odds) < _PARTED and not plan.shown:
+    reached = [each for each in odds if each >= _PARTED]
+    if odds and not reached and not plan.shown:
         return say(
             "No set-up that was tried is expected to part what this recording cannot: odds of {odds} : 1 at best for the "
             "true one. Another artefact is needed for that.", odds=rounded(max(odds)),
         )  # fmt: skip
-    least = min((each for each in odds if each >= _PARTED), default=None)
-    if least is None:
+    if not reached:
         return told
-    if min(odds) < _PARTED:
+    least = rounded(min(reached))
+    if len(reached) < len(odds):
         return say(
             "{told} Odds of {odds} : 1 or more for the true one are then expected, but for {count} of {all} pairs, which "
-            "they do not part: see below.", told=told, odds=rounded(least), count=sum(each < _PARTED for each in odds),
-            all=len(odds),
+            "they do not part: see below.", told=told, odds=least, count=len(odds) - len(reached), all=len(odds),
         )  # fmt: skip
-    return say("{told} Odds of {odds} : 1 or more for the true one are then expected.", told=told, odds=rounded(least))
+    return say("{told} Odds of {odds} : 1 or more for the true one are then expected.", told=told, odds=least)
 
 
 def _what(result: JobDiagnosis, plan: NextPlan) -> Text:
@@ -104,50 +106,24 @@ def _what(result: JobDiagnosis, plan: NextPlan) -> Text:
     return say("{what} They are the best that was found, but do not reach everything: see below.", what=what)
 
 
-def _set_ups(plan: NextPlan) -> Table:
-    rows = tuple(
-        (number(plan.first + i), placing.title, placing.ends, number(plan.repeats))
-        for i, placing in enumerate(plan.placings)
+def _partings(plan: NextPlan) -> Table | None:
+    rows = (
+        (together(map(effect_title, one.effects)), odds_words(one.before), say("{odds} : 1", odds=rounded(one.after)))
+        for one in plan.partings
     )
-    heads = (
-        Column(say("Measurement")), Column(say("Set-up"), numeric=False),
-        Column(say("First and last point, scale readings / mm"), numeric=False), Column(say("Repeats")),
-    )  # fmt: skip
-    return Table(say("Set-ups to measure"), heads, rows, (say("A CSV to fill in comes with this page."),))
-
-
-def _partings(plan: NextPlan) -> Table:
-    rows = tuple(
-        (
-            together(effect_title(name) for name in parting.effects),
-            odds_words(parting.before),
-            say("{odds} : 1", odds=rounded(parting.after)),
-        )
-        for parting in plan.partings
-    )
-    heads = (
-        Column(say("Cannot be told apart"), numeric=False), Column(say("Odds now, first over second")),
-        Column(say("Odds expected then")),
-    )  # fmt: skip
-    note = say(
+    heads = (say("Cannot be told apart"), Column(say("Odds now, first over second")), Column(say("Odds expected then")))
+    return table(say("What the set-ups part"), heads, rows, say(
         "Expected are the odds of the true one of the two, whichever it is, each as large as it would have to be to explain "
         "this recording; {odds:.0f} : 1 is aimed at.", odds=ODDS,
-    )  # fmt: skip
-    return Table(say("What the set-ups part"), heads, rows, (note,))
+    ))  # fmt: skip
 
 
-def _shown(plan: NextPlan, artefact: Artefact) -> Table:
-    rows = []
-    for one in plan.shown:
-        effect = _acting(one, artefact)
-        rows.append((effect.title, _amplitude(effect, one.before), _amplitude(effect, one.after)))
-    heads = (Column(say("Error"), numeric=False), Column(say("Found from, now")), Column(say("Found from, then")))
+def _shown(plan: NextPlan, artefact: Artefact) -> Table | None:
+    acting = [(artefact.acting(every()[one.effect]), one) for one in plan.shown]
+    rows = ((effect.title, _amplitude(effect, one.before), _amplitude(effect, one.after)) for effect, one in acting)
+    heads = (say("Error"), Column(say("Found from, now")), Column(say("Found from, then")))
     note = say("One error at a time, in 90 of 100 such recordings, with everything that the model names fitted.")
-    return Table(say("What the set-ups show"), heads, tuple(rows), (note,))
-
-
-def _acting(change: DetectionChange, artefact: Artefact) -> Effect:
-    return artefact.acting(every()[change.effect])
+    return table(say("What the set-ups show"), heads, rows, note)
 
 
 def _amplitude(effect: Effect, size: float) -> Text:
@@ -155,91 +131,36 @@ def _amplitude(effect: Effect, size: float) -> Text:
     return say("not found") if size > ALLOWED else _size(size * first.prior_sd, first.unit)
 
 
-def next_data(plan: NextPlan | None, artefact: Artefact) -> dict[str, Any] | None:
-    if plan is None:
-        return None
-    return {
-        "repeats": plan.repeats,
-        "reached": plan.reached,
-        "set_ups": [
-            {"measurement": plan.first + i, "what": placing.title, "ends": placing.ends}
-            for i, placing in enumerate(plan.placings)
-        ],
-        "parts": [
-            {"effects": list(parting.effects), "odds_before": parting.before, "odds_after": parting.after}
-            for parting in plan.partings
-        ],
-        "shows": [_shown_data(one, _acting(one, artefact)) for one in plan.shown],
-    }
-
-
-def _shown_data(change: DetectionChange, effect: Effect) -> dict[str, Any]:
-    parameter = effect.coefficients[0]
-    before, after = (
-        size * parameter.prior_sd if np.isfinite(size) and size <= ALLOWED else None
-        for size in (change.before, change.after)
-    )
-    name = effect.reported[0].name
-    return {"effect": change.effect, "parameter": name, "detected_before": before, "detected_after": after}
-
-
 _SHOWN = 4  # explanations that a table has columns for
 
 
 def costs_section(result: JobDiagnosis) -> Section:
     """A table of what remains; without blocks where one explanation is settled, or nothing depends on it."""
-    title, rivals = say("What the choice of an explanation costs"), result.diagnosis.remaining.rivals
-    rows = tuple(_cost_rows(result)) if rivals else ()
-    if not rows:  # as against a simulation, where no effect of the job takes part
-        return Section(title, ())
+    rivals = result.diagnosis.remaining.rivals
     heads = (
-        Column(say("Quantity"), numeric=False),
-        *(
-            Column(say("{what}: {probability}", what=explanation(one), probability=probability(one.probability)))
-            for one in rivals[:_SHOWN]
-        ),
-        Column(say("Averaged")), Column(say("Unit"), numeric=False),
-    )  # fmt: skip
-    notes: list[Text] = [
-        say(
-            "Each column is what follows if this explanation is the right one; figures and decisions are then corrected for "
-            "its effects. Averages are weighted by the probabilities; a certificate states those of the error factors."
-        )
-    ]
-    told = sum(one.probability for one in rivals)
-    more = max(len(rivals) - _SHOWN, 0)
+        Column(say("{what}: {probability}", what=explanation(one), probability=probability(one.probability)))
+        for one in rivals[:_SHOWN]
+    )
+    note = say(
+        "Each column is what follows if this explanation is the right one; figures and decisions are then corrected for "
+        "its effects. Averages are weighted by the probabilities; a certificate states those of the error factors."
+    )
+    told, more = probability(sum(one.probability for one in rivals)), max(len(rivals) - _SHOWN, 0)
     share = say(
         "The averages are over explanations with {told} of the probability together; each of the rest has less.",
-        told=probability(told),
+        told=told,
     )
     left = plural(
         more, one=say("One further explanation is in results.json."),
         many=say("{count} further explanations are in results.json.", count=more),
-    ) if more else NOTHING  # fmt: skip
-    notes.append(after(left, share))
-    return Section(title, (Table(say("What follows from each explanation that remains"), heads, rows, tuple(notes)),))
-
-
-def costs_data(result: JobDiagnosis) -> dict[str, Any]:
-    """For results.json: what remains, and the average; nothing where one explanation is settled."""
-    remaining, costs = result.diagnosis.remaining, result.costs
-    if not remaining.rivals:
-        return {}
-    each: list[dict[str, Any]] = []
-    for i, rival in enumerate(remaining.rivals):
-        cost = None if costs is None else costs.each[i]
-        each.append({
-            "probability": rival.probability, "effects": list(rival.effects), "functions": list(rival.functions),
-            "estimates": _data(rival.named), "parameters": _data(rival.added),
-            "figures": {} if cost is None else _each(cost.figures),
-            "decisions": [] if cost is None else [one.outcome for one in cost.statements],
-        })  # fmt: skip
-    whole = {
-        "estimates": _data(remaining.averaged),
-        "figures": {} if costs is None else _each(costs.figures),
-        "decisions": [] if costs is None else [dict(one) for one in costs.decisions],
-    }
-    return {"remaining": each, "averaged": whole}
+    )  # fmt: skip
+    follows = table(
+        say("What follows from each explanation that remains"),
+        (say("Quantity"), *heads, Column(say("Averaged")), say("Unit")),
+        _cost_rows(result) if rivals else (),  # none as against a simulation, where no effect of the job takes part
+        note, after(left if more else NOTHING, share),
+    )  # fmt: skip
+    return section(say("What the choice of an explanation costs"), follows)
 
 
 def explanation(rival: Rival) -> Text:
@@ -270,14 +191,6 @@ def _cost_rows(result: JobDiagnosis) -> Iterator[tuple[Text, ...]]:
         )
 
 
-def _data(named: EffectParameters) -> dict[str, Any]:
-    return {effect: _each(parameters) for effect, parameters in named.items()}
-
-
-def _each(quantities: Mapping[str, Quantity]) -> dict[str, Any]:
-    return {name: quantity_data(quantity) for name, quantity in quantities.items()}
-
-
 _NAMED = 5  # effects that the sentence beside the verdict names
 _RANGES = 3
 
@@ -288,48 +201,35 @@ def without_power(result: JobDiagnosis) -> Text:
         return NOTHING
     order = {name: i for i, name in enumerate(every())}
     blind = sorted((row for row in result.unseen if row.blind), key=lambda row: order.get(row.effect, len(order)))
-    if not blind:
-        return NOTHING
-    words = [
-        say(
-            "{title:small} up to {size}",
-            title=row.title,
-            size=_size(min(row.detected or row.allowed, row.allowed), row.unit),
-        )
+    words: list[Text] = [
+        say("{title:small} up to {size}", title=row.title,
+            size=_size(min(row.detected or row.allowed, row.allowed), row.unit))
         for row in blind
-    ]
-    more = len(words) - _NAMED
-    if more > 1:
+    ]  # fmt: skip
+    if (more := len(words) - _NAMED) > 1:
         words = [*words[:_NAMED], say("{more} more", more=more)]
-    return say("But this recording could not have shown: {effects}.", effects=listed(words))
+    return say("But this recording could not have shown: {effects}.", effects=listed(words)) if words else NOTHING
 
 
 def unseen_section(result: JobDiagnosis) -> Section:
     """The smallest amplitude of each common effect that the recording would have shown, and rarer ones that it would not."""
-    rows = tuple(
+    rows = [
         (row.title, _found(row, row.detected), _found(row, row.named), _size(row.allowed, row.unit), _why(row))
-        for row in result.unseen
-        if row.common or not row.shown
-    )
-    if not rows:
-        return Section(say("What would not have been seen"), ())
+        for row in result.unseen if row.common or not row.shown
+    ]  # fmt: skip
     heads = (
-        Column(say("Error"), numeric=False), Column(say("Found from")), Column(say("Named from")),
-        Column(say("Reckoned with up to")), Column(say("Why, and for which periods"), numeric=False),
+        say("Error"), Column(say("Found from")), Column(say("Named from")), Column(say("Reckoned with up to")),
+        say("Why, and for which periods"),
     )  # fmt: skip
-    notes = (
-        say(
-            "With the noise that was found and beside what was asserted, an error of this size would have been found, or "
-            "called by its right name, in {power:.0f} of 100 such recordings; “not found” where even the largest error "
-            "reckoned with would not. In closed form: mostly within 15 %, a name with a close rival within a factor of two.",
-            power=100 * POWER,
-        ),
-    )
-    beside = without_power(result)
-    head = (Paragraph(beside, tone="warning"),) if beside else ()
-    return Section(
-        say("What would not have been seen"),
-        (*head, Table(say("Smallest errors that would have shown"), heads, rows, notes)),
+    beside = without_power(result) if rows else NOTHING
+    smallest = table(say("Smallest errors that would have shown"), heads, rows, say(
+        "With the noise that was found and beside what was asserted, an error of this size would have been found, or "
+        "called by its right name, in {power:.0f} of 100 such recordings; “not found” where even the largest error "
+        "reckoned with would not. In closed form: mostly within 15 %, a name with a close rival within a factor of two.",
+        power=100 * POWER,
+    ))  # fmt: skip
+    return section(
+        say("What would not have been seen"), Paragraph(beside, tone="warning") if beside else None, smallest
     )
 
 
@@ -342,14 +242,14 @@ def _size(value: float, unit: Unit) -> Text:
 
 
 def _why(row: SmallestEffect) -> Text:
+    takers = listed([*map(_taker, row.taken_up)])
     said: list[Text] = []
-    if row.share == 0 and not row.taken_up:
+    if row.taken_up:
+        said.append(say("taken up by {effects}", effects=takers) if row.share < 1e-3 else
+                    say("mostly taken up by {effects}", effects=takers))  # fmt: skip
+    elif row.share == 0:
         said.append(say("moves nothing that is observed here"))
-    elif row.taken_up and row.share < 1e-3:
-        said.append(say("taken up by {effects}", effects=listed([*map(_taker, row.taken_up)])))
-    elif row.taken_up:
-        said.append(say("mostly taken up by {effects}", effects=listed([*map(_taker, row.taken_up)])))
-    if row.detected is not None and row.detected > row.allowed and row.detected < 100 * row.allowed:
+    if row.detected is not None and row.allowed < row.detected < 100 * row.allowed:
         said.append(say("it would take {size}", size=_size(row.detected, row.unit)))
     if row.periods is not None:
         said.append(_periods(row.periods, row))
@@ -379,19 +279,3 @@ def _periods(periods: PeriodRange, row: SmallestEffect) -> Text:
     if len(ranges) > _RANGES:
         ranges = [*ranges[:_RANGES], say("{more} more ranges", more=len(ranges) - _RANGES)]
     return say("{worst}; not resolved: {ranges}\u00a0{unit}", worst=worst, ranges=listed(ranges), unit=periods.unit)
-
-
-def unseen_data(rows: Sequence[SmallestEffect]) -> list[dict[str, Any]]:
-    """The same for results.json, every effect."""
-    return [
-        {
-            "effect": row.effect, "parameter": row.parameter, "detected": row.detected, "named": row.named,
-            "allowed": row.allowed, "shown": row.shown, "share": row.share,
-            "taken_up_by": [name for name in row.taken_up if name != PLACES],
-            **({} if row.periods is None else {"periods": {
-                "parameter": row.periods.parameter, "low": row.periods.low, "high": row.periods.high,
-                "worst": row.periods.worst, "unresolved": [list(each) for each in row.periods.unresolved],
-            }}),
-        }
-        for row in rows
-    ]  # fmt: skip

@@ -36,8 +36,7 @@ from cmm_uq.certificate.digital_certificate.figures import (
     ratio,
     without_unit,
 )
-from cmm_uq.certificate.origin import file_name
-from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.certificate.origin import as_json, file_name
 from cmm_uq.certificate.wording import stated_row, stated_value
 from cmm_uq.jobs.dcc.certificate import (
     Administrative,

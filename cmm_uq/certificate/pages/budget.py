@@ -49,12 +49,11 @@ def budget_document(file: ModelFile | ReadyBudget, evaluation: Evaluation, name:
 
 def _budget(evaluation: Evaluation, output: str, stated: Stated) -> tuple[Block, ...]:
     budget, reason, name = stated.budget, stated.reason, Verbatim(output)
-    sentence = say("{reason:capital}.", reason=reason)
-    if reason.endswith("."):
-        sentence = say("{reason:capital}", reason=reason)
-    blocks: list[Block] = [Paragraph(sentence, tone="note")]
-    if budget.statement:
-        blocks.append(Paragraph(budget.statement, tone="note"))
+    sentence = (
+        say("{reason:capital}", reason=reason) if reason.endswith(".") else say("{reason:capital}.", reason=reason)
+    )
+    texts = (sentence, budget.statement) if budget.statement else (sentence,)
+    blocks: list[Block] = [Paragraph(text, tone="note") for text in texts]
     blocks += budget_blocks(name, budget)
     rows = tuple(comparison_rows(evaluation, output))
     if len(rows) > 1:

@@ -1,26 +1,100 @@
-"""The page of a fleet: of however many machines, models and places those that matter."""
+"""Which machines are due for calibration."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import datetime as dt
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, day, number, plural, say
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, plural, say, semicolons, sentences
 from cmm_uq.base.points import Ints
 from cmm_uq.base.units import unit_as_written
 from cmm_uq.certificate import document as doc
-from cmm_uq.certificate.document import Column, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import Column, Document, Overview, Paragraph, Plot, Section, Standing, Table, columns
 from cmm_uq.certificate.pages import fleet_summary as words
 from cmm_uq.certificate.plots.style import ACCENT, INK, dots, drawn, picture, strokes
 from cmm_uq.laboratory.due.drift import PARTS
+from cmm_uq.laboratory.due.due import DueItem, State
 from cmm_uq.laboratory.due.fleet import FALSE_DISCOVERIES, FleetResult, FleetValue, UsualRate
+
+STATE_WORDS: Mapping[State, Text] = {
+    "overdue": say("overdue"), "due": say("due soon"), "later": say("later"), "unknown": say("no date"),
+}  # fmt: skip
+
+
+def due_document(items: Sequence[DueItem], on: dt.date, within: dt.timedelta) -> Document:
+    each = [(say("Machines"), [one for one in items if one.item == "machine"]),
+            (say("Artefacts"), [one for one in items if one.item == "artefact"])]  # fmt: skip
+    sections = tuple(Section(title, (_table(rows, on, within, title),)) for title, rows in each if rows)
+    (_, machines), (_, artefacts) = each
+    count, blocked = len(artefacts), sum(one.blocked is not None for one in items)
+    counted_artefacts = plural(count, one=say("one artefact"), many=say("{count} artefacts", count=count))
+    looked_at = say("{machines} and {artefacts}", machines=words.counted(len(machines)), artefacts=counted_artefacts)
+    out_of_date = ((say("Artefact out of date"), words.counted(blocked)),) if blocked else ()
+    overview = Overview(*counts(items, on, within), ((say("Looked at"), looked_at), *out_of_date))
+    return Document(
+        title=say("What is due for calibration"),
+        number=day(on),
+        subject=say("on {on}, and within {days} days", on=day(on), days=within.days),
+        sections=sections or (Section(say("Machines"), (Paragraph(say("Nothing is due.")),)),),
+        attachments=(Verbatim("due.json"),),
+        produced_by=say("cmm-uq {version}", version=Verbatim(__version__)),
+        end=say("End of list"),
+        overview=overview,
+    )
+
+
+def counts(items: Iterable[DueItem], on: dt.date, within: dt.timedelta) -> tuple[Text, Standing]:
+    """How many are overdue, due soon and without a date, in words; and what that means."""
+    found = Counter(one.state(on, within) for one in items)
+    words: tuple[tuple[State, Text], ...] = (
+        ("overdue", say("{count} overdue", count=found["overdue"])),
+        ("due", say("{count} due within {days} days", count=found["due"], days=within.days)),
+        ("unknown", say("{count} without a date", count=found["unknown"])),
+    )
+    parts = [text for state, text in words if found[state]]
+    standing: Standing = "bad" if found["overdue"] else "open" if parts else "good"
+    return (commas(parts) if parts else say("Nothing due within {days} days", days=within.days)), standing
+
+
+def _table(rows: Sequence[DueItem], on: dt.date, within: dt.timedelta, title: Text) -> Table:
+    cells = tuple(
+        (
+            DASH if one.due is None else day(one.due), STATE_WORDS[one.state(on, within)], Verbatim(one.serial),
+            Verbatim(one.name) if one.name else DASH, Verbatim(one.place) if one.place else DASH,
+            DASH if one.last is None else day(one.last), reason(one),
+        )
+        for one in rows
+    )  # fmt: skip
+    # dates are not broken at their hyphens
+    heads = (Column(say("Due")), say("State"), say("Serial number"), say("Name"), say("Place"), Column(say("Last calibrated")),
+             say("Why"))  # fmt: skip
+    return Table(title, columns(heads), cells)
+
+
+def reason(one: DueItem) -> Text:
+    """Why an item is due then, with all that is remarked of it."""
+    parts = semicolons([one.why, *((one.blocked,) if one.blocked else ())])
+    return sentences((say("{parts:capital}.", parts=parts), *one.remarks))
+
+
+def due_row(one: DueItem, on: dt.date, within: dt.timedelta) -> tuple[Text, ...]:
+    date: Text = DASH
+    left: Text = NOTHING
+    if one.due is not None:
+        date, days = day(one.due), (one.due - on).days
+        left = say("in {days} d", days=number(days)) if days >= 0 else say("{days} d ago", days=number(-days))
+    serial = Verbatim(one.serial)
+    what = say("machine {serial}", serial=serial) if one.item == "machine" else say("artefact {serial}", serial=serial)
+    return date, STATE_WORDS[one.state(on, within)], left, what, reason(one)
 
 
 def fleet_plot(
     rows: Sequence[UsualRate], names: Sequence[Text], *, axis: Text, caption: Text, alternative: Text
-) -> doc.Plot:
+) -> Plot:
     rate, low, high = (np.array([getattr(row, name) for row in rows]) for name in ("rate", "lower", "upper"))
     at, height = np.arange(len(rows), dtype=np.float64), 14 + 5.5 * len(rows)
     with picture(height, left=0.3, right=0.985, bottom=9 / height, top=1 - 2 / height) as (figure, ax):
@@ -60,15 +134,13 @@ def all_values(found: FleetResult) -> Table:
         if of.fleet.estimates.crossing is not None:
             due = number(int(of.beyond.sum())), number(int(of.crosses_by(until).sum()))
         rows.append((words.called(of), number(len(of.members)), words.usual_rate(of), unlike, *due))
-    columns = (
-        *text_columns(say("Value")), Column(say("Machines")), *text_columns(say("Average drift, U (95 %)")),
-        *figure_columns(say("Unlike the fleet"), say("Beyond the limit"), say("Beyond within a year")),
-    )  # fmt: skip
+    figures = (Column(head) for head in (say("Unlike the fleet"), say("Beyond the limit"), say("Beyond within a year")))
     note = say(
         "Beyond: at a machine's last certificate, and by {day}, a year after the newest of all, each with a probability of "
         "50 % or more.", day=words.date_of(until),
     )  # fmt: skip
-    return Table(say("What is usual, and how many machines matter"), columns, tuple(rows), (note,))
+    heads = columns((say("Value"), Column(say("Machines")), say("Average drift, U (95 %)"), *figures))
+    return Table(say("What is usual, and how many machines matter"), heads, tuple(rows), (note,))
 
 
 def groups_shown(of: FleetValue) -> tuple[UsualRate, ...]:
@@ -79,11 +151,8 @@ def groups_shown(of: FleetValue) -> tuple[UsualRate, ...]:
 
 
 def usual_table(of: FleetValue) -> Table:
-    spec, shown = words.digits(of), groups_shown(of)
-    columns = (
-        Column(say("Machines"), numeric=False), Column(say("Number")), Column(say("Rate"), words.per_year(of)),
-        Column(say("U (95 %)"), words.per_year(of)),
-    )  # fmt: skip
+    spec, shown, per_year = words.digits(of), groups_shown(of), words.per_year(of)
+    heads = (say("Machines"), Column(say("Number")), Column(say("Rate"), per_year), Column(say("U (95 %)"), per_year))
     rows = tuple(
         (
             words.group_words(each),
@@ -94,25 +163,24 @@ def usual_table(of: FleetValue) -> Table:
         for each in shown
     )
     notes: list[Text] = [say("A model at the fleet's average place; a place for the fleet's average machine.")]
-    left = len(of.fleet.usual) - len(shown)
-    if left:
+    if left := len(of.fleet.usual) - len(shown):
         notes.append(plural(
             left, one=say("One more model or place has fewer machines; fleet.json has all."),
             many=say("{count} more models and places have fewer machines; fleet.json has all.", count=left),
         ))  # fmt: skip
-    return Table(say("Usual drift"), columns, rows, tuple(notes))
+    return Table(say("Usual drift"), columns(heads), rows, tuple(notes))
 
 
 def outsiders(of: FleetValue) -> doc.Block:
     """Machines that do not belong, the clearest first; or that there are none, or that nobody can know."""
     if not of.compared:
-        return doc.Paragraph(say("Not enough history to compare machines: two at least need certificates of two days."))
+        return Paragraph(say("Not enough history to compare machines: two at least need certificates of two days."))
     which = np.flatnonzero(~of.belongs)
     if not len(which):
-        return doc.Paragraph(say("No machine drifts unlike the others."))
+        return Paragraph(say("No machine drifts unlike the others."))
     e, spec = of.fleet.estimates, words.digits(of)
     shown = which[np.argsort(e.p[which], kind="stable")][:MOST_MACHINES]
-    columns = (*_own(of), Column(say("Expected"), words.per_year(of)), Column(say("p")))
+    heads = (*_own(of), Column(say("Expected"), words.per_year(of)), Column(say("p")))
     rows = tuple(
         (*_own_row(of, i), words.signed_rate(e.expected[i], spec), number(e.p[i], ".2g")) for i in map(int, shown)
     )
@@ -121,13 +189,13 @@ def outsiders(of: FleetValue) -> doc.Block:
         "about {part:.0f} % are by chance (Benjamini and Hochberg).", part=100 * FALSE_DISCOVERIES,
     )  # fmt: skip
     left = () if len(shown) == len(which) else (_left_out(len(shown), len(which)),)
-    return Table(say("Machines that do not belong"), columns, rows, (note, *left))
+    return Table(say("Machines that do not belong"), heads, rows, (note, *left))
 
 
 def soonest(of: FleetValue) -> Table:
     """Machines beyond their limit, and those that cross it soonest; where none does, those that drift fastest."""
     N, shown = len(of.members), _soonest(of)
-    columns = (*_own(of), *text_columns(say("Limit crossed"), say("90 % from"), say("90 % to")))
+    heads = (*_own(of), *columns((say("Limit crossed"), say("90 % from"), say("90 % to"))))
     notes: list[Text] = [
         say("Rate with the fleet as prior: little history of its own is filled up from models and places like it.")
     ]
@@ -137,7 +205,7 @@ def soonest(of: FleetValue) -> Table:
         if np.isfinite(of.median[shown]).all():
             caption = say("Machines beyond their limit, and those that cross it soonest")
         notes.append(_left_out(len(shown), N))
-    return Table(caption, columns, tuple((*_own_row(of, i), *_crossed(of, i)) for i in map(int, shown)), tuple(notes))
+    return Table(caption, heads, tuple((*_own_row(of, i), *_crossed(of, i)) for i in map(int, shown)), tuple(notes))
 
 
 def _soonest(of: FleetValue) -> Ints:
@@ -159,7 +227,7 @@ def _left_out(shown: int, total: int) -> Text:
 
 def _own(of: FleetValue) -> tuple[Column, ...]:
     rate = Column(say("Rate, U (95 %)"), words.per_year(of))
-    return *text_columns(say("Machine"), say("Model"), say("Place")), Column(say("Certificates")), rate
+    return columns((say("Machine"), say("Model"), say("Place"), Column(say("Certificates")), rate))
 
 
 def _own_row(of: FleetValue, i: int) -> tuple[Text, ...]:
@@ -191,20 +259,20 @@ def spreads_table(of: FleetValue) -> Table:
          yearly.get(each.name, unit_as_written(of.unit)))
         for each in of.fleet.spreads
     )  # fmt: skip
-    columns = (*text_columns(say("Quantity")), Column(say("Median")), *text_columns(say("95 % interval"), say("Unit")))
-    return Table(say("How machines differ"), columns, rows)
+    heads = columns((say("Quantity"), Column(say("Median")), say("95 % interval"), say("Unit")))
+    return Table(say("How machines differ"), heads, rows)
 
 
-def fleet_document(found: FleetResult) -> doc.Document:
+def fleet_document(found: FleetResult) -> Document:
     values = plural(len(found.values), one=say("one value"), many=say("{count} values", count=len(found.values)))
-    return doc.Document(
+    return Document(
         title=say("Drift of a fleet"),
         number=words.date_of(found.newest),
         subject=say("{machines}, {values}", machines=words.counted(len(words.machines_of(found))), values=values),
         warnings=words.fleet_warnings(found),
         sections=(
-            doc.Section(say("All values"), (all_values(found),)),
-            *(doc.Section(words.called(of), _blocks(of)) for of in found.values),
+            Section(say("All values"), (all_values(found),)),
+            *(Section(words.called(of), _blocks(of)) for of in found.values),
         ),
         attachments=(Verbatim("fleet.json"), Verbatim("fleet.csv")),
         produced_by=say("cmm-uq {version}, seed {seed}", version=Verbatim(__version__), seed=found.seed),
@@ -226,4 +294,4 @@ def _blocks(of: FleetValue) -> tuple[doc.Block, ...]:
         "{steps} steps.", sampler=Verbatim(chains.sampler), machines=words.counted(of.fleet.learnt_from),
         rhat=number(chains.rhat_max, ".3f"), ess=number(chains.ess_min, ".0f"), steps=chains.steps,
     )  # fmt: skip
-    return usual_table(of), plot, outsiders(of), soonest(of), spreads_table(of), doc.Paragraph(sampled, tone="note")
+    return usual_table(of), plot, outsiders(of), soonest(of), spreads_table(of), Paragraph(sampled, tone="note")

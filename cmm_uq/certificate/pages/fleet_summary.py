@@ -10,8 +10,7 @@ import csv
 import datetime as dt
 import io
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,8 +81,7 @@ def usual_rate(of: FleetValue) -> Text:
 MOST_VERDICTS = 6  # machines and values that a terminal names as unlike their fleet
 
 
-@dataclass(frozen=True)
-class _Standings:
+class _Standings(NamedTuple):
     """Machines that matter: unlike their fleet, beyond a limit, and beyond one within a year."""
 
     unlike: set[str]
@@ -267,9 +265,8 @@ def fleet_csv(data: Mapping[str, Any]) -> bytes:
     writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     for row in rows:
-        writer.writerow({
-            name: f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell for name, cell in row.items()
-        })  # fmt: skip
+        named = {name: f"'{cell}" for name, cell in row.items() if isinstance(cell, str) and cell.startswith(FORMULA)}
+        writer.writerow(row | named)
     return text.getvalue().encode()
 
 

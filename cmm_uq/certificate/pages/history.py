@@ -40,18 +40,19 @@ STATE_WORDS: Mapping[str, Text] = {
 
 def value_row(history: MachineHistory, one: ValueHistory) -> tuple[Text, ...]:
     series = one.series
-    limit = DASH if series.limit is None else limit_in_full(series.limit)
+    change: Text = DASH
+    expanded: Text = DASH
     trend = (DASH, DASH) if one.line is None else rounded(one.line.slope, COVERAGE * one.line.u_slope)
-    change: tuple[Text, Text] = (DASH, DASH)
     if one.change is not None:
-        value, expanded = rounded(one.change.value, COVERAGE * one.change.u)
+        change, expanded = rounded(one.change.value, COVERAGE * one.change.u)
         if one.adjusted:
-            change = say("{value} adjusted", value=value), expanded
-        else:
-            change = say("{value} significant", value=value) if history.significant(one) else value, expanded
+            change = say("{value} adjusted", value=change)
+        elif history.significant(one):
+            change = say("{value} significant", value=change)
     return (
         Verbatim(series.quantity), *rounded(float(series.value[-1]), COVERAGE * float(series.u[-1])),
-        unit_as_written(series.unit), *change, *trend, limit, meets(one, history.on),
+        unit_as_written(series.unit), change, expanded, *trend,
+        DASH if series.limit is None else limit_in_full(series.limit), meets(one, history.on),
     )  # fmt: skip
 
 
@@ -79,11 +80,9 @@ def meets(one: ValueHistory, on: dt.date) -> Text:
 
 def model_note(history: MachineHistory) -> Text:
     learnt = {one.prior is not None for one in history.values if one.series.limit is not None}
-    model = say("the drift model without a fleet")
-    if True in learnt:
-        model = say("the drift model with its fleet")
-        if False in learnt:
-            model = say("the drift model, with its fleet where that has the value")
+    model = say("the drift model with its fleet") if True in learnt else say("the drift model without a fleet")
+    if len(learnt) == 2:
+        model = say("the drift model, with its fleet where that has the value")
     return say(
         "The day on which a limit is crossed is by {model} (about: with a probability of 50 %; not "
         "before: 5 %; by: 95 %; never: later than {horizon} years), not by the straight line.",
@@ -93,10 +92,8 @@ def model_note(history: MachineHistory) -> Text:
 
 def terminal_note(history: MachineHistory) -> Text:
     """What the rows of a terminal mean, in one line."""
-    factor = say("Every ± has k = 2.")
-    if all(one.crossing is None or one.beyond for one in history.values):
-        return factor
-    return say("{factor} {model}", factor=factor, model=model_note(history))
+    factor, foreseen = say("Every ± has k = 2."), any(one.crossing and not one.beyond for one in history.values)
+    return say("{factor} {model}", factor=factor, model=model_note(history)) if foreseen else factor
 
 
 def notes(history: MachineHistory) -> tuple[Text, ...]:
@@ -252,14 +249,23 @@ def history_document(history: MachineHistory) -> doc.Document:
         (say("Machine"), machine.name), (say("Serial number"), "" if machine.by_name else machine.serial),
         (say("Manufacturer"), machine.manufacturer), (say("Model"), machine.model), (say("Place"), machine.place),
     )  # fmt: skip
+    checks = sum(one.interim for one in history.certificates)
+    count = len(history.certificates) - checks
+    counted: Text = plural(count, one=say("one certificate"), many=say("{count} certificates", count=count))
+    if checks:
+        more = plural(checks, one=say("one interim check"), many=say("{count} interim checks", count=checks))
+        counted = say("{certificates}, {checks}", certificates=counted, checks=more)
     particulars: list[tuple[Text, Text]] = [(label, Verbatim(text)) for label, text in given if text]
-    particulars.append((say("Recordings"), _counted(history)))
+    particulars.append((say("Recordings"), counted))
     if machine.adjusted:
         particulars.append((say("Adjusted"), commas([day(when) for when in machine.adjusted])))
+    heads = tuple(doc.Column(heading, numeric=heading not in WORDS) for heading in HEADINGS)
+    rows = [value_row(history, one) for one in history.values]
+    values = doc.table(say("Error factors and figures of performance"), heads, rows, *notes(history))
     sections = (
-        doc.Section(say("Values and trends"), _values(history)),
-        doc.Section(say("Over time"), tuple(trend_plot(history, one) for one in history.values)),
-        doc.Section(say("Certificates and interim checks"), _certificates(history)),
+        doc.section(say("Values and trends"), values or doc.Paragraph(say("No value of this machine is recorded."))),
+        doc.section(say("Over time"), *(trend_plot(history, one) for one in history.values)),
+        doc.section(say("Certificates and interim checks"), _certificates(history)),
     )
     return doc.Document(
         title=say("History of a machine"),
@@ -276,7 +282,6 @@ def history_document(history: MachineHistory) -> doc.Document:
 
 
 def overview_of(history: MachineHistory) -> doc.Overview:
-    """Whether anything is beyond its limit, and what changed."""
     beyond, probable, changed = (
         [Verbatim(one.series.quantity) for one in history.values if holds(one)]
         for holds in (lambda one: one.beyond, lambda one: one.probably_beyond(history.on), history.significant)
@@ -308,30 +313,17 @@ def overview_of(history: MachineHistory) -> doc.Overview:
     return doc.Overview(next(text for holds, text in verdicts if holds), standing, tuple(rows))
 
 
-def _counted(history: MachineHistory) -> Text:
-    checks = sum(one.interim for one in history.certificates)
-    count = len(history.certificates) - checks
-    told = plural(count, one=say("one certificate"), many=say("{count} certificates", count=count))
-    if not checks:
-        return told
-    more = plural(checks, one=say("one interim check"), many=say("{count} interim checks", count=checks))
-    return say("{certificates}, {checks}", certificates=told, checks=more)
-
-
-def _values(history: MachineHistory) -> tuple[doc.Block, ...]:
-    if not history.values:
-        return (doc.Paragraph(say("No value of this machine is recorded.")),)
-    columns = tuple(doc.Column(heading, numeric=heading not in WORDS) for heading in HEADINGS)
-    rows = tuple(value_row(history, one) for one in history.values)
-    return (doc.Table(say("Error factors and figures of performance"), columns, rows, notes(history)),)
-
-
-def _certificates(history: MachineHistory) -> tuple[doc.Block, ...]:
-    if not history.certificates:
-        return ()
-    columns = doc.text_columns(say("Date"), say("Number"), say("What"), say("State"), say("Artefact"), say("Decision"),
-                           say("Adjusted before"))  # fmt: skip
-    rows = tuple(
+def _certificates(history: MachineHistory) -> doc.Table | None:
+    heads = (
+        say("Date"),
+        say("Number"),
+        say("What"),
+        say("State"),
+        say("Artefact"),
+        say("Decision"),
+        say("Adjusted before"),
+    )
+    rows = (
         (
             day(one.day), Verbatim(one.number), say("interim check") if one.interim else say("certificate"),
             STATE_WORDS.get(one.state, Verbatim(one.state)), Verbatim(one.artefact) if one.artefact else DASH,
@@ -339,4 +331,4 @@ def _certificates(history: MachineHistory) -> tuple[doc.Block, ...]:
         )
         for one in reversed(history.certificates)
     )  # fmt: skip
-    return (doc.Table(say("Newest first"), columns, rows),)
+    return doc.table(say("Newest first"), heads, rows)

@@ -18,8 +18,18 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.part.views import draw_outlines, label, panels, segments, span_of
-from cmm_uq.certificate.plots.labels import shown, told
-from cmm_uq.certificate.plots.style import ACCENT, DIVERGING, INK, MUTED, TINY, WIDTH_MM, dots, drawn, house_style
+from cmm_uq.certificate.plots.residuals import shown, told
+from cmm_uq.certificate.plots.style import (
+    ACCENT,
+    DIVERGING,
+    INK,
+    MUTED,
+    TINY,
+    WIDTH_MM,
+    dots,
+    drawn,
+    house_style,
+)
 from cmm_uq.certificate.plots.vectors import round_length
 from cmm_uq.maths.uncertainty.quantity import significant
 

@@ -16,7 +16,6 @@ import numpy as np
 from cmm_uq.base.messages import Text, commas, number, say, semicolons, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Outcome, Plot
-from cmm_uq.certificate.plots.labels import NAMES_MM, told_apart, width_mm
 from cmm_uq.certificate.plots.style import (
     ACCENT,
     BAD,
@@ -24,6 +23,7 @@ from cmm_uq.certificate.plots.style import (
     DIVERGING,
     INK,
     MUTED,
+    NAMES_MM,
     OPEN,
     RULE,
     TINY,
@@ -34,6 +34,8 @@ from cmm_uq.certificate.plots.style import (
     house_style,
     lettered,
     new_figure,
+    told_apart,
+    width_mm,
 )
 
 if TYPE_CHECKING:

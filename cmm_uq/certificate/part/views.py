@@ -16,9 +16,8 @@ from cmm_uq.analysis.parts.outlines import outline
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
-from cmm_uq.certificate.plots.labels import width_mm
 from cmm_uq.certificate.plots.plans import DEPTH
-from cmm_uq.certificate.plots.style import INK, MUTED, TINY, WIDTH_MM, lettered, new_figure
+from cmm_uq.certificate.plots.style import INK, MUTED, TINY, WIDTH_MM, lettered, new_figure, width_mm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,8 +13,7 @@ from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.plots import style
-from cmm_uq.certificate.plots.labels import width_mm
-from cmm_uq.certificate.plots.style import ACCENT, INK, MUTED, SMALL, TINY, WIDTH_MM
+from cmm_uq.certificate.plots.style import ACCENT, INK, MUTED, SMALL, TINY, WIDTH_MM, width_mm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,8 +13,7 @@ from cmm_uq.base.messages import Text, number, say, semicolons
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.plots import style
-from cmm_uq.certificate.plots.labels import folded, width_mm
-from cmm_uq.certificate.plots.style import ACCENT, INK, MUTED, RULE, SMALL, TINY, WIDTH_MM
+from cmm_uq.certificate.plots.style import ACCENT, INK, MUTED, RULE, SMALL, TINY, WIDTH_MM, folded, width_mm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,16 +6,28 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, say, semicolons, signed
-from cmm_uq.base.points import Floats
+from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.plots import style
-from cmm_uq.certificate.plots.labels import NAMES_MM, folded, shown, told, width_mm
-from cmm_uq.certificate.plots.style import ACCENT, BAND, DIVERGING, INK, MUTED, RULE, SMALL, TINY, WIDTH_MM
+from cmm_uq.certificate.plots.style import (
+    ACCENT,
+    BAND,
+    DIVERGING,
+    INK,
+    MUTED,
+    NAMES_MM,
+    RULE,
+    SMALL,
+    TINY,
+    WIDTH_MM,
+    folded,
+    width_mm,
+)
 from cmm_uq.certificate.result import Result
 from cmm_uq.maths.uncertainty.quantity import alike
 
@@ -73,9 +85,9 @@ def _panels(
     caption, x, marked = told(caption, len(rows), count), x[rows], marked[rows]
     size = float(np.clip(60.0 / count**0.75, 1.3, 4.2))
     below, above = (0.105, 0.945) if two else (0.16, 0.92)
-    with style.pictures(84 if two else 62, len(series), left=0.082, right=0.995, bottom=below, top=above, hspace=0.27) as (
-        figure, axes
-    ):  # fmt: skip
+    with style.pictures(
+        84 if two else 62, len(series), left=0.082, right=0.995, bottom=below, top=above, hspace=0.27
+    ) as (figure, axes):
         for ax, (label, whole, expanded, colour) in zip(axes, series, strict=True):
             every = np.broadcast_to(np.asarray(expanded, dtype=float), (count,))
             half, values = style.finite("expanded uncertainty", every, (count,))[rows], whole[rows]
@@ -108,7 +120,6 @@ def _panels(
 
 
 def _side_by_side(position: Floats) -> Floats:
-    """Repeats of one position spread over 0.6 of the room that it has."""
     _, inverse, counts = np.unique(position, return_inverse=True, return_counts=True)
     order = np.argsort(inverse, kind="stable")
     rank = np.empty(len(position))
@@ -343,3 +354,32 @@ def tolerance_plot(
         ax.tick_params(left=False)
         ax.spines["left"].set_visible(False)
         return style.drawn(figure, caption, alternative)
+
+
+MOST = 1500  # marks of one series: more would run into each other, and a page with them would take a browser seconds
+_LARGEST = 300
+
+
+def shown(sizes: Sequence[Floats], flagged: NDArray[np.bool_] | None = None, most: int = MOST) -> Ints:
+    """Rows to draw, ascending: of more than ``most`` those flagged, the largest of each size (n,), and some others."""
+    count = len(sizes[0])
+    if count <= most:
+        return np.arange(count)
+    largest = min(_LARGEST, most // 2)
+    each = largest // len(sizes)
+    first = [np.argsort(-np.abs(size), kind="stable")[:each] for size in sizes]
+    marked = np.flatnonzero(flagged)[:largest] if flagged is not None else np.zeros(0, dtype=np.int64)
+    chosen = np.unique(np.concatenate([*first, marked]))
+    rest = np.setdiff1d(np.arange(count), chosen, assume_unique=True)
+    evenly = np.linspace(0, len(rest) - 1, most - len(chosen)).astype(np.int64)
+    return np.sort(np.concatenate([chosen, rest[evenly]]))
+
+
+def told(caption: Text, drawn: int, count: int) -> Text:
+    """A caption that says how many of all are drawn, where it is not all."""
+    if drawn == count:
+        return caption
+    return say(
+        "{caption} Drawn are {drawn} of {count}: the largest, and some of the others from all over the recording.",
+        caption=caption, drawn=drawn, count=count,
+    )  # fmt: skip

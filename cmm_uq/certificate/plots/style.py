@@ -32,6 +32,7 @@ from cmm_uq.certificate.document import Plot
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.path import Path as Outline
     from matplotlib.ticker import Formatter
 
 JAPANESE = "IPAexGothic"  # family that sets Japanese, under the IPA Font License 1.0, which allows it in documents.
@@ -57,7 +58,6 @@ def fonts_of(language: Code) -> list[Path]:
 
 @contextmanager
 def lettered_in(language: Code) -> Iterator[None]:
-    """Pictures that are drawn meanwhile are lettered in a language."""
     before = _LANGUAGE.set(language)
     try:
         yield
@@ -85,20 +85,6 @@ def _known_to_matplotlib() -> str:
     return JAPANESE
 
 
-def letter(figure: Figure) -> None:
-    """Say every text of a figure in the language of pictures, figures of its ticks too."""
-    from matplotlib.text import Text as Lettering
-
-    code = _LANGUAGE.get()
-    if code == ENGLISH:
-        return
-    tickers = {id(axis.major): axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)}
-    for axis in tickers.values():  # panels may share theirs
-        axis.set_major_formatter(_localised()(axis.get_major_formatter(), code))
-    for found in figure.findobj(Lettering):
-        found.set_text(_said(found.get_text(), code))
-
-
 def _said(text: str, code: Code) -> Text:
     """A message in the language; a plain string in a picture is a figure (a test holds pictures to that)."""
     if isinstance(text, Text):
@@ -112,8 +98,6 @@ def _localised() -> Callable[[Formatter, Code], Formatter]:
     from matplotlib.ticker import Formatter
 
     class Localised(Formatter):
-        """Texts of another formatter, in a language."""
-
         def __init__(self, own: Formatter, code: Code) -> None:
             self.own, self.code = own, code
 
@@ -193,15 +177,13 @@ def pictures(
     """A figure in the house style with panels that share their axes; edges and gaps of ``layout`` are parts of it."""
     with house_style():
         figure = new_figure(height_mm)
-        axes = figure.subplots(rows, columns, sharex=True, sharey=rows == 1, squeeze=False,
-                                height_ratios=height_ratios)  # fmt: skip
+        axes = figure.subplots(rows, columns, sharex=True, sharey=rows == 1, squeeze=False, height_ratios=height_ratios)
         figure.subplots_adjust(**layout)
         yield figure, list(axes.ravel())
 
 
 @contextmanager
 def picture(height_mm: float, **layout: Any) -> Iterator[tuple[Figure, Axes]]:
-    """The same with one panel."""
     with pictures(height_mm, 1, **layout) as (figure, axes):
         yield figure, axes[0]
 
@@ -269,7 +251,13 @@ def drawn(figure: Figure, caption: Text, alternative: Text) -> Plot:
     """The figure as a block of a document, with the texts that are lettered in it."""
     from matplotlib.text import Text as Lettering
 
-    letter(figure)
+    code = _LANGUAGE.get()
+    if code != ENGLISH:  # every text, figures of ticks too
+        tickers = {id(axis.major): axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)}
+        for axis in tickers.values():  # panels may share theirs
+            axis.set_major_formatter(_localised()(axis.get_major_formatter(), code))
+        for found in figure.findobj(Lettering):
+            found.set_text(_said(found.get_text(), code))
     svg = as_svg(figure)
     lettering = (found.get_text() for found in figure.findobj(Lettering))
     return Plot(caption, alternative, svg, tuple(text for text in lettering if isinstance(text, Text) and text))
@@ -320,3 +308,85 @@ def panel_title(ax: Axes, text: Text, colour: str) -> None:
 def note(figure: Figure, text: Text, right: float = 0.985, top: float = 0.975) -> None:
     """What the marks are, small, at the upper right."""
     figure.text(right, top, text, ha="right", va="top", fontsize=TINY, color=MUTED)
+
+
+_MM = 25.4 / 72  # of a point
+
+
+def width_mm(text: str, size: float, weight: str = "normal") -> float:
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import TextPath
+
+    font = FontProperties(family=measuring_fonts(), weight=weight)
+    return _MM * max(farthest_right(TextPath((0, 0), str.__str__(text), size=size, prop=font)), size)
+
+
+def farthest_right(path: Outline) -> float:
+    """Largest x of a path of lines and quadratic curves, in the steps of its ``get_extents`` but for all curves at once."""
+    x, codes = np.asarray(path.vertices)[:, 0], np.asarray(path.codes)
+    controls = np.flatnonzero(codes == path.CURVE3)[::2]
+    begin, control, end = x[controls - 1], x[controls], x[controls + 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (begin - control) / (begin - 2 * control + end)
+    t = np.where((t > 0) & (t < 1), t, 0.0)
+    turns = (1 - t) ** 2 * begin + 2 * t * (1 - t) * control + t**2 * end
+    corners = x[np.isin(codes, (path.MOVETO, path.LINETO))]
+    return float(max(part.max(initial=-np.inf) for part in (corners, turns, end)))
+
+
+NAMES_MM = 54.0  # room of the names beside the bars of a budget
+
+
+def narrowed(text: Text, room_mm: float) -> Text:
+    """A name as it is lettered, cut to the room that it has."""
+    said = lettered(text)
+    whole = str.__str__(said)
+    kept = whole if width_mm(whole, SMALL) <= room_mm else _longest(whole, room_mm)
+    if kept == text:
+        return text
+    return Verbatim(kept) if said is text else Translation(kept, text)
+
+
+def folded(text: Text, room_mm: float, size: float = SMALL, weight: str = "normal") -> list[Text]:
+    """A name as it is lettered, in two texts where one line lacks room: lines of one text would not align in other fonts."""
+    whole = str.__str__(lettered(text))
+    if width_mm(whole, size, weight) <= room_mm:
+        return [text]
+    blanks = [i for i, letter in enumerate(whole) if letter == " "]
+    ends = [i for i in blanks or range(1, len(whole)) if width_mm(whole[:i], size, weight) <= room_mm]
+    if not ends:
+        return [narrowed(text, room_mm)]
+    rest = whole[ends[-1] :].strip()
+    kept = rest if width_mm(rest, size, weight) <= room_mm else _longest(rest, room_mm * SMALL / size)
+    return [Translation(line, text) for line in (whole[: ends[-1]], kept)]
+
+
+def told_apart(names: Sequence[Text], room_mm: float) -> list[Text]:
+    """Names cut to their room; where the beginnings of two are the same, each with its end in place of its beginning."""
+    short = [narrowed(name, room_mm) for name in names]
+    again = list(map(str, short))
+    return [
+        _ending(name, room_mm) if again.count(text) > 1 and text != str(name) else beginning
+        for name, beginning, text in zip(names, short, again, strict=True)
+    ]
+
+
+def _ending(text: Text, room_mm: float) -> Text:
+    """The longest end of a text that has room, with what says that it began before."""
+    whole = str.__str__(lettered(text))
+    ends = ("…" + whole[i:].lstrip(" ,") for i in range(1, len(whole)))
+    return Verbatim(next(end for end in ends if width_mm(end, SMALL) <= room_mm))
+
+
+def _longest(text: str, room_mm: float) -> str:
+    """The longest beginning of a text that has room, with what says that it goes on."""
+
+    def beginning(count: int) -> str:
+        return text[:count].rstrip(" ,") + "…"
+
+    fits, too_long, trial = 0, len(text), len(text) // 2
+    while too_long - fits > 1:
+        width = width_mm(beginning(trial), SMALL)
+        fits, too_long = (trial, too_long) if width <= room_mm else (fits, trial)
+        trial = min(max(round(trial * room_mm / width), fits + 1), too_long - 1)
+    return beginning(fits)

@@ -13,7 +13,7 @@ from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.plots import style
-from cmm_uq.certificate.plots.labels import shown, told
+from cmm_uq.certificate.plots.residuals import shown, told
 from cmm_uq.certificate.plots.style import ACCENT, BAND, DIVERGING, INK, MUTED, RULE, TINY, WIDTH_MM
 
 if TYPE_CHECKING:

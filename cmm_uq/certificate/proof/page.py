@@ -1,33 +1,25 @@
-"""A proof of the diagnosis as a document: a laboratory's validation of the method (ISO/IEC 17025:2017, 7.2.2)."""
+"""A proof of the diagnosis, the validation of a method (ISO/IEC 17025:2017, 7.2.2): page, results.json and outcome."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, plural, say
-from cmm_uq.base.units import unit
-from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
+from cmm_uq.certificate.document import Document, Facts, Paragraph, Section, working_page
 from cmm_uq.certificate.origin import program
-from cmm_uq.certificate.proof.sections import (
-    ANSWER_WORDS,
-    INTERVAL_WORDS,
-    KIND_WORDS,
-    NOISE_WORDS,
-    DiagnosisProof,
-    counted,
-    effects_section,
-    in_words,
-    interval,
-    limits,
-    percent,
-    said_plot,
-    standing,
-    strength_plot,
-    unseen_section,
-)
-from cmm_uq.certificate.wording import titles
+from cmm_uq.certificate.proof import sections as parts
+from cmm_uq.certificate.proof.sections import DiagnosisProof, in_words, limits, standing
+from cmm_uq.certificate.result import Outcome
+from cmm_uq.certificate.results.contents import head
+from cmm_uq.certificate.wording import Headline, Summary, titles
+from cmm_uq.laboratory.proving import judgement as judged
 from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH
 from cmm_uq.laboratory.proving.cases import KINDS, STRONGEST, WEAKEST, micrometres
 from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, REFUSED, VERDICTS
-from cmm_uq.laboratory.proving.rates import FEWEST, LARGEST, Rate
+from cmm_uq.laboratory.proving.rates import Rate
 from cmm_uq.laboratory.proving.sensitivity import ALLOWED
 
 # Purpose, cases, strengths, noise, seal
@@ -56,9 +48,8 @@ METHOD: tuple[Text, ...] = (
         "could show, as large as the job's readings."
     ),
     say(
-        "The truth of all cases was written down and sealed by its hash before the first of them was diagnosed. "
-        "Each recording then went through screening and diagnosis as a measured one does, with a seed of its "
-        "own."
+        "The truth of all cases was written down and sealed by its hash before the first of them was diagnosed. Each "
+        "recording then went through screening and diagnosis as a measured one does, with a seed of its own."
     ),
 )  # fmt: skip
 
@@ -69,9 +60,8 @@ NOT_COVERED: tuple[Text, ...] = (
         "that were drawn; not that this machine does. An error in the model's own equations would not show here."
     ),
     say(
-        "Not drawn: three and more causes at once, damaged and mistyped recordings, wrong temperatures and other "
-        "columns beside a job's own, periods shorter than 6 mm or longer than the readings reach, set-ups other "
-        "than these."
+        "Not drawn: three and more causes at once, damaged and mistyped recordings, wrong temperatures and other columns "
+        "beside a job's own, periods shorter than 6 mm or longer than the readings reach, set-ups other than these."
     ),
     say(
         "The figures hold for the strengths and the mixture that were drawn. Another share of strong causes "
@@ -90,71 +80,52 @@ HOW_TO_CHECK: tuple[Text, ...] = (
 
 
 def proof_document(proof: DiagnosisProof) -> Document:
-    facts, judgement = proof.job.facts, proof.judgement
-    points = proof.design.model.artefact.points
+    facts, count, points = proof.job.facts, len(proof.judgement.cases), proof.design.model.artefact.points
+    set_ups = len(set(points.measurement.tolist()))
+    size = plural(set_ups, one=say("one, {points} points", points=len(points)),
+                  many=say("{count}, {points} points", count=set_ups, points=len(points)))  # fmt: skip
+    of_the_job = (
+        (say("Machine"), Verbatim(facts.machine.name)), (say("Artefact"), proof.design.model.artefact.title),
+        (say("Set-ups"), size), (say("Effects that the job names"), commas(titles(facts.model.effects)) or say("none")),
+    )  # fmt: skip
+    of_the_proof = (
+        (say("Cases"), number(count)), (say("Seed"), number(proof.seed)),
+        (say("False-alarm rate asked for"), say("{alpha:g} %", alpha=100 * proof.alpha)),
+        (say("Program"), program(proof.job)), (say("Truth sealed by SHA-256"), Verbatim(proof.sha256)),
+    )  # fmt: skip
+
+    def told(title: Text, texts: tuple[Text, ...]) -> Section:
+        return Section(title, tuple(map(Paragraph, texts)))
+
     return working_page(
-        facts,
-        say("Validation of the diagnosis"),
-        say("proved on {count} sealed cases", count=len(judgement.cases)),
-        particulars=(
-            Facts(
-                (
-                    (say("Machine"), Verbatim(facts.machine.name)),
-                    (say("Artefact"), proof.design.model.artefact.title),
-                    (say("Set-ups"), _set_ups(len(set(points.measurement.tolist())), len(points))),
-                    (say("Effects that the job names"), commas(titles(facts.model.effects)) or say("none")),
-                )
-            ),
-            Facts(
-                (
-                    (say("Cases"), number(len(judgement.cases))),
-                    (say("Seed"), number(proof.seed)),
-                    (say("False-alarm rate asked for"), say("{alpha:g} %", alpha=100 * proof.alpha)),
-                    (say("Program"), program(proof.job)),
-                    (say("Truth sealed by SHA-256"), Verbatim(proof.sha256)),
-                )
-            ),
-        ),
+        facts, say("Validation of the diagnosis"), say("proved on {count} sealed cases", count=count),
+        particulars=(Facts(of_the_job), Facts(of_the_proof)),
         warnings=warnings_of(proof),
         sections=(
-            Section(say("Conclusion"), _conclusion(proof)),
-            Section(say("Purpose and method"), tuple(Paragraph(text) for text in METHOD)),
-            Section(say("Set-ups and noise"), (_noise(proof),)),
-            Section(say("What was hidden, and what was said"), _answers(proof)),
-            Section(say("How strong a cause must be"), _strength(proof)),
-            Section(say("Probability said, and right"), _probabilities(proof)),
-            Section(say("Intervals"), (_intervals(proof),)),
-            Section(say("Kinds of noise"), (_by_noise(proof),)),
-            effects_section(proof),
-            unseen_section(proof),
-            Section(say("What this does not cover"), tuple(Paragraph(text) for text in NOT_COVERED)),
-            Section(say("How to check it"), tuple(Paragraph(text) for text in HOW_TO_CHECK)),
+            parts.conclusion_section(conclusion_of(proof), proof.accepted),
+            told(say("Purpose and method"), METHOD),
+            parts.noise_section(proof), parts.answers_section(proof), parts.strength_section(proof, often_words(proof)),
+            parts.probabilities_section(proof), parts.intervals_section(proof), parts.kinds_section(proof),
+            parts.effects_section(proof), parts.unseen_section(proof),
+            told(say("What this does not cover"), NOT_COVERED), told(say("How to check it"), HOW_TO_CHECK),
         ),
         attachments=tuple(Verbatim(name) for name in (TRUTH, RECORDS, "results.json")),
         produced_by=say("{program}, seed {seed}", program=program(proof.job), seed=proof.seed),
         end=say("End of validation"),
-    )
+    )  # fmt: skip
 
 
 def warnings_of(proof: DiagnosisProof) -> tuple[Text, ...]:
-    """What must be known before a figure is used."""
-    found = [
-        say(
-            "{what}: {rate}; asked for: {limits}. This is missed.",
-            what=one.what,
-            rate=in_words(one.rate),
-            limits=limits(one),
-        )
-        for one in proof.accepted
-        if one.standing == MISSED
-    ]
-    refused = proof.judgement.refused
-    if refused.count:
-        found.append(plural(
-            refused.count, one=say("One case got no answer; it counts in no other figure."),
-            many=say("{count} cases got no answer; they count in no other figure.", count=refused.count),
-        ))  # fmt: skip
-    return tuple(found)
+    found: list[Text] = [
+        say("{what}: {rate}; asked for: {limits}. This is missed.", what=one.what, rate=in_words(one.rate), limits=limits(one))
+        for one in proof.accepted if one.standing == MISSED
+    ]  # fmt: skip
+    count = proof.judgement.refused.count
+    refused = plural(
+        count, one=say("One case got no answer; it counts in no other figure."),
+        many=say("{count} cases got no answer; they count in no other figure.", count=count),
+    )  # fmt: skip
+    return (*found, refused) if count else tuple(found)
 
 
 def conclusion_of(proof: DiagnosisProof) -> Text:
@@ -163,127 +134,10 @@ def conclusion_of(proof: DiagnosisProof) -> Text:
         return say("The diagnosis does not keep the acceptance figures on these set-ups.")
     if OPEN in standings:
         return say(
-            "The cases contradict no acceptance figure, but are too few to show that all of them are kept on these "
-            "set-ups."
+            "The cases contradict no acceptance figure, but are too few to show that all of them are kept on these set-ups."
         )
     return say(
         "The diagnosis keeps the acceptance figures on these set-ups, with a confidence of 95 % in each of them."
-    )
-
-
-def _set_ups(count: int, points: int) -> Text:
-    return plural(
-        count,
-        one=say("one, {points} points", points=points),
-        many=say("{count}, {points} points", count=count, points=points),
-    )
-
-
-def _conclusion(proof: DiagnosisProof) -> tuple[Block, ...]:
-    rows = tuple(
-        (one.what, counted(one.rate), percent(one.rate), interval(one.rate), limits(one), standing(one))
-        for one in proof.accepted
-    )
-    heads = (
-        Column(say("Figure"), numeric=False), Column(say("Counted")), Column(say("Rate"), unit("%")),
-        Column(say("95 % interval"), unit("%")), Column(say("Asked for"), numeric=False),
-        Column(say("Standing"), numeric=False),
-    )  # fmt: skip
-    note = say(
-        "Shown or missed: the whole interval (Clopper and Pearson) lies within or beyond what is asked for. What is "
-        "asked for was sealed with the truth."
-    )
-    return (Paragraph(conclusion_of(proof)), Table(say("Acceptance"), heads, rows, (note,)))
-
-
-def _noise(proof: DiagnosisProof) -> Block:
-    own = micrometres(proof.design.noise)
-    rows = [
-        (say("Reading along x, y, z"), say("{x:.3g}, {y:.3g}, {z:.3g} µm", x=own["x_um"], y=own["y_um"], z=own["z_um"]))
-    ]
-    for key, what in (
-        ("placing_um", say("Set-up offset")), ("growth_um", say("Growing, at the longest length")),
-        ("slow_um", say("Slow in time")),
-        ("resolution_um", say("Step of the display")),
-    ):  # fmt: skip
-        rows.append((what, say("{size:.3g} µm", size=own[key]) if own[key] else say("none")))
-    counts = {kind: sum(one.case.noise_kind == kind for one in proof.judgement.cases) for kind in NOISE_WORDS}
-    drawn = commas(
-        say("{what} {count}", what=NOISE_WORDS[kind], count=count) for kind, count in counts.items() if count
-    )
-    return Facts((*rows, (say("Noise of the cases"), drawn)))
-
-
-def _answers(proof: DiagnosisProof) -> tuple[Block, ...]:
-    judgement = proof.judgement
-    heads = (
-        Column(say("Hidden"), numeric=False), Column(say("Cases")),
-        *(Column(ANSWER_WORDS[verdict]) for verdict in (*VERDICTS, REFUSED)), Column(say("Right")),
-    )  # fmt: skip
-    rows = []
-    for kind in KINDS:
-        said, own = judgement.verdicts(kind), judgement.of_kind(kind)
-        cells = [number(said.get(verdict, 0)) for verdict in (*VERDICTS, REFUSED)]
-        rows.append((KIND_WORDS[kind], number(sum(said.values())), *cells, number(sum(one.right for one in own))))
-    note = say(
-        "Right: consistent of nothing; explained of effects that are all found and no other named; of a function, "
-        "that no known effect accounts for it; of a fault of the artefact, that something is there and no effect of "
-        "the machine named."
-    )
-    return (Table(say("Verdicts"), heads, tuple(rows), (note,)), _rates(proof))
-
-
-def _rates(proof: DiagnosisProof) -> Block:
-    judgement = proof.judgement
-    figures: tuple[tuple[Text, Rate], ...] = (
-        (say("False alarms, of cases that hide nothing"), judgement.false_alarms),
-        (say("Right verdicts, of all cases"), judgement.right),
-        (say("Hidden effects found"), judgement.found),
-        (say("Hidden effects found and told from all others"), judgement.found_alone),
-        (say("Cases with a wrong name"), judgement.wrong_names),
-        (say("Detected functions that are taken for no effect"), judgement.recognised),
-        (say("Faults of the artefact blamed on the machine"), judgement.machine_blamed),
-        (say("Assertions that predict better what was held out"), judgement.predicts_better),
-    )
-    rows = tuple((what, counted(rate), percent(rate), interval(rate)) for what, rate in figures)
-    notes = [
-        say(
-            "Found: asserted, alone or as one of a group that is said not to be told apart. A wrong name: an effect "
-            "asserted that does not act, in no group with one that does; of a fault of the artefact, any effect of "
-            "the machine."
-        )
-    ]
-    if judgement.held_out_ratio is not None:
-        notes.append(
-            say(
-                "Held out: the rms of predictions after over before is {ratio:.2f} in the median.",
-                ratio=judgement.held_out_ratio,
-            )
-        )
-    return Table(say("Rates"), _rate_heads(say("What")), rows, tuple(notes))
-
-
-def _rate_heads(what: Text) -> tuple[Column, ...]:
-    return (
-        Column(what, numeric=False),
-        Column(say("Counted")),
-        Column(say("Rate"), unit("%")),
-        Column(say("95 % interval"), unit("%")),
-    )
-
-
-def _strength(proof: DiagnosisProof) -> tuple[Block, ...]:
-    judgement, found = proof.judgement, proof.judgement.by_strength
-    if found is None:
-        return (Paragraph(say("Fewer than {fewest} effects were hidden: too few to say.", fewest=FEWEST)),)
-    rows = tuple(
-        (say("{low:g} to {high:g}", low=low, high=high), counted(rate), percent(rate), interval(rate))
-        for low, high, rate in judgement.in_bins
-    )
-    return (
-        Paragraph(often_words(proof)),
-        strength_plot(judgement.in_bins, found),
-        Table(say("Found by strength"), _rate_heads(say("Strength √λ")), rows),
     )
 
 
@@ -292,7 +146,7 @@ def often_words(proof: DiagnosisProof) -> Text:
     found = proof.judgement.by_strength
     if found is None:
         return NOTHING
-    low, high = (_strength_words(each) for each in found.interval)
+    low, high = (parts.strength_words(each) for each in found.interval)
     if found.often > STRONGEST:
         return say(
             "An effect is found in nine of ten recordings from a strength on that was not drawn: more than "
@@ -306,58 +160,155 @@ def often_words(proof: DiagnosisProof) -> Text:
     )  # fmt: skip
 
 
-def _strength_words(value: float) -> Text:
-    return number(value, ".1f") if value <= LARGEST else say("beyond {largest:g}", largest=LARGEST)
+SCHEMA = "cmm-uq/prove/1"
+
+# Below every key that is said to be a rate
+RATE: Mapping[str, str] = {
+    "count": "How many.",
+    "of": "Of how many.",
+    "rate": "Their quotient; null of none.",
+    "interval95": "Exact 95 % interval (Clopper and Pearson); of intervals for as many as would be independent.",
+}
+
+# By dotted name; a part in capitals stands for any name, [] for each entry of a list
+KEYS: Mapping[str, str] = {
+    "schema": "Name of the layout.",
+    "software.KEY": "The program and what took part, as in results of a report.",
+    "job.KEY": "The job, with the hashes of its inputs.",
+    "cases": "Number of cases.",
+    "seed": "Seed of the cases.",
+    "alpha": "Rate of false alarms that the diagnosis was asked for.",
+    "truth_sha256": "SHA-256 of truth.json, written and told before the first diagnosis.",
+    "noise.KEY": "The job's own noise: reading along each axis, set-up offset, growing and slow part, display.",
+    "verdicts.KIND.VERDICT": "How often each verdict was given of cases that hide this.",
+    "rates.false_alarms": "Rate: other verdicts than consistent, of cases that hide nothing.",
+    "rates.right": "Rate: right verdicts.",
+    "rates.found": "Rate: hidden effects that are found, alone or in a group.",
+    "rates.found_alone": "Rate: those told from all others.",
+    "rates.wrong_names": "Rate: cases in which an effect is named that does not act.",
+    "rates.recognised": "Rate: of detected functions outside the catalogue, those taken for no effect.",
+    "rates.machine_blamed": "Rate: faults of the artefact for which an effect of the machine is named.",
+    "rates.predicts_better": "Rate: cases with an assertion that predicts better what the fit has not seen.",
+    "rates.refused": "Rate: cases without an answer.",
+    "held_out_ratio": "Median rms of predictions of what was held out, after over before; null without assertions.",
+    "coverage.pooled": "Rate: 95 % intervals that hold the truth, where all that acts was named or found.",
+    "coverage.SORT": "Rate: the same of effects that were found, and of those that the job names by what was hidden.",
+    "probabilities[].from": "Lower end of a tenth of probabilities that were said.",
+    "probabilities[].to": "Its upper end.",
+    "probabilities[].said": "Mean of the probabilities in it.",
+    "probabilities[].right": "Rate: of these assertions, those whose effect acts.",
+    "strength[].from": "Lower end of strengths √λ.",
+    "strength[].to": "Upper end.",
+    "strength[].found": "Rate: effects of such a strength that are found.",
+    "found_in_nine_of_ten.strength": "Strength √λ from which on an effect is found in nine of ten; null if none.",
+    "found_in_nine_of_ten.interval95": "Its 95 % interval; an end that is not reached is null, both are of too few cases.",
+    "effects[].effect": "An effect that the job does not name.",
+    "effects[].standing": "drawn, or why no case hides it: unrecorded, taken, too small, no travel.",
+    "effects[].parameter": "Its first parameter.",
+    "effects[].unit": "The parameter's unit.",
+    "effects[].strength_per_unit": "√λ of one unit under the job's noise.",
+    "effects[].allowed": "Largest size that physics allows.",
+    "effects[].found": "Rate: how often it was found where it was hidden.",
+    "effects[].wrongly_named": "How often it was named where it did not act.",
+    "effects[].found_in_nine_of_ten": "Size from which on it is found in nine of ten; null beyond what physics allows.",
+    "effects[].columns": "Columns that it goes by and that were not recorded.",
+    "effects[].alike": "Another effect that these set-ups hardly tell from it; null where there is none.",
+    "artefact_faults[].what": "A fault of the artefact.",
+    "artefact_faults[].shows": "Whether it shows in these set-ups.",
+    "artefact_faults[].left": "Part of it that the nearest effect of the machine leaves.",
+    "artefact_faults[].like": "That effect; null where there is none.",
+    "by_noise.KIND.false_alarms": "Rate: under one kind of noise.",
+    "by_noise.KIND.found": "Rate: the same of hidden effects.",
+    "by_noise.KIND.coverage": "Rate: the same of intervals.",
+    "acceptance[].figure": "A figure that the laboratory accepts the method by.",
+    "acceptance[].lowest": "Lowest rate asked for.",
+    "acceptance[].highest": "Highest.",
+    "acceptance[].rate": "Rate: counted.",
+    "acceptance[].standing": "met, missed, or open where so many cases do not decide it.",
+}
 
 
-def _probabilities(proof: DiagnosisProof) -> tuple[Block, ...]:
-    each = proof.judgement.probabilities
-    if not each:
-        return (Paragraph(say("No effect was asserted.")),)
-    heads = (
-        Column(say("Said"), unit("%"), numeric=False), Column(say("Mean said"), unit("%")), *_rate_heads(say("What"))[1:],
-        Column(say("Agree"), numeric=False),
+def proof_outcome(proof: DiagnosisProof) -> Outcome:
+    judgement, warned = proof.judgement, warnings_of(proof)
+    verdicts = tuple(
+        Headline(*parts.HEADLINES[one.standing], one.what,
+                 (in_words(one.rate), say("asked for: {limits}", limits=limits(one)), standing(one)))
+        for one in proof.accepted
     )  # fmt: skip
-    rows = tuple(
-        (say("{low:.0f} to {high:.0f}", low=100 * one.low, high=100 * one.high), number(100 * one.said, ".1f"),
-         counted(one.right), percent(one.right), interval(one.right), say("yes") if one.agrees else say("no"))
-        for one in each
-    )  # fmt: skip
-    note = say(
-        "Of every effect that was asserted, cases with a fault of the artefact left out. Agree: the mean said lies "
-        "in the interval of what was right."
+    figures = (
+        (say("Hidden effects found"), in_words(judgement.found), NOTHING),
+        (say("Cases with a wrong name"), in_words(judgement.wrong_names), NOTHING),
+        (say("Right verdicts"), in_words(judgement.right), NOTHING),
     )
-    return (said_plot(each), Table(say("Probabilities"), heads, rows, (note,)))
-
-
-def _intervals(proof: DiagnosisProof) -> Block:
-    rows = []
-    for sort, what in INTERVAL_WORDS.items():
-        rate = proof.judgement.coverage_of(sort)
-        rows.append((what, counted(rate), percent(rate), interval(rate)))
-    rate = proof.judgement.coverage
-    rows.append((say("all but the last, pooled"), counted(rate), percent(rate), interval(rate)))
-    note = say(
-        "95 % intervals that hold the truth. Those of one recording are not independent; the interval of the rate "
-        "allows for that. What is estimated beside a cause that was not found is shown for itself: it cannot be "
-        "right."
-    )
-    return Table(say("95 % intervals that hold"), _rate_heads(say("Intervals")), tuple(rows), (note,))
-
-
-def _by_noise(proof: DiagnosisProof) -> Block:
-    rows = []
-    for kind in dict.fromkeys(proof.design.noises):
-        alarms, found, coverage = proof.judgement.by_noise(kind)
-        rows.append(
-            (
-                NOISE_WORDS[kind],
-                *(cell for rate in (alarms, found, coverage) for cell in (counted(rate), percent(rate))),
-            )
-        )
-    heads = (
-        Column(say("Noise"), numeric=False), Column(say("False alarms")), Column(say("Rate"), unit("%")),
-        Column(say("Effects found")), Column(say("Rate"), unit("%")), Column(say("Intervals that hold")),
-        Column(say("Rate"), unit("%")),
+    sealed = say("Truth sealed by SHA-256 {sha256}.", sha256=Verbatim(proof.sha256))
+    remarks = tuple(text for text in (conclusion_of(proof), often_words(proof), sealed) if text)
+    subject = say("{count} sealed cases", count=len(judgement.cases))
+    return Outcome(
+        proof, lambda: proof_document(proof), proof_results(proof),
+        Summary(subject, verdicts=verdicts, figures=figures, remarks=remarks, warnings=warned), warned,
+        {TRUTH: proof.truth, RECORDS: proof.answers}, in_order=proof.conforming,
     )  # fmt: skip
-    return Table(say("By kind of noise"), heads, tuple(rows))
+
+
+SORTS = {
+    "found": judged.STATED, "named": judged.NAMED, "named_beside_found": judged.NAMED_BESIDE,
+    "named_beside_group": judged.NAMED_GROUPED, "named_beside_missed": judged.NAMED_MISSED,
+}  # fmt: skip
+RATES = (
+    "false_alarms", "right", "found", "found_alone", "wrong_names", "recognised", "machine_blamed", "predicts_better",
+    "refused",
+)  # fmt: skip
+
+
+def proof_results(proof: DiagnosisProof) -> dict[str, Any]:
+    judgement, found = proof.judgement, proof.judgement.by_strength
+    effects = []
+    for reach in proof.reaches:
+        times, wrong = judgement.of_effect(reach.effect)
+        effects.append({
+            "effect": reach.effect, "standing": reach.standing, "parameter": reach.parameter, "unit": reach.unit,
+            "strength_per_unit": reach.per_unit, "allowed": reach.allowed, "found": _rate(times), "wrongly_named": wrong,
+            "found_in_nine_of_ten": None if found is None else reach.amplitude(found.often),
+            "columns": list(reach.columns), "alike": reach.alike or None,
+        })  # fmt: skip
+    noises = {kind: map(_rate, judgement.by_noise(kind)) for kind in dict.fromkeys(proof.design.noises)}
+    return {
+        **head(proof.job, SCHEMA), "cases": len(judgement.cases), "seed": proof.seed, "alpha": proof.alpha,
+        "truth_sha256": proof.sha256, "noise": micrometres(proof.design.noise),
+        "verdicts": {
+            kind.replace(" ", "_"): {said: judgement.verdicts(kind).get(said, 0) for said in (*VERDICTS, REFUSED)}
+            for kind in KINDS
+        },
+        "rates": {name: _rate(getattr(judgement, name)) for name in RATES},
+        "held_out_ratio": judgement.held_out_ratio,
+        "coverage": {"pooled": _rate(judgement.coverage),
+                     **{name: _rate(judgement.coverage_of(sort)) for name, sort in SORTS.items()}},
+        "probabilities": [
+            {"from": one.low, "to": one.high, "said": one.said, "right": _rate(one.right)}
+            for one in judgement.probabilities
+        ],
+        "strength": [{"from": low, "to": high, "found": _rate(rate)} for low, high, rate in judgement.in_bins],
+        "found_in_nine_of_ten": {
+            "strength": None if found is None else _finite(found.often),
+            "interval95": [None, None] if found is None else [_finite(end) for end in found.interval],
+        },
+        "effects": effects,
+        "artefact_faults": [
+            {"what": one.what, "shows": one.shows, "left": one.left, "like": one.like or None} for one in proof.faults
+        ],
+        "by_noise": {
+            kind: dict(zip(("false_alarms", "found", "coverage"), rates, strict=True)) for kind, rates in noises.items()
+        },
+        "acceptance": [
+            {"figure": one.key, "lowest": one.low, "highest": one.high, "rate": _rate(one.rate), "standing": one.standing}
+            for one in proof.accepted
+        ],
+    }  # fmt: skip
+
+
+def _rate(rate: Rate) -> dict[str, Any]:
+    return {"count": rate.count, "of": rate.of, "rate": rate.value, "interval95": list(rate.interval)}
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

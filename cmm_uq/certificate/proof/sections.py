@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,26 +11,16 @@ import numpy as np
 
 from cmm_uq.base.messages import DASH, NOTHING, Text, commas, names, number, say, semicolons
 from cmm_uq.base.points import Floats
+from cmm_uq.base.units import unit
 from cmm_uq.certificate.diagnosis.overview import VERDICT_WORDS
-from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
-from cmm_uq.certificate.plots.style import ACCENT, BAND, INK, MUTED, bars, dots, drawn, house_style, new_figure
+from cmm_uq.certificate.document import Column, Facts, Paragraph, Plot, Section, Standing, section, table
+from cmm_uq.certificate.plots.style import ACCENT, BAND, INK, MUTED, bars, dots, drawn, picture
 from cmm_uq.jobs.job import Job
-from cmm_uq.laboratory.proving import cases, judgement
-from cmm_uq.laboratory.proving.cases import canonical_json, sha256_of
-from cmm_uq.laboratory.proving.design import (
-    DRAWN,
-    NO_TRAVEL,
-    TAKEN,
-    TOO_SMALL,
-    UNRECORDED,
-    Design,
-    FaultReach,
-    Reach,
-    fault_reaches,
-    reaches,
-)
-from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, AcceptanceFigure, ProofJudgement, acceptance_figures
-from cmm_uq.laboratory.proving.rates import LARGEST, OFTEN, DetectionCurve, Rate, Tenth
+from cmm_uq.laboratory.proving import cases, design as set_ups, judgement
+from cmm_uq.laboratory.proving.cases import canonical_json, micrometres, sha256_of
+from cmm_uq.laboratory.proving.design import Design, FaultReach, Reach, fault_reaches, reaches
+from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, REFUSED, VERDICTS, AcceptanceFigure, ProofJudgement
+from cmm_uq.laboratory.proving.rates import FEWEST, LARGEST, OFTEN, DetectionCurve, Rate, Tenth
 
 KIND_WORDS: Mapping[str, Text] = {
     cases.NOTHING: say("nothing"),
@@ -65,10 +55,12 @@ INTERVAL_WORDS: Mapping[str, Text] = {
 }
 ANSWER_WORDS: Mapping[str, Text] = {**VERDICT_WORDS, judgement.REFUSED: say("no answer")}
 STANDING_WORDS: Mapping[str, Text] = {
-    judgement.MET: say("shown"),
-    OPEN: say("too few cases to decide"),
-    MISSED: say("missed"),
-}
+    judgement.MET: say("shown"), OPEN: say("too few cases to decide"), MISSED: say("missed"),
+}  # fmt: skip
+HEADLINES: Mapping[str, tuple[str, Standing]] = {
+    judgement.MET: ("SHOWN", "good"), OPEN: ("OPEN", "open"), MISSED: ("MISSED", "bad"),
+}  # fmt: skip
+RATE_HEADS = (Column(say("Counted")), Column(say("Rate"), unit("%")), Column(say("95 % interval"), unit("%")))
 
 
 def percent(rate: Rate) -> Text:
@@ -101,28 +93,25 @@ def limits(figure: AcceptanceFigure) -> Text:
     return say("{low:g} to {high:g} %", low=100 * figure.low, high=100 * figure.high)
 
 
+def cells(rate: Rate) -> tuple[Text, Text, Text]:
+    return counted(rate), percent(rate), interval(rate)
+
+
 def standing(figure: AcceptanceFigure) -> Text:
     """Whether it is kept, and what would decide it."""
-    told = STANDING_WORDS[figure.standing]
-    if figure.standing == OPEN and figure.kept and figure.cases is not None and figure.rate.of < figure.cases:
-        return say(
-            "{told}; counted within the limit; {needed} cases of this sort without one would show it",
-            told=told,
-            needed=figure.cases,
-        )
-    if figure.standing == OPEN and figure.rate.of:
-        return (
-            say("{told}; counted within the limits", told=told)
-            if figure.kept
-            else say("{told}; counted outside the limits", told=told)
-        )
-    return told
+    told, undecided = STANDING_WORDS[figure.standing], figure.standing == OPEN
+    if undecided and figure.kept and figure.cases is not None and figure.rate.of < figure.cases:
+        return say("{told}; counted within the limit; {needed} cases of this sort without one would show it",
+                   told=told, needed=figure.cases)  # fmt: skip
+    if not (undecided and figure.rate.of):
+        return told
+    return say("{told}; counted within the limits", told=told) if figure.kept else say(
+        "{told}; counted outside the limits", told=told
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class DiagnosisProof:
-    """A job whose diagnosis was tried on sealed cases."""
-
     job: Job  # with the set-ups that cases were drawn on
     design: Design  # these, with the job's own errors and noise
     seed: int  # seed, alpha: of the cases, and rate of false alarms that the diagnosis was asked for
@@ -142,8 +131,7 @@ class DiagnosisProof:
 
     @cached_property
     def accepted(self) -> tuple[AcceptanceFigure, ...]:
-        """The figures that the laboratory accepts the method by."""
-        return acceptance_figures(self.judgement, self.job.facts.prove)
+        return judgement.acceptance_figures(self.judgement, self.job.facts.prove)
 
     @cached_property
     def reaches(self) -> tuple[Reach, ...]:
@@ -159,33 +147,144 @@ class DiagnosisProof:
         return all(one.standing != MISSED for one in self.accepted)
 
 
+def conclusion_section(conclusion: Text, figures: Sequence[AcceptanceFigure]) -> Section:
+    rows = ((one.what, *cells(one.rate), limits(one), standing(one)) for one in figures)
+    note = say(
+        "Shown or missed: the whole interval (Clopper and Pearson) lies within or beyond what is asked for. What is "
+        "asked for was sealed with the truth."
+    )
+    heads = (say("Figure"), *RATE_HEADS, say("Asked for"), say("Standing"))
+    return section(say("Conclusion"), Paragraph(conclusion), table(say("Acceptance"), heads, rows, note))
+
+
+def noise_section(proof: DiagnosisProof) -> Section:
+    own, drawn_noise = micrometres(proof.design.noise), [one.case.noise_kind for one in proof.judgement.cases]
+    reading = say("{x:.3g}, {y:.3g}, {z:.3g} µm", x=own["x_um"], y=own["y_um"], z=own["z_um"])
+    sizes = (
+        (say("Set-up offset"), own["placing_um"]), (say("Growing, at the longest length"), own["growth_um"]),
+        (say("Slow in time"), own["slow_um"]), (say("Step of the display"), own["resolution_um"]),
+    )  # fmt: skip
+    rows = ((what, say("{size:.3g} µm", size=size) if size else say("none")) for what, size in sizes)
+    drawn_words = commas(
+        say("{what} {count}", what=what, count=drawn_noise.count(kind))
+        for kind, what in NOISE_WORDS.items() if kind in drawn_noise
+    )  # fmt: skip
+    facts = Facts(((say("Reading along x, y, z"), reading), *rows, (say("Noise of the cases"), drawn_words)))
+    return section(say("Set-ups and noise"), facts)
+
+
+def answers_section(proof: DiagnosisProof) -> Section:
+    judged, rows = proof.judgement, []
+    for kind, what in KIND_WORDS.items():
+        said = judged.verdicts(kind)
+        answers = (number(said.get(verdict, 0)) for verdict in (*VERDICTS, REFUSED))
+        right = number(sum(one.right for one in judged.of_kind(kind)))
+        rows.append((what, number(sum(said.values())), *answers, right))
+    answered = [Column(ANSWER_WORDS[verdict]) for verdict in (*VERDICTS, REFUSED)]
+    verdicts = table(say("Verdicts"), (say("Hidden"), Column(say("Cases")), *answered, Column(say("Right"))), rows, say(
+        "Right: consistent of nothing; explained of effects that are all found and no other named; of a function, "
+        "that no known effect accounts for it; of a fault of the artefact, that something is there and no effect of "
+        "the machine named."
+    ))  # fmt: skip
+    figures = (
+        (say("False alarms, of cases that hide nothing"), judged.false_alarms),
+        (say("Right verdicts, of all cases"), judged.right), (say("Hidden effects found"), judged.found),
+        (say("Hidden effects found and told from all others"), judged.found_alone),
+        (say("Cases with a wrong name"), judged.wrong_names),
+        (say("Detected functions that are taken for no effect"), judged.recognised),
+        (say("Faults of the artefact blamed on the machine"), judged.machine_blamed),
+        (say("Assertions that predict better what was held out"), judged.predicts_better),
+    )  # fmt: skip
+    notes = [say(
+        "Found: asserted, alone or as one of a group that is said not to be told apart. A wrong name: an effect "
+        "asserted that does not act, in no group with one that does; of a fault of the artefact, any effect of "
+        "the machine."
+    )]  # fmt: skip
+    if (ratio := judged.held_out_ratio) is not None:
+        notes.append(
+            say("Held out: the rms of predictions after over before is {ratio:.2f} in the median.", ratio=ratio)
+        )
+    rates = table(say("Rates"), (say("What"), *RATE_HEADS), ((what, *cells(rate)) for what, rate in figures), *notes)
+    return section(say("What was hidden, and what was said"), verdicts, rates)
+
+
+def strength_section(proof: DiagnosisProof, often: Text) -> Section:
+    title, curve, in_bins = say("How strong a cause must be"), proof.judgement.by_strength, proof.judgement.in_bins
+    if curve is None:
+        few = say("Fewer than {fewest} effects were hidden: too few to say.", fewest=FEWEST)
+        return section(title, Paragraph(few))
+    rows = ((say("{low:g} to {high:g}", low=low, high=high), *cells(rate)) for low, high, rate in in_bins)
+    by_strength = table(say("Found by strength"), (say("Strength √λ"), *RATE_HEADS), rows)
+    return section(title, Paragraph(often), strength_plot(in_bins, curve), by_strength)
+
+
+def strength_words(value: float) -> Text:
+    return number(value, ".1f") if value <= LARGEST else say("beyond {largest:g}", largest=LARGEST)
+
+
+def probabilities_section(proof: DiagnosisProof) -> Section:
+    title, each = say("Probability said, and right"), proof.judgement.probabilities
+    if not each:
+        return section(title, Paragraph(say("No effect was asserted.")))
+    heads = (
+        Column(say("Said"), unit("%"), numeric=False),
+        Column(say("Mean said"), unit("%")),
+        *RATE_HEADS,
+        say("Agree"),
+    )
+    rows = (
+        (say("{low:.0f} to {high:.0f}", low=100 * one.low, high=100 * one.high), number(100 * one.said, ".1f"),
+         *cells(one.right), say("yes") if one.agrees else say("no"))
+        for one in each
+    )  # fmt: skip
+    note = say(
+        "Of every effect that was asserted, cases with a fault of the artefact left out. Agree: the mean said lies "
+        "in the interval of what was right."
+    )
+    return section(title, said_plot(each), table(say("Probabilities"), heads, rows, note))
+
+
+def intervals_section(proof: DiagnosisProof) -> Section:
+    judged = proof.judgement
+    rows = [(what, *cells(judged.coverage_of(sort))) for sort, what in INTERVAL_WORDS.items()]
+    rows.append((say("all but the last, pooled"), *cells(judged.coverage)))
+    note = say(
+        "95 % intervals that hold the truth. Those of one recording are not independent; the interval of the rate "
+        "allows for that. What is estimated beside a cause that was not found is shown for itself: it cannot be "
+        "right."
+    )
+    hold = table(say("95 % intervals that hold"), (say("Intervals"), *RATE_HEADS), rows, note)
+    return section(say("Intervals"), hold)
+
+
+def kinds_section(proof: DiagnosisProof) -> Section:
+    rows = (
+        (
+            NOISE_WORDS[kind],
+            *(cell for rate in proof.judgement.by_noise(kind) for cell in (counted(rate), percent(rate))),
+        )
+        for kind in dict.fromkeys(proof.design.noises)
+    )
+    counts = (say("False alarms"), say("Effects found"), say("Intervals that hold"))
+    rates = (column for count in counts for column in (Column(count), Column(say("Rate"), unit("%"))))
+    return section(say("Kinds of noise"), table(say("By kind of noise"), (say("Noise"), *rates), rows))
+
+
 def effects_section(proof: DiagnosisProof) -> Section:
     """Every effect that cases could hide: how often it was found, and how large it must be."""
-    titles = {reach.effect: reach.title for reach in proof.reaches}
-    rows = []
+    titles, rows = {reach.effect: reach.title for reach in proof.reaches}, []
     for reach in proof.reaches:
-        if reach.standing != DRAWN:
-            continue
-        found, wrong = proof.judgement.of_effect(reach.effect)
-        cell = say("{count} of {of}", count=found.count, of=found.of) if found.of else DASH
-        alike: Text = titles[reach.alike] if reach.alike else NOTHING
-        rows.append(
-            (
-                reach.title,
-                cell,
-                number(wrong),
-                *_smallest(proof, reach),
-                number(reach.allowed, ".3g"),
-                reach.unit,
-                alike,
-            )
-        )
+        if reach.standing == set_ups.DRAWN:
+            found, wrong = proof.judgement.of_effect(reach.effect)
+            rows.append((
+                reach.title, counted(found), number(wrong), *_smallest(proof, reach), number(reach.allowed, ".3g"), reach.unit,
+                titles[reach.alike] if reach.alike else NOTHING,
+            ))  # fmt: skip
     heads = (
-        Column(say("Effect"), numeric=False), Column(say("Times found")), Column(say("Wrongly named")),
-        Column(say("Found in 9 of 10 from")), Column(say("95 %")), Column(say("Physics allows")),
-        Column(say("Unit"), numeric=False), Column(say("Hardly told from"), numeric=False),
+        say("Effect"), Column(say("Times found")), Column(say("Wrongly named")), Column(say("Found in 9 of 10 from")),
+        Column(say("95 %")), Column(say("Physics allows")), say("Unit"), say("Hardly told from"),
     )  # fmt: skip
-    notes = (
+    return section(say("Every effect"), table(say("Effects that cases hide"), heads, rows,
         say(
             "Found in 9 of 10 from: the strength that all hidden effects together show, as a size of this effect "
             "under the job's noise; with its 95 % interval. A dash: not within what physics allows, or too few cases "
@@ -195,9 +294,7 @@ def effects_section(proof: DiagnosisProof) -> Section:
             "Hardly told from: an effect that leaves less than a tenth of this one in these set-ups; one then stands "
             "for the other, and the diagnosis is to name both."
         ),
-    )
-    blocks: tuple[Block, ...] = (Table(say("Effects that cases hide"), heads, tuple(rows), notes),) if rows else ()
-    return Section(say("Every effect"), blocks)
+    ))  # fmt: skip
 
 
 def _smallest(proof: DiagnosisProof, reach: Reach) -> tuple[Text, Text]:
@@ -210,54 +307,37 @@ def _smallest(proof: DiagnosisProof, reach: Reach) -> tuple[Text, Text]:
 
 
 def unseen_section(proof: DiagnosisProof) -> Section:
-    found: list[Block] = [Paragraph(text) for text in (*_unseen(proof.reaches), *_faults(proof))]
+    standings: tuple[tuple[str, Text], ...] = (
+        (set_ups.TAKEN, say(
+            "Nothing of these shows, for they leave the observations as they are or what the job names takes all:"
+        )),
+        (set_ups.TOO_SMALL, say("These drown in the noise even as large as physics allows:")),
+        (set_ups.NO_TRAVEL, say("Not considered, for the job does not say what they need of the machine:")),
+    )  # fmt: skip
+    texts: list[Text] = []
+    for standing, what in standings:
+        if effects := [reach.title for reach in proof.reaches if reach.standing == standing]:
+            texts.append(say("{what} {effects}.", what=what, effects=semicolons(effects)))
+    titles = {reach.effect: reach.title for reach in proof.reaches}
+    for fault in proof.faults:
+        kind = FAULT_WORDS[fault.what]
+        if not fault.shows:
+            texts.append(say("Of the artefact, nothing shows of {what}: what the job names takes it.", what=kind))
+        elif fault.hidden:
+            texts.append(say("Of the artefact, {what} looks like {effect:small}; only other set-ups would tell.",
+                             what=kind, effect=titles[fault.like]))  # fmt: skip
     by_columns: dict[tuple[str, ...], list[Text]] = {}
     for reach in proof.reaches:
-        if reach.standing == UNRECORDED:
+        if reach.standing == set_ups.UNRECORDED:
             by_columns.setdefault(reach.columns, []).append(reach.title)
-    rows = tuple((semicolons(titles), commas(names(columns))) for columns, titles in by_columns.items())
-    heads = (Column(say("Effects"), numeric=False), Column(say("Columns that they go by"), numeric=False))
-    return Section(
-        say("What these set-ups cannot see"),
-        (*found, *((Table(say("Not considered, because it is not recorded"), heads, rows),) if rows else ())),
+    rows = ((semicolons(effects), commas(names(columns))) for columns, effects in by_columns.items())
+    left_out = table(
+        say("Not considered, because it is not recorded"), (say("Effects"), say("Columns that they go by")), rows
     )
+    return section(say("What these set-ups cannot see"), *map(Paragraph, texts), left_out)
 
 
-def _unseen(reaches: tuple[Reach, ...]) -> list[Text]:
-    told = {
-        TAKEN: say(
-            "Nothing of these shows, for they leave the observations as they are or what the job names takes all:"
-        ),
-        TOO_SMALL: say("These drown in the noise even as large as physics allows:"),
-        NO_TRAVEL: say("Not considered, for the job does not say what they need of the machine:"),
-    }
-    found: list[Text] = []
-    for standing, what in told.items():
-        titles = [reach.title for reach in reaches if reach.standing == standing]
-        if titles:
-            found.append(say("{what} {effects}.", what=what, effects=semicolons(titles)))
-    return found
-
-
-def _faults(proof: DiagnosisProof) -> list[Text]:
-    titles = {reach.effect: reach.title for reach in proof.reaches}
-    found: list[Text] = []
-    for fault in proof.faults:
-        what = FAULT_WORDS[fault.what]
-        if not fault.shows:
-            found.append(say("Of the artefact, nothing shows of {what}: what the job names takes it.", what=what))
-        elif fault.hidden:
-            like = titles[fault.like]
-            told = say(
-                "Of the artefact, {what} looks like {effect:small}; only other set-ups would tell.",
-                what=what,
-                effect=like,
-            )
-            found.append(told)
-    return found
-
-
-_HEIGHT_MM = 72
+EDGES = {"left": 0.09, "right": 0.985, "bottom": 0.15, "top": 0.96}  # of the axes, in a picture 72 mm high
 
 
 def strength_plot(in_bins: tuple[tuple[float, float, Rate], ...], curve: DetectionCurve) -> Plot:
@@ -265,10 +345,7 @@ def strength_plot(in_bins: tuple[tuple[float, float, Rate], ...], curve: Detecti
     counted = [(low, high, rate) for low, high, rate in in_bins if rate.of]
     middle = np.array([0.5 * (low + high) for low, high, _ in counted])
     share, low, high = _rates([rate for _, _, rate in counted])
-    with house_style():
-        figure = new_figure(_HEIGHT_MM)
-        ax = figure.subplots()
-        figure.subplots_adjust(left=0.09, right=0.985, bottom=0.15, top=0.96)
+    with picture(72, **EDGES) as (figure, ax):
         across = np.append(curve.strengths, curve.strengths[::-1])
         ax.fill(across, 100 * np.append(curve.low, curve.high[::-1]), color=BAND, lw=0, zorder=0)
         ax.plot(curve.strengths, 100 * curve.curve, color=ACCENT, lw=1.3)
@@ -277,8 +354,7 @@ def strength_plot(in_bins: tuple[tuple[float, float, Rate], ...], curve: Detecti
         dots(ax, middle, share, 4.0, INK)
         ax.set(xlim=(curve.strengths[0] - 0.5, curve.strengths[-1] + 0.5), ylim=(-3, 103))
         ax.grid(axis="y")
-        ax.set_xlabel(say("Strength √λ of the hidden effect"))
-        ax.set_ylabel(say("Found / %"))
+        ax.set(xlabel=say("Strength √λ of the hidden effect"), ylabel=say("Found / %"))
         return drawn(
             figure,
             say("Hidden effects that were found, by strength: counted with 95 % intervals, and the fitted curve with its "
@@ -292,17 +368,13 @@ def said_plot(each: tuple[Tenth, ...]) -> Plot:
     """Probabilities of asserted effects, by tenths, against the share of them that act."""
     said = 100 * np.array([one.said for one in each])
     share, low, high = _rates([one.right for one in each])
-    with house_style():
-        figure = new_figure(_HEIGHT_MM)
-        ax = figure.subplots()
-        figure.subplots_adjust(left=0.09, right=0.985, bottom=0.15, top=0.96)
+    with picture(72, **EDGES) as (figure, ax):
         ax.plot([0, 100], [0, 100], color=MUTED, lw=0.7, zorder=1)
         bars(ax, said, low, high, 1.0, ACCENT)
         dots(ax, said, share, 4.0, ACCENT)
         ax.set(xlim=(-2, 103), ylim=(-3, 103))
         ax.grid()
-        ax.set_xlabel(say("Probability that was said / %"))
-        ax.set_ylabel(say("Right / %"))
+        ax.set(xlabel=say("Probability that was said / %"), ylabel=say("Right / %"))
         return drawn(
             figure,
             say("Probability that was said of asserted effects against the share of them that act, by tenths, with 95 % "

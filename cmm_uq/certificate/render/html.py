@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import cache
+from itertools import chain
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.translation import code_of
-from cmm_uq.certificate.document import Document, view_words
+from cmm_uq.base.languages.translation import code_of, translated as said_in
+from cmm_uq.base.messages import Message, Plural, Text, Verbatim, say, sentences
+from cmm_uq.certificate.document import WORDS, Document, Facts, Paragraph, Plot, Section, Table, letters, view_words
 from cmm_uq.certificate.plots.style import COLOURS
-from cmm_uq.certificate.render.fitting import fitted, picture_share, tightness
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -68,3 +71,150 @@ def _css_string(text: str) -> str:
     """A CSS string literal that no text can break out of: everything but letters and digits is escaped."""
     escaped = re.sub(r"[^A-Za-z0-9]", lambda found: f"\\{ord(found[0]):06x} ", text)
     return f'"{escaped}"'
+
+
+SMALLEST = 0.66  # of a picture's width: its lettering is 5 pt then
+_PAGE = 256.0  # height of the text
+_BROWSER = 1.3  # times as high as in the PDF is what a browser prints
+_MEASURED = 0.85  # of the height that is reckoned from letters, what Typst makes of it
+_LONG, _NAME = 120, 45  # letters from which a text is given by its beginning, and least letters of that
+_CUT = re.compile(r"(?<=[.;:])\s|(?<=[。；：])")
+_IN_FULL = say("In full behind this page.")
+_REMARKS = ("Remarks", "Deviations from the method", "Results of external providers", "Data from the customer")
+"""Particulars that may continue behind the page."""
+
+
+def fitted(document: Document) -> Document:
+    """Remarks, then warnings, without room go behind the first page; of warnings that differ in figures the first stays."""
+    if not document.decides or _height(document) <= _PAGE:
+        return document
+    for shorter in (_remarks_behind, _warnings_behind):
+        document = shorter(document)
+        if _height(document) <= _PAGE:
+            break
+    return document
+
+
+def picture_share(document: Document) -> int:
+    """Part of the width that the picture of the first page has room for in print, per cent."""
+    tall = sum(_picture(block) for block in _first(document) if isinstance(block, Plot))
+    room = 100 * SMALLEST + (100 * (_PAGE / _BROWSER - _height(document)) / tall if tall else 0)
+    return max((share for share in (75, 85, 100) if share <= room), default=66)
+
+
+def tightness(document: Document) -> int:
+    """Size of the first page as a browser prints it, per cent; smaller letters make longer lines, too."""
+    share = 100 * (_PAGE / (_BROWSER * _height(document))) ** 0.8 if document.decides else 100
+    return max((part for part in range(70, 105, 5) if part <= share), default=70)
+
+
+def _remarks_behind(document: Document) -> Document:
+    long = [row for facts in document.particulars for row in facts.rows if _may_continue(row)]
+    if not long:
+        return document
+    in_full = _said(document, _IN_FULL)
+    shown = tuple(
+        Facts(tuple((row[0], sentences((_beginning(row[1]), in_full))) if row in long else row for row in facts.rows))
+        for facts in document.particulars
+    )
+    behind = Section(_said(document, WORDS["particulars"]), (Facts(tuple(long)),))
+    *others, annex = _around(document)
+    return replace(document, particulars=shown, sections=(*chain(*others), behind, *annex))
+
+
+def _may_continue(row: tuple[Text, Text]) -> bool:
+    return getattr(row[0], "source", row[0]) in _REMARKS and letters(row[1]) > _LONG
+
+
+def _warnings_behind(document: Document) -> Document:
+    if sum(map(letters, document.warnings)) <= _LONG:
+        return document
+    alike: dict[str, list[Text]] = {}
+    for text in document.warnings:
+        source = getattr(text, "source", text)
+        alike.setdefault(_pattern(source), []).append(text)
+    named = [
+        _beginning(texts[0]) if len(texts) == 1
+        else _said(document, say("{shown}; {count} more behind this page", shown=_beginning(texts[0]), count=len(texts) - 1))
+        for texts in alike.values()
+    ]  # fmt: skip
+    words = WORDS["warning"] if len(document.warnings) == 1 else WORDS["warnings"]
+    behind = Section(_said(document, words), tuple(Paragraph(text) for text in document.warnings))
+    first, *others = _around(document)
+    return replace(document, warnings=(*named, _said(document, _IN_FULL)), sections=(*first, behind, *chain(*others)))
+
+
+def _pattern(text: Text) -> str:
+    """What messages that differ in their figures alone have in common."""
+    if isinstance(text, Message) and not isinstance(text, Plural):
+        inner = (value for value in text.arguments.values() if isinstance(value, Message))
+        return text.pattern + "".join(map(_pattern, inner))
+    return str.__str__(text)
+
+
+def _beginning(text: Text) -> Text:
+    whole = str.__str__(text)
+    if letters(whole) <= _LONG:
+        return text
+    ends = [found.start() for found in _CUT.finditer(whole) if letters(whole[: found.start()]) >= _NAME]
+    end = max((end for end in ends if letters(whole[:end]) <= _LONG), default=0)
+    if not end:
+        end = next(i for i in range(len(whole), 0, -1) if letters(whole[:i]) <= _LONG)
+        end = whole.rfind(" ", 0, end) if " " in whole[_NAME // 2 : end] else end
+    return Verbatim(f"{whole[:end]} …")
+
+
+def _said(document: Document, text: Text) -> Text:
+    return said_in(text, code_of(document.language))
+
+
+def _around(document: Document) -> tuple[list[Section], ...]:
+    """Sections of the first page, those behind it, and those of the annex."""
+    ranks = [0 if one.first else 2 if one.opinion else 1 for one in document.sections]
+    return tuple([one for one, of in zip(document.sections, ranks, strict=True) if of == rank] for rank in range(3))
+
+
+def _height(document: Document) -> float:
+    address = 5 + 3.7 * max(0, len(document.issuer) - 1) if document.issuer else 0
+    head = max(19.0 if document.logo else 0.0, address)
+    height = 17 + head + (8 if head else 0) + 4.1 * _lines(document.subject, 170, 10)
+    height += _MEASURED * sum(_middle(document))
+    if document.statements or document.signatures:
+        statements = sum(3 + 3.7 * _lines(text, 170, 9) for text in document.statements)
+        height += 9 + statements + 23 * -(-len(document.signatures) // 3)
+    return height
+
+
+def _middle(document: Document) -> Iterator[float]:
+    narrow, wide = ((31, 46) if document.language == "en" else (38, 46)), (31, 132)
+    yield max((_rows(facts, *narrow) for facts in document.particulars[:2]), default=0) + 6
+    if document.overview:
+        rows = [max(_lines(name, 50, 10.5), _lines(text, 106, 10)) for name, text in document.overview.rows]
+        yield 24 + sum(1.1 + 4.1 * lines for lines in rows)
+    yield from (13.0 for section in document.sections if section.first)
+    for block in _first(document):
+        if isinstance(block, Plot):
+            yield 13 + SMALLEST * _picture(block) + 3.7 * _lines(block.caption, 170, 9)
+        elif isinstance(block, Table):
+            yield 15 + 5.5 * len(block.rows) + sum(1 + 3.7 * _lines(note, 170, 8.5) for note in block.notes)
+    yield from (_rows(facts, *wide) + 4 for facts in document.particulars[2:])
+    if document.warnings:
+        yield 16 + sum(0.1 + 4.4 * _lines(text, 158, 10) for text in document.warnings)
+
+
+def _first(document: Document) -> Iterable[object]:
+    return (block for section in document.sections if section.first for block in section.blocks)
+
+
+def _rows(facts: Facts, name_mm: float, mm: float) -> float:
+    return sum(1.0 + 3.95 * max(_lines(name, name_mm, 9.5), _lines(text, mm, 9.5)) for name, text in facts.rows)
+
+
+def _lines(text: str, mm: float, size: float) -> int:
+    """Of a text in a column: 0.43 of the size to a letter, twice as much to a Japanese character."""
+    return sum(max(1, ceil(letters(line) * 0.43 * size * 0.3528 / mm)) for line in text.split("\n"))
+
+
+def _picture(plot: Plot) -> float:
+    _, _, width, height = map(float, re.findall(r'viewBox="([^"]*)"', plot.svg)[0].split())
+    return 170 * height / width

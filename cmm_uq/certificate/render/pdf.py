@@ -21,8 +21,7 @@ from cmm_uq.base.languages.translation import Code, code_of, translated as said_
 from cmm_uq.base.messages import Text, Verbatim, commas, say, sentences
 from cmm_uq.certificate.document import Document, attachment_title, view_words
 from cmm_uq.certificate.plots.style import COLOURS, JAPANESE, fonts_of
-from cmm_uq.certificate.render.fitting import SMALLEST, fitted
-from cmm_uq.certificate.render.html import template_folder
+from cmm_uq.certificate.render.html import SMALLEST, fitted, template_folder
 from cmm_uq.certificate.sign import TEST_NOTE, Seal, Signer
 
 FACE = "Libertinus Serif"  # of the text; what it lacks, as Japanese, is set in the font of the language

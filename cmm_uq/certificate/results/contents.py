@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,18 +11,23 @@ from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Statement
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
+from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
+from cmm_uq.analysis.diagnosis.power import ALLOWED
+from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
+from cmm_uq.analysis.diagnosis.visibility import PLACES
+from cmm_uq.analysis.planning.advice import NextPlan
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.diagnosis.overview import sentence
-from cmm_uq.certificate.diagnosis.sections import costs_data, next_data, unseen_data
-from cmm_uq.certificate.origin import software
-from cmm_uq.certificate.result import JobDiagnosis, Result
-from cmm_uq.certificate.results.plain import quantity_data
-from cmm_uq.certificate.sections.findings import corrections, periods_data, withheld_data
+from cmm_uq.certificate.origin import quantity_data, software
+from cmm_uq.certificate.result import JobDiagnosis, Result, SimulatedTwin
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.verdicts import Verdicts
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.maths.inference.least_squares import LeastSquares
 from cmm_uq.maths.uncertainty.budget_results import budget_data
 from cmm_uq.maths.uncertainty.correlation import Covariance
 from cmm_uq.maths.uncertainty.quantity import Quantity
@@ -59,7 +64,7 @@ def results(result: Result) -> dict[str, Any]:
     posterior = result.posterior
     return {
         **head(result.job),
-        "estimates": {effect: _quantities(values) for effect, values in result.parameters.items()},
+        "estimates": _by_effect(result.parameters),
         "artefact": _quantities(result.sizes),
         "certified": {
             size.name: {"value": size.nominal, "u": size.sd}
@@ -90,7 +95,7 @@ def results(result: Result) -> dict[str, Any]:
             "ess_min": posterior.ess_min, "rhat_max": posterior.rhat_max, "steps": posterior.steps,
             "autocorrelation_time": posterior.autocorrelation_time, "converged": posterior.converged,
         },
-        "least_squares": _least_squares(result),
+        "least_squares": _least_squares(result.least_squares),
         **contradictions_data(result),
         "identifiability": _identifiability(result),
         "accuracy": {name: quantity.value for name, quantity in result.accuracy.items()},
@@ -106,9 +111,7 @@ def diagnosis_data(found: JobDiagnosis) -> dict[str, Any]:
     """The ``diagnosis`` part."""
     d, changes, simulated = found.diagnosis, found.consequences, found.simulated
     return {
-        **({} if simulated is None else {"simulation": simulated.data({
-            owner: _quantities(values) for owner, values in corrections(simulated, d.after, d.posterior).items()
-        })}),
+        **({} if simulated is None else {"simulation": simulated.data(_by_effect(corrections(found, simulated)))}),
         "verdict": d.verdict,
         "p_value": d.p_value,
         **false_alarms(d.alpha),
@@ -151,11 +154,90 @@ def false_alarms(alpha: float) -> dict[str, float]:
     return {} if alpha == FALSE_ALARMS else {"false_alarms": alpha}
 
 
+def corrections(found: JobDiagnosis, simulated: SimulatedTwin) -> dict[str, dict[str, Quantity]]:
+    """What the effects that were estimated anew differ by from what the simulation contains, by effect and parameter."""
+    d, each = found.diagnosis, dict[str, dict[str, Quantity]]()
+    for (owner, name), (values, of) in d.after.reported(d.posterior.draws, simulated.refitted).items():
+        each.setdefault(owner, {})[name] = Quantity.of_draws(values, of)
+    return each
+
+
+def withheld_data(withheld: Sequence[WithheldEffect]) -> list[dict[str, Any]]:
+    return [{"effect": item.effect, "probability": item.probability, "why": item.why,
+             "periods_mm": _periods(item.modes)} for item in withheld]  # fmt: skip
+
+
+def _periods(modes: Sequence[Mode]) -> list[dict[str, Any]]:
+    return [{"value": m.period.value, "u": m.period.u, "interval95": list(m.period.interval95),
+             "probability": m.probability} for m in modes]  # fmt: skip
+
+
+def next_data(plan: NextPlan | None, artefact: Artefact) -> dict[str, Any] | None:
+    if plan is None:
+        return None
+    shows = []
+    for one in plan.shown:
+        effect = artefact.acting(every()[one.effect])
+        before, after = (
+            size * effect.coefficients[0].prior_sd if np.isfinite(size) and size <= ALLOWED else None
+            for size in (one.before, one.after)
+        )
+        shows.append({"effect": one.effect, "parameter": effect.reported[0].name, "detected_before": before,
+                      "detected_after": after})  # fmt: skip
+    return {
+        "repeats": plan.repeats, "reached": plan.reached,
+        "set_ups": [
+            {"measurement": plan.first + i, "what": placing.title, "ends": placing.ends}
+            for i, placing in enumerate(plan.placings)
+        ],
+        "parts": [{"effects": list(one.effects), "odds_before": one.before, "odds_after": one.after} for one in plan.partings],
+        "shows": shows,
+    }  # fmt: skip
+
+
+def costs_data(result: JobDiagnosis) -> dict[str, Any]:
+    """What remains, and the average; nothing where one explanation is settled."""
+    remaining, costs = result.diagnosis.remaining, result.costs
+    if not remaining.rivals:
+        return {}
+    each = [None] * len(remaining.rivals) if costs is None else costs.each
+    whole = {
+        "estimates": _by_effect(remaining.averaged),
+        "figures": {} if costs is None else _quantities(costs.figures),
+        "decisions": [] if costs is None else [dict(one) for one in costs.decisions],
+    }
+    return {"remaining": [
+        {
+            "probability": rival.probability, "effects": list(rival.effects), "functions": list(rival.functions),
+            "estimates": _by_effect(rival.named), "parameters": _by_effect(rival.added),
+            "figures": {} if cost is None else _quantities(cost.figures),
+            "decisions": [] if cost is None else [one.outcome for one in cost.statements],
+        }
+        for rival, cost in zip(remaining.rivals, each, strict=True)
+    ], "averaged": whole}  # fmt: skip
+
+
+def unseen_data(rows: Sequence[SmallestEffect]) -> list[dict[str, Any]]:
+    """Every effect."""
+    return [
+        {
+            "effect": row.effect, "parameter": row.parameter, "detected": row.detected, "named": row.named,
+            "allowed": row.allowed, "shown": row.shown, "share": row.share,
+            "taken_up_by": [name for name in row.taken_up if name != PLACES],
+            **({} if row.periods is None else {"periods": {
+                "parameter": row.periods.parameter, "low": row.periods.low, "high": row.periods.high,
+                "worst": row.periods.worst, "unresolved": [list(each) for each in row.periods.unresolved],
+            }}),
+        }
+        for row in rows
+    ]  # fmt: skip
+
+
 def effect_data(item: OmittedEffect, gain: Improvement) -> dict[str, Any]:
     return {
         "effect": item.effect, "probability": item.probability, "probability_together": item.together,
         "group": list(item.group), "explained": item.explained, "parameters": _quantities(item.parameters),
-        **({"other_periods_mm" if item.settled else "periods_mm": periods_data(item.modes)} if item.modes else {}),
+        **({"other_periods_mm" if item.settled else "periods_mm": _periods(item.modes)} if item.modes else {}),
         "words": sentence(item, gain),
     }  # fmt: skip
 
@@ -199,37 +281,34 @@ def _quantities(quantities: Mapping[str, Quantity]) -> dict[str, Any]:
     return {name: quantity_data(quantity) for name, quantity in quantities.items()}
 
 
-def _least_squares(result: Result) -> dict[str, Any]:
-    ls = result.least_squares
+def _by_effect(named: Mapping[str, Mapping[str, Quantity]]) -> dict[str, Any]:
+    return {effect: _quantities(parameters) for effect, parameters in named.items()}
+
+
+def _least_squares(ls: LeastSquares) -> dict[str, Any]:
     estimates: dict[str, dict[str, Any]] = {}
-    for i, unknown in enumerate(ls.unknowns):
+    for unknown, known, value, variance in zip(
+        ls.unknowns, ls.determined, ls.value, np.diag(ls.covariance), strict=True
+    ):
         owner, name = unknown.key
-        known = bool(ls.determined[i])
-        estimates.setdefault(owner, {})[name] = {
-            "value": float(ls.value[i]) if known else None,
-            "u": float(np.sqrt(ls.covariance[i, i])) if known else None,
-        }
+        pair = (float(value), float(np.sqrt(variance))) if known else (None, None)
+        estimates.setdefault(owner, {})[name] = dict(zip(("value", "u"), pair, strict=True))
     return {
-        "estimates": estimates,
-        "observations": len(ls.residuals),
-        "degrees_of_freedom": ls.degrees_of_freedom,
+        "estimates": estimates, "observations": len(ls.residuals), "degrees_of_freedom": ls.degrees_of_freedom,
         "residual_rms_um": None if ls.residual_sd is None else ls.residual_sd / MICROMETRE,
-    }
+    }  # fmt: skip
 
 
 def _identifiability(result: Result) -> dict[str, Any]:
     ls = result.least_squares
+    names = [".".join(u.key) for u in ls.unknowns]
+    free = [{name: float(part) for name, part in zip(names, column, strict=True) if part} for column in ls.null_space.T]
     return {
-        "parameters": int(ls.rank + ls.null_space.shape[1]),
-        "rank": ls.rank,
+        "parameters": int(ls.rank + ls.null_space.shape[1]), "rank": ls.rank,
         "condition_number": ls.condition if np.isfinite(ls.condition) else None,
-        "undetermined": [
-            {f"{u.key[0]}.{u.key[1]}": float(part) for u, part in zip(ls.unknowns, column, strict=True) if part}
-            for column in ls.null_space.T
-        ]
-        + [{".".join(one.key): 1.0} for one in result.contradictions],
-        "prior_share": {f"{u.key[0]}.{u.key[1]}": result.prior_share(u.key) for u in ls.unknowns},
-    }
+        "undetermined": free + [{".".join(one.key): 1.0} for one in result.contradictions],
+        "prior_share": {name: result.prior_share(u.key) for name, u in zip(names, ls.unknowns, strict=True)},
+    }  # fmt: skip
 
 
 def _statement(statement: Statement) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, foreign, plural, say, semicolons
-from cmm_uq.certificate.document import Document, Facts, Section, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import Column, Document, Facts, Section, section, table
 
 KEY = "replaced"  # of results.json.
 COMPARED = say("Results compared")  # on the first page
@@ -69,17 +69,13 @@ class Reissue:
     @property
     def section(self) -> Section:
         """The table of all differences; without blocks where there are none."""
-        figures = (*self.differences, *self.added)
-        rows = tuple((each.what, each.before or DASH, each.after or DASH, each.unit) for each in figures)
-        heads = (
-            *text_columns(say("Decision or figure")), *figure_columns(say("Before"), say("After")),
-            *text_columns(say("Unit")),
-        )  # fmt: skip
+        rows = ((one.what, one.before or DASH, one.after or DASH, one.unit) for one in (*self.differences, *self.added))
+        heads = (say("Decision or figure"), Column(say("Before")), Column(say("After")), say("Unit"))
         caption = say("Differences from certificate {number}", number=Verbatim(self.number))
         note = say(
             "Figures are compared as they are printed, with the expanded uncertainty for a coverage probability of 95 %."
         )
-        return Section(say("Against the replaced certificate"), (Table(caption, heads, rows, (note,)),) if rows else ())
+        return section(say("Against the replaced certificate"), table(caption, heads, rows, note))
 
     @property
     def data(self) -> dict[str, Any]:

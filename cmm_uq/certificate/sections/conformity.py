@@ -6,9 +6,22 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from cmm_uq.analysis.conformity.statement import Decided, Statement, least_favourable
-from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, in_a_row, number, plural, say, sentences, signed
+from cmm_uq.base.messages import (
+    DASH,
+    NOTHING,
+    Text,
+    Verbatim,
+    after,
+    commas,
+    in_a_row,
+    number,
+    plural,
+    say,
+    sentences,
+    signed,
+)
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Column, DecisionBlock, Plot, Section, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import Block, Column, DecisionBlock, Plot, Section, Table, columns
 from cmm_uq.certificate.plots.residuals import trumpet
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, stated_value
 from cmm_uq.jobs.tables.conformity import ConformityFacts
@@ -22,26 +35,19 @@ def budget_table(measurand: Text, budget: Budget) -> Table:
     there = [(line, share) for line, share in zip(budget.lines, budget.shares, strict=True) if line.part]
     turned = any(line.unit != budget.unit or line.sensitivity != 1.0 for line, _ in there)
     several = len(there) > 1
-    columns = (
-        *text_columns(say("Cause"), *((say("Standard uncertainty"), say("Sensitivity")) if turned else ())),
-        Column(say("Contribution"), unit("µm")),
-        *(figure_columns(say("Share")) if several else ()),
-        *text_columns(say("Origin")),
-    )
-    rows = tuple(
-        (
-            line.name,
-            *(_turned(line, scale) if turned else ()),
-            significant(scale * line.contribution),
-            *((say("{share} %", share=signed(100 * share, ".1f")),) if several else ()),
-            line.origin,
-        )
+    rows = (
+        (line.name, *(_turned(line, scale) if turned else ()), significant(scale * line.contribution),
+         *((say("{share} %", share=signed(100 * share, ".1f")),) if several else ()), line.origin)
         for line, share in there
-    )
+    )  # fmt: skip
     notes = [say("Combined: u = {u} µm.", u=significant(scale * budget.u))] if several else []
     if absent := [line.name for line in budget.lines if not line.part]:
         notes.append(say("Without a contribution, or not stated: {absent}.", absent=commas(absent)))
-    return Table(say("Contributions to {measurand}", measurand=measurand), columns, rows, tuple(notes))
+    heads = columns((
+        say("Cause"), *((say("Standard uncertainty"), say("Sensitivity")) if turned else ()),
+        Column(say("Contribution"), unit("µm")), *((Column(say("Share")),) if several else ()), say("Origin"),
+    ))  # fmt: skip
+    return Table(say("Contributions to {measurand}", measurand=measurand), heads, tuple(rows), tuple(notes))
 
 
 def _turned(line: BudgetLine, scale: float) -> tuple[Text, Text]:
@@ -144,25 +150,19 @@ def has_picture(statement: Statement) -> bool:
 
 def picture(statement: Statement) -> Plot:
     items = [item for item in statement.errors if not item.set_aside]
-    far = len(statement.errors) - len(items)
+    far, outside = len(statement.errors) - len(items), [not _accepted(item) for item in items]
     beyond = say("Not drawn: the values that the screening set aside, {count}, which lie far outside.", count=far)
-    count, outside = len(items), sum(not _accepted(item) for item in items)
-    bands = [item.decision.guard_band for item in items]
-    accepted = [
-        None if band is None else max(0.0, item.limit_um - band) for item, band in zip(items, bands, strict=True)
-    ]
+    bands = [(item.limit_um, item.decision.guard_band) for item in items]
+    caption = say("{standard}: every error against ±MPE, {formula}, with the guard band.",
+                  standard=named(statement), formula=formula(statement.facts))  # fmt: skip
     return trumpet(
         [item.length_mm or 0.0 for item in items], [item.error_um for item in items],
-        limit_um=[item.limit_um for item in items], acceptance_um=accepted,
-        expanded_um=[2 * item.u_um for item in items], outside=[not _accepted(item) for item in items],
-        quantity=say("Error / µm"),
-        caption=sentences((
-            say("{standard}: every error against ±MPE, {formula}, with the guard band.",
-                standard=named(statement), formula=formula(statement.facts)),
-            *((beyond,) if far else ()),
-        )),
+        limit_um=[limit for limit, _ in bands],
+        acceptance_um=[None if band is None else max(0.0, limit - band) for limit, band in bands],
+        expanded_um=[2 * item.u_um for item in items], outside=outside, quantity=say("Error / µm"),
+        caption=after(caption, beyond if far else NOTHING),
         alternative=say("{count} errors over length between the limits; {outside} of them are not accepted.",
-                        count=count, outside=outside),
+                        count=len(items), outside=sum(outside)),
     )  # fmt: skip
 
 
@@ -188,20 +188,18 @@ def _table(statement: Statement) -> Table:
         notes.append(say("The {count} rows nearest to their limits; results.json has all.", count=_LISTED))
     lengths = any(item.length_mm is not None for item in statement.errors)
     known = any(item.u_um > 0 for item in statement.errors)
-    columns = (
-        *text_columns(say("Measurement")),
-        *((Column(say("Length"), unit("mm")),) if lengths else ()),
+    heads = columns((
+        say("Measurement"), *((Column(say("Length"), unit("mm")),) if lengths else ()),
         Column(say("Errors") if statement.signed else say("Values"), unit("µm"), numeric=False),
-        *((Column(say("U"), unit("µm")), *text_columns(say("P"))) if known else ()),
-        Column(say("Limit"), unit("µm")), *text_columns(say("Decision")),
-    )  # fmt: skip
+        *((Column(say("U"), unit("µm")), say("P")) if known else ()), Column(say("Limit"), unit("µm")), say("Decision"),
+    ))  # fmt: skip
     if known:
         notes.append(
             say("U: expanded uncertainty, k = 2. P: lowest probability in the row that a value is within its limit.")
         )
     title = say("All values decided by {standard}", standard=named(statement))
     cells = tuple(_row(row, lengths=lengths, known=known, signed_values=statement.signed) for row in rows)
-    return Table(title, columns, cells, tuple(notes))
+    return Table(title, heads, cells, tuple(notes))
 
 
 def _row(row: Sequence[Decided], *, lengths: bool, known: bool, signed_values: bool) -> tuple[Text, ...]:
@@ -213,9 +211,8 @@ def _row(row: Sequence[Decided], *, lengths: bool, known: bool, signed_values: b
     decision = OUTCOME_WORDS[worst.outcome]
     return (
         DASH if worst.measurement is None else number(worst.measurement),
-        *((DASH if worst.length_mm is None else nominal(worst.length_mm),) if lengths else ()),
-        values,
+        *((DASH if worst.length_mm is None else nominal(worst.length_mm),) if lengths else ()), values,
         *((significant(2 * worst.u_um), DASH if chance is None else probability(chance)) if known else ()),
         limit_in_full(worst.limit_um),
         say("{decision}, {standing}", decision=decision, standing=standing) if standing else decision,
-    )
+    )  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -11,32 +10,20 @@ from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
 from cmm_uq.analysis.diagnosis.location import Place, residual_field
-from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, after, alternatives, commas, number, say, signed
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, number, say, signed
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.document import (
-    Block,
-    Column,
-    Facts,
-    Paragraph,
-    Plot,
-    Section,
-    Table,
-    figure_columns,
-    text_columns,
-)
+from cmm_uq.certificate.document import Column, Facts, Paragraph, Plot, Section, Table, columns, section, table
 from cmm_uq.certificate.plots.vectors import profile_plot, residual_field_plot
 from cmm_uq.certificate.result import SimulatedTwin
 from cmm_uq.certificate.wording import effect_of, expanded, parameter_title, probability, titles, with_uncertainty
 from cmm_uq.jobs.columns import in_words, labelled, unit_of
-from cmm_uq.machine.model import RecordingModel
-from cmm_uq.maths.inference.posterior import Posterior
 from cmm_uq.maths.uncertainty.quantity import Quantity, alike, rounded, significant
 
-_TOLD = 8  # periods that a sentence tells; results.json has all.
+_PERIODS = 8  # periods that a sentence tells; results.json has all.
 
 
-def sentences(withheld: Sequence[WithheldEffect]) -> list[Text]:
+def withheld_words(withheld: Sequence[WithheldEffect]) -> list[Text]:
     return [
         say("{title} (probability {probability}) is not asserted: {why}.", title=item.title,
             probability=probability(item.probability),
@@ -58,23 +45,15 @@ def other_periods(item: OmittedEffect) -> Text:
     )
 
 
-def withheld_data(withheld: Sequence[WithheldEffect]) -> list[dict[str, Any]]:
-    return [{"effect": item.effect, "probability": item.probability, "why": item.why,
-             "periods_mm": periods_data(item.modes)} for item in withheld]  # fmt: skip
-
-
-def periods_data(modes: Sequence[Mode]) -> list[dict[str, Any]]:
-    return [{"value": m.period.value, "u": m.period.u, "interval95": list(m.period.interval95),
-             "probability": m.probability} for m in modes]  # fmt: skip
-
-
 def _listed(modes: Sequence[Mode]) -> Text:
     periods: list[Text] = []
-    for mode in modes[:_TOLD]:
+    for mode in modes[:_PERIODS]:
         value, U = rounded(mode.period.value, mode.period.expanded)
         periods.append(say("{value} ± {U} {unit}: {probability}", value=value, U=U, unit=mode.period.unit,
                            probability=probability(mode.probability)))  # fmt: skip
-    return commas([*periods, *([say("and {count} more", count=len(modes) - _TOLD)] if len(modes) > _TOLD else [])])
+    return commas(
+        [*periods, *([say("and {count} more", count=len(modes) - _PERIODS)] if len(modes) > _PERIODS else [])]
+    )
 
 
 VERDICTS: Mapping[str, Text] = {
@@ -85,52 +64,34 @@ VERDICTS: Mapping[str, Text] = {
 }
 
 
-def corrections(
-    simulated: SimulatedTwin, model: RecordingModel, posterior: Posterior
-) -> dict[str, dict[str, Quantity]]:
-    """What the effects that were estimated anew differ by from what the simulation contains, by effect and parameter."""
-    found: dict[str, dict[str, Quantity]] = {}
-    for (owner, name), (values, of) in model.reported(posterior.draws, simulated.refitted).items():
-        found.setdefault(owner, {})[name] = Quantity.of_draws(values, of)
-    return found
-
-
 def simulation_section(simulated: SimulatedTwin, refitted: Mapping[str, Mapping[str, Quantity]]) -> Section:
     """Which simulation it was, and what of it was estimated anew."""
-    rows: list[tuple[Text, Text]] = [
-        (say("Error map") if simulated.maps else say("Prediction"), Verbatim(file)) for file in simulated.files
-    ]
-    rows += [(say("SHA-256"), Verbatim(value)) for value in simulated.files.values()]
-    rows += [
-        (say("Program"), Verbatim(simulated.program) if simulated.program else NOTHING),
+    u = say("{u:.3g} µm", u=simulated.u_um)
+    if not simulated.u_um and not simulated.u_common_um:
+        u = say("not stated: taken as exact")
+    elif common := simulated.u_common_um:
+        u = say("{own}, and {common:.3g} µm of the artefact's size in common", own=u, common=common)
+    file = say("Error map") if simulated.maps else say("Prediction")
+    rows = (
+        *((file, Verbatim(name)) for name in simulated.files),
+        *((say("SHA-256"), Verbatim(value)) for value in simulated.files.values()),
+        (say("Program"), Verbatim(simulated.program)),
         (say("Effects that it contains"), commas(titles(simulated.contains)) or say("not stated")),
         (say("Estimated anew"), commas(titles(simulated.refitted)) or say("none")),
-        (say("Standard uncertainty of a predicted coordinate"), _uncertainty(simulated)),
+        (say("Standard uncertainty of a predicted coordinate"), u),
         (say("Predicted errors, rms in the observations"), say("{rms} µm", rms=alike(simulated.rms_predicted_um)[0])),
-    ]
-    blocks: list[Block] = [Facts(tuple((label, text) for label, text in rows if text))]
-    blocks.append(Paragraph(say(
+    )
+    told = say(
         "Observed minus predicted is what is explained here; where the artefact was taken to stand is no part of it. Sizes of "
         "effects are what the machine has beyond what the simulation contains. The noise is that of both together."
-    )))  # fmt: skip
-    if refitted:
-        differing = tuple(
-            (parameter_title(owner, name), with_uncertainty(quantity), quantity.unit, expanded(quantity)[2])
-            for owner, quantities in refitted.items() for name, quantity in quantities.items()
-        )  # fmt: skip
-        heads = (*text_columns(say("Parameter")), *figure_columns(say("Machine minus simulation")),
-                 *text_columns(say("Unit")), *figure_columns(say("k")))  # fmt: skip
-        blocks.append(Table(say("What the simulation contains, estimated anew"), heads, differing))
-    return Section(say("Simulation"), tuple(blocks))
-
-
-def _uncertainty(simulated: SimulatedTwin) -> Text:
-    if not simulated.u_um and not simulated.u_common_um:
-        return say("not stated: taken as exact")
-    own = say("{u:.3g} µm", u=simulated.u_um)
-    if not simulated.u_common_um:
-        return own
-    return say("{own}, and {common:.3g} µm of the artefact's size in common", own=own, common=simulated.u_common_um)
+    )
+    differing = (
+        (parameter_title(owner, name), with_uncertainty(quantity), quantity.unit, expanded(quantity)[2])
+        for owner, quantities in refitted.items() for name, quantity in quantities.items()
+    )  # fmt: skip
+    heads = (say("Parameter"), Column(say("Machine minus simulation")), say("Unit"), Column(say("k")))
+    anew = table(say("What the simulation contains, estimated anew"), heads, differing)
+    return section(say("Simulation"), Facts(tuple(row for row in rows if row[1])), Paragraph(told), anew)
 
 
 def contained(simulated: SimulatedTwin | None, effect: str) -> Text:
@@ -148,8 +109,8 @@ def improvement_table(gain: Improvement, rms: Text, heldout: Text, note: Text) -
         (heldout, *alike(gain.heldout_rms_before_um, gain.heldout_rms_after_um, decimals=2), unit("µm")),
         (say("Gain in log predictive density"), NOTHING, density, NOTHING),
     )
-    heads = (*text_columns(say("Quantity")), *figure_columns(say("Before"), say("After")), *text_columns(say("Unit")))
-    return Table(say("Improvement"), heads, rows, (note,))
+    heads = (say("Quantity"), Column(say("Before")), Column(say("After")), say("Unit"))
+    return Table(say("Improvement"), columns(heads), rows, (note,))
 
 
 _READINGS = frozenset(f"{a}_mm" for a in AXES)
@@ -172,7 +133,7 @@ def region_words(covariate: str, low: float, high: float) -> Text:
     """A region of a covariate: ``from 300 to 600 mm``; of one value, ``at 300 mm``."""
     own = unit_of(covariate)
     space = Verbatim("\u00a0" if own else "")
-    one, other = _reading(low), _reading(high)
+    one, other = (signed(value, ".0f" if abs(value) >= 100 else ".3g") for value in (low, high))
     if one == other:
         return say("at {value}{space}{unit}", value=one, space=space, unit=own)
     return say("from {low} to {high}{space}{unit}", low=one, high=other, space=space, unit=own)
@@ -185,31 +146,24 @@ def by_columns(d: Diagnosis) -> Text:
     return say("It depends on the {what}.", what=commas(in_words(column) for column in columns)) if columns else NOTHING
 
 
-def _reading(value: float) -> Number:
-    return signed(value, ".0f" if abs(value) >= 100 else ".3g")
-
-
 def where_section(d: Diagnosis) -> Section:
     """Pictures and table of where the residuals lie; without a mismatch, nothing."""
     if d.verdict == "consistent":
-        return Section(say("Where it is"), ())
-    picture = field_picture(d)
-    found: tuple[Block, ...] = (_profile(d.where[0]), _table(d.where)) if d.where else ()
-    pictures = () if picture is None else (picture,)
-    return Section(say("Where it is"), (Paragraph(where_sentence(d)), *pictures, *found))
+        return section(say("Where it is"))
+    further = (_profile(d.where[0]), _table(d.where)) if d.where else ()
+    return section(say("Where it is"), Paragraph(where_sentence(d)), field_picture(d), *further)
 
 
 def where_sentence(d: Diagnosis) -> Text:
-    if not d.where and (told := by_columns(d)):
-        return told
     if not d.where:
-        return say("No reading, column or direction by itself carries the evidence: it is spread over the recording.")
+        spread = say("No reading, column or direction by itself carries the evidence: it is spread over the recording.")
+        return by_columns(d) or spread
     first = d.where[0]
     size = significant(first.amplitude_um)
     told = say("The evidence lies {place}: up to {size} µm.", place=place_words(first), size=size)
-    if not first.also:
-        return told
-    return after(told, say("It could as well be read as {others}.", others=alternatives(first.also)))
+    return after(
+        told, say("It could as well be read as {others}.", others=alternatives(first.also)) if first.also else NOTHING
+    )
 
 
 def field_picture(d: Diagnosis) -> Plot | None:
@@ -238,32 +192,28 @@ def field_picture(d: Diagnosis) -> Plot | None:
 
 
 def _profile(place: Place) -> Plot:
-    x, y, u = place.curve
-    sizes = {"along": Verbatim((place.along or "").upper()), "k": number(place.k, ".2f")}
-    label = say("Error along {along} / µm", along=sizes["along"]) if place.along else say("Error / µm")
+    (x, y, u), along, k = place.curve, Verbatim((place.along or "").upper()), number(place.k, ".2f")
+    label = say("Error along {along} / µm", along=along) if place.along else say("Error / µm")
     if place.scale:
-        label = say("Scale of {along}, at the end of its range / µm", along=sizes["along"])
-    return profile_plot(
-        (x, y, place.k * u), place.data, place.region, x_label=labelled(place.covariate), y_label=label,
-        caption=say(
-            "{what:capital}, with U (k = {k}), as what the model leaves shows it; below, each observation over the range of "
-            "its points. What the model itself would absorb is no part of it.",
-            what=place.what, k=sizes["k"],
-        ),
-        alternative=say("A function of up to {size:.3g} µm, largest {region}.", size=place.amplitude_um,
-                        region=region_words(place.covariate, *place.region)),
+        label = say("Scale of {along}, at the end of its range / µm", along=along)
+    caption = say(
+        "{what:capital}, with U (k = {k}), as what the model leaves shows it; below, each observation over the range of "
+        "its points. What the model itself would absorb is no part of it.", what=place.what, k=k,
     )  # fmt: skip
+    region = region_words(place.covariate, *place.region)
+    shown = say("A function of up to {size:.3g} µm, largest {region}.", size=place.amplitude_um, region=region)
+    return profile_plot((x, y, place.k * u), place.data, place.region, x_label=labelled(place.covariate), y_label=label,
+                        caption=caption, alternative=shown)  # fmt: skip
 
 
-def _table(where: tuple[Place, ...]) -> Table:
-    rows = tuple(
+def _table(where: tuple[Place, ...]) -> Table | None:
+    rows = (
         (place.what, say("{where:capital}", where=region_words(place.covariate, *place.region)),
          significant(place.amplitude_um), number(place.p_value, ".1g"))
         for place in where
     )  # fmt: skip
-    heads = (*text_columns(say("What it depends on"), say("Where")), Column(say("Up to"), unit("µm")), Column(say("p")))
-    note = say(
+    heads = (say("What it depends on"), say("Where"), Column(say("Up to"), unit("µm")), Column(say("p")))
+    return table(say("What the residuals depend on"), heads, rows, say(
         "p is corrected for having looked everywhere, and of a further place holds beside those above it. A region is where "
         "the function exceeds half its largest value and its band does not hold zero, or between which values it jumps."
-    )
-    return Table(say("What the residuals depend on"), heads, rows, (note,))
+    ))  # fmt: skip

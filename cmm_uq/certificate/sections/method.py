@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from cmm_uq.analysis.conformity.lengths_decided import unknown_expansion
+from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, listed, number, say, sentences
 from cmm_uq.certificate.diagnosis.overview import VERDICTS
-from cmm_uq.certificate.document import Facts, Paragraph, Section
+from cmm_uq.certificate.document import Facts, Paragraph, Section, section
 from cmm_uq.certificate.plots.corner import corner_plot
 from cmm_uq.certificate.result import RecordingNoise, Result
 from cmm_uq.certificate.wording import title_of, with_uncertainty
@@ -38,22 +39,21 @@ def noise_found(noise: RecordingNoise, *, heavy_tails: bool) -> Text:
 
 def _components(noise: RecordingNoise) -> list[Text]:
     there: list[Text] = []
-    components = noise.components
     if noise.axes_apart > _SHOWN:
-        x, y, z = (components[axis].size.value for axis in "xyz")
+        x, y, z = (noise.components[axis].size.value for axis in "xyz")
         there.append(say("a scatter that differs by axis (X {x:.2g}, Y {y:.2g}, Z {z:.2g} µm)", x=x, y=y, z=z))
     if noise.display_um:
         there.append(say("the steps of the display, {step:.2g} µm", step=noise.display_um))
-    size = {name: components[name].size.value for name in ("placing", "growth", "slow") if name in components}
-    p = {name: components[name].probability for name in size}
-    if p.get("placing", 0.0) > _SHOWN:
-        there.append(say("an offset of {size:.2g} µm of each set-up, shared by its repeats (probability {p:.2f})",
-                         size=size["placing"], p=p["placing"]))  # fmt: skip
-    if p.get("growth", 0.0) > _SHOWN:
-        there.append(say("scatter that grows with length to {size:.2g} µm (probability {p:.2f})",
-                         size=size["growth"], p=p["growth"]))  # fmt: skip
-    if p.get("slow", 0.0) > _SHOWN:
-        there.append(say("slow noise in time of {size:.2g} µm (probability {p:.2f})", size=size["slow"], p=p["slow"]))
+    for name in ("placing", "growth", "slow"):
+        found = noise.components.get(name)
+        if found is not None and found.probability > _SHOWN:
+            size, p = found.size.value, found.probability
+            there.append({
+                "placing": say("an offset of {size:.2g} µm of each set-up, shared by its repeats (probability {p:.2f})",
+                               size=size, p=p),
+                "growth": say("scatter that grows with length to {size:.2g} µm (probability {p:.2f})", size=size, p=p),
+                "slow": say("slow noise in time of {size:.2g} µm (probability {p:.2f})", size=size, p=p),
+            }[name])  # fmt: skip
     return there
 
 
@@ -63,7 +63,7 @@ def posterior_section(result: Result) -> Section:
     set_up = {(ARTEFACT, size.name) for size in result.artefact.sizes if size.role == "set-up"}
     shown = [i for i, unknown in enumerate(posterior.unknowns) if unknown.key not in set_up]
     if not shown:
-        return Section(say("Posterior distribution"), ())
+        return section(say("Posterior distribution"))
     titles, draws = [title_of(posterior.unknowns[i].key, result) for i in shown], result.values[:, shown]
     plot = corner_plot(
         draws, titles, units=[posterior.unknowns[i].unit for i in shown], estimates=draws.mean(axis=0),
@@ -73,7 +73,7 @@ def posterior_section(result: Result) -> Section:
         ),
         alternative=say("Marginal and pairwise posterior densities of {names}.", names=listed(titles)),
     )  # fmt: skip
-    return Section(say("Posterior distribution"), (plot,))
+    return section(say("Posterior distribution"), plot)
 
 
 def method(result: Result) -> Section:
@@ -116,13 +116,12 @@ def method(result: Result) -> Section:
         (say("Calibrated lengths together"), _calibration(result)),
     )  # fmt: skip
     text = say(
-        "{what} are estimated from the observations with a linear measurement "
-        "model, by least squares (orthogonal factorisation) and as a posterior distribution with "
-        "priors as wide as physics allows; the certified length enters with its uncertainty. The "
-        "attached job, recording and results.json suffice to run it again.",
+        "{what} are estimated from the observations with a linear measurement model, by least squares (orthogonal "
+        "factorisation) and as a posterior distribution with priors as wide as physics allows; the certified length enters "
+        "with its uncertainty. The attached job, recording and results.json suffice to run it again.",
         what=say("Rigid-body error factors") if result.model.effects else say("Sizes of the artefact"),
     )
-    return Section(say("Method"), (Paragraph(text), Facts(tuple((label, value) for label, value in rows if value))))
+    return section(say("Method"), Paragraph(text), Facts(tuple(row for row in rows if row[1])))
 
 
 def _stated(result: Result) -> Text:
@@ -157,8 +156,12 @@ IMPLAUSIBLE = 4.0  # standard deviations of what was known beforehand from which
 
 
 def warnings(result: Result) -> tuple[Text, ...]:
-    each = (_mismatch, _noise, _expansion, _implausible, _undetermined, _contradicted, _screening)
-    return *not_converged(result.posterior), *(text for of in each for text in of(result))
+    each = (_mismatch, _noise, _expansion, _implausible, _undetermined, _contradicted)
+    return (
+        *not_converged(result.posterior),
+        *(text for of in each for text in of(result)),
+        *map(_screened, result.findings),
+    )
 
 
 def not_converged(sampled: Posterior | Chains) -> list[Text]:
@@ -264,10 +267,6 @@ def _contradicted(result: Result) -> list[Text]:
     ]  # fmt: skip
 
 
-def _screening(result: Result) -> list[Text]:
-    return [
-        say("{why:capital}. It is set aside: not used for the error factors.", why=finding.why)
-        if finding.set_aside
-        else say("{why:capital}. It is used as it stands.", why=finding.why)
-        for finding in result.findings
-    ]
+def _screened(finding: Finding) -> Text:
+    aside = say("{why:capital}. It is set aside: not used for the error factors.", why=finding.why)
+    return aside if finding.set_aside else say("{why:capital}. It is used as it stands.", why=finding.why)

@@ -1,21 +1,47 @@
-"""Results of a certificate: figures of performance, error factors, the machine as found, tolerances."""
+"""Results of a certificate, its first page, and the summary on the terminal: every figure and every decision."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from cmm_uq.analysis.conformity.accuracy import TITLES
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, listed, names, number, say
+from cmm_uq.analysis.conformity.decision import rule_words
+from cmm_uq.analysis.conformity.statement import Statement
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, listed, names, number, plural, say, semicolons
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.document import Block, Paragraph, Section, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import (
+    Block,
+    Column,
+    Overview,
+    Paragraph,
+    Plot,
+    Section,
+    Table,
+    columns,
+    section,
+    table,
+)
 from cmm_uq.certificate.plots.residuals import tolerance_plot
 from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.sections.first_page import subject_of, tolerances_of
-from cmm_uq.certificate.wording import OUTCOME_WORDS, expanded, title_of
+from cmm_uq.certificate.sections.conformity import has_picture, named, picture
+from cmm_uq.certificate.wording import (
+    CERTAIN,
+    OUTCOME_WORDS,
+    Headline,
+    Summary,
+    expanded,
+    figure_row,
+    measured,
+    probability,
+    stated_row,
+    stated_value,
+    title_of,
+)
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.verdicts import Verdict
-from cmm_uq.maths.uncertainty.quantity import Quantity, rounded
+from cmm_uq.jobs.verdicts import GRAVEST, NONE, Verdict, gravest, standing_of
+from cmm_uq.maths.uncertainty.quantity import Quantity, limit_in_full, rounded, significant
 
 SIGN = say("Sign rule: true coordinate = indicated coordinate + error.")
 
@@ -29,22 +55,19 @@ def stated_table(
     caption: Text, named: Iterable[tuple[Text, Quantity]], notes: tuple[Text, ...] = (), *, what: Text = say("Quantity"),
     value: Text = say("Value"),
 ) -> Table:  # fmt: skip
-    columns = (*text_columns(what), *figure_columns(value, say("U"), say("k")), *text_columns(say("Unit")))
-    return Table(caption, columns, tuple((name, *expanded(one), one.unit) for name, one in named), notes)
+    heads = (what, Column(value), Column(say("U")), Column(say("k")), say("Unit"))
+    return Table(caption, columns(heads), tuple((name, *expanded(one), one.unit) for name, one in named), notes)
 
 
 def performance(result: Result) -> Section:
     """Figures of the lengths; without blocks for an artefact that has none."""
-    title = say("Figures of performance")
-    if not result.accuracy:
-        return Section(title, ())
+    title, named = say("Figures of performance"), [(TITLES[name], one) for name, one in result.accuracy.items()]
     measurand = say(
         "Each figure estimates what the machine would show on average if the recording were "
         "repeated; all recorded lengths count. The test value of a statement of conformity is another quantity, that of "
         "this recording alone, and its U is the test uncertainty."
     )
-    named = [(TITLES[name], quantity) for name, quantity in result.accuracy.items()]
-    return Section(title, (stated_table(title, named, (UNCERTAINTY, measurand)),))
+    return section(title, stated_table(title, named, (UNCERTAINTY, measurand)) if named else None)
 
 
 def error_factors(result: Result) -> Section:
@@ -53,26 +76,26 @@ def error_factors(result: Result) -> Section:
     contradicted = {one.key for one in result.contradictions}
     fitted = {unknown.key: value for unknown, value in zip(ls.unknowns, ls.value, strict=True)}
     rows: list[tuple[Text, ...]] = []
-    for effect in result.model.effects:
-        for name, quantity in result.parameters[effect.name].items():
-            key = (effect.name, name)
-            value, U, k = expanded(quantity)
-            if key in result.not_given:
-                why = say("not given") if key in contradicted else say("not determined")
-                rows.append((title_of(key, result), why, NOTHING, NOTHING, NOTHING, quantity.unit))
-                continue
-            least = rounded(float(fitted[key]), quantity.expanded)[0] if key in fitted else NOTHING
-            rows.append((title_of(key, result), value, U, k, least, quantity.unit))
+    for key, quantity in reported(result):
+        if key in result.not_given:
+            why = say("not given") if key in contradicted else say("not determined")
+            rows.append((title_of(key, result), why, NOTHING, NOTHING, NOTHING, quantity.unit))
+            continue
+        least = rounded(float(fitted[key]), quantity.expanded)[0] if key in fitted else NOTHING
+        rows.append((title_of(key, result), *expanded(quantity), least, quantity.unit))
     least_squares = say("Least squares, named model") if result.averaged else say("Least squares")
-    columns = (
-        *text_columns(say("Error factor")), *figure_columns(say("Estimate"), say("U"), say("k"), least_squares),
-        *text_columns(say("Unit")),
-    )  # fmt: skip
-    notes = (SIGN, UNCERTAINTY)
-    blocks: list[Block] = [Table(say("Error factors of the machine"), columns, tuple(rows), notes)] if rows else []
-    for combination in result.undetermined:
-        blocks += _free_combination(result, combination)
-    return Section(say("Error factors"), tuple(blocks))
+    figures = (Column(head) for head in (say("Estimate"), say("U"), say("k"), least_squares))
+    factors = table(
+        say("Error factors of the machine"), (say("Error factor"), *figures, say("Unit")), rows, SIGN, UNCERTAINTY
+    )
+    free = (block for combination in result.undetermined for block in _free_combination(result, combination))
+    return section(say("Error factors"), factors, *free)
+
+
+def reported(result: Result) -> Iterator[tuple[tuple[str, str], Quantity]]:
+    """Every parameter of the named effects, by its key."""
+    for effect in result.model.effects:
+        yield from (((effect.name, name), quantity) for name, quantity in result.parameters[effect.name].items())
 
 
 def _free_combination(result: Result, combination: tuple[tuple[str, str], ...]) -> list[Block]:
@@ -86,10 +109,8 @@ def _free_combination(result: Result, combination: tuple[tuple[str, str], ...]) 
         (say("{second} − {first}", second=title_of(one.second, result), first=title_of(one.first, result)), one.quantity)
         for one in result.differences(combination)
     ]  # fmt: skip
-    if not named:
-        return [words]
     caption = say("Differences that are determined")
-    return [words, stated_table(caption, named, what=say("Difference"), value=say("Estimate"))]
+    return [words, *([stated_table(caption, named, what=say("Difference"), value=say("Estimate"))] if named else [])]
 
 
 Left = tuple[str, str, Text, Quantity]  # group and name of a quantity in results.json, its title, and what it is now.
@@ -99,31 +120,28 @@ def as_found_section(job: Job, left: Iterable[Left], verdicts: Iterable[Verdict]
     """Quantities and decisions as found beside those ``left`` (lengths: ``accuracy``); no blocks where nothing is as found."""
     title, found = say("As found and as left"), job.as_found
     if found is None:
-        return Section(title, ())
-    told = say(
-        "As found: {job}{date}, before the machine was adjusted. As left: this measurement.",
-        job=Verbatim(found.job.id), date=say(", measured on {date}", date=day(found.job.date)) if found.job.date else NOTHING,
-    )  # fmt: skip
-    blocks: list[Block] = [Paragraph(told)]
+        return section(title)
+    date = say(", measured on {date}", date=day(found.job.date)) if found.job.date else NOTHING
+    told = say("As found: {job}{date}, before the machine was adjusted. As left: this measurement.",
+               job=Verbatim(found.job.id), date=date)  # fmt: skip
     rows = []
     for group, name, quantity, now in left:
         if (before := found.figure(group, name)) is not None:
             low, high = before.interval95
             then = Quantity(before.value, before.u, (low, high), now.unit)
             rows.append((quantity, *expanded(then)[:2], *expanded(now)[:2], now.unit))
-    if rows:
-        heads = (*text_columns(say("Quantity")), *figure_columns(say("As found"), say("U"), say("As left"), say("U")),
-                 *text_columns(say("Unit")))  # fmt: skip
-        note = say("U is the expanded uncertainty for a coverage probability of 95 %.")
-        blocks.append(Table(say("The machine as found and as left"), heads, tuple(rows), (note,)))
-    decided = tuple(
+    figures = (Column(head) for head in (say("As found"), say("U"), say("As left"), say("U")))
+    note = say("U is the expanded uncertainty for a coverage probability of 95 %.")
+    heads = (say("Statement"), say("As found"), say("As left"))
+    decided = (
         (subject_of(now), *(OUTCOME_WORDS.get(name, Verbatim(name)) for name in (before.outcome, now.outcome)))
         for now in verdicts for before in found.stated if (before.by, before.name) == (now.by, now.name)
     )  # fmt: skip
-    if decided:
-        columns = text_columns(say("Statement"), say("As found"), say("As left"))
-        blocks.append(Table(say("Statements of conformity as found and as left"), columns, decided))
-    return Section(title, tuple(blocks))
+    return section(
+        title, Paragraph(told),
+        table(say("The machine as found and as left"), (say("Quantity"), *figures, say("Unit")), rows, note),
+        table(say("Statements of conformity as found and as left"), heads, decided),
+    )  # fmt: skip
 
 
 def quantities_left(result: Result) -> list[Left]:
@@ -144,28 +162,27 @@ def as_found_data(job: Job) -> dict[str, Any]:
     return {"as_found": found}
 
 
-_WORDS = {"pass": say("in"), "fail": say("out"), "undecided": say("open")}
+_TOLERANCES = say("Tolerances by parameter")
+_INSIDE = {"pass": say("in"), "fail": say("out"), "undecided": say("open")}
 
 
 def tolerance_sections(result: Result) -> list[Section]:
     """Every parameter with a tolerance; none when the job sets none."""
-    toleranced = tolerances_of(result)
+    toleranced, title = tolerances_of(result), _TOLERANCES
     left_out = sorted(one.name.partition(".")[0] for one in toleranced if one.value is None)
     unknown = say("Not determined by this recording, so not judged: {left_out}.", left_out=listed(names(left_out)))
     judged = [one for one in toleranced if one.value is not None]
-    title = say("Tolerances by parameter")
     if not judged:
-        return [Section(title, (Paragraph(unknown),))] if left_out else []
+        return [section(title, Paragraph(unknown))] if left_out else []
     rows, ratios = [], []
     for one in judged:
         effect, _, parameter = one.name.partition(".")
         quantity, tolerance = result.parameters[effect][parameter], result.job.facts.model.tolerances[effect]
         value, U, _ = expanded(quantity)
-        rows.append((one.title, value, U, number(tolerance, "g"), one.unit, _WORDS[one.outcome]))
+        rows.append((one.title, value, U, number(tolerance, "g"), one.unit, _INSIDE[one.outcome]))
         part = quantity.times(1 / tolerance, unit("1"))
         ratios.append((part.value, *part.interval95))
-    columns = (*text_columns(say("Parameter")), *figure_columns(say("Estimate"), say("U"), say("Tolerance")),
-               *text_columns(say("Unit"), say("Verdict")))  # fmt: skip
+    figures = (Column(head) for head in (say("Estimate"), say("U"), say("Tolerance")))
     notes = (say("In or out: the whole 95 % interval is; otherwise open."), *((unknown,) if left_out else ()))
     out = [one.title for one in judged if one.outcome == "fail"]
     plot = tolerance_plot(
@@ -173,4 +190,161 @@ def tolerance_sections(result: Result) -> list[Section]:
         caption=say("Each parameter over its tolerance, with its 95 % interval."),
         alternative=say("Out of tolerance: {out}.", out=listed(out)) if out else say("No parameter is out of tolerance."),
     )  # fmt: skip
-    return [Section(title, (plot, Table(say("Parameters and tolerances"), columns, tuple(rows), notes)))]
+    return [
+        section(
+            title,
+            plot,
+            table(
+                say("Parameters and tolerances"),
+                (say("Parameter"), *figures, say("Unit"), say("Verdict")),
+                rows,
+                *notes,
+            ),
+        )
+    ]
+
+
+def summary(result: Result, warnings: Iterable[Text]) -> Summary:
+    facts, artefact = result.job.facts, result.artefact
+    machine = Verbatim(facts.machine.name)
+    subject = say("{machine}, {artefact:small}, {count} observations",
+                  machine=machine, artefact=artefact.title, count=len(result.residuals))  # fmt: skip
+    figures = [figure_row(TITLES[name], quantity) for name, quantity in result.accuracy.items()]
+    figures += [figure_row(size.title, result.sizes[size.name]) for size in artefact.sizes if size.role == "sought"]
+    figures += [
+        figure_row(title_of(key, result), one, known=key not in result.not_given) for key, one in reported(result)
+    ]
+    remarks = (*map(_remarks, result.statements), *map(_tolerance_remarks, tolerances_of(result)))
+    decided = tuple(
+        Headline(one.outcome.upper(), one.standing, subject_of(one), tuple(told))
+        for one, told in zip(result.verdicts, remarks, strict=True)
+    )
+    return Summary(subject, day(facts.job.date), decided, tuple(figures), warnings=tuple(warnings))
+
+
+def subject_of(one: Verdict) -> Text:
+    """What is decided: standard and characteristic, or a parameter with its tolerance."""
+    if one.by:
+        return say("{standard}, {what}", standard=Verbatim(one.by), what=Verbatim(one.name))
+    limit = limit_in_full(one.limit or 0.0)
+    return say("{title}, tolerance {limit} {unit}", title=one.title, limit=limit, unit=one.unit)
+
+
+def tolerances_of(result: Result) -> list[Verdict]:
+    return [one for one in result.verdicts if not one.by]
+
+
+def _tolerance_remarks(one: Verdict) -> list[Text]:
+    if one.value is None or one.U is None:
+        return list(one.missing)
+    value, U = rounded(one.value, one.U)
+    return [say("{value} ± {u} {unit}", value=value, u=U, unit=one.unit)]
+
+
+def _remarks(statement: Statement) -> list[Text]:
+    """Value, limit, uncertainty and probability of a statement; what its test lacks."""
+    value, _ = measured(statement)
+    chance = statement.decision.probability_conforming
+    told: list[Text] = [say("{value} µm against {limit} µm", value=value, limit=limit_in_full(statement.limit_um))]
+    if statement.u_um > 0:
+        told.append(say("test uncertainty U = {u} µm (k = 2)", u=significant(2 * statement.u_um)))
+    if chance is not None:
+        told.append(say("conforming with {chance}", chance=_chance(chance)))
+    if statement.outcome == "incomplete":
+        told = [say("the {measured} measured conform ({figures})", measured=statement.measured, figures=commas(told))]
+    if statement.missing:
+        told.append(say("missing: {what}", what=semicolons(statement.missing)))
+    return told
+
+
+def _chance(p: float) -> Text:
+    if p < CERTAIN:
+        return say("less than\u00a0{p}\u00a0%", p=number(100 * CERTAIN, "g"))
+    if p > 1 - CERTAIN:
+        return say("more than\u00a0{p}\u00a0%", p=number(100 * (1 - CERTAIN), "g"))
+    return probability(p)
+
+
+_MOST = 8  # statements in the box; of more the gravest, all are behind the page
+_ROWS = 16  # of a table that the first page has room for
+
+_WORDS: Mapping[str, Text] = {
+    "fail": say("Does not conform"),
+    "conditional fail": say("Does not conform, within the uncertainty of the measurement"),
+    "remeasure": say("Not decided: the standard asks for further readings"),
+    "undecided": say("Not decided: the value is nearer to its limit than its uncertainty"),
+    "incomplete": say("Incomplete: conformity is not stated"),
+    "conditional pass": say("Conforms, within the uncertainty of the measurement"),
+}
+
+
+def overview_of(result: Result) -> Overview | None:
+    """The verdict on the whole and each statement behind it; nothing where nothing is stated."""
+    verdicts = result.verdicts
+    if verdicts.overall == NONE:
+        return None
+    signed = {i: statement.signed for i, statement in enumerate(result.statements)}
+    rows = [(subject_of(one), _row(one, signed=signed.get(i, True))) for i, one in enumerate(verdicts)]
+    if (more := len(rows) - _MOST) > 0:
+        order = sorted(range(len(rows)), key=lambda i: _gravity(verdicts[i].outcome))[:_MOST]
+        further = say("Further statements"), say("{count}, behind this page", count=more)
+        rows = [*(rows[i] for i in sorted(order)), further]
+    return Overview(_verdict(verdicts), standing_of(verdicts.overall), (*rows, *_lacking(verdicts), *_rules(result)))
+
+
+def _gravity(outcome: str) -> int:
+    return GRAVEST.index(outcome) if outcome in GRAVEST else GRAVEST.index("undecided")
+
+
+def _verdict(verdicts: Sequence[Verdict]) -> Text:
+    overall, count = gravest(one.outcome for one in verdicts), len(verdicts)
+    if overall == "pass":
+        many = say("Conforms: all {count} statements of conformity", count=count)
+        return plural(count, one=say("Conforms"), many=many)
+    words = _WORDS.get(overall, OUTCOME_WORDS.get(overall, say("Not decided")))
+    if count == 1:
+        return words
+    alike = sum(one.outcome == overall for one in verdicts)
+    return say("{words}: {alike} of {count} statements of conformity", words=words, alike=alike, count=count)
+
+
+def _row(one: Verdict, *, signed: bool) -> Text:
+    if one.value is None:
+        outcome = OUTCOME_WORDS.get(one.outcome, say("undecided"))
+        return say("{outcome}: not determined by this recording", outcome=outcome)
+    value = stated_value(one.value, one.U, signed=signed)
+    return stated_row(one.outcome, value, one.unit, one.limit if one.by else None)
+
+
+def _lacking(verdicts: Sequence[Verdict]) -> list[tuple[Text, Text]]:
+    """The first of what statements lack, and how much more there is."""
+    lacking = list(dict.fromkeys(what for one in verdicts if one.value is not None for what in one.missing))
+    shown, more = semicolons(lacking[:2]), len(lacking) - 2
+    if more > 0:
+        shown = say("{shown}; {count} more behind this page", shown=shown, count=more)
+    return [(say("Missing"), shown)] if lacking else []
+
+
+def _rules(result: Result) -> list[tuple[Text, Text]]:
+    told = [rule_words(one.facts.rule) for one in result.statements]
+    if len(result.verdicts) > len(result.statements):
+        told.append(say("tolerances: the whole 95 % interval must lie within"))
+    return [(say("Decision rule"), semicolons(dict.fromkeys(told)))]
+
+
+def with_first(result: Result, sections: Sequence[Section]) -> list[Section]:
+    """Sections, with the first page's: the picture of the gravest statement, else of the tolerances, else the main figures."""
+    shown = min((s for s in result.statements if has_picture(s)), key=lambda s: _gravity(s.outcome), default=None)
+    plot: Plot | None = None
+    if shown is not None:
+        plot = picture(shown)
+    elif len(result.verdicts) > len(result.statements):
+        plot = next((b for s in sections if s.title == _TOLERANCES for b in s.blocks if isinstance(b, Plot)), None)
+    if plot is None:
+        first, *others = (section for section in sections if section.blocks)
+        rows = sum(len(block.rows) for block in first.blocks if isinstance(block, Table))
+        return [replace(first, first=rows <= _ROWS), *others]
+    rest = [replace(section, blocks=tuple(b for b in section.blocks if not (isinstance(b, Plot) and b.svg == plot.svg)))
+            for section in sections]  # fmt: skip
+    title = named(shown) if isinstance(shown, Statement) else _TOLERANCES
+    return [Section(say("{what} against the limits", what=title), (plot,), first=True), *rest]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, names, say, semicolons, sentences
 from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE, Unit, unit
-from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
+from cmm_uq.certificate.document import Block, Facts, Paragraph, Section, section
 from cmm_uq.certificate.wording import NO_FACTOR, expanded
 from cmm_uq.jobs.chain import TraceabilityChain, chain_of
 from cmm_uq.jobs.job import Job
@@ -25,24 +25,21 @@ if TYPE_CHECKING:
 
 
 def traceability_section(job: Job, rows: tuple[tuple[Text, Text], ...], *further: Block) -> Section:
-    facts = Facts(tuple((label, text) for label, text in (*rows, *_instruments(job)) if text))
-    said = (Paragraph(claimed(job).statement),) if job.origin == MEASURED else ()
-    return Section(say("Artefact and traceability"), (facts, *said, *further))
-
-
-def _instruments(job: Job) -> list[tuple[Text, Text]]:
-    """What temperatures were read from, each with its certificate; by what a recording was taken live, and what it lacks."""
-    rows: list[tuple[Text, Text]] = [
-        (say("Thermometer"), sentences((*names(filter(None, (one.name, one.serial))), *_listed(one.certificate))))
-        for one in job.facts.thermometer
-    ]
-    rows += [(say("Imported file"), recognised.sentence) for recognised in job.imported]
-    if (taken := job.acquired) is not None:
-        rows += [
+    """The artefact, what temperatures were read from, and by what a recording was taken live, each with its certificate."""
+    facts, taken = job.facts, job.acquired
+    every_row = [
+        *rows,
+        *((say("Thermometer"), sentences((*names(filter(None, (one.name, one.serial))), *_listed(one.certificate))))
+          for one in facts.thermometer),
+        *((say("Imported file"), recognised.sentence) for recognised in job.imported),
+    ]  # fmt: skip
+    if taken is not None:
+        every_row += [
             (say("Recording"), taken.sentence), (say("Instruments"), semicolons(taken.instruments)),
             (say("Joined by time"), semicolons(taken.joins)), (say("Gaps"), semicolons(taken.gaps)),
         ]  # fmt: skip
-    return rows
+    said = Paragraph(claimed(job).statement) if job.origin == MEASURED else None
+    return section(say("Artefact and traceability"), Facts(tuple(row for row in every_row if row[1])), said, *further)
 
 
 def artefact_rows(job: Job, otherwise: Text) -> list[tuple[Text, Text]]:

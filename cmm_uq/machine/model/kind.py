@@ -43,11 +43,11 @@ class Kind:
     observe : makes an artefact of points; ``None`` where the recording is no points of an artefact.
     screen : a :class:`~cmm_uq.analysis.screening.shape.Screening`.
     plan : a :class:`~cmm_uq.analysis.planning.setting.Planning`.
-    page : a :class:`~cmm_uq.certificate.outcome.Page`.
+    page : a :class:`~cmm_uq.certificate.result.Page`.
     begin : a :class:`~cmm_uq.jobs.beginning.Beginning`: what a new job of the kind begins with.
     begin_also : the same for a further way of it, by the name that it is asked for by.
     check : ``(job)``: what its own analysis refuses, before anything is estimated.
-    own : a :class:`~cmm_uq.certificate.outcome.OwnAnalysis`, where its errors are no list of effects.
+    own : a :class:`~cmm_uq.certificate.result.OwnAnalysis`, where its errors are no list of effects.
     tested : what of it a standard may be decided on: :data:`LENGTHS`, :data:`BARS`, :data:`FORMS`, or a word of its own.
     refusal, instead : why some command cannot serve it, with ``{}`` for what cannot be done, and what can be done.
     """

@@ -17,11 +17,11 @@ from cmm_uq.app.commands.report import evaluate as analyse_observations, outcome
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.points import Machine
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.diagnosis.sections import costs_data, costs_section
+from cmm_uq.certificate.diagnosis.sections import costs_section
 from cmm_uq.certificate.document import Table
-from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.certificate.result import JobDiagnosis, Result
-from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.certificate.origin import as_json
+from cmm_uq.certificate.result import JobDiagnosis, Outcome, Result
+from cmm_uq.certificate.results.contents import costs_data
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import EVERY, effects
 from tests.artefacts.reading import tables

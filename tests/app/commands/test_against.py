@@ -13,8 +13,8 @@ import pandas as pd
 import pytest
 
 import cmm_uq
-from cmm_uq.app.commands.against import Against, against_simulation
 from cmm_uq.app.commands.diagnose import write_diagnosis
+from cmm_uq.app.commands.model import Against, against_simulation
 from cmm_uq.app.commands.reading import compared_with_frame
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.job import Job

@@ -17,21 +17,30 @@ from cmm_uq.app.api import calls as beginning
 from cmm_uq.app.commands.budget import write_budget
 from cmm_uq.app.commands.diagnose import diagnosis_outcome
 from cmm_uq.app.commands.jobs.check import check_job, check_read
-from cmm_uq.app.commands.jobs.folder import BUDGET, PLAN, README, RECORDING, SCHEMA
-from cmm_uq.app.commands.jobs.new import job_of_export, known, new_job, titles, write_new
+from cmm_uq.app.commands.jobs.new import (
+    BUDGET,
+    PLAN,
+    README,
+    RECORDING,
+    SCHEMA,
+    job_of_export,
+    known,
+    new_job,
+    titles,
+    write_new,
+)
 from cmm_uq.app.commands.parts.new import PART
 from cmm_uq.app.commands.plans.plan import write_plan
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.app.commands.report import report_outcome
 from cmm_uq.artefacts import BUILT_IN, kind_named
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.origin import origin_warnings
+from cmm_uq.certificate.origin import as_json, origin_warnings
 from cmm_uq.certificate.results.keys import RESULTS, described
-from cmm_uq.certificate.results.plain import as_json
 from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.origin import SIMULATED
-from tests.app.commands.test_schemas import dated
+from tests.app.commands.test_budget import dated
 from tests.plugin.packages import OUTSIDE_KINDS, install
 
 NAMES = (*BUILT_IN, "shift_plate")

@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.planning.candidates import ready_plan
-from cmm_uq.app.commands.plans.page import plan_document
+from cmm_uq.app.commands.plans.page import combination, plan_document
 from cmm_uq.app.commands.plans.plan import plan_results
 from cmm_uq.app.commands.plans.planning import MeasurementPlan, make_plan
-from cmm_uq.app.commands.plans.words import combination
 from cmm_uq.app.commands.reading import read_job
+from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.plots.plans import gain_plot, placing_pictures
 from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.results.plain import as_json
 from tests.analysis.planning.plans import EVERY_KIND, setting
 from tests.app.commands.test_planning import JOB, SIX
 

@@ -1,4 +1,4 @@
-"""A job is planned: what it asks for is what it gets, and a better plan is better."""
+"""Plans of jobs, and how they are said."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cmm_uq.app.commands.plans.page import combination
 from cmm_uq.app.commands.plans.planning import RECORDED, SPREAD, MeasurementPlan, make_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Message
+from cmm_uq.machine.model.measurement import ARTEFACT
 from tests.conftest import ROOT
 
 JOB = """
@@ -218,3 +221,17 @@ def test_where_the_standard_plan_is_not_possible_a_criterion_finds_another(tmp_p
 def test_a_plate_shifted_in_a_plane_is_left_to_its_report() -> None:
     with pytest.raises(CmmUqError, match="are not planned"):
         make_plan(read_job(ROOT / "examples" / "shift-plate-simulated", recorded=False))
+
+
+@pytest.mark.parametrize(("effects", "sizes", "words"), [
+    (["scale_x"], 0, "Scale error of X: nothing shows of it"),
+    (["scale_x", "scale_y", "scale_z"], 1, "Scale error of X, Y and Z together, with the artefact's own length"),
+    (["squareness_xy", "hysteresis_x", "squareness_zx"], 0, "Squareness X–Y and Z–X and Hysteresis of X together"),
+    (["artefact_sag", "scale_x"], 0, "Sag of the artefact and Scale error of X together"),
+    ([], 1, "The artefact's own length"), ([], 2, "The artefact's own dimensions"),
+])  # fmt: skip
+def test_a_free_combination_in_words(effects: list[str], sizes: int, words: str) -> None:
+    parts = {(effect, "p"): 1.0 for effect in effects} | {(ARTEFACT, f"size_{i}_mm"): 1.0 for i in range(sizes)}
+    found = combination(parts)
+    assert found == words
+    assert isinstance(found, Message)

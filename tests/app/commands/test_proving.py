@@ -20,8 +20,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.proof.page import proof_document
-from cmm_uq.certificate.proof.results import KEYS, RATE, proof_outcome, proof_results
+from cmm_uq.certificate.proof.page import KEYS, RATE, proof_document, proof_outcome, proof_results
 from cmm_uq.certificate.proof.sections import DiagnosisProof
 from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH
 from cmm_uq.machine.physics.catalogue import every

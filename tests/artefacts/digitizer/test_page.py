@@ -14,7 +14,7 @@ from cmm_uq.artefacts.digitizer import THREE as PLANNED, DigitizerArtefact, scan
 from cmm_uq.artefacts.digitizer_page import DigitizerFigures, results
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.document import Paragraph
-from cmm_uq.certificate.sections.first_page import summary
+from cmm_uq.certificate.sections.results import summary
 from cmm_uq.machine.physics.digitizer import euler_313
 from tests.artefacts.digitizer.aligned import OFFSET, THREE
 from tests.artefacts.reading import number

@@ -13,7 +13,7 @@ from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.artefacts.shift.axis import ShiftResult
 from cmm_uq.artefacts.shift.axis_page import shift_results
 from cmm_uq.certificate.document import Document, Plot
-from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.certificate.origin import as_json
 from tests.artefacts.reading import number, tables
 from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT

@@ -12,7 +12,7 @@ from cmm_uq.artefacts.shift.placed_plate import placed_plate
 from cmm_uq.artefacts.shift.plane import PlaneShiftResult, estimate_plane
 from cmm_uq.artefacts.shift.plane_page import plane_shift_results, sections, warnings
 from cmm_uq.certificate.document import Document, Paragraph, Plot, Table
-from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.certificate.origin import as_json
 from tests.artefacts.reading import number, tables
 from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT

@@ -17,7 +17,7 @@ from scipy import stats
 
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.certificate.digital_certificate.certificate import IN_THE_SCHEMA, digital_certificate
-from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.wording import OUTCOME_WORDS
 from cmm_uq.jobs.dcc import Certificate, read, written
 from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity, StatementMetadata as Statement

@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 from lxml import etree
 
 from cmm_uq.certificate.digital_certificate.certificate import digital_certificate
-from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.certificate.origin import as_json
 from cmm_uq.jobs.dcc import Certificate, read, written
 from cmm_uq.jobs.dcc.quantities import Expanded, Real
 from cmm_uq.jobs.job import Job

@@ -37,7 +37,7 @@ from cmm_uq.certificate.wording import effect_title
 from cmm_uq.jobs.part.job import TABLES
 from tests.certificate.parts_found import ERRORS, STANDING as CERTIFICATE, found_of, measured_points
 from tests.certificate.saying import leaves, strangers
-from tests.certificate.test_customers_words import mentioned
+from tests.certificate.test_completeness import mentioned
 from tests.certificate.test_html_layout import LABELS_COLLIDING, OVERLAPS
 from tests.jobs.part.parts import plate
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from cmm_uq.app.commands.prove_case import model_on
+from cmm_uq.app.commands.prove import model_on
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.points import Floats

@@ -26,7 +26,7 @@ from cmm_uq.app.commands.reading import in_language, job_of
 from cmm_uq.app.commands.report import REPORT, report_outcome
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import ENGLISH, code_of
-from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.certificate.origin import as_json
 from cmm_uq.jobs.importing.recording import header, is_own
 from cmm_uq.jobs.job import Recorded
 from cmm_uq.jobs.verdicts import Verdicts

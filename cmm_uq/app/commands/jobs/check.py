@@ -57,7 +57,6 @@ class Problem:
 
     @classmethod
     def of(cls, error: CmmUqError) -> Problem:
-        """What an error says."""
         where = error.where or ""
         match = _KEY_BEHIND.fullmatch(where) or _PLACE.fullmatch(where)
         parts = {} if match is None else {name: value or "" for name, value in match.groupdict().items()}
@@ -108,7 +107,6 @@ class JobCheck:
 
 @naming_package()
 def check_job(folder: Path) -> JobCheck:
-    """Check a job."""
     wrong, path = Gathered(), folder if folder.suffix == ".toml" else folder / "job.toml"
     job, of_part = None, False
     with contextlib.suppress(CmmUqError):
@@ -124,7 +122,6 @@ def check_job(folder: Path) -> JobCheck:
 
 @naming_package()
 def check_read(job: Job) -> JobCheck:
-    """Check a job that was read."""
     return _checked(job.facts.job.id, job, job.folder / "job.toml", Gathered())
 
 
@@ -194,7 +191,6 @@ def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
 
 
 def _to_be_known(job: Job, path: Path) -> list[Problem]:
-    """What the certificate would warn of, whatever was measured."""
     if job.origin != MEASURED:
         said = f"the recording is {job.origin}, and all that is made of it says so"
         return [Problem(said, str(path), key="[job] origin", fix="Put in your own readings for a certificate")]
@@ -244,12 +240,11 @@ def _line_of(key: str, text: str) -> int | None:
     """Line of a key such as ``[artefact] u_um``, or of its table."""
     from cmm_uq.base.files.toml_file import line_of
 
-    found = _TABLE_KEY.match(key)
+    found, entry = _TABLE_KEY.match(key), re.match(r"\[\[\w+\]\] (\d+) ?(\w*)", key)
     if found is None:
         return None
-    number = re.match(r"\[\[\w+\]\] (\d+) ?(\w*)", key)
-    if number:
-        return line_of([found[1], str(int(number[1]) - 1), number[2]], text)
+    if entry:
+        return line_of([found[1], str(int(entry[1]) - 1), entry[2]], text)
     return line_of([*found[1].split("."), *found[2].split(".")], text)
 
 

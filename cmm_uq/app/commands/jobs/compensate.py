@@ -62,7 +62,7 @@ def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict
 
 def write_compensated(
     job: Path, out: Path, *, beyond: Beyond = "refuse", map_text_c: float | None = None, force: bool = False
-) -> dict[str, Path]:  # fmt: skip
+) -> dict[str, Path]:
     """Write a job folder with the compensated recording, marked as such; its job.toml names no error map any more.
 
     map_text_c : temperature, °C, at which the error map is written beside it in the contractors' text form.
@@ -83,7 +83,6 @@ def compensated_job(job: Job, *, beyond: Beyond = "refuse") -> Job:
 
 
 def _refuse(read: Job) -> None:
-    """Refuse what is not compensated, or not in one go."""
     if is_compensated(read):
         raise CmmUqError("is compensated already", where=f"{read.folder / 'job.toml'} [job] origin",
                          fix="Compensate the measured recording")  # fmt: skip
@@ -102,7 +101,7 @@ def _files(read: Job, beyond: Beyond, text: Mapping[str, bytes]) -> dict[str, by
         recording_name(read): first_line("compensate", PROGRAM, f"; see {PROVENANCE}").encode() + recording(points),
         **text,
         PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
-    }  # fmt: skip
+    }
     toml = derived_toml(read, "compensate", files, without=("error_map", "squareness_arcsec", *IN_THE_RECORDING))
     return {"job.toml": toml, **files}
 

@@ -29,7 +29,6 @@ _MARK = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*")
 
 @naming_package()
 def read_export(path: Path, keys: ImportKeys | None = None) -> ImportedTable:
-    """A file in any format that is known."""
     content = content_of(path, TABLE_BYTES, "Check its name")
     found = imported(content, str(path), keys or ImportKeys())
     points_of(found.columns, found.lines.tolist(), str(path), Machine())  # refused as a job refuses it
@@ -86,7 +85,6 @@ _FIX = "Name the results.json of a report, or the folder it lies in"
 
 
 def write_qif(report: Path, out: Path | None = None) -> Path:
-    """Write the results of a report as QIF."""
     path = report / RESULTS if report.is_dir() else report
     found = read_results(
         ReportResults, content_of(path, TABLE_BYTES, _FIX), str(path), "is no results.json of a report", _FIX

@@ -37,7 +37,6 @@ def job() -> Schema:
 
 
 def budget() -> Schema:
-    """Of a measurement model of one's own, or of a ready budget."""
     from cmm_uq.maths.uncertainty.budgets.tables import TABLES
     from cmm_uq.maths.uncertainty.models.model_file import ModelFileTable
 
@@ -66,7 +65,6 @@ SCHEMAS: Mapping[str, Callable[[], Schema]] = MappingProxyType({
 
 @naming_package()
 def schema_named(name: str) -> Schema:
-    """One of :data:`SCHEMAS`."""
     if name not in SCHEMAS:
         raise CmmUqError(f"there is no schema {name!r}", fix=suggestion(name, SCHEMAS))
     return SCHEMAS[name]()

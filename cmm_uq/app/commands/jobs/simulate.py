@@ -85,7 +85,7 @@ def _placed(where: str, *, always: bool = False) -> Iterator[None]:
 
 def write_simulation(
     job: Path, truth: Path, out: Path, *, seed: int | None = None, force: bool = False
-) -> dict[str, Path]:  # fmt: skip
+) -> dict[str, Path]:
     """Write a job folder with a simulated recording, marked as such, and the truth that it was drawn from."""
     read = read_job(job)
     kind_of(read).observing("simulated")

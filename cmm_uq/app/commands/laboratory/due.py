@@ -184,8 +184,8 @@ def _write(
 ) -> dict[str, Path]:
     """Write ``NAME.html``, ``NAME.json`` and what else there is, by the ends of names, all or none."""
     from cmm_uq.base.output import Owner, staged
+    from cmm_uq.certificate.origin import as_json
     from cmm_uq.certificate.render.html import render_html
-    from cmm_uq.certificate.results.plain import as_json
 
     files = [f"{name}.{end}" for end in ("html", "json", *further)]
     with staged(folder, Owner(name, owner), force=force, expected=files) as place:
@@ -195,7 +195,7 @@ def _write(
 
 def write_due(found: WhatIsDue, folder: Path, *, force: bool = False) -> dict[str, Path]:
     """Write ``due.html`` and ``due.json``, all or none."""
-    from cmm_uq.certificate.pages.due import due_document
+    from cmm_uq.certificate.pages.fleet import due_document
 
     document = due_document(found.items, found.on, found.within)
     return _write("due", "records", folder, document, found.data(), force=force)

@@ -108,10 +108,10 @@ def written(
 
 def contents_of(found: PartMeasurement, stage: Stage = silent, *, finished: Finished = unchanged) -> dict[str, bytes]:
     """Bytes of every file, by name."""
+    from cmm_uq.certificate.origin import as_json
     from cmm_uq.certificate.part.results import part_results
     from cmm_uq.certificate.render.html import render_html
     from cmm_uq.certificate.render.pdf import render_pdf
-    from cmm_uq.certificate.results.plain import as_json
 
     job = found.job
     if RESULTS in job.inputs:

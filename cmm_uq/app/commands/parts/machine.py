@@ -249,7 +249,7 @@ def _checks(found: Verification) -> tuple[VerificationCheck, ...]:
 def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
     """What the machine's job gives when it is analysed here."""
     from cmm_uq.app.commands.report import evaluate_job, outcome_of
-    from cmm_uq.certificate.results.plain import as_json
+    from cmm_uq.certificate.origin import as_json
 
     named = str(job.facts.machine_state.job)
     attached = attached_calibration(job)

@@ -1,39 +1,144 @@
-"""A plan as a document for the operator and for whoever answers for it."""
+"""A plan in words: what its placings determine, what they leave open, how the operator sets the artefact up."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.analysis.diagnosis.power import POWER, SIZES
+from cmm_uq.analysis.planning.identifiability import Determination, Identifiability
 from cmm_uq.app.commands.plans.planning import RECORDED, MeasurementPlan
-from cmm_uq.app.commands.plans.words import (
-    CRITERIA,
-    STATUS,
-    absorbed,
-    combination,
-    expected,
-    expected_white,
-    named,
-    pairs,
-    parameter_name,
-    parameter_unit,
-    smallest,
-    title_of,
-    unit_of,
-)
-from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, names, number, plural, say
+from cmm_uq.base.messages import DASH, NOTHING, Message, Text, Verbatim, commas, listed, names, number, plural, say
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
+from cmm_uq.certificate.document import (
+    Block,
+    Column,
+    Document,
+    Facts,
+    Paragraph,
+    Table,
+    columns,
+    section,
+    table,
+    working_page,
+)
 from cmm_uq.certificate.origin import program
 from cmm_uq.certificate.plots.plans import gain_plot, placing_pictures
+from cmm_uq.certificate.wording import effect_title
+from cmm_uq.machine.model.measurement import ARTEFACT
+from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.maths.inference.linear_model import Unknown
+
+STATUS = {
+    "determined": say("determined"),
+    "weak": say("weakly: hardly better than physics allows"),
+    "free": say("not determined"),
+}
+
+CRITERIA = {
+    "separation": say("effects told apart best"),
+    "D": say("smallest volume of uncertainty (D)"),
+    "A": say("smallest mean variance (A)"),
+    "worst": say("smallest of the largest uncertainties (worst case)"),
+}
+
+
+def combination(parts: Mapping[tuple[str, str], float]) -> Text:
+    """A free combination in words: ``scale error of X, Y and Z together, with the artefact's own length``."""
+    effects = list(dict.fromkeys(owner for owner, _ in parts if owner != ARTEFACT))
+    sizes = [name for owner, name in parts if owner == ARTEFACT]
+    one = len(sizes) == 1
+    if not effects:
+        return say("The artefact's own length") if one else say("The artefact's own dimensions")
+    words = listed(_families([effect_title(effect) for effect in effects]))
+    if sizes:
+        own = say("the artefact's own length") if one else say("the artefact's own dimensions")
+        together = say("{effects} together", effects=words) if len(effects) > 1 else words
+        return say("{effects}, with {own}", effects=together, own=own)
+    if len(effects) > 1:
+        return say("{effects} together", effects=words)
+    return say("{effect}: nothing shows of it", effect=words)
+
+
+def _families(titles: Sequence[Text]) -> list[Text]:
+    """Titles that differ in their last argument alone as one, in the order of the first: ``scale error of X, Y and Z``."""
+    families: dict[tuple[object, ...], list[Text]] = {}
+    for title in titles:
+        key: tuple[object, ...] = (title,)
+        if isinstance(title, Message) and title.pattern.endswith("}"):
+            key = (title.pattern, *list(title.arguments.values())[:-1])
+        families.setdefault(key, []).append(title)
+    words: list[Text] = []
+    for first, *others in families.values():
+        if others and isinstance(first, Message):
+            name = first.pattern.rpartition("{")[2].removesuffix("}")
+            last = [member.arguments[name] for member in (first, *others) if isinstance(member, Message)]
+            merged = listed([one for one in last if isinstance(one, Text)])
+            words.append(Message(first.pattern, {**first.arguments, name: merged}))
+        else:
+            words.append(first)
+    return words
+
+
+def expected(parameter: Determination, u: float | None) -> Text:
+    """An expected standard uncertainty, in the unit of :func:`unit_of`."""
+    return DASH if u is None else number(u / (MICROMETRE if parameter.unknown.unit == "mm" else 1.0), ".2g")
+
+
+def unit_of(unknown: Unknown) -> Text:
+    """Unit of an expected uncertainty: sizes of the artefact in micrometres."""
+    return unit("µm") if unknown.unit == "mm" else unknown.unit
+
+
+def named(unknown: Unknown) -> Text:
+    """A parameter in words; a size of the artefact by its name, which a kind of another package may choose as it likes."""
+    owner, name = unknown.key
+    if owner != ARTEFACT:
+        effect = every()[owner]
+        if len(effect.coefficients) == 1:
+            return effect.title
+        return say("{title}, {name}", title=effect.title, name=Verbatim(name))
+    plain = name.removesuffix("_mm")
+    what, _, which = plain.partition("_")
+    size: Text = say("length") if plain == "length" else Verbatim(plain.replace("_", " "))
+    if which.isdigit() and what == "block":
+        size = say("block {which}", which=Verbatim(which))
+    if which.isdigit() and what == "cylinder":
+        size = say("cylinder {which}", which=Verbatim(which))
+    return say("Artefact, {size}", size=size)
+
+
+def pairs(found: Identifiability) -> list[Text]:
+    """Effects that could not be told apart, grouped where they all resemble each other."""
+    groups: list[set[str]] = []
+    for first, second, _ in found.alike:
+        joined = [group for group in groups if first in group or second in group]
+        merged = {first, second}.union(*joined)
+        groups = [group for group in groups if group not in joined] + [merged]
+    return [listed([effect_title(name) for name in every() if name in group]) for group in groups]
+
+
+def absorbed(found: Identifiability) -> list[Text]:
+    """Effects that would be taken for others: ``sag of the artefact for scale error of X and scale error of Y``."""
+    own = say("the artefact's own size")
+    each = (
+        (name, listed([own if other == ARTEFACT else effect_title(other) for other in others]))
+        for name, others in found.absorbed
+        if others
+    )
+    return [say("{effect} for {others}", effect=effect_title(name), others=others) for name, others in each]
+
+
+def smallest(amplitude: float | None) -> Text:
+    return DASH if amplitude is None else number(amplitude, ".2g")
+
 
 SHOWN = 6  # repeats in the table; results.json has all that are compared
-_PRIOR = say("not known: averaged over the prior")
 
 
 def noise_facts(plan: MeasurementPlan) -> tuple[tuple[Text, Text], ...]:
-    """Reading noise, set-up offset and growth, and where each is from."""
     setting, noise = plan.setting, plan.setting.noise
     source: Text = say("assumed: the job states none")
     if setting.plan.noise_from is not None:
@@ -42,19 +147,17 @@ def noise_facts(plan: MeasurementPlan) -> tuple[tuple[Text, Text], ...]:
         source = NOTHING
     elif plan.name == RECORDED:
         source = say("from the recording's residuals")
-    reading = _size(setting.sigma, source)
+    reading = (say("Noise of a coordinate"), _size(setting.sigma, source))
     if noise is None:
-        return ((say("Noise of a coordinate"), reading), (say("Set-up offset"), say("taken as none")))
+        return (reading, (say("Set-up offset"), say("taken as none")))
     known = NOTHING if setting.plan.noise_from is None else source
-    return (
-        (say("Noise of a coordinate"), reading), (say("Set-up offset"), _size(noise.placing, known)),
-        (say("Noise that grows with length"), _size(noise.growth, known)),
-    )  # fmt: skip
+    growth = (say("Noise that grows with length"), _size(noise.growth, known))
+    return (reading, (say("Set-up offset"), _size(noise.placing, known)), growth)
 
 
 def _size(size: float | None, source: Text) -> Text:
     if size is None:
-        return _PRIOR
+        return say("not known: averaged over the prior")
     if not source:
         return say("{sigma:.2g} µm", sigma=size / MICROMETRE)
     return say("{sigma:.2g} µm ({source})", sigma=size / MICROMETRE, source=source)
@@ -69,12 +172,11 @@ _AVERAGED = say(
 
 
 def worth(plan: MeasurementPlan) -> tuple[Block, ...]:
-    """Repeats against placings."""
     found = plan.worth
     if found is None:
         return ()
     rows = found.rows[:SHOWN]
-    heads = (_words(say("Repeats of every point")), *(Column(number(row.repeats)) for row in rows), _words(say("Unit")))
+    each = [Column(number(row.repeats)) for row in rows]
     cells: list[tuple[Text, ...]] = [
         (say("Readings"), *(_pair(row.readings, row.readings_more, ".0f") for row in rows), NOTHING),
         (say("Time"), *(_pair(row.minutes, row.minutes_more, ".0f") for row in rows), unit("min")),
@@ -84,12 +186,11 @@ def worth(plan: MeasurementPlan) -> tuple[Block, ...]:
         figures = (
             _pair(row.u[i] / size, row.u_more[i] / size, ".2g") if np.isfinite(row.u[i]) else DASH for row in rows
         )
-        cells.append((parameter_name(unknown), *figures, parameter_unit(unknown)))
+        cells.append((named(unknown), *figures, unit_of(unknown)))
     note = say(
         "Expected u of each parameter with the {count} placings of the plan; in brackets with one more, which tells as "
-        "much as they do on average. An offset of a set-up is shared by its repeats.",
-        count=found.placings,
-    )
+        "much as they do on average. An offset of a set-up is shared by its repeats.", count=found.placings,
+    )  # fmt: skip
     enough, most, repeats = found.enough, found.rows[-1].repeats, plan.setting.plan.repeats
     if enough is None:
         advice = say(
@@ -109,11 +210,9 @@ def worth(plan: MeasurementPlan) -> tuple[Block, ...]:
             "of one more repeat. The plan has {repeats}.",
             enough=enough, repeats=repeats,
         )  # fmt: skip
-    return (Table(say("Repeats and placings"), heads, tuple(cells), (note,)), Paragraph(advice))
-
-
-def _words(heading: Text) -> Column:
-    return Column(heading, numeric=False)
+    return Table(
+        say("Repeats and placings"), columns((say("Repeats of every point"), *each, say("Unit"))), tuple(cells), (note,)
+    ), Paragraph(advice)
 
 
 def _pair(one: float, other: float, form: str) -> Text:
@@ -121,7 +220,6 @@ def _pair(one: float, other: float, form: str) -> Text:
 
 
 def plan_document(plan: MeasurementPlan) -> Document:
-    """The page of a plan."""
     facts, findings = plan.job.facts, plan.outlook.identifiability
     artefact = Verbatim(facts.artefact.name or facts.artefact.kind.replace("_", " "))
     count = len(plan.start.placings)
@@ -130,13 +228,13 @@ def plan_document(plan: MeasurementPlan) -> Document:
         start = say("the recording ({count} placings)", count=count)
     warnings: list[Text] = [say("Not met: {what}.", what=each.what) for each in plan.conditions if not each.met]
     if findings is not None and not findings.complete:
-        free = commas(named(p) for p in findings.parameters if p.status == "free")
+        free = commas(named(p.unknown) for p in findings.parameters if p.status == "free")
         warnings.append(say("Not determined by these placings: {free}.", free=free))
-    met, not_met = Verbatim("✓"), Verbatim("✗")
-    conditions = tuple(
-        Paragraph(say("{mark} {what}", mark=met if each.met else not_met, what=each.what)) for each in plan.conditions
+    conditions = (
+        Paragraph(say("{mark} {what}", mark=Verbatim("✓" if each.met else "✗"), what=each.what))
+        for each in plan.conditions
     )
-    pictures = placing_pictures(plan.to_measure, plan.setting.volume.box, plan.first) if plan.to_measure else ()
+    pictures = placing_pictures(plan.to_measure, plan.setting.volume.box, plan.first)
     return working_page(
         facts, say("Measurement plan"), artefact,
         particulars=(
@@ -150,13 +248,12 @@ def plan_document(plan: MeasurementPlan) -> Document:
         ),
         warnings=warnings,
         sections=(
-            Section(say("Placings"), _placings(plan)),
-            Section(say("Pictures of the placings"), tuple(pictures)),
-            Section(say("What these placings determine"), _determined(plan)),
-            Section(say("Repeats or placings"), worth(plan)),
-            Section(say("What a better plan gains"), _gain(plan)),
-            Section(say("Smallest effects that the diagnosis would find"), _smallest(plan)),
-            Section(say("Conditions of the standard"), conditions),
+            section(say("Placings"), _placings(plan)), section(say("Pictures of the placings"), *pictures),
+            section(say("What these placings determine"), *_determined(plan)),
+            section(say("Repeats or placings"), *worth(plan)),
+            section(say("What a better plan gains"), *_gain(plan)),
+            section(say("Smallest effects that the diagnosis would find"), _smallest(plan)),
+            section(say("Conditions of the standard"), *conditions),
         ),
         attachments=(*((Verbatim("plan.csv"),) if plan.to_measure else ()), Verbatim("results.json")),
         produced_by=program(plan.job), end=say("End of plan"),
@@ -180,17 +277,15 @@ def placing_rows(plan: MeasurementPlan) -> list[tuple[Text, ...]]:
     ]
 
 
-def _placings(plan: MeasurementPlan) -> tuple[Block, ...]:
-    if not plan.to_measure:
-        return ()
+def _placings(plan: MeasurementPlan) -> Table | None:
     heads = (
-        Column(say("No.")), _words(say("Set up")), _words(say("From → to, scale readings in mm")), Column(say("Points")),
+        Column(say("No.")), say("Set up"), say("From → to, scale readings in mm"), Column(say("Points")),
         Column(say("Time"), unit("min")),
     )  # fmt: skip
     notes = [say("Every point {repeats} times; points count repeats.", repeats=plan.setting.plan.repeats)]
     if plan.measured:
         notes.append(say("{measured} measurements are recorded already.", measured=plan.measured))
-    return (Table(say("Placings in the order of measurement"), heads, tuple(placing_rows(plan)), tuple(notes)),)
+    return table(say("Placings in the order of measurement"), heads, placing_rows(plan), *notes)
 
 
 def _determined(plan: MeasurementPlan) -> tuple[Block, ...]:
@@ -199,22 +294,21 @@ def _determined(plan: MeasurementPlan) -> tuple[Block, ...]:
     if found is None:
         return tuple(blocks)
     heads = (
-        _words(say("Parameter")), Column(say("Expected u")), Column(say("Under white noise")), _words(say("Unit")),
-        Column(say("Allowed by physics")), _words(NOTHING),
+        say("Parameter"), Column(say("Expected u")), Column(say("Under white noise")), say("Unit"),
+        Column(say("Allowed by physics")), NOTHING,
     )  # fmt: skip
     rows = tuple(
-        (named(p), expected(p), expected_white(p), unit_of(p),
+        (named(p.unknown), expected(p, p.u), expected(p, p.u_white), unit_of(p.unknown),
          number(p.unknown.prior_sd, ".3g") if p.unknown.prior_sd < 1e6 else say("any"), STATUS[p.status])
         for p in found.parameters
     )  # fmt: skip
     note = say(
-        "u is the standard uncertainty of the least-squares estimate, certificates included. "
-        "“Allowed by physics” is the standard deviation that the effect may have before anything is "
-        "measured."
+        "u is the standard uncertainty of the least-squares estimate, certificates included. “Allowed by physics” is the "
+        "standard deviation that the effect may have before anything is measured."
     )
     noise = plan.setting.noise
     averaged = noise is not None and (noise.placing is None or noise.growth is None)
-    blocks.append(Table(say("What to expect"), heads, rows, (note, _AVERAGED) if averaged else (note,)))
+    blocks.append(Table(say("What to expect"), columns(heads), rows, (note, _AVERAGED) if averaged else (note,)))
     blocks += [
         *(Paragraph(say("Stays free: {combination}.", combination=combination(parts)), tone="warning")
           for parts in found.free),
@@ -223,37 +317,40 @@ def _determined(plan: MeasurementPlan) -> tuple[Block, ...]:
           for text in absorbed(found)),
     ]  # fmt: skip
     if found.unseen:
-        effects = commas(title_of(name) for name in found.unseen)
+        effects = commas(effect_title(name) for name in found.unseen)
         blocks.append(Paragraph(say("Nothing would show of: {effects}.", effects=effects), tone="note"))
     return tuple(blocks)
 
 
-def _gain(plan: MeasurementPlan) -> tuple[Block, ...]:
+def _gain(plan: MeasurementPlan) -> tuple[Block | None, ...]:
     start, better = plan.start.identifiability, plan.better.identifiability if plan.better else None
     criterion = plan.setting.plan.criterion
     if start is None or better is None or plan.better is None or criterion is None:
         return ()
     both = (say("the recording") if plan.name == RECORDED else plan.name, say("the better plan"))
     text = say(
-        "Searched for: {criteria}, by greedy choice and exchange. {before} placings before, {better} "
-        "in the better plan, {kept} of them kept. Pairs that could not be told apart: {alike_before} "
-        "before, {alike_after} after; effects of which nothing shows, or that pass for named ones: "
-        "{hidden_before} before, {hidden_after} after.",
+        "Searched for: {criteria}, by greedy choice and exchange. {before} placings before, {better} in the better plan, "
+        "{kept} of them kept. Pairs that could not be told apart: {alike_before} before, {alike_after} after; effects of "
+        "which nothing shows, or that pass for named ones: {hidden_before} before, {hidden_after} after.",
         criteria=CRITERIA[criterion], before=len(plan.start.placings), better=len(plan.better.placings), kept=plan.kept,
         alike_before=len(start.alike), alike_after=len(better.alike),
         hidden_before=len(start.unseen) + len(start.absorbed), hidden_after=len(better.unseen) + len(better.absorbed),
     )  # fmt: skip
-    blocks: list[Block] = [Paragraph(text)]
+    blocks: list[Block | None] = [Paragraph(text)]
     blocks += _beside(
-        [(named(p), p.u, q.u, unit_of(p), expected(p), expected(q))
+        [(named(p.unknown), p.u, q.u, unit_of(p.unknown), expected(p, p.u), expected(q, q.u))
          for p, q in zip(start.parameters, better.parameters, strict=True)],
         both, say("Expected standard uncertainty"),
     )  # fmt: skip
     if plan.start.powers and plan.better.powers:
+        both_powers = zip(plan.start.powers, plan.better.powers, strict=True)
+        shown = [
+            (p, p.identifiable, q.identifiable)
+            for p, q in both_powers
+            if (p.identifiable, q.identifiable) != (None, None)
+        ]
         blocks += _beside(
-            [(title_of(p.effect), p.identifiable, q.identifiable, p.unit, smallest(p.identifiable), smallest(q.identifiable))
-             for p, q in zip(plan.start.powers, plan.better.powers, strict=True)
-             if p.identifiable is not None or q.identifiable is not None],
+            [(effect_title(p.effect), one, other, p.unit, smallest(one), smallest(other)) for p, one, other in shown],
             both, say("Smallest effect named rightly"),
         )  # fmt: skip
     return tuple(blocks)
@@ -261,24 +358,24 @@ def _gain(plan: MeasurementPlan) -> tuple[Block, ...]:
 
 def _beside(
     rows: list[tuple[Text, float | None, float | None, Text, Text, Text]], names: tuple[Text, Text], quantity: Text
-) -> list[Block]:
+) -> list[Block | None]:
     """Both plans beside each other as a picture and in numbers: label, both values, unit, both in words."""
     if not rows:
         return []
-    labels, before, after, units, before_words, after_words = (list(column) for column in zip(*rows, strict=True))
-    heads = (_words(quantity), Column(names[0]), Column(names[1]), _words(say("Unit")))
-    cells = tuple(zip(labels, before_words, after_words, units, strict=True))
-    picture = gain_plot(labels, before, after, names=names, quantity=quantity)
-    return [picture, Table(say("{quantity} with both plans", quantity=quantity), heads, cells)]
+    labels, before, after, units, before_words, after_words = map(list, zip(*rows, strict=True))
+    heads = (quantity, Column(names[0]), Column(names[1]), say("Unit"))
+    cells = zip(labels, before_words, after_words, units, strict=True)
+    both = table(say("{quantity} with both plans", quantity=quantity), heads, cells)
+    return [gain_plot(labels, before, after, names=names, quantity=quantity), both]
 
 
-def _smallest(plan: MeasurementPlan) -> tuple[Block, ...]:
-    if not plan.outlook.powers:
-        return ()
-    heads = (_words(say("Effect not in the job's model")), _words(say("Parameter")), Column(say("Detected from")),
-             Column(say("Named rightly from")), _words(say("Unit")))  # fmt: skip
-    rows = tuple(
-        (title_of(p.effect), Verbatim(p.parameter), smallest(p.detectable), smallest(p.identifiable), p.unit)
+def _smallest(plan: MeasurementPlan) -> Table | None:
+    heads = (
+        say("Effect not in the job's model"), say("Parameter"), Column(say("Detected from")),
+        Column(say("Named rightly from")), say("Unit"),
+    )  # fmt: skip
+    rows = (
+        (effect_title(p.effect), Verbatim(p.parameter), smallest(p.detectable), smallest(p.identifiable), p.unit)
         for p in plan.outlook.powers
     )
     notes: list[Text] = [say(
@@ -293,4 +390,4 @@ def _smallest(plan: MeasurementPlan) -> tuple[Block, ...]:
             "With repeats, what changes from placing to placing looks in part like set-up offsets: such an effect may have to "
             "be larger than is said here."
         ))  # fmt: skip
-    return (Table(say("Smallest effects"), heads, rows, tuple(notes)),)
+    return table(say("Smallest effects"), heads, rows, *notes)

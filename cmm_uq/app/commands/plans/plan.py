@@ -9,17 +9,26 @@ import numpy as np
 
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.app.commands.files import Form, Stage, Written, silent
-from cmm_uq.app.commands.plans.page import placing_rows, to_measure_words
+from cmm_uq.app.commands.plans.page import (
+    STATUS,
+    absorbed,
+    combination,
+    expected,
+    named,
+    pairs,
+    placing_rows,
+    to_measure_words,
+    unit_of,
+)
 from cmm_uq.app.commands.plans.planning import MeasurementPlan, Outlook
-from cmm_uq.app.commands.plans.words import STATUS, absorbed, combination, expected, named, pairs, unit_of
 from cmm_uq.app.commands.reading import in_language, read_job
 from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.plots.style import lettered_in
+from cmm_uq.certificate.result import Outcome
 from cmm_uq.certificate.results.contents import head
 from cmm_uq.certificate.wording import Figure, Headline, Summary
 from cmm_uq.jobs.job import Job
@@ -47,15 +56,9 @@ def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = 
 
 
 def write_plan(
-    job: Path,
-    out: Path | None = None,
-    *,
-    power: bool = True,
-    seed: int = 0,
-    force: bool = False,
-    stage: Stage | None = None,
-    language: Code | None = None,
-) -> Written:
+    job: Path, out: Path | None = None, *, power: bool = True, seed: int = 0, force: bool = False,
+    stage: Stage | None = None, language: Code | None = None,
+) -> Written:  # fmt: skip
     """Plan a job and write ``plan.csv``, ``plan.html`` and ``results.json``, all or none.
 
     ``plan.csv`` has the columns of a recording of the artefact, at nominal coordinates; it is left out where nothing is left
@@ -83,7 +86,6 @@ SCHEMA = "cmm-uq/plan/1"
 
 
 def plan_results(plan: MeasurementPlan) -> dict[str, Any]:
-    """results.json of a plan."""
     better = None if plan.better is None or plan.scores is None else {
         "criterion": plan.setting.plan.criterion, "score_before": plan.scores[0], "score_after": plan.scores[1],
         "kept": plan.kept, "added": len(plan.better.placings) - plan.kept, **_outlook_data(plan.better),
@@ -173,7 +175,7 @@ def plan_summary(plan: MeasurementPlan) -> Summary:
     remarks: list[Text] = [say("No reading shows: {what}.", what=text) for text in plan.free]
     if found is not None:
         figures = tuple(
-            (named(p), say("u = {u} {unit}", u=expected(p), unit=unit_of(p)), STATUS[p.status])
+            (named(p.unknown), say("u = {u} {unit}", u=expected(p, p.u), unit=unit_of(p.unknown)), STATUS[p.status])
             for p in found.parameters
         )
         remarks += [say("Stays free: {what}.", what=combination(parts)) for parts in found.free]

@@ -60,7 +60,7 @@ def of_standards(job: Job, setting: Setting, name: str, points: Points, recorded
 
 def completing(
     job: Job, setting: Setting, recorded: Points, after: Callable[[Sequence[SetUp]], Points]
-) -> tuple[SetUp, ...]:  # fmt: skip
+) -> tuple[SetUp, ...]:
     """Placings of the usual ready plan of which each supplies something that the standards' tests still lack."""
     if not job.facts.conformity:
         return ()
@@ -149,7 +149,6 @@ class MeasurementPlan:
 
     @property
     def to_measure(self) -> tuple[SetUp, ...]:
-        """Placings that are still to be measured."""
         return self.outlook.placings[self.measured :]
 
     @property
@@ -165,7 +164,6 @@ def minutes(setting: Setting, placing: SetUp) -> float:
 
 @refusing_overflow("job.toml", OVERFLOW_FIX)
 def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress | None = None) -> MeasurementPlan:
-    """Plan a job."""
     tell = progress or (lambda what, part: None)
     tell("Finding what the placings determine", 0.05)
     refuse_planned(job)
