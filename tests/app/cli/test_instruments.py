@@ -16,13 +16,13 @@ import pytest
 from cmm_uq.laboratory.live.instruments.library import read_profile, ready
 from cmm_uq.laboratory.live.instruments.simulated_line import (
     Readout1502,
-    SimulatedLine,
     Speaker,
     Thermocouples,
 )
 from tests.app.cli.process import COMMAND, run
 from tests.app.cli.terminal import everything
 from tests.conftest import ROOT
+from tests.laboratory.live.instruments.mischief import UnreliableLine
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals here")
 
@@ -48,7 +48,7 @@ def test_ready_profiles_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_message_stands_beside_what_was_understood(tmp_path: Path) -> None:
-    with SimulatedLine(Readout1502(), "pty", tmp_path) as line:
+    with UnreliableLine(Readout1502(), "pty", tmp_path) as line:
         done = listened("temp_c = 20.013", "test", "fluke-1502a", line.port)
     assert done.returncode == 0, done.stderr
     assert "<LF>t:   20.013 C<CR>                         temp_c = 20.013\n" in done.stdout
@@ -58,7 +58,7 @@ def test_a_message_stands_beside_what_was_understood(tmp_path: Path) -> None:
 def test_a_source_of_a_job_is_tried_by_its_name(tmp_path: Path) -> None:
     job = tmp_path / "job"
     shutil.copytree(ROOT / "examples" / "iota-1102-20C", job)
-    with SimulatedLine(Thermocouples(), "pty", tmp_path) as line:
+    with UnreliableLine(Thermocouples(), "pty", tmp_path) as line:
         with (job / "job.toml").open("a", encoding="utf-8") as file:
             file.write(
                 f'\n[[acquire.source]]\nname = "table"\nprofile = "thermocouple-logger-11"\nport = "{line.port}"\n'
@@ -86,7 +86,7 @@ class Foreign(Speaker):
         return b"HELLO WORLD\r"
 
 
-def garbled(line: SimulatedLine) -> None:
+def garbled(line: UnreliableLine) -> None:
     line.mischief.garbled = True
 
 
@@ -98,7 +98,7 @@ def garbled(line: SimulatedLine) -> None:
     (Foreign(), garbled, "; expected like t:   20.013 C<CR>. Check baud rate, data bits and parity: the profile has 2400 8N1"),
 ])  # fmt: skip
 def test_where_nothing_is_understood_it_says_what_to_check(speaker, spoil, told: str, tmp_path: Path) -> None:
-    with SimulatedLine(speaker, "pty", tmp_path) as line:
+    with UnreliableLine(speaker, "pty", tmp_path) as line:
         if spoil:
             spoil(line)
         done = listened(told, "test", "fluke-1502a", line.port)
@@ -110,7 +110,7 @@ def test_where_nothing_is_understood_it_says_what_to_check(speaker, spoil, told:
 def test_an_instrument_that_answers_but_is_ill_is_said(tmp_path: Path) -> None:
     speaker = Readout1502()
     speaker.ill = True
-    with SimulatedLine(speaker, "pty", tmp_path) as line:
+    with UnreliableLine(speaker, "pty", tmp_path) as line:
         done = listened("the probe is open", "test", "fluke-1502a", line.port)
     assert "the instrument answers, but gives no value" in done.stderr
     assert "the probe is open or out of range" in done.stderr
@@ -124,7 +124,7 @@ def test_a_new_profile_from_a_line_reads_that_instrument(tmp_path: Path) -> None
     assert done.returncode == 0, done.stderr
     assert tomllib.loads(own.read_text())["quantities"]["temp_scale_x_c"]["range"] == [0, 40]
     spaced = own.rename(tmp_path / "my gauge.toml")
-    with SimulatedLine(Thermocouples(), "pty", tmp_path) as line:
+    with UnreliableLine(Thermocouples(), "pty", tmp_path) as line:
         done = listened("temp_scale_x_c", "test", spaced, line.port, "--json")
     spaced.rename(own)
     assert json.loads(done.stdout)["quantities"] == {"temp_scale_x_c": 20.11}

@@ -1,4 +1,4 @@
-"""A simulated CMM behind an I++ DME server on a real socket: one that keeps to specification 1.4.3, or one that does not.
+"""A simulated CMM behind an I++ DME server on a real socket, that keeps to specification 1.4.3.
 
 It follows the sections of the specification that its methods name. It is for trying clients: it moves nothing.
 """
@@ -10,7 +10,6 @@ import math
 import select
 import socket
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -66,19 +65,6 @@ class MethodError(Exception):
     """An error of a number, which the method answers with."""
 
 
-@dataclass
-class IppMischief:
-    """What a server does wrong; all may be changed while it runs."""
-
-    hangs: bool = False
-    no_ack: bool = False
-    exchanged: bool = False  # sends ``%`` where ``&`` belongs and the reverse, as some published programs do
-    wrong_tag: bool = False
-    halves: bool = False  # cuts each line of data
-    noise: bytes = b""  # bytes before each line
-    delay_s: float = 0.0
-
-
 class SimulatedIppServer:
     """A CMM behind a server, listening at a port (0: a free one) until it is closed.
 
@@ -88,7 +74,7 @@ class SimulatedIppServer:
     tools = ("RefTool", "NoTool", "Probe1", "Probe2")
 
     def __init__(self, tcp_port: int = 0, *, part_c: float | None = 20.13, version: str | None = "1.4.3") -> None:
-        self.state, self.mischief, self.port = SimulatedState(), IppMischief(), tcp_port
+        self.state, self.port = SimulatedState(), tcp_port
         self.part_c, self.version = part_c, version  # ``None``: it does not know the property, the question
         self.radial = 0.0  # how far the surface lies from where it is expected, along the normal, mm
         self.lines: list[str] = []  # all that was said, by both sides, with > and <
@@ -114,15 +100,6 @@ class SimulatedIppServer:
         """The user picks a point by hand (section 9.5.3)."""
         self.state.position = [x, y, z]
         self._send(f"E0000 # PtMeas({self.reported(self.state.report, (0, 0, 1))})")
-
-    def press(self, key: str) -> None:
-        """The user presses a key (section 9.5.1)."""
-        self._send(f'E0000 # KeyPress("{key}")')
-
-    def trip(self, number: int = 500) -> None:
-        """Something goes wrong by itself (section 6.2.4.1)."""
-        self.state.error = TEXTS[number][0] >= 2
-        self._send(f"E0000 ! {_error(number, 'HealthCheck')}")
 
     # --- the connection -----------------------------------------------------------------------------------------------------
 
@@ -150,36 +127,28 @@ class SimulatedIppServer:
 
     def _send(self, line: str) -> None:
         self.lines.append(f"< {line}")
-        wrong = self.mischief
-        if wrong.exchanged and line[6:7] in ("&", "%"):
-            line = f"{line[:6]}{'%' if line[6] == '&' else '&'}"
-        if wrong.wrong_tag:
-            line = f"9{line[1:]}"
-        if wrong.halves and line[6:7] == "#":
-            line = line[: len(line) // 2]
+        self._put(line.encode("ascii") + b"\r\n")
+
+    def _put(self, data: bytes) -> None:
         if self._connection is not None:
             with self._sending, contextlib.suppress(OSError):
-                self._connection.sendall(wrong.noise + line.encode("ascii") + b"\r\n")
+                self._connection.sendall(data)
 
     def _command(self, body: bytes) -> None:
         """A line of the client, answered in the order of the signs."""
         line = body.decode("latin-1")
         self.lines.append(f"> {line}")
-        if self.mischief.hangs:
-            return
-        time.sleep(self.mischief.delay_s)
         tag, text = line[:5], line[6:]
         if not (tag[:1].isdigit() or tag[:1] == "E") or not tag[1:].isdigit() or tag in ("00000", "E0000"):
-            self._send(f"E0000 ! {_error(1, 'Tag')}")
+            self._send(f"E0000 ! {fault(1, 'Tag')}")
             return
-        if not self.mischief.no_ack:
-            self._send(f"{tag} &")
+        self._send(f"{tag} &")
         try:
             (method,) = ipp.arguments_of(text)
             if line[5:6] != " " or not isinstance(method, ipp.Term):
                 raise ipp.BadLineError("no method")
         except (ipp.BadLineError, ValueError):
-            self._send(f"{tag} ! {_error(8, 'Parser')}")
+            self._send(f"{tag} ! {fault(8, 'Parser')}")
             self.state.error = True
         else:
             self._answer(tag, method)
@@ -203,7 +172,7 @@ class SimulatedIppServer:
         except MethodError as error:
             number = int(error.args[0])
             state.error = state.error or TEXTS[number][0] >= 2
-            self._send(f"{tag} ! {_error(number, method.name)}")
+            self._send(f"{tag} ! {fault(number, method.name)}")
 
     # --- the methods --------------------------------------------------------------------------------------------------------
 
@@ -320,6 +289,6 @@ def _target(method: ipp.Term, position: list[float]) -> tuple[list[float], tuple
     return place, normal
 
 
-def _error(number: int, cause: str) -> str:
+def fault(number: int, cause: str) -> str:
     severity, text = TEXTS[number]
     return f'Error({severity}, {number:04d}, "{cause}", "{text}")'

@@ -1,4 +1,4 @@
-"""Simulated instruments at a real pseudo-terminal, TCP socket or RFC 2217 server, well-behaved or not.
+"""Simulated instruments at a real pseudo-terminal, TCP socket or RFC 2217 server.
 
 What each answers is by its manual, written from the same sources as the profiles and not from the profiles.
 """
@@ -13,7 +13,6 @@ import socket
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
@@ -23,34 +22,15 @@ WAYS: tuple[Way, ...] = ("pty", "socket", "rfc2217")
 _TICK_S = 0.01
 
 
-@dataclass
-class Mischief:
-    """What the instrument does wrong; all may be changed while it runs."""
-
-    hangs: bool = False
-    halves: bool = False  # leaves out the second half of each message
-    noise: bytes = b""  # sends these bytes before each message
-    garbled: bool = False  # sends other bytes than it means, as at a wrong baud rate
-    a_byte_at_a_time: bool = False
-
-    def spoiled(self, data: bytes) -> bytes:
-        """What goes onto the line."""
-        if self.hangs or not data:
-            return b""
-        data = data[: len(data) // 2] if self.halves else data
-        return self.noise + (bytes(0x80 | (byte * 37 + 11) & 0x7F for byte in data) if self.garbled else data)
-
-
 class SimulatedLine(contextlib.AbstractContextManager["SimulatedLine"]):
     """An instrument that speaks from a thread of its own until closed; a pseudo-terminal keeps its name in ``folder``."""
 
     def __init__(self, speaker: Speaker, way: Way = "pty", folder: Path | None = None, tcp_port: int = 0) -> None:
-        self.speaker, self.mischief, self._way = speaker, Mischief(), way
+        self.speaker, self._way = speaker, way
         self._name = (folder or Path()) / "tty"
         self._speaking, self._tcp_port = threading.Lock(), tcp_port
         self._wire: _Wire | None = None
         self._listening: socket.socket | None = None
-        self.sent = 0  # messages that the instrument sent whole
         self.plug_in()
 
     @property
@@ -76,13 +56,6 @@ class SimulatedLine(contextlib.AbstractContextManager["SimulatedLine"]):
                 end.close()
         self._wire = self._listening = None
 
-    def restart(self) -> None:
-        """Switch it off and on: it has forgotten what it was told, and says its banner."""
-        with self._speaking, contextlib.suppress(OSError):
-            said = self.speaker.restarted()
-            if self._wire is not None:
-                self._wire.send(said)
-
     close = unplug
 
     def __exit__(self, *_: object) -> None:
@@ -97,7 +70,7 @@ class SimulatedLine(contextlib.AbstractContextManager["SimulatedLine"]):
             try:
                 received = wire.receive()
                 with self._speaking:
-                    self._say(wire, b"" if self.mischief.hangs else self.speaker.hear(received))
+                    self._say(wire, self.speaker.hear(received))
                     if self.speaker.every_s and time.monotonic() >= following:
                         following += self.speaker.every_s
                         self._say(wire, self.speaker.says())
@@ -109,10 +82,7 @@ class SimulatedLine(contextlib.AbstractContextManager["SimulatedLine"]):
                     self._wire = None
 
     def _say(self, wire: _Wire, data: bytes) -> None:
-        spoiled = self.mischief.spoiled(data)
-        for part in map(bytes, zip(spoiled)) if self.mischief.a_byte_at_a_time else [spoiled]:
-            wire.send(part)
-        self.sent += bool(data) and spoiled == data
+        wire.send(data)
 
     def _accepted(self) -> _Wire | None:
         if self._listening is None or not select.select([self._listening], [], [], 5 * _TICK_S)[0]:
@@ -213,10 +183,6 @@ class Speaker:
 
     def says(self) -> bytes:
         return b""
-
-    def restarted(self) -> bytes:
-        self.__init__()  # type: ignore[misc]
-        return self.banner
 
 
 class Vaisala(Speaker):

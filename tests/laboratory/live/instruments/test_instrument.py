@@ -12,13 +12,13 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.live.instruments.simulated_line import (
     SPEAKERS,
     Readout1502,
-    SimulatedLine,
     Speaker,
     Thermocouples,
     Way,
 )
 from cmm_uq.laboratory.live.instruments.source import Gap, Reading, Returned
 from tests.laboratory.live.instruments.listening import Listener, hasty, listening, opened
+from tests.laboratory.live.instruments.mischief import UnreliableLine
 
 WITHIN_S = 2.0
 """From the instrument's return to its first reading: the requirement."""
@@ -35,7 +35,7 @@ def returned(heard: Listener, since: int, at: float) -> float:
 @pytest.mark.parametrize("way", ["pty", "socket", "rfc2217"])
 def test_an_instrument_that_was_unplugged_is_read_again_within_two_seconds(way: Way, tmp_path: Path) -> None:
     with (
-        SimulatedLine(Thermocouples(), way, tmp_path) as line,
+        UnreliableLine(Thermocouples(), way, tmp_path) as line,
         listening(opened(hasty("thermocouple-logger-11"), line.port)) as heard,
     ):
         heard.until(lambda one: len(one.good()) >= 2)
@@ -55,7 +55,7 @@ def test_an_instrument_that_was_unplugged_is_read_again_within_two_seconds(way: 
 @pytest.mark.parametrize(("name", "way"), [("sylvac-rs232", "pty"), ("sylvac-rs232", "socket"), ("fluke-1529", "pty")])
 def test_an_instrument_that_hung_is_read_again_within_two_seconds(name: str, way: Way, tmp_path: Path) -> None:
     profile = hasty(name, answer_within_s=0.5)
-    with SimulatedLine(SPEAKERS[name](), way, tmp_path) as line, listening(opened(profile, line.port)) as heard:
+    with UnreliableLine(SPEAKERS[name](), way, tmp_path) as line, listening(opened(profile, line.port)) as heard:
         heard.until(lambda one: len(one.good()) >= 4)
         line.mischief.hangs = True
         heard.until(lambda one: one.of(Gap))
@@ -70,7 +70,7 @@ def test_one_that_was_switched_off_is_told_again_what_it_forgot(tmp_path: Path) 
     """The station speaks in its own FORM after a restart, which the profile does not read: it is set again."""
     profile = hasty("vaisala-ptb330", answer_within_s=0.4)
     with (
-        SimulatedLine(SPEAKERS["vaisala-ptb330"](), "pty", tmp_path) as line,
+        UnreliableLine(SPEAKERS["vaisala-ptb330"](), "pty", tmp_path) as line,
         listening(opened(profile, line.port)) as heard,
     ):
         heard.until(lambda one: len(one.good()) >= 2)
@@ -87,7 +87,7 @@ def test_half_lines_noise_and_a_wrong_baud_rate_give_words_and_no_value(
 ) -> None:
     profile = hasty("moeller-wedel-elcomat", answer_within_s=0.3)
     with (
-        SimulatedLine(SPEAKERS["moeller-wedel-elcomat"](), "pty", tmp_path) as line,
+        UnreliableLine(SPEAKERS["moeller-wedel-elcomat"](), "pty", tmp_path) as line,
         listening(opened(profile, line.port)) as heard,
     ):
         heard.until(lambda one: len(one.good()) >= 2)
@@ -104,7 +104,7 @@ def test_half_lines_noise_and_a_wrong_baud_rate_give_words_and_no_value(
 
 def test_bytes_one_at_a_time_make_the_same_readings(tmp_path: Path) -> None:
     with (
-        SimulatedLine(Thermocouples(), "pty", tmp_path) as line,
+        UnreliableLine(Thermocouples(), "pty", tmp_path) as line,
         listening(opened(hasty("thermocouple-logger-11"), line.port)) as heard,
     ):
         line.mischief.a_byte_at_a_time = True
@@ -122,7 +122,7 @@ class Counting(Speaker):
 
 def test_at_a_hundred_readings_a_second_none_is_lost_or_twice(tmp_path: Path) -> None:
     with (
-        SimulatedLine(Counting(), "pty", tmp_path) as line,
+        UnreliableLine(Counting(), "pty", tmp_path) as line,
         listening(opened(hasty("line-logger"), line.port)) as heard,
     ):
         heard.until(lambda one: len(one.good()) >= 150)
@@ -131,7 +131,7 @@ def test_at_a_hundred_readings_a_second_none_is_lost_or_twice(tmp_path: Path) ->
 
 
 def test_another_instrument_than_the_declared_one_is_refused(tmp_path: Path) -> None:
-    with SimulatedLine(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line, pytest.raises(CmmUqError) as error:
+    with UnreliableLine(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line, pytest.raises(CmmUqError) as error:
         opened(hasty("fluke-1502a"), line.port, serial="B99")
     assert "it says serial number 'A24680', the job names 'B99'" in str(error.value)
 
@@ -143,7 +143,7 @@ class Other(Readout1502):
 
 def test_another_instrument_that_comes_back_is_not_read(tmp_path: Path) -> None:
     with (
-        SimulatedLine(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line,
+        UnreliableLine(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line,
         listening(opened(hasty("fluke-1502a"), line.port)) as heard,
     ):
         heard.until(lambda one: one.good())
@@ -160,7 +160,7 @@ def test_another_instrument_that_is_put_at_the_same_line_while_it_is_silent_is_n
     """As behind a device server, where no port is lost."""
     profile = hasty("fluke-1502a", answer_within_s=0.3)
     with (
-        SimulatedLine(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line,
+        UnreliableLine(SPEAKERS["fluke-1502a"](), "pty", tmp_path) as line,
         listening(opened(profile, line.port)) as heard,
     ):
         heard.until(lambda one: one.good())
@@ -176,7 +176,7 @@ def test_another_instrument_that_is_put_at_the_same_line_while_it_is_silent_is_n
 
 def test_a_late_answer_is_no_value_where_it_could_be_that_of_another_channel(tmp_path: Path) -> None:
     profile = hasty("fluke-1529", answer_within_s=0.2)
-    late = SimulatedLine(SPEAKERS["fluke-1529"](), "pty", tmp_path)
+    late = UnreliableLine(SPEAKERS["fluke-1529"](), "pty", tmp_path)
     try:
         with listening(opened(profile, late.port)) as heard:
             heard.until(lambda one: len(one.good()) >= 4)

@@ -8,12 +8,12 @@ from contextlib import contextmanager
 import pytest
 
 from cmm_uq.laboratory.live.instruments.ipp import Client, FaultError, NoAnswerError, terms_of
-from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer
 from cmm_uq.laboratory.live.instruments.source import SYSTEM, PortLostError, TcpPort
+from tests.laboratory.live.instruments.mischief import UnreliableIppServer
 
 
 @contextmanager
-def session(machine: SimulatedIppServer, *, begin: bool = True) -> Iterator[Client]:
+def session(machine: UnreliableIppServer, *, begin: bool = True) -> Iterator[Client]:
     port = TcpPort("127.0.0.1", machine.port, machine.url)
     client = Client(port, SYSTEM)
     try:
@@ -29,13 +29,13 @@ def said(client: Client, command: str) -> list[str]:
 
 
 @pytest.fixture
-def machine() -> Iterator[SimulatedIppServer]:
-    made = SimulatedIppServer()
+def machine() -> Iterator[UnreliableIppServer]:
+    made = UnreliableIppServer()
     yield made
     made.close()
 
 
-def test_a_session_from_beginning_to_end(machine: SimulatedIppServer) -> None:
+def test_a_session_from_beginning_to_end(machine: UnreliableIppServer) -> None:
     with session(machine) as client:
         assert (client.version(), client.machine_class(), client.in_error()) == ("1.4.3", "CartCMM", False)
         assert said(client, "EnumTools()") == ['"RefTool"', '"NoTool"', '"Probe1"', '"Probe2"']
@@ -47,7 +47,7 @@ def test_a_session_from_beginning_to_end(machine: SimulatedIppServer) -> None:
             client.get()
 
 
-def test_a_point_is_measured_where_the_surface_is(machine: SimulatedIppServer) -> None:
+def test_a_point_is_measured_where_the_surface_is(machine: UnreliableIppServer) -> None:
     """The surface lies 0.05 mm outside the nominal one along (3, 0, 4)/5: contact at nominal + 0.05·n."""
     machine.radial = 0.05
     with session(machine) as client:
@@ -58,7 +58,7 @@ def test_a_point_is_measured_where_the_surface_is(machine: SimulatedIppServer) -
         assert found["IJK"] == pytest.approx((0.6, 0.0, 0.8))
 
 
-def test_an_error_stops_the_server_until_it_is_cleared(machine: SimulatedIppServer) -> None:
+def test_an_error_stops_the_server_until_it_is_cleared(machine: UnreliableIppServer) -> None:
     """Section 6.2.5, with 2500 and 0514 of 8.2."""
     with session(machine) as client:
         with pytest.raises(FaultError) as error:
@@ -72,7 +72,7 @@ def test_an_error_stops_the_server_until_it_is_cleared(machine: SimulatedIppServ
         client.get()
 
 
-def test_reports_of_a_daemon_and_events_are_kept_beside_the_answers(machine: SimulatedIppServer) -> None:
+def test_reports_of_a_daemon_and_events_are_kept_beside_the_answers(machine: UnreliableIppServer) -> None:
     with session(machine) as client:
         client.on_move_report(0.1, 1.0, "X")
         client.call("GoTo(X(7))")
@@ -83,7 +83,7 @@ def test_reports_of_a_daemon_and_events_are_kept_beside_the_answers(machine: Sim
 
 
 def test_an_older_server_is_asked_no_more_than_it_knows() -> None:
-    machine = SimulatedIppServer(version=None, part_c=None)
+    machine = UnreliableIppServer(version=None, part_c=None)
     try:
         with session(machine) as client:
             assert client.version() is None
@@ -95,7 +95,7 @@ def test_an_older_server_is_asked_no_more_than_it_knows() -> None:
         machine.close()
 
 
-def test_an_emergency_stop_is_no_unknown_command(machine: SimulatedIppServer) -> None:
+def test_an_emergency_stop_is_no_unknown_command(machine: UnreliableIppServer) -> None:
     with session(machine) as client:
         machine.state.error = True
         with pytest.raises(FaultError, match="Use ClearAllErrors to continue"):
@@ -103,7 +103,7 @@ def test_an_emergency_stop_is_no_unknown_command(machine: SimulatedIppServer) ->
         assert machine.state.error
 
 
-def test_a_session_of_another_is_not_taken_over_unless_it_was_ones_own(machine: SimulatedIppServer) -> None:
+def test_a_session_of_another_is_not_taken_over_unless_it_was_ones_own(machine: UnreliableIppServer) -> None:
     machine.state.session = True
     with session(machine, begin=False) as client:
         with pytest.raises(FaultError, match="Protocol error"):
@@ -115,7 +115,7 @@ def test_a_session_of_another_is_not_taken_over_unless_it_was_ones_own(machine: 
     ({"hangs": True}, "was not answered within"), ({"no_ack": True}, "before it was acknowledged"),
     ({"exchanged": True}, "before it was acknowledged"), ({"wrong_tag": True}, "was not answered within"),
 ])  # fmt: skip
-def test_a_server_that_breaks_the_protocol_is_refused_in_words(wrong, told: str, machine: SimulatedIppServer) -> None:
+def test_a_server_that_breaks_the_protocol_is_refused_in_words(wrong, told: str, machine: UnreliableIppServer) -> None:
     with session(machine) as client:
         for key, value in wrong.items():
             setattr(machine.mischief, key, value)
@@ -124,14 +124,14 @@ def test_a_server_that_breaks_the_protocol_is_refused_in_words(wrong, told: str,
             client.call("Get(X())")
 
 
-def test_half_a_line_of_data_is_no_position(machine: SimulatedIppServer) -> None:
+def test_half_a_line_of_data_is_no_position(machine: UnreliableIppServer) -> None:
     with session(machine) as client:
         machine.mischief.halves = True
         with pytest.raises(NoAnswerError):
             client.machine_class()
 
 
-def test_a_connection_that_is_cut_is_lost(machine: SimulatedIppServer) -> None:
+def test_a_connection_that_is_cut_is_lost(machine: UnreliableIppServer) -> None:
     with session(machine) as client:
         machine.close()
         with pytest.raises(PortLostError):

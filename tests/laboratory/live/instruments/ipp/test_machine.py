@@ -13,23 +13,23 @@ from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments.instrument import open_source
 from cmm_uq.laboratory.live.instruments.ipp import BadLineError, HeardLine, response_of
 from cmm_uq.laboratory.live.instruments.ipp_machine import IppMachine
-from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer
 from cmm_uq.laboratory.live.instruments.source import Gap, Reading, Returned
 from tests.laboratory.live.instruments.listening import listening
+from tests.laboratory.live.instruments.mischief import UnreliableIppServer
 
 
 @pytest.fixture
-def machine() -> Iterator[SimulatedIppServer]:
-    made = SimulatedIppServer()
+def machine() -> Iterator[UnreliableIppServer]:
+    made = UnreliableIppServer()
     yield made
     made.close()
 
 
-def declared(machine: SimulatedIppServer, profile: str = "ipp") -> DeclaredSource:
+def declared(machine: UnreliableIppServer, profile: str = "ipp") -> DeclaredSource:
     return DeclaredSource(name="cmm", profile=profile, port=machine.url)
 
 
-def test_picked_points_keys_and_errors_are_readings(machine: SimulatedIppServer) -> None:
+def test_picked_points_keys_and_errors_are_readings(machine: UnreliableIppServer) -> None:
     with listening(open_source(declared(machine))) as heard:
         assert heard.source.identity().firmware == "I++ DME 1.4.3"
         assert machine.state.user
@@ -45,7 +45,7 @@ def test_picked_points_keys_and_errors_are_readings(machine: SimulatedIppServer)
     assert not machine.state.session
 
 
-def test_positions_are_asked_for_as_often_as_is_said(machine: SimulatedIppServer) -> None:
+def test_positions_are_asked_for_as_often_as_is_said(machine: UnreliableIppServer) -> None:
     machine.state.position = [4.0, 5.0, 6.0]
     with listening(open_source(declared(machine, "ipp-position"))) as heard:
         heard.until(lambda one: len(one.good()) >= 2)
@@ -64,7 +64,7 @@ def test_positions_are_asked_for_as_often_as_is_said(machine: SimulatedIppServer
 
 
 @pytest.mark.parametrize("cut", ["closed", "hung"])
-def test_a_machine_that_was_lost_is_heard_again_within_two_seconds(cut: str, machine: SimulatedIppServer) -> None:
+def test_a_machine_that_was_lost_is_heard_again_within_two_seconds(cut: str, machine: UnreliableIppServer) -> None:
     with listening(open_source(declared(machine))) as heard:
         heard.until(lambda one: any("OnPtMeasReport" in line for line in machine.lines))
         if cut == "closed":
@@ -82,7 +82,7 @@ def test_a_machine_that_was_lost_is_heard_again_within_two_seconds(cut: str, mac
         heard.until(lambda one: one.good())
 
 
-def test_noise_between_lines_is_said_and_is_no_point(machine: SimulatedIppServer) -> None:
+def test_noise_between_lines_is_said_and_is_no_point(machine: UnreliableIppServer) -> None:
     with listening(open_source(declared(machine))) as heard:
         machine.mischief.noise = b"\xff\x00\r\n"
         machine.pick(1, 2, 3)
@@ -93,7 +93,7 @@ def test_noise_between_lines_is_said_and_is_no_point(machine: SimulatedIppServer
         assert all("no line of I++ DME" in str(event.status) and not event.values for event in bad)
 
 
-def test_what_is_no_server_is_refused(machine: SimulatedIppServer) -> None:
+def test_what_is_no_server_is_refused(machine: UnreliableIppServer) -> None:
     machine.mischief.exchanged = True
     with pytest.raises(CmmUqError, match=r"no I\+\+ DME server answers: .* before it was acknowledged"):
         open_source(declared(machine))
@@ -111,7 +111,7 @@ LINES = st.one_of(
 )  # fmt: skip
 
 
-def test_whatever_a_server_sends_is_told_and_no_place_is_invented(machine: SimulatedIppServer) -> None:
+def test_whatever_a_server_sends_is_told_and_no_place_is_invented(machine: UnreliableIppServer) -> None:
     source = open_source(declared(machine))
     assert isinstance(source, IppMachine)
 
