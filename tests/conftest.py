@@ -47,7 +47,7 @@ LONG = (
     "site/test_site.py", "artefacts/test_certificate_figures.py", "hostile/test_kills_and_collisions.py",
     "artefacts/shift_plate/test_plane.py", "site/test_notebooks.py", "certificate/diagnosis/test_overview.py",
     "certificate/test_every_layout.py", "hostile/test_kernels.py", "app/commands/test_planning.py",
-    "app/cli/test_outside_effect.py", "certificate/test_compose.py", "app/commands/test_batch.py",
+    "app/cli/test_packages.py", "certificate/test_compose.py", "app/commands/test_batch.py",
     "laboratory/schedule/test_cluster.py", "app/commands/test_new.py", "laboratory/records/test_pending.py",
     "app/commands/test_analysis.py", "app/cli/test_report.py", "analysis/diagnosis/test_diagnosis.py",
 )  # fmt: skip

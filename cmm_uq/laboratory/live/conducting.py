@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError, OutputError
@@ -27,9 +26,7 @@ _SHOWN = 50  # lines of what happened that a screen may show
 _PASTED_S = 0.6  # between two points that are typed: in less nobody measures
 _NUMBERS = ("measurement", "point", "repeat")
 _NOTHING_LEFT = say("nothing is left of the plan")
-_UNTIMED: Mapping[str, bool] = MappingProxyType(
-    {"timed": False}
-)  # of points that share a moment which is none of theirs
+_UNTIMED = {"timed": False}  # of points that share a moment which is none of theirs
 
 
 class Conductor:

@@ -157,11 +157,6 @@ class Lead:
         return [step for step in self.steps(run) if step.place not in taken]
 
 
-def titles_of(measurements: Sequence[int], titles: Sequence[Text]) -> dict[int, Text]:
-    """Titles by the number of their measurement, of those that have one."""
-    return {number: title for number, title in zip(measurements, titles, strict=False) if title}
-
-
 _FIRST = ("measurement", "point", "repeat", *COORDINATES)
 TYPED = "typed"  # how a point came that the operator typed; ``typed length`` where it was a distance
 

@@ -98,7 +98,6 @@ class WatchedFolder:
 
 class Screen(Protocol):
     def tell(self, text: Text) -> None: ...
-
     def show(self, view: SessionView) -> None: ...
 
 

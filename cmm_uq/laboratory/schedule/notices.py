@@ -151,7 +151,6 @@ class Channel(Protocol):
 
     def send(self, message: OutgoingMessage) -> str:
         """Send a message; what is to be remarked of it, as a rule nothing."""
-        ...
 
 
 def within(seconds: float, call: Callable[[], str], who: str) -> str:

@@ -41,14 +41,11 @@ class State(Protocol):
 
     def reported(self, job: str) -> Mapping[str, str] | None:
         """SHA-256 by name of every file that a job's newest certificate was made from; ``None`` where it has none."""
-        ...
 
     def released(self, job: str) -> bool:
         """Whether a person has released the newest certificate of a job, so that it must not be replaced."""
-        ...
 
     def sent(self, key: str) -> bool: ...
-
     def add_sent(self, key: str, content: Mapping[str, Any]) -> None: ...
 
 
@@ -175,15 +172,6 @@ class Turn:
     resumed: bool  # whether a run ended before it was through with what the lock is of
     through: bool = True  # whether this one is, so that it may be forgotten
 
-    def end(self) -> None:
-        if self.through:
-            try:
-                self.path.unlink()
-            except OSError:  # on Windows while it is open; empty it says the same
-                with contextlib.suppress(OSError):
-                    os.ftruncate(self.descriptor, 0)
-        os.close(self.descriptor)
-
 
 def turn_at(path: Path) -> Turn | None:
     """Take a lock without waiting; ``None`` where another process holds it."""
@@ -221,7 +209,13 @@ def turn(path: Path, *, patience_s: float = 0.0) -> Iterator[Turn | None]:
         yield taken
     finally:
         if taken is not None:
-            taken.end()
+            if taken.through:
+                try:
+                    path.unlink()
+                except OSError:  # on Windows while it is open; empty it says the same
+                    with contextlib.suppress(OSError):
+                        os.ftruncate(taken.descriptor, 0)
+            os.close(taken.descriptor)
 
 
 def was_left(path: Path) -> bool:

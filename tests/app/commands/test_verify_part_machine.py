@@ -17,8 +17,7 @@ from cmm_uq.app.commands.parts.drift import FILE
 from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.part.measurement import PartMeasurement
-from tests.app.cli.test_due import recorded
-from tests.app.cli.test_history import scale
+from tests.app.cli.test_due import recorded, scale
 from tests.part_machines import PDF as MACHINE_PDF, by_certificate, plate_of
 from tests.part_reports import put, sampled_once, unchanged
 

@@ -1,4 +1,4 @@
-"""Whatever happens to the file of a journal, it opens, and what was kept before is there."""
+"""Records are kept whole: journals, sessions and blocks of readings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.laboratory.live.instruments.source import Moment
+from cmm_uq.base.messages import Verbatim
+from cmm_uq.laboratory.live.instruments.source import Moment, Reading
 from cmm_uq.laboratory.live.journal import (
     NoRoomError,
     Record,
@@ -20,6 +21,7 @@ from cmm_uq.laboratory.live.journal import (
     record_of,
     written_whole,
 )
+from cmm_uq.laboratory.live.recorder import put_blocks, readings_of
 from cmm_uq.laboratory.live.story import begin, read_story, sessions_in
 
 NOW = Moment(1_700_000_000_000_000_000, 7)
@@ -166,3 +168,23 @@ def test_a_file_is_written_whole_or_stays_as_it_was(tmp_path: Path, monkeypatch:
         written_whole(path, b"new")
     assert path.read_bytes() == b"old"
     assert [one.name for one in tmp_path.iterdir()] == ["bar.csv"]
+
+
+READING = st.builds(
+    Reading, st.sampled_from("ab"), st.integers(1, 9), st.integers(0, 2**62), st.integers(0, 2**62), st.binary(max_size=30),
+    st.dictionaries(st.sampled_from(["temp_c", "x_mm"]), st.floats(allow_nan=False, allow_infinity=False), max_size=2),
+    st.none() | st.just(Verbatim("out of range")), st.none() | st.just("PtMeas"),
+)  # fmt: skip
+
+
+@given(st.lists(READING, max_size=12))
+@settings(max_examples=50, deadline=None)
+def test_every_reading_comes_back_with_its_bytes_values_and_clocks(tmp_path_factory, readings: list[Reading]) -> None:  # type: ignore[no-untyped-def]
+    path: Path = tmp_path_factory.mktemp("b") / "j"
+    journal = RecordingJournal(path)
+    put_blocks(readings, journal, NOW)
+    journal.commit()
+    journal.close()
+    found = [reading for record in opened(path).records for reading in readings_of(record.data)]
+    assert found == [reading for source in dict.fromkeys(r.source for r in readings) for reading in readings
+                     if reading.source == source]  # fmt: skip

@@ -1,21 +1,33 @@
-"""What was done is known from run to run: from the records, or from the folder of the reports where there are none."""
+"""What earlier runs have done, locks, and how far a run is."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import shutil
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.store import Records
 from cmm_uq.laboratory.schedule.jobs import JobFolder, JobReporting
-from cmm_uq.laboratory.schedule.state import FolderState, RecordsState
+from cmm_uq.laboratory.schedule.state import (
+    FolderState,
+    Log,
+    Pace,
+    RecordsState,
+    duration,
+    pace,
+    turn,
+    turn_at,
+    was_left,
+)
 from tests.laboratory.records.histories import certificate
 from tests.laboratory.schedule.runs import Jobs, made
 
@@ -105,3 +117,135 @@ def test_runs_with_records_send_once_and_their_chain_holds(tmp_path: Path, recor
     assert len(jobs.channel.messages) == 1
     assert [entry.kind for entry in records.entries()] == ["sent", "report"]
     assert records.verify(files=False) == []
+
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from cmm_uq.laboratory.schedule.state import turn_at
+assert turn_at(Path(sys.argv[1])) is not None
+print("held", flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.fixture
+def lock(tmp_path: Path) -> Path:
+    return tmp_path / "locks" / "job.lock"
+
+
+def test_while_another_process_holds_a_lock_there_is_no_turn_and_once_it_is_killed_there_is(lock: Path) -> None:
+    holder = subprocess.Popen([sys.executable, "-c", HOLD, str(lock)], stdout=subprocess.PIPE)
+    try:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == b"held\n"
+        assert turn_at(lock) is None
+    finally:
+        holder.kill()
+        holder.communicate()
+    assert was_left(lock)
+    with turn(lock) as mine:
+        assert mine is not None
+        assert mine.resumed
+    assert not was_left(lock)
+
+
+def test_a_turn_that_ended_leaves_nothing(lock: Path) -> None:
+    for _ in range(2):
+        with turn(lock) as mine:
+            assert mine is not None
+            assert not mine.resumed
+            assert was_left(lock)
+    assert not lock.exists()
+
+
+def test_one_that_was_not_through_is_resumed_by_the_next(lock: Path) -> None:
+    with turn(lock) as mine:
+        assert mine is not None
+        mine.through = False
+    with turn(lock) as mine:
+        assert mine is not None
+        assert mine.resumed
+
+
+def test_a_second_turn_in_the_same_process_waits_no_longer_than_it_is_to(lock: Path) -> None:
+    with turn(lock), turn(lock, patience_s=0.1) as second:
+        assert second is None
+
+
+def test_a_file_where_the_folder_of_locks_belongs_is_told(tmp_path: Path) -> None:
+    (tmp_path / "locks").write_text("")
+    with pytest.raises(OutputError, match="cannot be locked"):
+        turn_at(tmp_path / "locks" / "job.lock")
+
+
+def test_rate_and_remaining_time_follow_from_what_was_computed_alone() -> None:
+    now = [100.0]
+    found = Pace(400, lambda: now[0])
+    assert str(found) == "0 of 400"
+    for _ in range(100):
+        found.add(computed=False)  # was there already
+    assert str(found) == "100 of 400"
+    now[0] += 50.0
+    for i in range(100):
+        found.add(failed=i < 3)
+    assert str(found) == "200 of 400, 3 failed, 2.0/s, 1 min 40 s left"
+    assert found.part == 0.5
+    for _ in range(200):
+        found.add()
+    assert str(found) == "400 of 400, 3 failed, 6.0/s"
+
+
+@pytest.mark.parametrize(("rate", "said"), [(2.04, "2.0/s"), (0.5, "30.0/min"), (0.01, "36.0/h")])
+def test_a_rate_is_told_in_a_unit_in_which_there_are_some(rate: float, said: str) -> None:
+    assert pace(rate) == said
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"), [(59.4, "59 s"), (59.6, "1 min 0 s"), (3599.0, "59 min 59 s"), (7260.0, "2 h 1 min")]
+)
+def test_a_duration_is_told_in_its_two_largest_units(seconds: float, said: str) -> None:
+    assert duration(seconds) == said
+
+
+WRITE = """
+import sys
+from pathlib import Path
+from cmm_uq.laboratory.schedule.state import Log
+log = Log(Path(sys.argv[1]), 500, 100)
+for i in range(150):
+    log.write(f"{sys.argv[2]} {i}")
+"""
+
+
+def test_two_processes_lose_no_line_while_files_are_begun_anew(tmp_path: Path) -> None:
+    path = tmp_path / "schedule.log"
+    writers = [subprocess.Popen([sys.executable, "-c", WRITE, str(path), name]) for name in "ab"]
+    assert [writer.wait() for writer in writers] == [0, 0]
+    files = sorted(tmp_path.glob("schedule.log*"))
+    assert len(files) > 1
+    assert all(file.stat().st_size <= 500 for file in files)
+    lines = [line for file in files for line in file.read_text().splitlines()]
+    assert sorted(lines) == sorted(f"{name} {i}" for name in "ab" for i in range(150))
+
+
+def test_no_more_are_kept_than_said(tmp_path: Path) -> None:
+    log = Log(tmp_path / "schedule.log", 1000, 2)
+    for i in range(200):
+        log.write(f"line {i:04} {'x' * 40}")
+    assert sorted(path.name for path in tmp_path.glob("schedule.log*")) == [
+        "schedule.log", "schedule.log.1", "schedule.log.2",
+    ]  # fmt: skip
+    assert "line 0199" in (tmp_path / "schedule.log").read_text()
+
+
+def test_a_line_is_one_line_whatever_it_holds(tmp_path: Path) -> None:
+    Log(tmp_path / "schedule.log", 1000, 1).write("a\nb\x1b[31m\udcff µ")
+    assert (tmp_path / "schedule.log").read_text(encoding="utf-8").splitlines() == ["a\\nb\\x1b[31m\\udcff µ"]
+
+
+def test_a_log_that_cannot_be_written_stops_nothing(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    Log(tmp_path / "file" / "schedule.log", 1000, 1).write("a")
+    Log(tmp_path, 1000, 1).write("a")
+    Log(None, 1000, 1).write("a")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,7 @@ from cmm_uq.laboratory.live.instruments.ipp_machine import IppMachine
 from cmm_uq.laboratory.live.instruments.source import SYSTEM, Clock, LiveSource, Moment
 from cmm_uq.laboratory.live.journal import made_folder, written_whole
 from cmm_uq.laboratory.live.judging import Judge
-from cmm_uq.laboratory.live.lead import Lead, LiveRecording, titles_of
+from cmm_uq.laboratory.live.lead import Lead, LiveRecording
 from cmm_uq.laboratory.live.recorder import Recorder
 from cmm_uq.laboratory.live.running import Acquisition, DroppedFile, WatchedFolder
 from cmm_uq.laboratory.live.simulated import SimulatedMachine, simulated
@@ -44,36 +45,24 @@ from cmm_uq.machine.model.kind import Observe
 from cmm_uq.machine.physics.catalogue import effects
 
 
-class Taking:
-    """Takes files of a folder: keeps their bytes beside the journal, and reads their points as any import does."""
-
-    def __init__(self, job: Job, watched: WatchedFolder, conductor: Conductor, clock: Clock) -> None:
-        self._job, self._watched, self._conductor, self._clock = job, watched, conductor, clock
-
-    def __call__(self, file: DroppedFile) -> None:
-        """A file that stands still."""
-        try:
-            rows = _rows(file, self._job)
-        except CmmUqError as error:
-            self._conductor.tell(Verbatim(str(error)))
-            return
-        try:
-            kept = self._kept(file)
-        except OutputError as error:
-            self._conductor.tell(Verbatim(str(error)))
-            self._watched.again(file.path)
-            return
-        age = self._clock.utc_ns() - file.utc_ns
-        moment = Moment(file.utc_ns, self._clock.monotonic_ns() - age)
-        self._conductor.file(file.path.name, file.content, moment, rows, kept)
-
-    def _kept(self, file: DroppedFile) -> str:
-        folder = self._job.folder / FOLDER / "files"
+def _take(file: DroppedFile, job: Job, watched: WatchedFolder, conductor: Conductor, clock: Clock) -> None:
+    """Take a file that stands still: keep its bytes beside the journal, and read its points as any import does."""
+    try:
+        rows = _rows(file, job)
+    except CmmUqError as error:
+        conductor.tell(Verbatim(str(error)))
+        return
+    try:
+        folder = job.folder / FOLDER / "files"
         made_folder(folder)
-        number = 1 + sum(1 for _ in folder.iterdir())
-        path = folder / f"{number:04d}-{file.path.name}"
+        path = folder / f"{1 + sum(1 for _ in folder.iterdir()):04d}-{file.path.name}"
         written_whole(path, file.content)
-        return path.name
+    except OutputError as error:
+        conductor.tell(Verbatim(str(error)))
+        watched.again(file.path)
+        return
+    age = clock.utc_ns() - file.utc_ns
+    conductor.file(file.path.name, file.content, Moment(file.utc_ns, clock.monotonic_ns() - age), rows, path.name)
 
 
 def _rows(file: DroppedFile, job: Job) -> list[dict[str, float]]:
@@ -139,7 +128,8 @@ def begin_acquisition(
     conductor.tick()
     if watched is None:
         return Acquisition(conductor, sources, clock, journals, job.folder)
-    return Acquisition(conductor, sources, clock, journals, job.folder, watched, Taking(job, watched, conductor, clock))
+    dropped = partial(_take, job=job, watched=watched, conductor=conductor, clock=clock)
+    return Acquisition(conductor, sources, clock, journals, job.folder, watched, dropped)
 
 
 def plan_file(job: Job) -> dict[str, bytes]:
@@ -205,7 +195,8 @@ def _lead(job: Job, plan: str, titles: Sequence[str]) -> Lead:
     points: Points = read_recording(plan.encode(), "the plan", job.points.machine)
     numbers = list(dict.fromkeys(points.measurement.tolist()))
     unmeasured = {"time_s", *job.facts.plan.columns, *(name for name in points.columns if name.startswith("temp_"))}
-    return Lead(points, titles_of(numbers, [Verbatim(title) for title in titles]), frozenset(unmeasured))
+    shown = {number: Verbatim(title) for number, title in zip(numbers, titles, strict=False) if title}
+    return Lead(points, shown, frozenset(unmeasured))
 
 
 def _judge(job: Job) -> Judge:

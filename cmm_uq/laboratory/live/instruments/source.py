@@ -93,11 +93,9 @@ class LiveSource(Protocol):
 
     def identity(self) -> Identity:
         """Which instrument it is, as far as is known by now."""
-        ...
 
     def events(self, stop: threading.Event) -> Iterator[Event]:
         """What happens, as it happens; it reconnects within 2 s and never raises for what the line does."""
-        ...
 
     def close(self) -> None: ...
 
@@ -106,9 +104,7 @@ class Clock(Protocol):
     """Time, as the system tells it or as a test does."""
 
     def utc_ns(self) -> int: ...
-
     def monotonic_ns(self) -> int: ...
-
     def sleep(self, s: float) -> None: ...
 
 
@@ -139,10 +135,8 @@ class Port(Protocol):
 
     def read(self) -> bytes:
         """What came, as soon as anything comes; empty where nothing did within :data:`TICK_S`."""
-        ...
 
     def write(self, data: bytes) -> None: ...
-
     def close(self) -> None: ...
 
 

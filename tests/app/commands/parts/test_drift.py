@@ -14,8 +14,7 @@ from cmm_uq.app.commands.parts.drift import known_of, with_drift
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine
 from cmm_uq.machine.physics.catalogue import effects
-from tests.app.cli.test_due import recorded
-from tests.app.cli.test_history import scale
+from tests.app.cli.test_due import recorded, scale
 from tests.laboratory.records.histories import certificate
 
 CALIBRATED, ON = dt.date(2026, 3, 2), dt.date(2027, 3, 2)

@@ -1,20 +1,103 @@
-"""A summary in lines: nothing runs over the edge, nothing is lost that was asked for, the decision comes first."""
+"""What goes to a terminal: colours, encodings, and lines of any width."""
 
 from __future__ import annotations
 
+import inspect
+import io
+import json
+import os
 import re
+import sys
 from itertools import product
+from pathlib import Path
 
 import pytest
 from hypothesis import given, strategies as st
 from rich.cells import cell_len
 
+from cmm_uq.app.cli import terminal as encoding
 from cmm_uq.app.cli.summary import COLOURS, Layout
-from cmm_uq.app.cli.terminal import Line, folded
-from cmm_uq.base.messages import Verbatim
+from cmm_uq.app.cli.terminal import Line, folded, progress
+from cmm_uq.app.commands.plans.plan import plan_summary
+from cmm_uq.base.messages import Verbatim, say
+from cmm_uq.base.units import Unit
 from cmm_uq.certificate.wording import Headline, Summary
+from tests.app.cli.terminal import on_terminal
 from tests.artefacts.simulated import outcome
 from tests.conftest import ROOT
+
+ANSWER = "cmm-uq: No such option: --seeed. Did you mean --seed? cmm-uq report --help lists its options"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals of POSIX")
+@pytest.mark.parametrize(
+    ("environment", "coloured"), [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False)]
+)
+def test_an_error_is_folded_between_words_and_red_only_where_colour_is_wanted(
+    environment: dict[str, str], coloured: bool
+) -> None:
+    code, told = on_terminal("report", "x", "--seeed", "3", columns=60, environment=environment)
+    assert code == 2
+    assert ("\x1b[1;31mcmm-uq:\x1b[0m" in told) is coloured
+    plain = told.replace("\x1b[1;31m", "").replace("\x1b[0m", "")
+    assert "\x1b" not in plain
+    assert max(map(len, plain.splitlines())) <= 60
+    assert " ".join(plain.split()) == ANSWER
+
+
+def stages(capsys: pytest.CaptureFixture[str], *, quiet: bool, verbose: bool) -> list[str]:
+    with progress(quiet=quiet, verbose=verbose) as stage:
+        for part in (0.0, 0.5, 1.0) if stage else ():
+            stage(f"Sampling: {part:.0%} of the draws needed", part)
+        if stage:
+            stage("Writing", 1.0)
+    said = capsys.readouterr()
+    assert said.out == ""
+    return said.err.splitlines()
+
+
+def test_away_from_a_terminal_stages_are_told_once_each_and_only_when_asked_for(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert stages(capsys, quiet=False, verbose=True) == ["Sampling", "Writing"]
+    assert stages(capsys, quiet=False, verbose=False) == []
+    assert stages(capsys, quiet=True, verbose=True) == []
+
+
+def written(text: str, codec: str, monkeypatch: pytest.MonkeyPatch) -> str:
+    stream = io.TextIOWrapper(io.BytesIO(), encoding=codec)
+    monkeypatch.setattr(sys, "stdout", stream)
+    encoding.any_character()
+    stream.write(text)
+    stream.flush()
+    assert isinstance(stream.buffer, io.BytesIO)
+    return stream.buffer.getvalue().decode(codec)
+
+
+def test_ascii_has_the_nearest_of_what_is_printed(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert written("−174 ± 16 ″, 3 µm → 4 ≤ 5", "ascii", monkeypatch) == '-174 +/- 16 ", 3 um -> 4 <= 5'
+    assert written("machine 漢 \udcff", "ascii", monkeypatch) == "machine \\u6f22 \\udcff"
+
+
+def test_what_windows_writes_into_a_pipe_keeps_what_it_can(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert written("−1 ± 2 µm…", "cp1252", monkeypatch) == "-1 ± 2 µm…"
+
+
+@given(st.text())
+def test_json_is_the_same_data_in_every_encoding(text: str) -> None:
+    for codec in ("ascii", "cp1252", "utf-8"):
+        found = encoding.json_for(codec, json.dumps({"a": text}, ensure_ascii=False))
+        found.encode(codec, "surrogatepass" if codec == "utf-8" else "strict")
+        assert json.loads(found) == {"a": text}
+
+
+def test_everything_that_the_program_prints_beyond_ascii_has_a_nearest() -> None:
+    """Of the modules that write what a terminal shows; a unit or a sign that is added there must be added here too."""
+    writers = map(inspect.getfile, (plan_summary, Summary, Unit, say))
+    sources = [*(ROOT / "cmm_uq" / "app" / "cli").rglob("*.py"), *map(Path, writers)]
+    used = {c for path in sources for c in path.read_text(encoding="utf-8") if not c.isascii()}
+    assert sorted(used - encoding.NEAREST.keys()) == []
+
 
 FILES = [("certificate.html, certificate.pdf", "the certificate"), ("results.json", "every figure, for other programs")]
 WORDS = st.lists(st.text("abcäµ漢-/.,\u00a0", min_size=1, max_size=12), min_size=1, max_size=60)
