@@ -25,14 +25,9 @@ _UNSHOWN = frozenset({"Cc", "Cf", "Co", "Cs", "Zl", "Zp"})
 class CmmUqError(Exception):
     """Something in the input (or the place to write to) that the user has to mend.
 
-    Parameters
-    ----------
     problem : what is wrong, one sentence without a full stop.
     where : file, with line, key or column.
     fix : what to do about it.
-
-    Attributes
-    ----------
     also : what else is wrong with the same input, where its reader went on.
     """
 
@@ -125,7 +120,6 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 def _shares(lengths: Sequence[int], total: int) -> list[int]:
     """Characters for each part: short ones stay whole, the others share what is left alike."""
-    shares = list(lengths)
     cut = [i for i, length in enumerate(lengths) if length]
     while True:
         whole = [i for i in range(len(lengths)) if i not in cut]
@@ -134,6 +128,4 @@ def _shares(lengths: Sequence[int], total: int) -> list[int]:
         if longer == cut:
             break
         cut = longer
-    for i in cut:
-        shares[i] = share
-    return shares
+    return [share if i in cut else length for i, length in enumerate(lengths)]

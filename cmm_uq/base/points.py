@@ -32,8 +32,6 @@ class Machine:
     A machine with further axes, or with others, is a class of its own, whose :meth:`coordinates` and :meth:`readings` say how
     they belong together; everything else is said by axis.
 
-    Parameters
-    ----------
     name : as on the certificate.
     chain : carriages from the table to the ram, a permutation of ``XYZ``.
     travel_mm : (axes, 2) lowest and highest scale reading of each axis, mm; ``nan`` where the job does not say.
@@ -57,20 +55,12 @@ class Machine:
     def readings(self, xyz: Floats, columns: Mapping[str, Floats]) -> Floats:
         """Scale readings (n, axes) of recorded coordinates (n, 3), mm.
 
-        Parameters
-        ----------
-        xyz : recorded coordinates.
-        columns : what was recorded beside them, each (n,): readings that do not follow from coordinates are among it.
+        ``columns``: what was recorded beside them, each (n,): readings that do not follow from coordinates are among it.
         """
         return np.asarray(xyz + self.origin_mm, dtype=np.float64)
 
     def travel(self, axis: str) -> tuple[float, float]:
-        """Lowest and highest scale reading of an axis, mm.
-
-        Raises
-        ------
-        CmmUqError : the job does not give the travel of this axis.
-        """
+        """Lowest and highest scale reading of an axis, mm; a ``CmmUqError`` where the job does not give them."""
         low, high = self.travel_mm[self.axes.index(axis)]
         if np.isnan(low) or np.isnan(high):
             fix = f"Give travel_mm = {{ {axis} = [lowest, highest] }} in mm"
@@ -94,8 +84,6 @@ def beyond_travel(readings: Floats, travel_mm: Floats) -> list[tuple[int, int]]:
 class Points:
     """Indicated coordinates of one recording, and all that was recorded beside them.
 
-    Parameters
-    ----------
     xyz : (n, 3) indicated coordinates, mm, in the recorded frame.
     measurement, point, repeat : (n,) what belongs together; see the recording's columns of the same names.
     machine : the machine that read them.
@@ -177,12 +165,7 @@ class Points:
         return int(self.measurement[row]), int(self.repeat[row])
 
     def column(self, name: str) -> Floats:
-        """A recorded column, (n,).
-
-        Raises
-        ------
-        CmmUqError : the recording has no such column.
-        """
+        """A recorded column, (n,); a ``CmmUqError`` where the recording has no such column."""
         if name not in self.columns:
             problem = f"the recording has no column {name!r}, which the model needs"
             raise CmmUqError(problem, where="job.toml [model] effects", fix=f"Record {name}, or leave out the effect")
@@ -198,12 +181,7 @@ class Points:
 
     @cached_property
     def hours(self) -> Floats:
-        """Time since the start (n,), h.
-
-        Raises
-        ------
-        CmmUqError : the recording has no time.
-        """
+        """Time since the start (n,), h; a ``CmmUqError`` where the recording has no time."""
         return np.asarray((self.column("time_s") - self.start) / HOUR)
 
     def at(self, xyz: Floats) -> Points:

@@ -30,8 +30,6 @@ REFERENCE_TEMPERATURE = 20.0  # standard reference temperature for dimensional s
 class Unit(Text):
     r"""A unit as printed, ``µm``, with what machines call it.
 
-    Parameters
-    ----------
     symbol : as printed.
     dsi : in the notation of D-SI (SmartCom, D-SI 2.1): ``\micro\metre``.
     qif : name for the ``UnitName`` of QIF 3.0 (ANSI/DMSC, ``FileUnits``), which gives the factor beside it.

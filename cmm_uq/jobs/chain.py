@@ -52,7 +52,6 @@ _HEADS: Mapping[Claim, Text] = {
     ),
     "not shown": say("The results are not shown to be traceable to the International System of Units (SI)."),
 }
-_NO_EVIDENCE = say("no arrangement covers this calibration, and no evidence of the issuer's competence is named")
 
 
 @dataclass(frozen=True)
@@ -78,43 +77,41 @@ class Link:
 
     def lacks(self) -> Iterator[Lack]:
         """What is not stated, or contradicts itself."""
-        chain, at = self.chain or Traceability(), self.table
-        if not chain.number.strip():
-            yield say("the number of the certificate is not stated"), f"{at} number"
-        if not chain.laboratory.strip():
-            yield say("who issued the certificate is not stated"), f"{at} laboratory"
-        if chain.issuer is None:
-            what = say("whether its issuer is a national metrology institute or an accredited laboratory is not stated")
-            yield what, f"{at} issuer"
-        elif chain.issuer == CONSENSUS:
-            yield say("a value by consensus is no route to the SI for lengths and temperatures"), f"{at} issuer"
-        elif not _covered(chain) and not chain.evidence.strip():
-            yield _NO_EVIDENCE, f"{at} {'arrangement' if chain.issuer in (NATIONAL, ACCREDITED) else 'evidence'}"
-        if chain.issuer == ACCREDITED and not chain.accreditation.strip():
-            yield say("the number of the issuer's accreditation is not stated"), f"{at} accreditation"
-        if chain.issuer == ACCREDITED and not chain.accredited_by.strip():
-            yield say("who accredited the issuer is not stated"), f"{at} accredited_by"
-        yield from self._dates(chain)
-        if self.another:
-            yield say("the temperatures were read from {serial}", serial=Verbatim(self.another)), f"{at} serial"
+        chain = self.chain or Traceability()
+        bare, accredited = chain.issuer not in (None, CONSENSUS) and not _covered(chain), chain.issuer == ACCREDITED
+        found = (
+            (not chain.number.strip(), "number", say("the number of the certificate is not stated")),
+            (not chain.laboratory.strip(), "laboratory", say("who issued the certificate is not stated")),
+            (chain.issuer is None, "issuer",
+             say("whether its issuer is a national metrology institute or an accredited laboratory is not stated")),
+            (chain.issuer == CONSENSUS, "issuer",
+             say("a value by consensus is no route to the SI for lengths and temperatures")),
+            (bare and not chain.evidence.strip(),
+             "arrangement" if chain.issuer in (NATIONAL, ACCREDITED) else "evidence",
+             say("no arrangement covers this calibration, and no evidence of the issuer's competence is named")),
+            (accredited and not chain.accreditation.strip(), "accreditation",
+             say("the number of the issuer's accreditation is not stated")),
+            (accredited and not chain.accredited_by.strip(), "accredited_by", say("who accredited the issuer is not stated")),
+            *self._dates(chain),
+            (bool(self.another), "serial", say("the temperatures were read from {serial}", serial=Verbatim(self.another))),
+        )  # fmt: skip
+        yield from ((what, f"{self.table} {key}") for lacks, key, what in found if lacks)
 
-    def _dates(self, chain: Traceability) -> Iterator[Lack]:
+    def _dates(self, chain: Traceability) -> Iterator[tuple[bool, str, Text]]:
         """The first and the last day belong to the time for which a calibration holds."""
         date, until, measured = chain.date, chain.until, day(self.day)
         if date is None:
-            yield say("the date of the certificate is not stated"), f"{self.table} date"
+            yield True, "date", say("the date of the certificate is not stated")
         elif date > self.day:
             what = say("the certificate is dated {date}, after the measurement of {day}", date=day(date), day=measured)
-            yield what, f"{self.table} date"
+            yield True, "date", what
         if until is None:
-            yield say("until when the calibration holds is not stated"), f"{self.table} due"
+            yield True, "due", say("until when the calibration holds is not stated")
         elif until < self.day:
-            what = say(
-                "the calibration was due on {due}, before the measurement of {day}", due=day(until), day=measured
-            )
-            yield what, f"{self.table} due"
+            yield True, "due", say("the calibration was due on {due}, before the measurement of {day}", due=day(until),
+                                   day=measured)  # fmt: skip
         elif date is not None and until < date:
-            yield say("the calibration was due before the certificate was issued"), f"{self.table} due"
+            yield True, "due", say("the calibration was due before the certificate was issued")
 
     @property
     def sentence(self) -> Text:
@@ -216,12 +213,14 @@ def _temperatures(job: Job, read: Collection[str]) -> Iterator[Link]:
     recorded = {name for name in (*job.points.columns, *gauge) if name.startswith("temp_") and name.endswith("_c")}
     columns = recorded & {ARTEFACT, *read}
     facts, date = job.facts, job.facts.job.date
+    instruments = [] if job.acquired is None else job.acquired.said.instruments  # that a live recording is from
     for number, one in enumerate(facts.thermometer, 1):
         if own := sorted(columns & {*one.columns}):
             named = commas(names(filter(None, (one.name, one.serial))))
             what = say("thermometer {named}", named=named) if named else _nameless(own)
-            yield Link(what, f"[[thermometer]] {number} certificate", one.certificate, date, True,
-                       _another(job, own, one.serial))  # fmt: skip
+            taken = (each.serial for each in instruments if not {*each.columns.values()}.isdisjoint(own))
+            another = next((serial for serial in taken if serial and serial != one.serial), "")
+            yield Link(what, f"[[thermometer]] {number} certificate", one.certificate, date, True, another)
     known = {name for one in facts.thermometer for name in one.columns}
     for name in sorted(columns - known):
         yield Link(_nameless([name]), "[[thermometer]] certificate", None, date, True)
@@ -229,13 +228,6 @@ def _temperatures(job: Job, read: Collection[str]) -> Iterator[Link]:
 
 def _nameless(columns: Iterable[str]) -> Text:
     return say("thermometer of the {column}", column=commas(map(in_words, columns)))
-
-
-def _another(job: Job, columns: Collection[str], serial: str) -> str:
-    """Serial number of the instrument that a live recording has these columns from, where it is another."""
-    instruments = [] if job.acquired is None else job.acquired.said.instruments
-    taken = (one.serial for one in instruments if not {*one.columns.values()}.isdisjoint(columns))
-    return next((number for number in taken if number and number != serial), "")
 
 
 def holds_on(chain: Traceability, day: dt.date) -> bool:
@@ -260,15 +252,11 @@ def dates_out_of_order(of: Job) -> tuple[Text, ...]:
         (chain.until, job.date, say("the artefact was due for calibration before this"), "[artefact.certificate] due"),
         (chain.until, chain.date, say("the artefact's certificate was due before its date"), "[artefact.certificate] due"),
         (job.date, job.received, say("it was measured before it was received"), "[job] received"),
-        (
-            job.issued, None if job.replaces is None else job.replaces.date,
-            say("issued before the certificate that it replaces"), "[job.replaces] date",
-        ),
+        (job.issued, job.replaces.date if job.replaces else None, say("issued before the certificate that it replaces"),
+         "[job.replaces] date"),
         (job.date, found, say("the machine was found as it was after it was left"), AS_FOUND),
-        (
-            job.recalibration_agreed, job.date, say("the next calibration is agreed for a day before this one"),
-            "[job] recalibration_agreed",
-        ),
+        (job.recalibration_agreed, job.date, say("the next calibration is agreed for a day before this one"),
+         "[job] recalibration_agreed"),
     )  # fmt: skip
     return tuple(
         say("Dates out of order: {what}, {first} against {second}{key}.", what=what, first=day(first), second=day(second),

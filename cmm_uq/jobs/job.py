@@ -146,14 +146,14 @@ class JobFile(JobTable):
     def _rules_have_their_uncertainty(
         cls, wishes: list[ConformityFacts], info: ValidationInfo
     ) -> list[ConformityFacts]:
-        artefact = info.data.get("artefact")
+        artefact, uncertainty = info.data.get("artefact"), info.data.get("test_uncertainty")
+        if artefact is None or uncertainty is None:
+            return wishes  # what is wrong with these is said instead
+        by_points = artefact.with_references and artefact.u_um is None  # which the recording may state of each
+        whole = artefact.model_copy(update={"u_um": 1.0}) if by_points else artefact
         for wish in wishes:
-            if artefact is None or "test_uncertainty" not in info.data:
-                continue  # what is wrong with these is said instead
-            by_points = artefact.with_references and artefact.u_um is None  # which the recording may state of each
-            whole = artefact.model_copy(update={"u_um": 1.0}) if by_points else artefact
-            if key := uncertainty_missing(wish, whole, info.data["test_uncertainty"], standards_in(info)):
-                raise ValueError(". ".join(needed(key, wish)))
+            if missing := uncertainty_missing(wish, whole, uncertainty, standards_in(info)):
+                raise ValueError(". ".join(needed(missing, wish)))
         return wishes
 
     @field_validator("conformity")
@@ -206,8 +206,6 @@ def job_file_of(table: type[ArtefactFacts]) -> type[JobFile]:
 class Job:
     """A job as read: its facts, its recording, and the bytes of every file it was read from.
 
-    Parameters
-    ----------
     folder : where it lies; the empty path for a job that lies in no folder yet.
     facts : job.toml.
     points : the recording.
@@ -264,16 +262,12 @@ class Job:
         return str(self.folder / self.facts.recording.file)
 
     def write(self, folder: str | Path, *, force: bool = False) -> dict[str, Path]:
-        """Write the job as a folder that reads back to it.
+        """Write the job as a folder that reads back to it; the path of each file is given back, by its name.
 
         Parameters
         ----------
         folder : to write to.
         force : keep what stands in the way as ``NAME.previous`` instead of refusing.
-
-        Returns
-        -------
-        path of each file, by its name.
 
         Raises
         ------

@@ -141,11 +141,8 @@ def _check_element(element: Element, refuse: _Refuse, where: str) -> None:
     if f"{space}}}" != _SVG and not any(editor in space for editor in _EDITORS):
         refuse(f"it has a <{name}> that is no SVG")
     if f"{space}}}" == _SVG and name not in _DRAWING:
-        why = (
-            "whose font other machines may not have"
-            if name in ("text", "tspan", "font")
-            else "which a logo does not need"
-        )
+        lettering = name in ("text", "tspan", "font")
+        why = "whose font other machines may not have" if lettering else "which a logo does not need"
         refuse(f"it has a <{name}>, {why}")
     if name == "style" and _OUTWARD.search(element.text or ""):
         refuse("its style refers to something outside the file")

@@ -85,14 +85,14 @@ def chosen_by(key: str, each: Mapping[str, Schema], word: str) -> Schema:
             item["description"] = f"{item['description']} {word}: {', '.join(item['x-for'])}."
         else:
             del item["x-for"]
-    keys[key] = {name: item for name, item in keys[key].items() if name != "anyOf"} | {
-        "type": "string",
-        "enum": list(each),
-    }
-    return {
-        "type": "object", "properties": keys, "required": [key], "additionalProperties": False,
-        "allOf": [_of_one(key, value, found, keys) for value, found in each.items()],
-    }  # fmt: skip
+    keys[key] = {name: item for name, item in keys[key].items() if name != "anyOf"}
+    keys[key] |= {"type": "string", "enum": list(each)}
+    cases = []
+    for value, found in each.items():
+        foreign = {name: False for name in keys if name not in found["properties"]}
+        then = {"required": found.get("required", [])} | ({"properties": foreign} if foreign else {})
+        cases.append({"if": {"properties": {key: {"enum": [value]}}, "required": [key]}, "then": then})
+    return {"type": "object", "properties": keys, "required": [key], "additionalProperties": False, "allOf": cases}
 
 
 def _widen(known: Schema, other: Schema) -> None:
@@ -103,14 +103,6 @@ def _widen(known: Schema, other: Schema) -> None:
         for name in one:
             del known[name]
         known["anyOf"] = [*one.get("anyOf", [one]), two]
-
-
-def _of_one(key: str, value: str, found: Schema, keys: Mapping[str, Schema]) -> Schema:
-    foreign = {name: False for name in keys if name not in found["properties"]}
-    return {
-        "if": {"properties": {key: {"enum": [value]}}, "required": [key]},
-        "then": {"required": found.get("required", [])} | ({"properties": foreign} if foreign else {}),
-    }
 
 
 def keys_of(schema: Mapping[str, Any], parent: str = "") -> Iterable[tuple[str, Schema]]:
@@ -213,17 +205,13 @@ def without_place(description: str) -> str:
 def _lines(
     keys: Mapping[str, AnySchema], given: Mapping[str, Any], comment: bool, marked: Collection[str]
 ) -> list[str]:
-    mark = {key: f"{EXAMPLE}, put in your own: " if key in marked else "" for key in keys}
-    left = [key for key in keys if key not in given and comment]
-    return [
-        *(
-            f"{key} = {written(given[key])}  # {mark[key]}{without_place(keys[key]['description'])}"
-            for key in keys
-            if key in given
-        ),
-        *(f"{key} = {written(value)}" for key, value in given.items() if key not in keys),
-        *(f"# {key} = {written(_example(keys[key]))}  # {keys[key]['description']}" for key in left),
-    ]
+    lines = []
+    for key in (name for name in keys if name in given):
+        mark = f"{EXAMPLE}, put in your own: " if key in marked else ""
+        lines.append(f"{key} = {written(given[key])}  # {mark}{without_place(keys[key]['description'])}")
+    lines += [f"{key} = {written(value)}" for key, value in given.items() if key not in keys]
+    left = [(key, item) for key, item in keys.items() if key not in given and comment]
+    return lines + [f"# {key} = {written(_example(item))}  # {item['description']}" for key, item in left]
 
 
 def _example(key: AnySchema) -> Any:

@@ -5,7 +5,7 @@ Every output that says whether something conforms takes it from here: a document
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Literal
@@ -120,27 +120,23 @@ def _by_standard(one: Mapping[str, Any]) -> Verdict:
     )  # fmt: skip
 
 
-def _by_tolerance(results: Mapping[str, Any]) -> list[Verdict]:
-    found = []
+def _by_tolerance(results: Mapping[str, Any]) -> Iterator[Verdict]:
     for effect, held in (results.get("tolerances") or {}).items():
         outcome = TOLERANCE_OUTCOMES.get(str(held.get("verdict")), "undecided")
         for parameter, limit in held.items():
             if parameter != "verdict":
                 known = ((results.get("estimates") or {}).get(effect) or {}).get(parameter) or {}
-                found.append(Verdict(f"{effect}.{parameter}", outcome, known.get("value"), known.get("U"), limit,
-                                     printed_unit(parameter)))  # fmt: skip
-    return found
+                yield Verdict(f"{effect}.{parameter}", outcome, known.get("value"), known.get("U"), limit,
+                              printed_unit(parameter))  # fmt: skip
 
 
-def _of_part(characteristics: Any) -> list[Verdict]:
-    found = []
+def _of_part(characteristics: Any) -> Iterator[Verdict]:
     for one in characteristics:
         if isinstance(one, Mapping) and one.get("decision"):
             limits = one.get("limits") or {}
             limit = _nearest(one.get("value"), limits.get("lower"), limits.get("upper"))
-            found.append(Verdict(str(one["name"]), str(one["decision"]["outcome"]), one.get("value"), one.get("U"), limit,
-                                 Verbatim(one.get("unit") or "")))  # fmt: skip
-    return found
+            yield Verdict(str(one["name"]), str(one["decision"]["outcome"]), one.get("value"), one.get("U"), limit,
+                          Verbatim(one.get("unit") or ""))  # fmt: skip
 
 
 def _nearest(value: float | None, lower: float | None, upper: float | None) -> float | None:

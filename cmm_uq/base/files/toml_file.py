@@ -55,17 +55,13 @@ def _check_text(text: str, where: str) -> None:
     for token in _TOKEN.finditer(text):
         kind = token.lastgroup
         depth += (kind == "open") - (kind == "close")
-        if kind == "dotted" or depth > DEPTH.most:
-            raise _too_deep(f"{where} line {_line(text, token)}")
-        if kind == "long":
-            raise CmmUqError(
-                f"{token[0][:20]!r} … has {len(token[0])} characters: as a number, date or key, "
-                f"{NUMERAL.most} are the most", where=f"{where} line {_line(text, token)}", fix="Put text in quotes",
-            )  # fmt: skip
-
-
-def _line(text: str, token: re.Match[str]) -> int:
-    return text.count("\n", 0, token.start()) + 1
+        if kind in ("dotted", "long") or depth > DEPTH.most:
+            line = text.count("\n", 0, token.start()) + 1
+            if kind != "long":
+                raise _too_deep(f"{where} line {line}")
+            long = f"{token[0][:20]!r} … has {len(token[0])} characters"
+            problem = f"{long}: as a number, date or key, {NUMERAL.most} are the most"
+            raise CmmUqError(problem, where=f"{where} line {line}", fix="Put text in quotes")
 
 
 def _too_deep(where: str) -> CmmUqError:

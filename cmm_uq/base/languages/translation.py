@@ -158,11 +158,17 @@ def translated(text: Text, code: Code) -> Text:
 
 def _filled(message: Message, language: Language) -> str:
     """The pattern with its arguments; figures with decimal commas that a comma would part are parted by a semicolon."""
-    pattern, arguments, formatter = _pattern(message, language), _arguments(message), _formatter(language)
+    arguments: Mapping[str, Argument] = message.arguments
+    if isinstance(message, Plural):  # another language may need what one of the English forms leaves out
+        arguments = {**message.one.arguments, **message.many.arguments, **arguments}
+    pattern, formatter = _pattern(message, language), _formatter(language)
     parts: list[str] = []
     joins: list[int] = []
     for literal, name, spec, _ in formatter.parse(pattern):
-        text = "" if name is None else _argument(arguments[name], spec or "", formatter)
+        value = "" if name is None else arguments[name]
+        text = formatter.format_field(
+            translated(value, language.code) if isinstance(value, Text) else value, spec or ""
+        )
         if literal == ", " and parts and _FIGURES.fullmatch(parts[-1]) and _FIGURES.fullmatch(text):
             joins.append(len(parts))
         parts += [literal, text]
@@ -170,11 +176,6 @@ def _filled(message: Message, language: Language) -> str:
         for place in joins:
             parts[place] = language.parting
     return "".join(parts)
-
-
-def _argument(value: Argument, spec: str, formatter: _Localised) -> str:
-    said = translated(value, formatter.language.code) if isinstance(value, Text) else value
-    return formatter.format_field(said, spec)
 
 
 _SIGNS = r"[-+−±\d,.; \u00a0\u202f×⁻⁰¹²³⁴⁵⁶⁷⁸⁹e]*"
@@ -192,13 +193,6 @@ def _pattern(message: Message, language: Language) -> str:
     return patterns.single.get(message.pattern, message.pattern) if form is None else form
 
 
-def _arguments(message: Message) -> Mapping[str, Argument]:
-    """Of a plural those of both forms, since another language may need what one of the English ones leaves out."""
-    if not isinstance(message, Plural):
-        return message.arguments
-    return {**message.one.arguments, **message.many.arguments, **message.arguments}
-
-
 class _Localised(PatternFormatter):
     """Numbers as the language writes them; in one without capitals nothing is changed to one."""
 
@@ -213,6 +207,4 @@ class _Localised(PatternFormatter):
         return super().format_field(value, format_spec)
 
 
-@cache
-def _formatter(language: Language) -> _Localised:
-    return _Localised(language)
+_formatter = cache(_Localised)

@@ -126,22 +126,12 @@ class Stage:
     def write(
         self, contents: Mapping[str, bytes], large: Iterable[str] = (), *, ledger: Ledger | None = None
     ) -> dict[str, Path]:
-        """Put a set of files in place, the manifest last.
+        """Put a set of files in place, the manifest last; the path of each is given back, the manifest's too.
 
-        Parameters
-        ----------
-        contents : of each file by its name inside the folder.
-        large : names of files that were written into their :meth:`room`.
-        ledger : that is to have the set if it is put in place, and only then.
-
-        Returns
-        -------
-        path of each file, the manifest too.
-
-        Raises
-        ------
-        CmmUqError : something that is not this owner's stands in the way.
-        OutputError : the disk is full, or the place cannot be written to, or the ledger; what stood there before is untouched.
+        ``contents`` of each file by its name inside the folder, ``large`` ones by their names where they were written into
+        their :meth:`room`; the ``ledger`` has the set if it is put in place, and only then. A ``CmmUqError`` says that
+        something that is not this owner's stands in the way; an ``OutputError`` that the disk is full, or that the place or
+        the ledger cannot be written to; what stood there before is untouched.
         """
         with writing_to(self.folder, _MENDED):
             hashes = {name: sha256(content).hexdigest() for name, content in contents.items()}
@@ -275,7 +265,9 @@ def finish_interrupted(folder: Path) -> None:
 
 def is_pending(folder: Path, token: str) -> bool:
     """Whether a set is on its way in a folder still: its process lives, or somebody is just completing it."""
-    return _alive(folder, token) or _token(folder / PLACING) == token
+    with _of_the_dead(folder, token) as dead:
+        lives = bool(token) and not dead
+    return lives or _token(folder / PLACING) == token
 
 
 def synced(folder: Path) -> None:
@@ -295,18 +287,6 @@ def _token(placing: Path) -> str:
     except (OSError, ValueError):
         return ""
     return token if _STAGED.fullmatch(f"{STAGE}{token}") else ""
-
-
-def _alive(folder: Path, token: str) -> bool:
-    """Whether the process that staged something still holds its lock."""
-    lock = folder / f"{STAGE}{token}{LOCK}"
-    if not token or not lock.exists():
-        return False
-    descriptor = locked(lock, create=False)
-    if descriptor is None:
-        return lock.exists()
-    os.close(descriptor)
-    return False
 
 
 @contextlib.contextmanager

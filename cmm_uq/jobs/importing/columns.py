@@ -25,9 +25,7 @@ from cmm_uq.jobs.importing.header import NAME, Header, understood
 from cmm_uq.jobs.importing.keys import LENGTH, UNITS, ImportKeys, WrittenUnit, length_named
 from cmm_uq.jobs.importing.numerals import decimal_sign, is_number, split_units, values_of
 
-LARGEST_MACHINE_MM = (
-    40_000.0  # longest diagonal of a coordinate measuring machine: gantries of 30 m are the largest made
-)
+LARGEST_MACHINE_MM = 40_000.0  # longest diagonal of a measuring machine: gantries of 30 m are the largest made
 SIGNS = {".": say("point"), ",": say("comma")}
 _SHOWN = 15
 
@@ -35,7 +33,7 @@ Written = Mapping[str, Sequence[tuple[Floats, WrittenUnit | None, int]]]
 """Values of each column as written, with its unit and its index."""
 
 
-def lengths_unit(
+def _lengths_unit(
     sheet: Sheet,
     keys: ImportKeys,
     named: Mapping[str, WrittenUnit],
@@ -49,9 +47,7 @@ def lengths_unit(
         (first, of_first), (second, of_second) = list(headings.items())[:2]
         raise CmmUqError(f"{of_first!r} is in {first} and {of_second!r} in {second}: the coordinates mix units", where=where,
                          fix="Export all coordinates in one unit")  # fmt: skip
-    stated = [
-        (named[heading], say("in the heading {heading}", heading=Verbatim(heading))) for heading in headings.values()
-    ]
+    stated = [(named[each], say("in the heading {heading}", heading=Verbatim(each))) for each in headings.values()]
     for name, origin in ((sheet.unit, say("in the file")), (keys.unit, say("by the key unit"))):
         if name is not None and (unit := length_named(name)):
             stated.append((unit, origin))
@@ -96,7 +92,7 @@ def columns_of(
         [table.cells[i] for i in numeric], lambda i, row: table.place(numeric[i], row), keys.decimal
     )
     written = {name: table.written(name, sign) for name in plain}
-    unit, of_unit = lengths_unit(sheet, keys, table.named_units(written), written, where, reach_mm)
+    unit, of_unit = _lengths_unit(sheet, keys, table.named_units(written), written, where, reach_mm)
     values = {name: table.in_units(name, parts, unit) for name, parts in written.items() if parts}
     numbers, facts = table.numbers(sign)
     lines = np.repeat(np.array([sheet.lines[i] for i in table.rows], dtype=np.int64), header.points)
@@ -125,9 +121,8 @@ class _Table:
         if len(body) > ROWS.most or len(body) * width > CELLS.most:
             fix = f"{ROWS.most} rows and {CELLS.most} cells are the most: split or thin out the table"
             raise CmmUqError(f"has {len(body)} rows of {width} columns", where=where, fix=fix)
-        needed = [i for name in COORDINATES for i in header.columns.get(name, ())] or [
-            i for name, columns in header.columns.items() if name not in (NAME, *NUMBERS) for i in columns
-        ]
+        others = (columns for name, columns in header.columns.items() if name not in (NAME, *NUMBERS))
+        needed = [i for name in COORDINATES for i in header.columns.get(name, ())] or [i for own in others for i in own]
         self.rows: Sequence[int] = range(header.first, header.first + len(body))
         self.after = 0
         self.cells: Sequence[Sequence[Cell]] = []
@@ -136,9 +131,8 @@ class _Table:
         if not self.cells or any("" in self.cells[i] for i in needed):
             self.rows, self.after = _usable(sheet, header, needed, where)
             if not self.rows:
-                raise CmmUqError(
-                    "has a header and no rows of figures", where=self.start, fix="Export the table with its figures"
-                )
+                fix = "Export the table with its figures"
+                raise CmmUqError("has a header and no rows of figures", where=self.start, fix=fix)
             body = [[*sheet.rows[i][:width], *[""] * (width - len(sheet.rows[i]))] for i in self.rows]
             self.cells = list(zip(*body, strict=True))
 
@@ -301,9 +295,8 @@ def numbered(cells: Sequence[Cell], sign: str, at: Callable[[int], str]) -> tupl
             raise CmmUqError(problem, where=at(row), fix="Number all, or name all")
     known: dict[str, int] = {}
     values = [known.setdefault(str(cell), len(known) + 1) for cell in cells]
-    shown = commas(
-        [say("{name} is {number}", name=Verbatim(name), number=i) for name, i in list(known.items())[:_NAMED]]
-    )
+    first = list(known.items())[:_NAMED]
+    shown = commas([say("{name} is {number}", name=Verbatim(name), number=i) for name, i in first])
     return np.array(values, dtype=np.float64), shown if len(known) <= _NAMED else say("{shown}, …", shown=shown)
 
 
@@ -315,10 +308,8 @@ def completed(
     if MEASUREMENT in numbers:
         if POINT in numbers:
             return numbers, []
-        how = say(
-            "{columns} {how}", columns=commas(names((POINT,))), how=say("numbered as they follow in their measurement")
-        )
-        numbers[POINT] = _within(numbers)
+        follow = say("numbered as they follow in their measurement")
+        how, numbers[POINT] = say("{columns} {how}", columns=Verbatim(POINT), how=follow), _within(numbers)
     elif keys.points_per_measurement is not None:
         size = count if isinstance(keys.points_per_measurement, str) else keys.points_per_measurement
         if count % size:
@@ -340,10 +331,10 @@ def completed(
 
 def _within(columns: Mapping[str, Floats]) -> Floats:
     """1, 2, … in each (measurement, repeat)."""
-    ones = np.ones(len(columns[MEASUREMENT]))
+    repeat = columns.get(REPEAT, np.ones(len(columns[MEASUREMENT])))
     last: dict[tuple[float, float], int] = {}
     values = []
-    for key in zip(columns[MEASUREMENT].tolist(), columns.get(REPEAT, ones).tolist(), strict=True):
+    for key in zip(columns[MEASUREMENT].tolist(), repeat.tolist(), strict=True):
         last[key] = last.get(key, 0) + 1
         values.append(last[key])
     return np.array(values, dtype=np.float64)

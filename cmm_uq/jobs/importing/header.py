@@ -270,11 +270,8 @@ def _with_units(sheet: Sheet, row: int, headings: Sequence[str], columns: Mappin
     units = {i: meaning.unit for i, meaning in meanings.items() if meaning.unit}
     odd = {i: meaning.odd_unit for i, meaning in meanings.items() if meaning.odd_unit and not meaning.unit}
     below = sheet.rows[row + 1] if row + 1 < len(sheet.rows) else []
-    alone = {
-        i: unit_named(cell.strip("[]()<>{} ")) if isinstance(cell, str) else None
-        for i, cell in enumerate(below)
-        if cell != ""
-    }
+    filled = ((i, cell) for i, cell in enumerate(below) if cell != "")
+    alone = {i: unit_named(cell.strip("[]()<>{} ")) if isinstance(cell, str) else None for i, cell in filled}
     if alone and all(alone.values()):
         return Header(row, row + 2, headings, columns, units | {i: unit for i, unit in alone.items() if unit}, odd)
     return Header(row, row + 1, headings, columns, units, odd)
@@ -296,9 +293,8 @@ def no_header(sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Seq
         given = f" ({', '.join(map(repr, texts))})" if keys.columns else ""
         return CmmUqError(f"no line names the columns{given} of a table of points", where=where,
                           fix="Name them by number: columns = { x_mm = 1, y_mm = 2, z_mm = 3 }, or export one")  # fmt: skip
-    lacking = [
-        name for name, given in keys.columns.items() if any(_place(one, headings) is None for one in sources_of(given))
-    ]
+    named = keys.columns.items()
+    lacking = [name for name, given in named if any(_place(one, headings) is None for one in sources_of(given))]
     known = {understood(heading).column for heading in headings} | set(keys.columns)
     missing = [*lacking, *(name for name in wanted[0] if name not in known), wanted[0][0]][0]
     listed = ", ".join(map(repr, headings[:_SHOWN])) + (" …" if len(headings) > _SHOWN else "")

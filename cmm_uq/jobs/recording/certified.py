@@ -171,16 +171,13 @@ def _valued(value: CertifiedValue, quantity: QuantityFigures, given: Mapping[str
     outer, _, key = value.key.rpartition(".")
     stated = _table(given, outer) if outer else given
     scale = Decimal(1_000_000 if value.micrometres else 1000)
-    numbers = [
-        float(number * _METRES[unit] * scale) for number, unit in zip(quantity.values, quantity.units, strict=True)
-    ]
+    pairs = zip(quantity.values, quantity.units, strict=True)
+    numbers = [float(number * _METRES[unit] * scale) for number, unit in pairs]
     table: dict[str, Any] = {key: numbers if value.count > 1 else numbers[0]}
     if key in stated:
         listed = list(stated[key]) if isinstance(stated[key], (list, tuple)) else [stated[key]]
-        same = (
-            isinstance(a, (int, float)) and math.isclose(a, b, rel_tol=SAME)
-            for a, b in zip(listed, numbers, strict=False)
-        )
+        both = zip(listed, numbers, strict=False)
+        same = (isinstance(a, (int, float)) and math.isclose(a, b, rel_tol=SAME) for a, b in both)
         if not all(same) or len(listed) != len(numbers):
             raise _contradicted(f"[artefact] {value.key}", stated[key], table[key], where)
         table = {}
@@ -227,12 +224,9 @@ def _longest(
     wanted = [name for name in ("reference_mm", *(f"reference_{axis}_mm" for axis in AXES)) if name in found.columns]
     headings = [sources.get(name) or sources.get(name.removeprefix("reference_")) for name in wanted]
     held = [one for head in headings for one in figures(certificate) if heading(one) == head]
-    known = len(held) == len(wanted) and all(
-        stated.u is not None and unit in _METRES
-        for one in held
-        for stated, unit in zip(one.uncertainties, one.units, strict=True)
-    )
+    in_metres = all(unit in _METRES for one in held for unit in one.units)
     every = [stated.u is not None for one in held for stated in one.uncertainties]
+    known = len(held) == len(wanted) and all(every) and in_metres
     if any(every) and not all(every):
         raise CmmUqError("states an uncertainty of some of its points and none of others", where=where,
                          fix="Ask the laboratory for all, or give the values as a CSV with U_um in [artefact]")  # fmt: skip
@@ -278,10 +272,8 @@ def _farthest(columns: Sequence[QuantityFigures]) -> tuple[float, float]:
                       strict=True))  # fmt: skip
     last = max(range(len(points)), key=lambda i: math.dist(points[i], points[0]))
     length = math.dist(points[last], points[0])
-    variance = sum(
-        ((points[last][axis] - points[0][axis]) / length) ** 2 * _variance_of_difference(one, last)
-        for axis, one in enumerate(columns)
-    )
+    along = [(end - start) / length for start, end in zip(points[0], points[last], strict=True)]
+    variance = sum(part**2 * _variance_of_difference(one, last) for part, one in zip(along, columns, strict=True))
     return length, math.sqrt(max(variance, 0.0))
 
 

@@ -102,8 +102,12 @@ class Prediction:
 def read_prediction(content: bytes, where: str, facts: SimulationFacts) -> Prediction:
     cells = _table(content, where)
     table: dict[str, Floats] = {}
+
+    def place(column: int, row: int) -> str:
+        return f"{where} line {cells.lines[row]}, column {cells.header[column]}"
+
     for column, i in _places(cells, where, facts).items():
-        at = partial(_at, cells, where, i)
+        at = partial(place, i)
         values = numbers([row[i] for row in cells.rows], at)
         table[column] = values * (UNIT_MM[facts.unit] if column in (*COORDINATES, LENGTH) else 1.0)
         _check_size(table[column], column, at)
@@ -177,10 +181,6 @@ def _places(cells: Cells, where: str, facts: SimulationFacts) -> dict[str, int]:
     if LENGTH in places and "x_mm" in places:
         raise CmmUqError("predicts coordinates and lengths", where=at, fix="Leave one of them out")
     return places
-
-
-def _at(cells: Cells, where: str, column: int, row: int) -> str:
-    return f"{where} line {cells.lines[row]}, column {cells.header[column]}"
 
 
 def _check_size(values: Floats, column: str, at: Callable[[int], str]) -> None:

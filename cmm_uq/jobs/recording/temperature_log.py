@@ -85,13 +85,9 @@ class TemperatureLog:
 
 
 def parse_temperature_log(
-    content: bytes,
-    where: str,
-    sensors: Mapping[str, Sequence[str]] | None = None,
-    *,
-    start: datetime | None = None,
+    content: bytes, where: str, sensors: Mapping[str, Sequence[str]] | None = None, *, start: datetime | None = None,
     max_gap: float | None = None,
-) -> TemperatureLog:
+) -> TemperatureLog:  # fmt: skip
     """Temperature log of a CSV file; ``max_gap``, s, is :data:`BRIDGED` median intervals when left out."""
     table = csv_table(content, where, ())
     times = _seconds(table, start)

@@ -48,12 +48,10 @@ def mpe_of(text: str) -> dict[str, float]:
     least = _LEAST.fullmatch(plain) or _LEAST_BY_COMMA.fullmatch(plain)
     if least is None:
         return _growing(plain)
-    parts = [_growing(least["first"]), _growing(least["second"])]
-    rising = [part for part in parts if "k" in part]
-    flat = [part for part in parts if "k" not in part]
-    if len(rising) != 1 or len(flat) != 1:
+    flat, rising = sorted((_growing(least["first"]), _growing(least["second"])), key=lambda part: "k" in part)
+    if "k" in flat or "k" not in rising:
         raise ValueError(HOW_MPE)
-    return {**rising[0], **flat[0]}
+    return {**rising, **flat}
 
 
 def _growing(plain: str) -> dict[str, float]:
