@@ -45,7 +45,7 @@ LONG = (
     "app/commands/test_verify_part.py", "app/commands/test_verify_part_machine.py", "app/commands/test_reissue.py",
     "artefacts/test_contract.py", "test_one_verdict.py", "analysis/parts/test_zones.py", "certificate/test_one_page.py",
     "site/test_site.py", "artefacts/test_certificate_figures.py", "hostile/test_kills_and_collisions.py",
-    "artefacts/shift_plate/test_plane.py", "site/test_notebooks.py", "certificate/diagnosis/test_overview.py",
+    "artefacts/shift/test_plane.py", "site/test_notebooks.py", "certificate/diagnosis/test_overview.py",
     "certificate/test_every_layout.py", "hostile/test_kernels.py", "app/commands/test_planning.py",
     "app/cli/test_packages.py", "certificate/test_compose.py", "app/commands/test_batch.py",
     "laboratory/schedule/test_cluster.py", "app/commands/test_new.py", "laboratory/records/test_pending.py",

@@ -18,25 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.plans import B89
-from cmm_uq.analysis.planning.candidates import (
-    MIDDLE,
-    PatternFor,
-    RelocatedCandidates,
-    VolumeCandidates,
-    along_lines,
-    check_allowed,
-)
+from cmm_uq.analysis.planning import candidates
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, direction_words, planned_length
 from cmm_uq.analysis.planning.setting import Planning, Setting, Volume
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, bar_misfit, common_length, no_references, rows_by
-from cmm_uq.artefacts import adjustment as adjustment_section
-from cmm_uq.artefacts.adjustment import Lengths, lengths_of, settings
-from cmm_uq.artefacts.distance_equations import DistanceSolution, second_way_data, solve_distances
+from cmm_uq.artefacts import adjustment
+from cmm_uq.artefacts.adjustment import Lengths, lengths_of
+from cmm_uq.artefacts.distance_equations import DistanceSolution, solve_distances
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Column, Section, Table
+from cmm_uq.certificate.document import Column, Section, Table, figure_columns, text_columns
 from cmm_uq.certificate.pages.budget import budget_blocks
 from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
@@ -145,21 +138,19 @@ def _ends(points: Points, where: str | None) -> np.ndarray[tuple[int, int], np.d
                 if missing
                 else f"measurement {measurement}, repeat {repeat} has points {sorted(numbers.tolist())}, a bar has 1 and 2"
             )
-            raise CmmUqError(problem, where=f"{where or 'recording'} line {line}",
-                             fix="Record both balls, as points 1 and 2, or leave out the measurement")  # fmt: skip
+            fix = "Record both balls, as points 1 and 2, or leave out the measurement"
+            raise CmmUqError(problem, where=f"{where or 'recording'} line {line}", fix=fix)
         ends.append(rows[np.argsort(numbers)])
     return np.array(ends, dtype=np.int64)
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
     """Bars of one length; ``None`` where one has not two ends."""
-    rows = rows_by(points.group)
+    rows, length = rows_by(points.group), facts.length_mm
     if any(sorted(points.point[r]) != [1, 2] for r in rows):
         return None
-    length = facts.length_mm or np.nan
-    return ArtefactShape(
-        rows, bar_misfit, length, facts.length_mm or common_length(points.xyz, rows), True, (), no_references(points)
-    )
+    extent = length or common_length(points.xyz, rows)
+    return ArtefactShape(rows, bar_misfit, length or np.nan, extent, True, (), no_references(points))
 
 
 SCREENING = Screening(shape_of, balls=True)
@@ -185,9 +176,8 @@ def ballbar(facts: ArtefactFacts, plan: PlanFacts) -> Pattern:
 
 def ballbar_positions(setting: Setting) -> tuple[SetUp, ...]:
     """Twenty positions for a nearly cubic volume; in a longer one ten diagonals more for each further cube along it."""
-    pattern = ballbar(setting.artefact, setting.plan)
-    sections = _sections(setting.volume)
-    wanted = [(d, MIDDLE) for d in _DIAGONALS] + list(_PARALLELS)
+    pattern, sections = ballbar(setting.artefact, setting.plan), _sections(setting.volume)
+    wanted = [(d, candidates.MIDDLE) for d in _DIAGONALS] + list(_PARALLELS)
     placings = _lines(setting, sections[0], pattern, wanted)
     for section in sections[1:]:
         placings += _lines(setting, section, pattern, wanted[: len(_DIAGONALS)])
@@ -201,7 +191,7 @@ def _lines(
     found = []
     for direction, place in wanted:
         u = np.array(direction, dtype=np.float64)
-        check_allowed(setting, u)
+        candidates.check_allowed(setting, u)
         found.append(volume.set_up(pattern, attitude_along(u), place, direction_words(u)))
     return found
 
@@ -214,19 +204,19 @@ def _sections(volume: Volume) -> list[Volume]:
     found = []
     for at in product(*(range(count) for count in counts)):
         length = np.minimum(size, np.where(np.array(counts) > 1, edge, size))
-        start = volume.box[:, 0] + (size - length) * np.array(
-            [i / (count - 1) if count > 1 else 0.0 for i, count in zip(at, counts, strict=True)]
-        )
+        share = [i / (count - 1) if count > 1 else 0.0 for i, count in zip(at, counts, strict=True)]
+        start = volume.box[:, 0] + (size - length) * np.array(share)
         found.append(replace(volume, box=np.column_stack([start, start + length])))
     return found
 
 
-def _shape(setting: Setting) -> PatternFor:
+def _shape(setting: Setting) -> candidates.PatternFor:
     pattern = ballbar(setting.artefact, setting.plan)
     return lambda _: pattern
 
 
-_PLACES = VolumeCandidates(along_lines, _shape, RelocatedCandidates(along_lines))
+_LINES = candidates.along_lines
+_PLACES = candidates.VolumeCandidates(_LINES, _shape, candidates.RelocatedCandidates(_LINES))
 PLANNING = Planning({"ASME B89.4.1": ballbar_positions}, _PLACES.candidates, _PLACES.elsewhere)
 
 
@@ -238,36 +228,26 @@ def _lengths(result: Result, bar: Ballbar) -> Lengths:
 
 def results(result: Result) -> dict[str, Any]:
     bar = cast("Ballbar", result.artefact)
-    return {
-        "lengths": _lengths(result, bar).as_data(),
-        "length_budget": budget_data(_budget(result, bar)),
-        "adjustments": [setting.as_data() for setting in settings(result)],
-        **second_way_data(_second_way(result, bar), result.at_least),
-    }
+    budget, second_way = budget_data(_budget(result, bar)), _second_way(result, bar)
+    return adjustment.distances_data(result, _lengths(result, bar), second_way, length_budget=budget)
 
 
 def _budget(result: Result, bar: Ballbar) -> Budget:
     """What one length's deviation from the reference is uncertain by: the readings, and the certified length."""
-    coordinate = result.noise.coordinate
+    coordinate, size = result.noise.coordinate, bar.sizes[0]
     origin = say("residuals of this recording") if coordinate.u > 0 else say("stated in the job")
-    lines = [
-        BudgetLine(
-            say("Coordinate of a ball, along the bar, twice"),
-            coordinate.value,
-            origin,
-            unit=unit("µm"),
-            dof=coordinate.degrees_of_freedom,
-            sensitivity=float(bar.noise_scale[0]),
-        )
-    ]
-    size = bar.sizes[0]
+    what, dof, twice = (
+        say("Coordinate of a ball, along the bar, twice"),
+        coordinate.degrees_of_freedom,
+        bar.noise_scale[0],
+    )
+    lines = [BudgetLine(what, coordinate.value, origin, unit=unit("µm"), dof=dof, sensitivity=float(twice))]
     if size.certified and size.sd > 0:
         chain = result.job.facts.artefact.certificate
         number = chain.number if chain else ""
         source = say("certificate {number}", number=Verbatim(number)) if number else say("certificate")
-        lines.append(
-            BudgetLine(say("Certified length"), size.sd / MICROMETRE, source, unit=unit("µm"), sensitivity=-1.0)
-        )
+        u = size.sd / MICROMETRE
+        lines.append(BudgetLine(say("Certified length"), u, source, unit=unit("µm"), sensitivity=-1.0))
     return Budget(say("deviation of one length"), lines, unit=unit("µm"))
 
 
@@ -290,6 +270,7 @@ def sections(result: Result) -> list[Section]:
     size, lengths = bar.sizes[0], _lengths(result, bar)
     name = say("certified length") if size.certified else say("mean length")
     deviations, residuals, expanded = lengths.deviation_um, lengths.residual_um, lengths.expanded_um
+    what = say("{count} lengths: as recorded they deviate", count=len(deviations))
     plot = length_plot(
         lengths.measurement.astype(float),
         deviations,
@@ -304,38 +285,35 @@ def sections(result: Result) -> list[Section]:
             name=name,
             k=number(lengths.coverage_factor, ".2f"),
         ),
-        alternative=deviating(
-            say("{count} lengths: as recorded they deviate", count=len(deviations)),
-            say("from the {name}", name=name), deviations, residuals, ".0f",
-        ),
-    )  # fmt: skip
+        alternative=deviating(what, say("from the {name}", name=name), deviations, residuals, ".0f"),
+    )
     volume, budget = residual_volume(result, say("bars")), _budget(result, bar)
     return [
         Section(say("Lengths"), (plot, volume, _table(lengths, name))),
         Section(say("Budget of one length"), tuple(budget_blocks(say("the deviation of one length"), budget))),
-        adjustment_section.section(result, settings(result), _second_way(result, bar)),
+        adjustment.section(result, _second_way(result, bar)),
     ]
 
 
 def _table(lengths: Lengths, name: Text) -> Table:
     expanded, repeated = lengths.expanded_um, lengths.repeat.max() > 1
+    figures = np.column_stack([lengths.length, lengths.deviation_um, lengths.residual_um])[:_ROWS_SHOWN]
     rows = []
-    for i in range(min(len(lengths.length), _ROWS_SHOWN)):
-        shown, _ = rounded(float(lengths.length[i]), expanded * MICROMETRE)
-        deviation, _ = rounded(float(lengths.deviation_um[i]), expanded)
-        residual, _ = rounded(float(lengths.residual_um[i]), expanded)
+    for i, row in enumerate(figures.tolist()):
+        shown = [rounded(x, U)[0] for x, U in zip(row, (expanded * MICROMETRE, expanded, expanded), strict=True)]
         place = numbered(lengths.measurement[i], lengths.repeat[i] if repeated else None)
         mark = say("set aside") if not lengths.used[i] else say("see warnings") if lengths.flagged[i] else NOTHING
-        rows.append((place, shown, deviation, residual, mark))
-    columns: tuple[Column, ...] = (Column(say("Position"), numeric=False), Column(say("Length"), unit("mm")))
-    columns += (Column(say("From the {name}", name=name), unit("µm")), Column(say("Residual"), unit("µm")))
-    columns += (Column(say("Remark"), numeric=False),)
-    left = len(lengths.length) - len(rows)
+        rows.append((place, *shown, mark))
+    from_reference = figure_columns(say("From the {name}", name=name), say("Residual"), unit=unit("µm"))
+    columns = (
+        *text_columns(say("Position")), Column(say("Length"), unit("mm")), *from_reference, *text_columns(say("Remark")),
+    )  # fmt: skip
     note = say(
         "U = {U} µm (k = {k}) for each length, from the standard uncertainty of a coordinate and how well that is known.",
         U=rounded(0.0, expanded)[1],
         k=number(lengths.coverage_factor, ".2f"),
     )
+    left = len(lengths.length) - len(rows)
     notes = (note, say("{left} more lengths are in the attached recording.", left=left)) if left > 0 else (note,)
     return Table(say("Lengths brought to 20 °C"), columns, tuple(rows), notes)
 

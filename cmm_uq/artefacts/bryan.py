@@ -15,9 +15,9 @@ import numpy as np
 from cmm_uq.analysis.planning.set_up import SetUp, direction_words, planned_length
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start, Volume
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, ball_misfit, no_references
-from cmm_uq.artefacts import adjustment as adjustment_section
-from cmm_uq.artefacts.adjustment import Lengths, lengths_of, settings
-from cmm_uq.artefacts.distance_equations import FACTORS, DistanceSolution, second_way_data, solve_distances
+from cmm_uq.artefacts import adjustment
+from cmm_uq.artefacts.adjustment import Lengths, lengths_of
+from cmm_uq.artefacts.distance_equations import FACTORS, DistanceSolution, solve_distances
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, number, say
 from cmm_uq.base.points import Floats, Points
@@ -109,10 +109,8 @@ def swept(volume: Volume, length: float, count: int, repeats: int, centre: Float
     high = (places[:, 2] >= volume.heights[0]) & (places[:, 2] <= volume.heights[1])
     fitting = np.flatnonzero(held & inside & high)
     if len(fitting) < LEAST:
-        raise CmmUqError(
-            f"a bar of {length:g} mm about ({', '.join(f'{v:.0f}' for v in middle)}) mm has hardly any position",
-            where="job.toml [plan]", fix="Use a shorter bar, a larger volume or more fixtures",
-        )  # fmt: skip
+        problem = f"a bar of {length:g} mm about ({', '.join(f'{v:.0f}' for v in middle)}) mm has hardly any position"
+        raise CmmUqError(problem, where="job.toml [plan]", fix="Use a shorter bar, a larger volume or more fixtures")
     chosen = _spread(places[fitting], min(count, len(fitting)))
     found = []
     for i in fitting[chosen]:
@@ -183,11 +181,7 @@ def _second_way(result: Result, bar: Bryan) -> DistanceSolution | Text:
 
 def results(result: Result) -> dict[str, Any]:
     bar = cast("Bryan", result.artefact)
-    return {
-        "lengths": _distances(result, bar).as_data(),
-        "adjustments": [setting.as_data() for setting in settings(result)],
-        **second_way_data(_second_way(result, bar), result.at_least),
-    }
+    return adjustment.distances_data(result, _distances(result, bar), _second_way(result, bar))
 
 
 IN_TWO_STEPS = say(
@@ -220,7 +214,7 @@ def sections(result: Result) -> list[Section]:
     )  # fmt: skip
     return [
         Section(say("Distances"), (plot, residual_volume(result, say("swept positions")))),
-        adjustment_section.section(result, settings(result), _second_way(result, bar), IN_TWO_STEPS),
+        adjustment.section(result, _second_way(result, bar), IN_TWO_STEPS),
     ]
 
 

@@ -35,7 +35,7 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size
 from cmm_uq.machine.model.placed import Radial
 from cmm_uq.machine.model.recorded import columns_needed, expansion, place
-from cmm_uq.machine.physics.digitizer import Alignment, MountOffset, align_on_sphere, mount_offset
+from cmm_uq.machine.physics.digitizer import THREE_ATTITUDES, Alignment, MountOffset, align_on_sphere, mount_offset
 from cmm_uq.machine.physics.effects.probing import attitudes
 from cmm_uq.machine.physics.kinematics import euler_313
 from cmm_uq.maths.inference.linear_model import Freedoms
@@ -184,10 +184,8 @@ class DigitizerArtefact(Artefact):
         drawn = np.array(facts.offset_mm)
         if np.linalg.norm(self.start.offset - drawn) > _FAR * np.linalg.norm(drawn):
             found = ", ".join(f"{value:.3f}" for value in self.start.offset)
-            raise CmmUqError(
-                f"the alignments give [U1 V1 W1] = [{found}] mm, far from offset_mm", where=where,
-                fix="Check the units, the Euler angles, and offset_mm in job.toml [artefact]",
-            )  # fmt: skip
+            fix = "Check the units, the Euler angles, and offset_mm in job.toml [artefact]"
+            raise CmmUqError(f"the alignments give [U1 V1 W1] = [{found}] mm, far from offset_mm", where=where, fix=fix)
 
 
 _UNKNOWNS = 6
@@ -248,10 +246,6 @@ MOST = 100.0
 _SAME = 1e-9  # degrees by which the rows of one measurement may differ
 _LITTLE = 0.005  # part of a direction that is not told
 
-_TURN_MORE = (
-    "Align in three attitudes that differ by turns about two axes, such as γ = 0° and 90°, and α = 90° and 180°"
-)
-
 
 def scan_of(points: Points) -> Floats | None:
     """(n, 2) u, v in the scan plane, mm; ``None`` where the recording holds centres of the sphere."""
@@ -280,11 +274,8 @@ def alignments(points: Points, where: str | None) -> tuple[Alignment, ...]:
         rows = poses.index == i
         alpha, beta, gamma = (float(np.radians(points.columns[name][rows][0])) for name in ANGLES)
         if scan is None:
-            found.append(
-                Alignment(
-                    alpha, beta, gamma, points.xyz[rows].mean(axis=0), MICROMETRE**2 * np.eye(3) / int(rows.sum())
-                )
-            )
+            covariance = MICROMETRE**2 * np.eye(3) / int(rows.sum())
+            found.append(Alignment(alpha, beta, gamma, points.xyz[rows].mean(axis=0), covariance))
             continue
         try:
             found.append(align_on_sphere(scan[rows], points.xyz[rows], alpha, beta, gamma, u_point=MICROMETRE))
@@ -313,7 +304,7 @@ def refuse_undetermined(found: Sequence[Alignment], where: str | None) -> None:
         return
     told = "" if np.isinf(times) else f", {times:.0f} times as uncertain as a centre"
     problem = f"{len(found)} attitudes leave the offset of the mount along {words(direction)} open{told}"
-    raise CmmUqError(problem, where=where, fix=_TURN_MORE)
+    raise CmmUqError(problem, where=where, fix=THREE_ATTITUDES)
 
 
 def words(direction: Floats) -> Text:
@@ -324,12 +315,10 @@ def words(direction: Floats) -> Text:
         return axis
     text: Text = say("{part} {axis}", part=signed(first, ".2f"), axis=axis)
     for part, axis in further:
-        size = number(abs(part), ".2f")
-        text = (
-            say("{before} − {size} {axis}", before=text, size=size, axis=axis)
-            if part < 0
-            else say("{before} + {size} {axis}", before=text, size=size, axis=axis)
-        )
+        size, before = number(abs(part), ".2f"), text
+        text = say("{before} + {size} {axis}", before=before, size=size, axis=axis)
+        if part < 0:
+            text = say("{before} − {size} {axis}", before=before, size=size, axis=axis)
     return text
 
 

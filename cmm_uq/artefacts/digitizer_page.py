@@ -13,7 +13,7 @@ from cmm_uq.artefacts.digitizer import ANGLES, OFFSET, THREE, DigitizerArtefact,
 from cmm_uq.base.messages import DASH, Text, Verbatim, number, say, semicolons, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
+from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table, figure_columns, text_columns
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.residuals import length_plot
 from cmm_uq.certificate.result import Page, Result
@@ -146,10 +146,10 @@ def _offset(found: DigitizerFigures) -> Table:
     for i, (name, quantity) in enumerate(zip(OFFSET, found.offset, strict=True)):
         value, U, k = expanded(quantity)
         rows.append((Verbatim(name), value, U, k, unit("mm"), *(signed(one, ".2f") for one in found.correlation[i])))
+    correlations = (say("Correlation with {name}", name=Verbatim(name)) for name in OFFSET)
     columns = (
-        Column(say("Component"), numeric=False), Column(say("Estimate")), Column(say("U")), Column(say("k")),
-        Column(say("Unit"), numeric=False),
-        *(Column(say("Correlation with {name}", name=Verbatim(name))) for name in OFFSET),
+        *text_columns(say("Component")), *figure_columns(say("Estimate"), say("U"), say("k")),
+        *text_columns(say("Unit")), *figure_columns(*correlations),
     )  # fmt: skip
     x, y, z = (signed(value, ".4f") for value in found.sphere)
     notes = (
@@ -161,8 +161,9 @@ def _offset(found: DigitizerFigures) -> Table:
 
 
 def _assumed(digitizer: DigitizerArtefact) -> list[Block]:
+    """What is known of each attitude by itself, and of what U contains nothing."""
     known: list[Text] = []
-    missing: list[Text] = []
+    missing = []
     if digitizer.u_turn:
         known.append(say("attitude, u = {u:g}″ about each axis", u=digitizer.u_turn))
     else:
@@ -172,16 +173,16 @@ def _assumed(digitizer: DigitizerArtefact) -> list[Block]:
         known.append(say("the sphere's centre as a whole, u = ({x:g}, {y:g}, {z:g}) µm along x, y, z", x=x, y=y, z=z))
     else:
         missing.append(say("of what shifts a whole scan: form of the ball, digitizer, scales"))
-    said: list[Block] = []
+    blocks: list[Block] = []
     if known:
-        said.append(Paragraph(say("In each attitude by itself, U contains: {known}.", known=semicolons(known))))
-    if len(missing) == 1:
-        said.append(Paragraph(say("U contains no uncertainty {missing}.", missing=missing[0]), tone="note"))
-    if len(missing) == 2:
-        first, second = missing
-        both = say("U contains no uncertainty {first} and none {second}.", first=first, second=second)
-        said.append(Paragraph(both, tone="note"))
-    return said
+        blocks.append(Paragraph(say("In each attitude by itself, U contains: {known}.", known=semicolons(known))))
+    if missing:
+        first, *others = missing
+        nothing = say("U contains no uncertainty {missing}.", missing=first)
+        if others:
+            nothing = say("U contains no uncertainty {first} and none {second}.", first=first, second=others[0])
+        blocks.append(Paragraph(nothing, tone="note"))
+    return blocks
 
 
 def _two_ways(found: DigitizerFigures) -> Table:
@@ -192,17 +193,13 @@ def _two_ways(found: DigitizerFigures) -> Table:
         each, _ = rounded(float(start[i]), quantity.expanded)
         by_source = DASH if closed is None else rounded(float(closed[i]), quantity.expanded)[0]
         rows.append((Verbatim(name), value, each, by_source, unit("mm")))
-    columns = (
-        Column(say("Component"), numeric=False), Column(say("Fitted model")), Column(say("By centres")),
-        Column(say("Closed form")), Column(say("Unit"), numeric=False),
-    )  # fmt: skip
-    notes = (
-        say(
-            "By centres: the centre of the sphere in each attitude by itself, then all equations by weighted least "
-            "squares. Closed form: Harris 2004 eq. 19–21, for its three attitudes."
-        ),
+    ways = figure_columns(say("Fitted model"), say("By centres"), say("Closed form"))
+    columns = (*text_columns(say("Component")), *ways, *text_columns(say("Unit")))
+    note = say(
+        "By centres: the centre of the sphere in each attitude by itself, then all equations by weighted least "
+        "squares. Closed form: Harris 2004 eq. 19–21, for its three attitudes."
     )
-    return Table(say("The offset by other ways"), columns, tuple(rows), notes)
+    return Table(say("The offset by other ways"), columns, tuple(rows), (note,))
 
 
 def _attitudes(found: DigitizerFigures) -> Table:
@@ -220,29 +217,24 @@ def _attitudes(found: DigitizerFigures) -> Table:
         *(Column(say("Off {axis}", axis=Verbatim(axis)), unit("µm")) for axis in "xyz"), Column(say("Rms"), unit("µm")),
     )  # fmt: skip
     direction, times = found.times
-    notes = (
-        say(
-            "D0, E0, F0: scale reading with the origin of the scan plane at the centre of the sphere, from this attitude "
-            "by itself. Off: this minus what the fitted offset gives. Rms: of the residuals."
-        ),
-        say(
-            "These attitudes tell least of the offset along {direction}: {times:.2g} times the uncertainty of one centre.",
-            direction=words(direction),
-            times=times,
-        ),
+    meaning = say(
+        "D0, E0, F0: scale reading with the origin of the scan plane at the centre of the sphere, from this attitude "
+        "by itself. Off: this minus what the fitted offset gives. Rms: of the residuals."
     )
-    return Table(say("Every attitude"), columns, tuple(rows), notes)
+    least = say(
+        "These attitudes tell least of the offset along {direction}: {times:.2g} times the uncertainty of one centre.",
+        direction=words(direction),
+        times=times,
+    )
+    return Table(say("Every attitude"), columns, tuple(rows), (meaning, least))
 
 
 def _residuals(result: Result, digitizer: DigitizerArtefact) -> Plot:
     after = result.residuals / MICROMETRE
     before = _before(digitizer) / MICROMETRE
     expanded_um = result.noise.expanded
-    what = (
-        say("radial distance of each point of the sphere")
-        if digitizer.scanned
-        else say("each coordinate of the centre")
-    )
+    radial, each = say("radial distance of each point of the sphere"), say("each coordinate of the centre")
+    what = radial if digitizer.scanned else each
     low, high, low_after, high_after = alike(before.min(), before.max(), after.min(), after.max())
     return length_plot(
         digitizer.measurement.astype(float), before, after, expanded_before_um=expanded_um, expanded_after_um=expanded_um,

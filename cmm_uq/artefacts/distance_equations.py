@@ -48,10 +48,8 @@ class DistanceSolution:
     covariance: Floats  # (6, 6) of them, from the residuals
     residuals: Floats  # (m,) calibrated distance minus the one that e1 … e6 make of the readings, mm
     residual_sd: float  # mm; 0 without degrees of freedom
-    # relative standard uncertainty of the distance, where it is certified; 0 where it is taken as known
-    relative_length_u: float = 0.0
-    # (6,) what the way to the distances makes of the three scales, ppm, and squarenesses, ″; it is not taken off,
-    # and counts as a standard uncertainty
+    relative_length_u: float = 0.0  # of the distance, where it is certified; 0 where it is taken as known
+    # (6,) what the way to the distances makes of the scales, ppm, and squarenesses, ″; it counts as a standard uncertainty
     bias: Floats = field(default_factory=lambda: np.zeros(UNKNOWNS))
     open_scales: bool = False  # whether nothing says the distance, so that scales are not determined
 
@@ -76,33 +74,26 @@ class DistanceSolution:
         if factors is None:
             return None
         return tuple(
-            at_least(f"distance_equations.{effect}.{parameter}", factors[i] * float(self.u[i]), factors[i],
-                     unit("ppm" if parameter == "ppm" else "″"))
-            for i, (effect, parameter) in enumerate(FACTORS)
-        )  # fmt: skip
+            at_least(f"distance_equations.{effect}.{parameter}", k * u, k, unit("ppm" if parameter == "ppm" else "″"))
+            for (effect, parameter), k, u in zip(FACTORS, factors, self.u.tolist(), strict=True)
+        )
 
     def as_data(self, at_least: AtLeast = as_evaluated) -> dict[str, Any]:
         """For results.json: e1 … e6 with their covariance, the six factors and the angles that they give."""
-        u, stated = self.u.tolist(), self.expanded(at_least)
         values = [*self.scales_ppm.tolist(), *self.squareness_arcsec.tolist()]
-        known = [not (self.open_scales and parameter == "ppm") for _, parameter in FACTORS]
+        stated = self.expanded(at_least) or [(None, None)] * UNKNOWNS
+        factors = {}
+        for (effect, parameter), *figures in zip(
+            FACTORS, values, self.u.tolist(), *zip(*stated, strict=True), strict=True
+        ):
+            open_ = self.open_scales and parameter == "ppm"
+            figures = [None] * len(figures) if open_ else figures
+            factors[effect] = {parameter: dict(zip(("value", "u", "U", "k"), figures, strict=True))}
         return {
-            "e": self.e.tolist(),
-            "e_covariance": self.covariance.tolist(),
-            "factors": {
-                effect: {
-                    parameter: {
-                        "value": values[i] if known[i] else None,
-                        "u": u[i] if known[i] else None,
-                        "U": None if stated is None or not known[i] else stated[i][0],
-                        "k": None if stated is None or not known[i] else stated[i][1],
-                    }
-                }
-                for i, (effect, parameter) in enumerate(FACTORS)
-            },
+            "e": self.e.tolist(), "e_covariance": self.covariance.tolist(), "factors": factors,
             "angles_deg": dict(zip(SQUARENESS, np.degrees(self.angles_rad).tolist(), strict=True)),
             "residual_sd_um": self.residual_sd / MICROMETRE,
-        }
+        }  # fmt: skip
 
     @property
     def u(self) -> Floats:
@@ -127,10 +118,8 @@ class DistanceSolution:
     def _u_of_residuals(self) -> Floats:
         """(6,) of these, from the residuals alone."""
         step = 1e-6
-        changes = [
-            (_reported(self.e + step * unit) - _reported(self.e - step * unit)) / (2 * step)
-            for unit in np.eye(UNKNOWNS)
-        ]
+        steps = step * np.eye(UNKNOWNS)
+        changes = [(_reported(self.e + one) - _reported(self.e - one)) / (2 * step) for one in steps]
         jacobian = np.column_stack(changes)
         return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", jacobian, self.covariance, jacobian)), dtype=np.float64)
 
@@ -208,15 +197,9 @@ def refuse_poor_placings(differences: Floats) -> None:
         problem = say("all {count} distances lie in one plane, so they tell nothing of the axis across it", count=count)
     else:
         problem = say("the directions of the {count} distances leave a factor of scale or squareness open", count=count)
-    raise CmmUqError(
-        problem,
-        where="recording",
-        fix=plural(
-            len(wanted),
-            one=say("Add {count} placing: {wanted}", count=len(wanted), wanted=commas(wanted)),
-            many=say("Add {count} placings: {wanted}", count=len(wanted), wanted=commas(wanted)),
-        ),
-    )
+    one = say("Add {count} placing: {wanted}", count=len(wanted), wanted=commas(wanted))
+    many = say("Add {count} placings: {wanted}", count=len(wanted), wanted=commas(wanted))
+    raise CmmUqError(problem, where="recording", fix=plural(len(wanted), one=one, many=many))
 
 
 def _cosines(e: Floats) -> Floats:

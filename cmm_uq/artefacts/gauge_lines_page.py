@@ -13,9 +13,9 @@ from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.messages import NOTHING, Text, listed, number, say, semicolons, sentences
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, PPM, unit
-from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, text_columns
 from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
-from cmm_uq.certificate.result import AtLeast, Page, Result
+from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import deviating
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.maths.inference.doubt import Doubt
@@ -114,6 +114,8 @@ def periodic_part(position: Floats, deviation: Floats) -> Periodic | None:
 
 _DRAWS = 2000  # of the sizes of the noise, over which a line's uncertainties are taken
 
+Stated = tuple[float, float, float]  # standard uncertainty, expanded one and coverage factor, as stated
+
 
 @dataclass(frozen=True, eq=False)
 class LineFigures:
@@ -122,23 +124,8 @@ class LineFigures:
     line: GaugeLine  # as recorded
     position: Text  # in words
     share: float | None  # of the travel along it; ``None`` where no travel is stated
-    scale_u_ppm: float  # scale_u_ppm, scale_factor: standard uncertainty of the slope, and k for 95 %
-    scale_factor: float
-    gap_u_um: float | None  # gap_u_um, gap_factor: of the bidirectional error; ``None`` without one
-    gap_factor: float
-    at_least: AtLeast  # raises a U that a certificate does not state
-
-    @property
-    def expanded_scale_ppm(self) -> tuple[float, float]:
-        """U and k of the slope."""
-        return self.at_least("lines.slope_ppm", self.scale_factor * self.scale_u_ppm, self.scale_factor, unit("µm/m"))
-
-    @property
-    def expanded_gap_um(self) -> tuple[float, float] | None:
-        """U and k of the bidirectional error; ``None`` without one."""
-        if self.gap_u_um is None:
-            return None
-        return self.at_least("lines.bidirectional_um", self.gap_factor * self.gap_u_um, self.gap_factor, unit("µm"))
+    scale_ppm: Stated  # of the slope
+    gap_um: Stated | None  # of the bidirectional error; ``None`` without one
 
     @property
     def short(self) -> bool:
@@ -148,89 +135,72 @@ class LineFigures:
     def as_data(self) -> dict[str, Any]:
         line, periodic = self.line, self.line.periodic
         return {
-            "measurement": line.measurement,
-            "position": self.position,
-            "length_mm": line.length,
-            "faces": line.faces,
-            "slope_ppm": {
-                "value": line.scale_ppm,
-                "u": self.scale_u_ppm,
-                "U": self.expanded_scale_ppm[0],
-                "k": self.expanded_scale_ppm[1],
-            },
-            "off_slope_um": line.linearity / MICROMETRE,
+            "measurement": line.measurement, "position": self.position, "length_mm": line.length, "faces": line.faces,
+            "slope_ppm": _stated_data(line.scale_ppm, self.scale_ppm), "off_slope_um": line.linearity / MICROMETRE,
             "bidirectional_um": None
-            if line.gap is None
-            else {
-                "value": line.gap / MICROMETRE,
-                "u": self.gap_u_um,
-                "U": None if self.expanded_gap_um is None else self.expanded_gap_um[0],
-                "k": self.gap_factor if self.expanded_gap_um is None else self.expanded_gap_um[1],
-            },
-            "periodic": None
-            if periodic is None
-            else {
-                "amplitude_um": periodic.amplitude / MICROMETRE,
-                "period_mm": periodic.period,
-                "p_value": periodic.p_value,
+            if line.gap is None or self.gap_um is None else _stated_data(line.gap / MICROMETRE, self.gap_um),
+            "periodic": None if periodic is None else {
+                "amplitude_um": periodic.amplitude / MICROMETRE, "period_mm": periodic.period, "p_value": periodic.p_value,
             },
             "share_of_travel": self.share,
-        }
+        }  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class GaugeFigures:
-    """Every line, and which of the seven positions of ISO 10360-2:2009 were not measured."""
-
-    lines: tuple[LineFigures, ...]
-    missing: tuple[Text, ...]
+def _stated_data(value: float, stated: Stated) -> dict[str, float]:
+    return {"value": value, **dict(zip(("u", "U", "k"), stated, strict=True))}
 
 
-def figures(result: Result) -> GaugeFigures:
+def figures(result: Result) -> tuple[LineFigures, ...]:
     gauge, sizes = cast("StepGauge", result.artefact), result.posterior.sizes
     every = replace(result.model, used=np.ones_like(result.model.used))
     components, sizes = noise_of(every), sizes.at(evenly(len(sizes.placing), _DRAWS))
     size, machine = gauge.sizes[0], gauge.points.machine
     relative = size.sd / size.nominal if size.certified else 0.0
+
+    def stated(name: str, of: str, weights: Floats, beside: float) -> Stated:
+        u, expanded = uncertainty_of_sum(components, sizes, weights, beside)
+        k = expanded / u if u else 2.0
+        return u, *result.at_least(f"lines.{name}", k * u, k, unit(of))
+
     lines = []
     for line in lines_of(gauge):
         weights = np.stack([line.scale_weights, line.gap_weights / MICROMETRE])
         doubt = Doubt.of(result.causes, weights)
         if not gauge.certificate.plain:
             relative = abs(float(line.scale_weights @ gauge.size_change()[:, 0])) * size.sd * PPM
-        beside = float(np.hypot(relative / PPM, np.sqrt(doubt.variance(np.array([1.0, 0.0])))))
-        scale_u, scale_expanded = uncertainty_of_sum(components, sizes, line.scale_weights, beside)
-        gap_u, gap_expanded = uncertainty_of_sum(
-            components, sizes, weights[1], float(np.sqrt(doubt.variance(np.array([0.0, 1.0]))))
-        )
-        lines.append(LineFigures(
-            line, position_on(machine, line.middle, line.direction),
-            share_of_travel(machine, line.middle, line.direction, line.length),
-            scale_u, scale_expanded / scale_u, None if line.gap is None else gap_u,
-            gap_expanded / gap_u if gap_u else 2.0, result.at_least,
-        ))  # fmt: skip
-    found = {one.position for one in lines}
-    return GaugeFigures(tuple(lines), tuple(position for position in ISO_10360_2.positions if position not in found))
+        of_slope, of_gap = (float(np.sqrt(doubt.variance(one))) for one in np.eye(2))
+        slope = stated("slope_ppm", "µm/m", line.scale_weights, float(np.hypot(relative / PPM, of_slope)))
+        gap = None if line.gap is None else stated("bidirectional_um", "µm", weights[1], of_gap)
+        share = share_of_travel(machine, line.middle, line.direction, line.length)
+        lines.append(LineFigures(line, position_on(machine, line.middle, line.direction), share, slope, gap))
+    return tuple(lines)
+
+
+def missing_positions(lines: tuple[LineFigures, ...]) -> tuple[Text, ...]:
+    """Which of the seven positions of ISO 10360-2:2009 were not measured."""
+    measured = {one.position for one in lines}
+    return tuple(position for position in ISO_10360_2.positions if position not in measured)
 
 
 def results(result: Result) -> dict[str, Any]:
-    found = figures(result)
-    return {"lines": [line.as_data() for line in found.lines], "positions_not_measured": list(found.missing)}
+    lines = figures(result)
+    return {"lines": [line.as_data() for line in lines], "positions_not_measured": list(missing_positions(lines))}
 
 
 def sections(result: Result) -> list[Section]:
-    gauge = cast("StepGauge", result.artefact)
-    found = figures(result)
-    blocks: list[Block] = [_plot(result, gauge), _table(result, found.lines)]
-    blocks += [*_periodic(found.lines), *_positions(found), residual_volume(result, say("faces"))]
-    return [Section(say("Deviations along the gauge"), tuple(blocks))]
+    lines = figures(result)
+    blocks = (
+        _plot(result, cast("StepGauge", result.artefact)), _table(result, lines), *_periodic(lines), *_positions(lines),
+        residual_volume(result, say("faces")),
+    )  # fmt: skip
+    return [Section(say("Deviations along the gauge"), blocks)]
 
 
 def _plot(result: Result, gauge: StepGauge) -> Block:
     deviations, residuals = gauge.deviations() / MICROMETRE, result.residuals / MICROMETRE
-    expanded, factor = result.at_least(
-        "lines.faces_um", result.noise.expanded, result.noise.coverage_factor, unit("µm")
-    )
+    noise, lines = result.noise, len(set(gauge.measurement.tolist()))
+    expanded, factor = result.at_least("lines.faces_um", noise.expanded, noise.coverage_factor, unit("µm"))
+    what = say("{faces} faces on {lines} lines: as recorded they deviate", faces=len(deviations), lines=lines)
     return length_plot(
         _side_by_side(gauge),
         deviations,
@@ -245,12 +215,8 @@ def _plot(result: Result, gauge: StepGauge) -> Block:
             "with U (k = {k}).",
             k=number(factor, ".2f"),
         ),
-        alternative=deviating(
-            say("{faces} faces on {lines} lines: as recorded they deviate", faces=len(deviations),
-                lines=len(set(gauge.measurement.tolist()))),
-            say("from the mean of their line"), deviations, residuals,
-        ),
-    )  # fmt: skip
+        alternative=deviating(what, say("from the mean of their line"), deviations, residuals),
+    )
 
 
 def _side_by_side(gauge: StepGauge) -> Floats:
@@ -260,86 +226,59 @@ def _side_by_side(gauge: StepGauge) -> Floats:
     return np.asarray(gauge.reference + 0.7 * float(np.diff(faces).min()) * rank, dtype=np.float64)
 
 
-def _table(result: Result, found: tuple[LineFigures, ...]) -> Table:
-    noise = result.noise.expanded
-    both = any(one.line.gap is not None for one in found)
+def _table(result: Result, lines: tuple[LineFigures, ...]) -> Table:
+    both = any(one.gap_um is not None for one in lines)
     rows: list[tuple[Text, ...]] = []
-    for one in found:
-        line = one.line
-        scale, U = rounded(line.scale_ppm, one.expanded_scale_ppm[0])
-        linearity = rounded(line.linearity / MICROMETRE, noise)[0]
-        row: list[Text] = [
-            number(line.measurement),
-            one.position,
-            number(line.length, ".10g"),
-            number(line.faces),
-            scale,
-            U,
-            linearity,
-        ]
-        if both:
-            row += _gap(one)
-        rows.append(tuple(row))
-    columns = [Column(say("Line"), numeric=False), Column(say("Position"), numeric=False)]
-    columns += [Column(say("Length"), unit("mm")), Column(say("Faces")), Column(say("Slope"), unit("µm/m"))]
-    columns += [Column(say("U"), unit("µm/m")), Column(say("Off slope"), unit("µm"))]
-    notes = [
-        say(
-            "Slope: indicated minus certified distance, over the distance. Off slope: largest deviation "
-            "of a face from it."
-        )
-    ]
-    if both:
-        columns += [Column(say("Bidirectional"), unit("µm")), Column(say("U"), unit("µm"))]
-        notes.append(
-            say(
-                "Bidirectional: faces met travelling away from the first face minus the same faces met on the way back."
-            )
-        )
-    notes.append(
-        say(
-            "U for a coverage probability of 95 %, from the standard uncertainty of a coordinate and how well it is known, "
-            "for the slope also from the gauge's certificate; a line by itself, without what the other lines tell."
-        )
+    for one in lines:
+        line, gap = one.line, (NOTHING, NOTHING)
+        if line.gap is not None and one.gap_um is not None:
+            gap = rounded(line.gap / MICROMETRE, one.gap_um[1])
+        where = (number(line.measurement), one.position, number(line.length, ".10g"), number(line.faces))
+        linearity = rounded(line.linearity / MICROMETRE, result.noise.expanded)[0]
+        rows.append((*where, *rounded(line.scale_ppm, one.scale_ppm[1]), linearity, *(gap if both else ())))
+    per_metre = figure_columns(say("Slope"), say("U"), unit=unit("µm/m"))
+    in_um = (say("Off slope"), *((say("Bidirectional"), say("U")) if both else ()))
+    columns = (
+        *text_columns(say("Line"), say("Position")), Column(say("Length"), unit("mm")), Column(say("Faces")), *per_metre,
+        *figure_columns(*in_um, unit=unit("µm")),
+    )  # fmt: skip
+    slope = say(
+        "Slope: indicated minus certified distance, over the distance. Off slope: largest deviation of a face from it."
     )
-    return Table(say("Each line by itself, at 20 °C"), tuple(columns), tuple(rows), tuple(notes))
-
-
-def _gap(one: LineFigures) -> tuple[Text, Text]:
-    if one.line.gap is None or one.expanded_gap_um is None:
-        return (NOTHING, NOTHING)
-    return rounded(one.line.gap / MICROMETRE, one.expanded_gap_um[0])
+    bidirectional = say(
+        "Bidirectional: faces met travelling away from the first face minus the same faces met on the way back."
+    )
+    u = say(
+        "U for a coverage probability of 95 %, from the standard uncertainty of a coordinate and how well it is known, "
+        "for the slope also from the gauge's certificate; a line by itself, without what the other lines tell."
+    )
+    notes = (slope, bidirectional, u) if both else (slope, u)
+    return Table(say("Each line by itself, at 20 °C"), columns, tuple(rows), notes)
 
 
 def _periodic(lines: tuple[LineFigures, ...]) -> list[Block]:
-    found = [
+    parts = [
         say(
             "line {measurement}: amplitude {amplitude:.2g} µm, period {period:.3g} mm (p = {p_value:.1g})",
-            measurement=line.measurement,
-            amplitude=line.periodic.amplitude / MICROMETRE,
-            period=line.periodic.period,
-            p_value=line.periodic.p_value,
+            measurement=one.line.measurement, amplitude=periodic.amplitude / MICROMETRE, period=periodic.period,
+            p_value=periodic.p_value,
         )
-        for line in (one.line for one in lines)
-        if line.periodic is not None
-    ]
-    text = say("Periodic along the line, beyond what scatter explains: {lines}.", lines=semicolons(found))
-    return [Paragraph(text)] if found else []
+        for one in lines if (periodic := one.line.periodic) is not None
+    ]  # fmt: skip
+    text = say("Periodic along the line, beyond what scatter explains: {lines}.", lines=semicolons(parts))
+    return [Paragraph(text)] if parts else []
 
 
-def _positions(found: GaugeFigures) -> list[Block]:
+def _positions(lines: tuple[LineFigures, ...]) -> list[Block]:
     short = [
         say("line {measurement} ({share:.0f} %)", measurement=one.line.measurement, share=100 * one.share)
-        for one in found.lines
+        for one in lines
         if one.share and one.short
     ]
-    texts = []
-    if found.missing:
-        texts.append(
-            say(
-                "Not measured of the seven positions of ISO 10360-2:2009: {positions}.", positions=listed(found.missing)
-            )
-        )
+    texts: list[Text] = []
+    if missing := missing_positions(lines):
+        positions = listed(missing)
+        texts.append(say("Not measured of the seven positions of ISO 10360-2:2009: {positions}.", positions=positions))
     if short:
         least = say("{least_share:.0f} %", least_share=100 * ISO_10360_2.least_share)
         texts.append(

@@ -21,7 +21,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, in_a_row, number, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Column, Section, Table
+from cmm_uq.certificate.document import Block, Column, Section, Table, text_columns
 from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
@@ -46,8 +46,7 @@ class ProbedPlane:
 
     measurement: int  # its number
     count: int  # points of contact
-    # range of the distances from the least-squares plane, mm; ``None`` of three points, which have none
-    flatness: float | None
+    flatness: float | None  # range of the distances from the plane, mm; ``None`` of three points, which have none
     surface: OffsetPlane | None  # the plane moved by the probe's offset; ``None`` without offset
 
 
@@ -181,10 +180,9 @@ class PlaneSurface(Artefact):
             problem = (
                 f"{count} points of contact are too few" if few[which] else "all points of contact lie on one line"
             )
-            raise CmmUqError(
-                f"measurement {measurement}: {problem}", where=place(points, points.measurement == measurement, where),
-                fix=f"Record at least {LEAST_POINTS} points spread over the plane",
-            )  # fmt: skip
+            where = place(points, points.measurement == measurement, where)
+            fix = f"Record at least {LEAST_POINTS} points spread over the plane"
+            raise CmmUqError(f"measurement {measurement}: {problem}", where=where, fix=fix)
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
@@ -240,7 +238,9 @@ def _expanded(surface: OffsetPlane, factor: float) -> tuple[float, float]:
     return across, factor * float(np.sqrt(np.diag(surface.covariance)[3:].max()))
 
 
-def _surface_data(surface: OffsetPlane, factor: float) -> dict[str, Any]:
+def _surface_data(surface: OffsetPlane | None, factor: float) -> dict[str, Any] | None:
+    if surface is None:
+        return None
     across, of_normal = _expanded(surface, factor)
     return {
         "point_mm": surface.point.tolist(), "normal": surface.normal.tolist(),
@@ -254,22 +254,17 @@ def _surface_data(surface: OffsetPlane, factor: float) -> dict[str, Any]:
 
 
 def results(result: Result) -> dict[str, Any]:
-    factor = result.noise.coverage_factor
-    return {
-        "planes": [
-            {
-                "measurement": plane.measurement, "points": plane.count,
-                "flatness_um": None if plane.flatness is None else plane.flatness / MICROMETRE,
-                "surface": None if plane.surface is None else _surface_data(plane.surface, factor),
-            }
-            for plane in _planes(result)
-        ]
-    }  # fmt: skip
+    planes = []
+    for plane in _planes(result):
+        flatness = None if plane.flatness is None else plane.flatness / MICROMETRE
+        surface = _surface_data(plane.surface, result.noise.coverage_factor)
+        number = plane.measurement
+        planes.append({"measurement": number, "points": plane.count, "flatness_um": flatness, "surface": surface})
+    return {"planes": planes}
 
 
 def sections(result: Result) -> list[Section]:
-    plane = cast("PlaneSurface", result.artefact)
-    probed = _planes(result)
+    plane, probed = cast("PlaneSurface", result.artefact), _planes(result)
     blocks: list[Block] = [_flatness(result, probed), _by_point(result, plane), residual_volume(result, say("points"))]
     if any(one.surface is not None for one in probed):
         blocks.insert(1, _surfaces(result, probed))
@@ -280,13 +275,12 @@ def _flatness(result: Result, probed: tuple[ProbedPlane, ...]) -> Table:
     noise = result.noise.coordinate.value
     rows = tuple(
         (
-            number(one.measurement),
-            number(one.count),
-            (say("–") if one.flatness is None else rounded(one.flatness / MICROMETRE, noise)[0]),
+            number(one.measurement), number(one.count),
+            say("–") if one.flatness is None else rounded(one.flatness / MICROMETRE, noise)[0],
         )
         for one in probed
-    )
-    columns = (Column(say("Measurement"), numeric=False), Column(say("Points")), Column(say("Flatness"), unit("µm")))
+    )  # fmt: skip
+    columns = (*text_columns(say("Measurement")), Column(say("Points")), Column(say("Flatness"), unit("µm")))
     note = say("Flatness: range of the distances from the least-squares plane, of surface, machine and probe together.")
     return Table(say("Flatness as recorded"), columns, rows, (note,))
 
@@ -301,19 +295,17 @@ def _surfaces(result: Result, probed: tuple[ProbedPlane, ...]) -> Table:
         normal = in_a_row(rounded(float(v), max(of_normal, 2e-9))[0] for v in surface.normal)
         U = rounded(0.0, across / MICROMETRE)[1]
         rows.append((number(one.measurement), place, normal, U, number(float(np.degrees(surface.angle)), ".0f")))
-    columns: tuple[Column, ...] = (Column(say("Measurement"), numeric=False),)
-    columns += (Column(say("Point of the surface"), unit("mm"), numeric=False),)
-    columns += (Column(say("Outward normal"), numeric=False), Column(say("U across"), unit("µm")))
-    columns += (Column(say("Approach"), unit("°")),)
-    notes = (
-        say(
-            "The plane of the probe's centre, moved by the probe's offset against the normal that points "
-            "to where the probe came from (US 4,866,643, claim 1). U (k = {k}) of the surface's position "
-            "along the normal, at its middle.",
-            k=number(result.noise.coverage_factor, ".2f"),
-        ),
+    columns = (
+        *text_columns(say("Measurement")), Column(say("Point of the surface"), unit("mm"), numeric=False),
+        *text_columns(say("Outward normal")), Column(say("U across"), unit("µm")), Column(say("Approach"), unit("°")),
+    )  # fmt: skip
+    note = say(
+        "The plane of the probe's centre, moved by the probe's offset against the normal that points "
+        "to where the probe came from (US 4,866,643, claim 1). U (k = {k}) of the surface's position "
+        "along the normal, at its middle.",
+        k=number(result.noise.coverage_factor, ".2f"),
     )
-    return Table(say("Surface, compensated for the probe's offset"), columns, tuple(rows), notes)
+    return Table(say("Surface, compensated for the probe's offset"), columns, tuple(rows), (note,))
 
 
 def _by_point(result: Result, plane: PlaneSurface) -> Block:

@@ -138,11 +138,9 @@ class Plate(Rigid):
         nominal, found = self.extents()
         if np.any(lost := (nominal == 0) | (found == 0)):
             number = placings.numbers[np.argmax(lost)]
-            raise CmmUqError(
-                f"measurement {number} has no two different balls, so it tells no length of the plate",
-                where=place(points, points.measurement == number, where),
-                fix="Record at least three balls of different reference positions in each measurement, or leave it out",
-            )
+            problem = f"measurement {number} has no two different balls, so it tells no length of the plate"
+            fix = "Record at least three balls of different reference positions in each measurement, or leave it out"
+            raise CmmUqError(problem, where=place(points, points.measurement == number, where), fix=fix)
         length = self.sizes[0].nominal
         check_length(float(found.sum() / nominal.sum()) * length, length, "the recorded plates", where)
         self.refuse_another_shape("Check the numbering of the balls and their reference positions", where)

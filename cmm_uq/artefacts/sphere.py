@@ -6,7 +6,7 @@ A sphere without a certified diameter cannot tell an error of the effective styl
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -14,22 +14,14 @@ import numpy as np
 from cmm_uq.analysis.planning.candidates import MIDDLE, PatternFor, RelocatedCandidates, VolumeCandidates, upright
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp, planned_length
 from cmm_uq.analysis.planning.setting import Planning, Setting
-from cmm_uq.analysis.screening.shape import (
-    ArtefactShape,
-    Screening,
-    ball_misfit,
-    no_references,
-    recentred,
-    rows_by,
-    samples_of,
-    spread,
-)
+from cmm_uq.analysis.screening import shape
+from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
 from cmm_uq.artefacts.kinds import SphereFacts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Number, Text, number, say
-from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Column, Plot, Section, Table
+from cmm_uq.certificate.document import Plot, Section, Table, figure_columns, text_columns
 from cmm_uq.certificate.plots.residuals import length_plot, volume_plot
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import deviating, numbered
@@ -45,20 +37,6 @@ from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 # between a recorded normal and the direction away from the centre; beyond it the normals belong to something else
 LARGEST_ANGLE = np.radians(20.0)
-
-
-@dataclass(frozen=True, eq=False)
-class ProbedSpheres:
-    """Least-squares spheres of a recording, one for each (measurement, repeat)."""
-
-    measurement: Ints  # measurement, repeat: (q,)
-    repeat: Ints
-    count: Ints  # (q,) points of each
-    form: Floats  # (q,) range of the radial distances, mm (ISO 10360-5:2010, P_Form)
-    # (q,) diameter of the least-squares sphere minus the certified one, mm (P_Size); not finite without a
-    # certificate
-    size: Floats
-    centres: Floats  # (q, 3) of the least-squares spheres, mm
 
 
 class SphereArtefact(Radial):
@@ -85,29 +63,18 @@ class SphereArtefact(Radial):
     def own_faults(self) -> Iterable[Effect]:
         return form_faults(self._facts, self._facts.form_um, self.points)
 
-    def probed(self) -> ProbedSpheres:
-        runs = Placings.of(self.points.group)
-        size = self.sizes[0]
-        first, form, diameter, centres = [], [], [], []
-        for rows in runs.rows:
-            ball = fit_sphere(self.points.xyz[rows], u_point=1.0)
-            first.append(rows[0])
-            centres.append(ball.centre)
-            form.append(ball.form_deviation)
-            diameter.append(2 * ball.radius / float(self.expansion[rows].mean()))
-        nominal = size.nominal if size.certified else np.nan
-        return ProbedSpheres(
-            self.points.measurement[first], self.points.repeat[first], runs.sizes, np.array(form),
-            np.array(diameter) - nominal, np.array(centres),
-        )  # fmt: skip
-
     def forms(self) -> Forms:
-        probed = self.probed()
-        directions = self.directions(self.points.xyz)
-        size = probed.size if self.sizes[0].certified else None
+        """Of the least-squares sphere of each (measurement, repeat) (ISO 10360-5:2010, P_Form and P_Size)."""
+        points, runs, size = self.points, Placings.of(self.points.group), self.sizes[0]
+        balls = [fit_sphere(points.xyz[rows], u_point=1.0) for rows in runs.rows]
+        expanded = np.array([float(self.expansion[rows].mean()) for rows in runs.rows])
+        first = [rows[0] for rows in runs.rows]
+        diameter = np.array([2 * ball.radius for ball in balls]) / expanded
         return Forms(
-            probed.measurement, probed.repeat, probed.count, probed.form, self.form, directions, size, probed.centres
-        )
+            points.measurement[first], points.repeat[first], runs.sizes, np.array([ball.form_deviation for ball in balls]),
+            self.form, self.directions(points.xyz), diameter - size.nominal if size.certified else None,
+            np.array([ball.centre for ball in balls]),
+        )  # fmt: skip
 
     def _take_normals(self, where: str | None) -> None:
         """Normals as recorded, brought to unit length: the probe's errors act along them, and so they are seen exactly."""
@@ -117,11 +84,9 @@ class SphereArtefact(Radial):
         wrong = np.einsum("ni,ni->n", normals, geometric) < length * np.cos(LARGEST_ANGLE)
         if np.any(rows := wrong | (length == 0)):
             inward = np.all(np.einsum("ni,ni->n", normals, geometric) < 0)
-            raise CmmUqError(
-                "nx, ny, nz point into the sphere" if inward else "nx, ny, nz does not point away from the centre",
-                where=place(self.points, rows, where),
-                fix="Give the outward normal at each probed point" + (": turn all signs round" if inward else ""),
-            )
+            problem = "nx, ny, nz point into the sphere" if inward else "nx, ny, nz does not point away from the centre"
+            fix = "Give the outward normal at each probed point" + (": turn all signs round" if inward else "")
+            raise CmmUqError(problem, where=place(self.points, rows, where), fix=fix)
         self._normals = normals / length[:, None]
         columns = {f"n{a}": self._normals[:, i] for i, a in enumerate(AXES)}
         self.points = replace(self.points, columns={**self.points.columns, **columns})
@@ -133,12 +98,12 @@ _NORMALS = tuple(f"n{a}" for a in AXES)
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
     """Spheres, with normals where they are recorded; ``None`` where one has too few points."""
-    rows, radius = rows_by(points.measurement), (facts.length_mm or np.nan) / 2
+    rows, radius = shape.rows_by(points.measurement), (facts.length_mm or np.nan) / 2
     if any(len(r) < 5 for r in rows):
         return None
-    extent = radius if np.isfinite(radius) else 0.5 * float(np.median([spread(points.xyz[r]) for r in rows]))
+    extent = radius if np.isfinite(radius) else 0.5 * float(np.median([shape.spread(points.xyz[r]) for r in rows]))
     if not all(name in points.columns for name in _NORMALS):
-        return ArtefactShape(rows, ball_misfit, radius, extent, False, (), no_references(points))
+        return ArtefactShape(rows, shape.ball_misfit, radius, extent, False, (), shape.no_references(points))
     normals = np.column_stack([points.columns[name] for name in _NORMALS])
     return ArtefactShape(rows, _ball_with_normals, radius, extent, False, _NORMALS, normals)
 
@@ -146,14 +111,14 @@ def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
 def _ball_with_normals(xyz: Floats, normals: Floats, radius: float) -> Floats:
     """Each normal says where the centre lies; their median does not follow a few."""
     if np.isnan(radius):
-        i, j = samples_of(len(xyz), 2).T
+        i, j = shape.samples_of(len(xyz), 2).T
         steps = normals[j] - normals[i]
         squares = np.sum(steps**2, axis=1)
         if not np.any(wide := squares > 0.5 * squares.max()):
             return np.zeros(len(xyz))
         radius = float(np.median(np.sum((xyz[j] - xyz[i]) * steps, axis=1)[wide] / squares[wide]))
     away = xyz - np.median(xyz - radius * normals, axis=0)
-    away, radius = recentred(away, radius, free=False)  # nominal normals put it astray
+    away, radius = shape.recentred(away, radius, free=False)  # nominal normals put it astray
     misses = np.linalg.norm(away - radius * normals, axis=1) - _NORMAL * abs(radius)
     return np.asarray(np.maximum(np.abs(np.linalg.norm(away, axis=1) - radius), misses), dtype=np.float64)
 
@@ -196,60 +161,34 @@ _PLACES = VolumeCandidates(upright, _shape, RelocatedCandidates(lambda volume: [
 PLANNING = Planning({"ISO 10360-5": sphere_places}, _PLACES.candidates, _PLACES.elsewhere)
 
 
-def deviations_um(sphere: SphereArtefact) -> Floats:
-    """(n,) distance of each point from its best centre minus the certified or mean radius, µm."""
-    radius = sphere.sizes[0].nominal * sphere.per_size * sphere.expansion
-    return np.asarray((sphere.distances(sphere.points.xyz, None) - radius) / MICROMETRE, dtype=np.float64)
-
-
-def about_centre(sphere: SphereArtefact) -> Floats:
-    """(n, 3) places of the points about their centres, on the sphere of the nominal size, mm."""
-    return np.asarray(
-        sphere.size_change() * sphere.sizes[0].nominal * sphere.directions(sphere.points.xyz), dtype=np.float64
-    )
-
-
 def results(result: Result) -> dict[str, Any]:
     """Form and size errors for results.json."""
-    sphere = cast("SphereArtefact", result.artefact)
-    probed, certified = sphere.probed(), sphere.sizes[0].certified
-    return {
-        "spheres": [
-            {"measurement": int(measurement), "repeat": int(repeat), "points": int(count), "form_error_um": form,
-             "size_error_um": size if certified else None}
-            for measurement, repeat, count, form, size in zip(
-                probed.measurement, probed.repeat, probed.count, (probed.form / MICROMETRE).tolist(),
-                (probed.size / MICROMETRE).tolist(), strict=True,
-            )
-        ]
-    }  # fmt: skip
+    forms = cast("SphereArtefact", result.artefact).forms()
+    sizes = [None] * len(forms.form) if forms.size is None else (forms.size / MICROMETRE).tolist()
+    each = (forms.measurement.tolist(), forms.repeat.tolist(), forms.count.tolist(), (forms.form / MICROMETRE).tolist())
+    names = ("measurement", "repeat", "points", "form_error_um", "size_error_um")
+    return {"spheres": [dict(zip(names, one, strict=True)) for one in zip(*each, sizes, strict=True)]}
 
 
 def sections(result: Result) -> list[Section]:
     sphere = cast("SphereArtefact", result.artefact)
-    return [
-        Section(
-            say("Probing of the sphere"), (_table(result, sphere), _by_point(result, sphere), _over(result, sphere))
-        )
-    ]
+    blocks = (_table(result, sphere), _by_point(result, sphere), _over(result, sphere))
+    return [Section(say("Probing of the sphere"), blocks)]
 
 
 def _table(result: Result, sphere: SphereArtefact) -> Table:
-    probed, size = sphere.probed(), sphere.sizes[0]
-    noise = result.noise.expanded
-    repeated = probed.repeat.max() > 1
+    forms, size, noise = sphere.forms(), sphere.sizes[0], result.noise.expanded
+    repeated = forms.repeat.max() > 1
     rows: list[tuple[Text, ...]] = []
-    for i, measurement in enumerate(probed.measurement):
-        place = numbered(measurement, probed.repeat[i] if repeated else None)
-        form = rounded(float(probed.form[i]) / MICROMETRE, max(sphere.form / MICROMETRE, noise / 10))[0]
-        row: list[Text] = [place, number(probed.count[i]), form]
-        if size.certified:
-            row.append(rounded(float(probed.size[i]) / MICROMETRE, noise)[0])
-        rows.append(tuple(row))
-    columns = [Column(say("Sphere"), numeric=False), Column(say("Points")), Column(say("Form error"), unit("µm"))]
+    for i, measurement in enumerate(forms.measurement):
+        place = numbered(measurement, forms.repeat[i] if repeated else None)
+        form = rounded(float(forms.form[i]) / MICROMETRE, max(sphere.form / MICROMETRE, noise / 10))[0]
+        error = () if forms.size is None else (rounded(float(forms.size[i]) / MICROMETRE, noise)[0],)
+        rows.append((place, number(forms.count[i]), form, *error))
+    errors = [say("Form error")]
     notes = [say("Form error: range of the radial distances from the least-squares sphere (ISO 10360-5:2010).")]
     if size.certified:
-        columns.append(Column(say("Size error"), unit("µm")))
+        errors.append(say("Size error"))
         u = rounded(0.0, 2 * size.sd / MICROMETRE)[1] if size.sd else Number("0")
         notes.append(
             say(
@@ -257,14 +196,18 @@ def _table(result: Result, sphere: SphereArtefact) -> Table:
                 u=u,
             )
         )
-    return Table(say("Probing errors"), tuple(columns), tuple(rows), tuple(notes))
+    columns = (*text_columns(say("Sphere")), *figure_columns(say("Points")), *figure_columns(*errors, unit=unit("µm")))
+    return Table(say("Probing errors"), columns, tuple(rows), tuple(notes))
 
 
 def _by_point(result: Result, sphere: SphereArtefact) -> Plot:
-    size = sphere.sizes[0]
-    deviations = deviations_um(sphere)
+    """Distance of each point from its best centre minus the certified or mean radius."""
+    size, xyz = sphere.sizes[0], sphere.points.xyz
+    radius = size.nominal * sphere.per_size * sphere.expansion
+    deviations = np.asarray((sphere.distances(xyz, None) - radius) / MICROMETRE, dtype=np.float64)
     residuals, expanded = result.residuals / MICROMETRE, result.noise.expanded
     name = say("certified radius") if size.certified else say("mean radius")
+    what = say("{count} points: as recorded they deviate", count=len(deviations))
     return length_plot(
         sphere.points.point,
         deviations,
@@ -280,22 +223,18 @@ def _by_point(result: Result, sphere: SphereArtefact) -> Plot:
             name=name,
             k=number(result.noise.coverage_factor, ".2f"),
         ),
-        alternative=deviating(
-            say("{count} points: as recorded they deviate", count=len(deviations)),
-            say("from the {name}", name=name), deviations, residuals,
-        ),
-    )  # fmt: skip
+        alternative=deviating(what, say("from the {name}", name=name), deviations, residuals),
+    )
 
 
 def _over(result: Result, sphere: SphereArtefact) -> Plot:
+    """Residuals at the places of the points about their centres, on the sphere of the nominal size."""
     residuals = result.residuals / MICROMETRE
+    places = sphere.size_change() * sphere.sizes[0].nominal * sphere.directions(sphere.points.xyz)
     low, high = alike(residuals.min(), residuals.max())
-    return volume_plot(
-        about_centre(sphere),
-        residuals,
-        caption=say("Residuals after the fitted model over the sphere (all spheres, about their centres)."),
-        alternative=say("Three projections of the sphere; residuals of {low} to {high} µm.", low=low, high=high),
-    )
+    caption = say("Residuals after the fitted model over the sphere (all spheres, about their centres).")
+    projections = say("Three projections of the sphere; residuals of {low} to {high} µm.", low=low, high=high)
+    return volume_plot(places, residuals, caption=caption, alternative=projections)
 
 
 PAGE = Page(sections, results)

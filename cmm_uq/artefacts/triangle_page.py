@@ -75,11 +75,9 @@ class TriangleSolution:
 def solve_equations(triangle: Triangle) -> TriangleSolution:
     machine = triangle.points.machine
     if machine.chain != "YXZ":
-        raise CmmUqError(
-            say("the source's equations are those of the chain YXZ, not {chain}", chain=Verbatim(machine.chain)),
-            where="job.toml [machine] chain",
-            fix=say("Use the fitted model, which serves every chain"),
-        )
+        problem = say("the source's equations are those of the chain YXZ, not {chain}", chain=Verbatim(machine.chain))
+        fix = say("Use the fitted model, which serves every chain")
+        raise CmmUqError(problem, where="job.toml [machine] chain", fix=fix)
     lower = np.array([machine.travel(axis)[0] for axis in AXES])
     xyz, dimensions = triangle.points.xyz, triangle.standard.dimensions
 
@@ -330,9 +328,7 @@ def _standard(sides: list[Figure], angles: list[Figure], height: Figure) -> Tabl
         shown = rounded(degrees(angle), degrees(spread))[0]
         rows.append((say("Angle at {i}", i=i), shown, say("{U}″", U=rounded(0.0, spread / ARCSECOND)[1]), unit("°")))
     rows.append((say("Height over side 1–2"), *rounded(*height), unit("mm")))
-    columns = (
-        *text_columns(say("Quantity")), *figure_columns(say("Value"), say("U")), *text_columns(say("Unit")),
-    )  # fmt: skip
+    columns = (*text_columns(say("Quantity")), *figure_columns(say("Value"), say("U")), *text_columns(say("Unit")))
     note = say(
         "U for a coverage probability of 95 % by Monte Carlo, {draws} draws of the dimensions of blocks and cylinders; "
         "angles by the cosine rule.",

@@ -37,9 +37,7 @@ def copies(values: Floats, unit: float) -> list[tuple[int, ...]]:
     column's unit in ``values``.
     """
     groups: list[list[int]] = []
-    for k in range(len(values)):
-        if not np.any(values[k]):
-            continue
+    for k in np.flatnonzero(values.any(axis=1)).tolist():
         group = next((group for group in groups if any(_same(values[j], values[k], unit) for j in group)), None)
         if group is None:
             groups.append([k])
@@ -244,14 +242,12 @@ class MapColumn:
 
 def title_of(axis: str, component: int) -> Text:
     """An error of a carriage in words."""
-    along = AXES[component % 3].upper()
+    carriage, along = Verbatim(axis.upper()), Verbatim(AXES[component % 3].upper())
     if component >= 3:
-        return say("rotation of {axis} about {along}", axis=Verbatim(axis.upper()), along=Verbatim(along))
-    return (
-        say("scale error of {along}", along=Verbatim(along))
-        if along == axis.upper()
-        else say("straightness of {axis} along {along}", axis=Verbatim(axis.upper()), along=Verbatim(along))
-    )
+        return say("rotation of {axis} about {along}", axis=carriage, along=along)
+    if along == carriage:
+        return say("scale error of {along}", along=along)
+    return say("straightness of {axis} along {along}", axis=carriage, along=along)
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,12 +280,11 @@ def columns_of(maps: Sequence[ErrorMap]) -> tuple[list[MapColumn], list[Finding]
             unmeasured += [] if looked.measured else [looked.title]
             columns += [] if looked.column is None else [looked.column]
             findings += looked.findings
-        if len(shared) < LEAST_POSITIONS:
+        if (count := len(shared)) < LEAST_POSITIONS:
             why = say(
                 "the maps share {count} positions of axis {carriage}: they are not compared. Map the same positions",
-                count=len(shared),
-                carriage=Verbatim(carriage),
-            )
+                count=count, carriage=Verbatim(carriage),
+            )  # fmt: skip
             findings.append(Finding("positions", (), (), why))
     return columns, [*_alike(same, unmeasured), *findings]
 
@@ -346,11 +341,8 @@ def _stray(title: Text, position: float, error_map: ErrorMap, value: float, colu
     why = say(
         "the {title} at {position} mm in the map at {temperature:g} °C, {value}, jumps off its neighbours and off the "
         "other maps; the position is left out. Measure it again",
-        title=title,
-        position=signed(position, "g"),
-        temperature=error_map.temperature,
-        value=signed(value, ".4g"),
-    )
+        title=title, position=signed(position, "g"), temperature=error_map.temperature, value=signed(value, ".4g"),
+    )  # fmt: skip
     return Finding("outlier", (), (), why, column=column, set_aside=True)
 
 
@@ -366,20 +358,12 @@ def _damaged(title: Text, error_map: ErrorMap) -> Finding:
 
 def _alike(same: dict[tuple[float, ...], list[Text]], unmeasured: list[Text]) -> Iterator[Finding]:
     for temperatures, titles in same.items():
-        shown = commas(number(t, "g") for t in temperatures)
         why = say(
             "{titles}: the maps at {temperatures} °C give the same figures. They were measured once, and say "
             "nothing of how the maps differ; measure them at each temperature",
-            titles=listed(titles),
-            temperatures=shown,
-        )
+            titles=listed(titles), temperatures=commas(number(t, "g") for t in temperatures),
+        )  # fmt: skip
         yield Finding("copied", (), (), why, set_aside=True)
     if unmeasured:
-        yield Finding(
-            "not measured",
-            (),
-            (),
-            say("{titles}: zero in every map, so they were not measured", titles=listed(unmeasured)),
-            None,
-            True,
-        )
+        why = say("{titles}: zero in every map, so they were not measured", titles=listed(unmeasured))
+        yield Finding("not measured", (), (), why, set_aside=True)

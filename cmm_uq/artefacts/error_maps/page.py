@@ -35,22 +35,22 @@ from cmm_uq.certificate.wording import effect_of, effect_title, probability, siz
 
 # a verdict as the title of its overview, and in a sentence
 VERDICTS: Mapping[str, tuple[Text, Text]] = {
-    "consistent": (
-        say("Consistent: the maps agree"), say("The maps agree with each other within their noise."),
-    ),
+    "consistent": (say("Consistent: the maps agree"), say("The maps agree with each other within their noise.")),
     "explained": (
         say("Explained: what makes the maps differ is found"),
         say("The maps differ from each other, and what makes them differ is found."),
     ),
     "partial": (
         say("Partly explained: a cause is found, and maps differ besides"),
-        say("The maps differ from each other; something that makes them differ is found, but it does not account for all."),
+        say(
+            "The maps differ from each other; something that makes them differ is found, but it does not account for all."
+        ),
     ),
     "unexplained": (
         say("Unexplained: maps differ, and no known effect accounts for it"),
         say("The maps differ from each other, and no known effect accounts for it."),
     ),
-}  # fmt: skip
+}
 
 
 def difference_words(difference: Difference) -> Text:

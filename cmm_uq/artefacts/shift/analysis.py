@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from cmm_uq import __version__
-from cmm_uq.artefacts.shift import axis_page as axis_page, plane_page as plane_page
+from cmm_uq.artefacts.shift import axis_page, plane_page
 from cmm_uq.artefacts.shift.axis import ShiftResult, analyse_shift, checked_series
-from cmm_uq.artefacts.shift.axis_page import shift_results
 from cmm_uq.artefacts.shift.plane import PlaneShiftResult, analyse_plane, checked_plate
-from cmm_uq.artefacts.shift.plane_page import plane_shift_results
 from cmm_uq.artefacts.shift.result import shift_facts, table_file, table_text
-from cmm_uq.base.messages import Text, Verbatim, names, say
+from cmm_uq.base.messages import Verbatim, day, names, say
 from cmm_uq.certificate.certificate import certificate_of
 from cmm_uq.certificate.clauses import clauses_data, formal_warnings
 from cmm_uq.certificate.document import Document
 from cmm_uq.certificate.origin import posterior_file
 from cmm_uq.certificate.result import Outcome, OwnAnalysis, Recipe
 from cmm_uq.certificate.sections.results import as_found_data, as_found_section
+from cmm_uq.certificate.wording import Summary, figure_row
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.ensembles import Progress
 
@@ -34,41 +35,33 @@ def analyse(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Shi
 
 
 def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
-    if isinstance(found, ShiftResult):
-        told, results = axis_page.warnings(found), shift_results(found)
-    else:
-        told, results = plane_page.warnings(found), plane_shift_results(found)
-    told += tuple(found.stating.warnings())
-    if found.job.circumstances.uncertainty.of_artefact:
-        told += (
+    page: Any = axis_page if isinstance(found, ShiftResult) else plane_page
+    job, left = found.job, page.quantities(found)
+    told = [*page.warnings(found), *found.stating.warnings()]
+    if job.circumstances.uncertainty.of_artefact:
+        told.append(
             say(
                 "What is stated of the artefact's temperature, expansion, alignment and fixturing is in no figure here."
-            ),
+            )
         )
-    warned = (*told, *formal_warnings(found.job))
-    short = axis_page.summary(found, warned) if isinstance(found, ShiftResult) else plane_page.summary(found, warned)
-    draws, table = posterior_file(found.draws, found.job.origin), table_file(found.job)
-    results |= as_found_data(found.job) | clauses_data(found.job) | found.stating.data() | {"posterior": draws.entry}
+    warned = (*told, *formal_warnings(job))
+    figures = tuple(figure_row(name, quantity) for _, _, name, quantity in left)
+    short = Summary(page.measured(found), day(job.facts.job.date), figures=figures, warnings=warned)
+    draws, table = posterior_file(found.draws, job.origin), table_file(job)
+    results = page.shift_results(found) | as_found_data(job) | clauses_data(job) | found.stating.data()
+    results["posterior"] = draws.entry
     files = {table: table_text(found.table), draws.name: draws.content}
-    return Outcome(
-        found, lambda: _certificate(found, told, tuple(files)), results, short, warned, files,
-        draws=found.draws,
-    )  # fmt: skip
 
+    def certificate() -> Document:
+        sections = page.sections(found)
+        sections.insert(1, as_found_section(job, left))
+        produced_by = say(
+            "cmm-uq {version}, {sampler}, seed {seed}",
+            version=Verbatim(__version__), sampler=Verbatim(found.estimate.chains.sampler), seed=found.estimate.seed,
+        )  # fmt: skip
+        return certificate_of(job, sections, tuple(told), produced_by, tuple(names(files)))
 
-def _certificate(found: ShiftResult | PlaneShiftResult, told: tuple[Text, ...], files: tuple[str, ...]) -> Document:
-    if isinstance(found, ShiftResult):
-        sections, left = axis_page.sections(found), axis_page.quantities(found)
-    else:
-        sections, left = plane_page.sections(found), plane_page.quantities(found)
-    sections.insert(1, as_found_section(found.job, left))
-    produced_by = say(
-        "cmm-uq {version}, {sampler}, seed {seed}",
-        version=Verbatim(__version__),
-        sampler=Verbatim(found.estimate.chains.sampler),
-        seed=found.estimate.seed,
-    )
-    return certificate_of(found.job, sections, told, produced_by, tuple(names(files)))
+    return Outcome(found, certificate, results, short, warned, files, draws=found.draws)
 
 
 OWN = OwnAnalysis(report=Recipe(analyse, outcome))

@@ -322,9 +322,8 @@ def known_points(given: KnownLength, numbers: Ints) -> tuple[int, int]:
     index = {int(number): i for i, number in enumerate(numbers)}
     for number in (given.from_point, given.to_point):
         if number not in index:
-            raise CmmUqError(
-                f"there is no point {number}", where=KNOWN, fix=f"Points are {numbers[0]} to {numbers[-1]}"
-            )
+            problem = f"there is no point {number}"
+            raise CmmUqError(problem, where=KNOWN, fix=f"Points are {numbers[0]} to {numbers[-1]}")
     if given.from_point == given.to_point:
         raise CmmUqError(f"from and to are both point {given.from_point}", where=KNOWN, fix="Name two points")
     return index[given.from_point], index[given.to_point]

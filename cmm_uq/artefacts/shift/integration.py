@@ -42,10 +42,8 @@ def check_readings(a: Floats, b: Floats) -> None:
         raise CmmUqError("the second placing is not shifted against the first",
                          fix="Shift the artefact along the axis by about the pitch of its points")  # fmt: skip
     if np.abs(difference).min() > np.ptp(a):
-        raise CmmUqError(
-            f"shifted by {abs(difference.mean()):g} mm, the artefact of {np.ptp(a):g} mm reads no range twice",
-            fix=f"Shift it by less than {np.ptp(a):g} mm, best by the pitch of its points",
-        )
+        problem = f"shifted by {abs(difference.mean()):g} mm, the artefact of {np.ptp(a):g} mm reads no range twice"
+        raise CmmUqError(problem, fix=f"Shift it by less than {np.ptp(a):g} mm, best by the pitch of its points")
 
 
 def estimated_shift(a: Readings, b: Readings) -> Readings:

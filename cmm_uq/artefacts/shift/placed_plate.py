@@ -115,10 +115,8 @@ def _laid_over(flat: Floats, placing: Ints, ball: Ints, placings: Ints, where: s
     while waiting:
         shared = [int(np.isfinite(balls[ball[placing == s], 0]).sum()) for s in waiting]
         if max(shared) < 2:
-            raise CmmUqError(
-                f"placing {placings[waiting[0]]} shares fewer than two balls with the placings before it", where=where or None,
-                fix="Read at least two balls, best all, in every placing",
-            )  # fmt: skip
+            problem = f"placing {placings[waiting[0]]} shares fewer than two balls with the placings before it"
+            raise CmmUqError(problem, where=where or None, fix="Read at least two balls, best all, in every placing")
         s = waiting.pop(int(np.argmax(shared)))
         rows = np.flatnonzero(placing == s)
         known = rows[np.isfinite(balls[ball[rows], 0])]
@@ -138,9 +136,8 @@ def _laid_over(flat: Floats, placing: Ints, ball: Ints, placings: Ints, where: s
 
 def _check_counts(placing: Ints, ball: Ints, placings: Ints, numbers: Ints, where: str) -> None:
     if len(placings) < 2:
-        raise CmmUqError("the plate was read in one placing only", where=where or None,
-                         fix="Shift it along both axes by about the pitch of its balls, turn it by 90°, and read it each "
-                         "time")  # fmt: skip
+        fix = "Shift it along both axes by about the pitch of its balls, turn it by 90°, and read it each time"
+        raise CmmUqError("the plate was read in one placing only", where=where or None, fix=fix)
     few = np.flatnonzero(np.bincount(placing) < 3)
     if few.size:
         raise CmmUqError(f"placing {placings[few[0]]} has fewer than three balls", where=where or None,
@@ -148,10 +145,8 @@ def _check_counts(placing: Ints, ball: Ints, placings: Ints, numbers: Ints, wher
     alone = np.flatnonzero(np.bincount(ball) < 2)
     if alone.size:
         there = placings[placing[ball == alone[0]][0]]
-        raise CmmUqError(
-            f"ball {numbers[alone[0]]} is read in placing {there} only", where=where or None,
-            fix=f"Read ball {numbers[alone[0]]} in another placing as well, or leave it out of placing {there}",
-        )  # fmt: skip
+        fix = f"Read ball {numbers[alone[0]]} in another placing as well, or leave it out of placing {there}"
+        raise CmmUqError(f"ball {numbers[alone[0]]} is read in placing {there} only", where=where or None, fix=fix)
 
 
 def _check_plane(readings: Floats, placing: Ints, placings: Ints, axes: list[int], plane: str, where: str) -> None:
@@ -201,7 +196,6 @@ def _check_placings(flat: Floats, placing: Ints, placings: Ints, turned: Floats,
     for s, number in enumerate(placings):
         others = np.arange(len(placings)) != s
         if not np.any(np.all((low[others] < high[s]) & (high[others] > low[s]), axis=1)):
-            raise CmmUqError(
-                f"placing {number} covers no area that another placing covers: nothing is read twice", where=where or None,
-                fix="Shift the plate by less than its size, best by the pitch of its balls",
-            )  # fmt: skip
+            problem = f"placing {number} covers no area that another placing covers: nothing is read twice"
+            fix = "Shift the plate by less than its size, best by the pitch of its balls"
+            raise CmmUqError(problem, where=where or None, fix=fix)

@@ -78,10 +78,9 @@ def free(setting: Setting, points: Points, where: str) -> tuple[Text, ...]:
 def _facts(setting: Setting) -> ShiftFacts:
     facts = cast("ShiftFacts", setting.artefact)
     if facts.plane is not None:
-        raise CmmUqError(
-            "the placings of a plate shifted in a plane are not planned", where="job.toml [artefact] plane",
-            fix="cmm-uq report says what those of a recording leave open",
-        )  # fmt: skip
+        problem = "the placings of a plate shifted in a plane are not planned"
+        fix = "cmm-uq report says what those of a recording leave open"
+        raise CmmUqError(problem, where="job.toml [artefact] plane", fix=fix)
     return facts
 
 

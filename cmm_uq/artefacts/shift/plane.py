@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -175,6 +176,20 @@ def estimate_plane(
 PEAK_TO_VALLEY = "peak_to_valley_um"
 
 
+class PrintedCurve(NamedTuple):
+    """A curve by its name in results.json, with the unit that it is printed in, its size and its suffix there."""
+
+    name: str
+    curve: Curve
+    size: float
+    unit: Unit
+    suffix: str
+
+    @property
+    def axis(self) -> str:
+        return self.name.split("_")[1]
+
+
 @dataclass(frozen=True, eq=False)
 class PlaneShiftResult(ShiftFound):
     """All that is known of a plate's placings after their analysis."""
@@ -193,10 +208,14 @@ class PlaneShiftResult(ShiftFound):
         return dict(zip(names, (*self.estimate.linearity, *self.estimate.straightness), strict=True))
 
     @cached_property
-    def rotations(self) -> dict[str, Curve]:
-        """Rotation of each carriage that carries the other axis, by name, rad."""
+    def printed(self) -> tuple[PrintedCurve, ...]:
+        """These, and the rotation of each carriage that carries the other axis."""
         normal = AXES[3 - sum(self.estimate.plate.axes)]
-        return {ROTATION[AXES[axis], normal].name: curve for axis, curve in self.estimate.rotations.items()}
+        rotations = [(ROTATION[AXES[a], normal].name, curve) for a, curve in self.estimate.rotations.items()]
+        return (
+            *(PrintedCurve(name, curve, MICROMETRE, unit("µm"), "um") for name, curve in self.curves.items()),
+            *(PrintedCurve(name, curve, ARCSECOND, unit("″"), "arcsec") for name, curve in rotations),
+        )
 
     @cached_property
     def scalars(self) -> dict[str, dict[str, Quantity]]:
@@ -218,10 +237,8 @@ class PlaneShiftResult(ShiftFound):
     @cached_property
     def listed(self) -> Reported:
         found: dict[str, tuple[Floats, str]] = {}
-        for name, curve in self.curves.items():
-            found |= listed_draws(f"curves.{name}.error_um", curve.draws / MICROMETRE, "µm")
-        for name, curve in self.rotations.items():
-            found |= listed_draws(f"curves.{name}.error_arcsec", curve.draws / ARCSECOND, "″")
+        for c in self.printed:
+            found |= listed_draws(f"curves.{c.name}.error_{c.suffix}", c.curve.draws / c.size, c.unit)
         for k, name in enumerate(("first_mm", "second_mm")):
             found |= listed_draws(f"artefact.{name}", self.estimate.balls[:, :, k], "mm")
         return found

@@ -10,25 +10,26 @@ these alone (Bonferroni).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, cast
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.artefacts.kinds import ShiftFacts
-from cmm_uq.base.messages import Text, Verbatim, day, number, say
+from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
-from cmm_uq.certificate.origin import file_name
+from cmm_uq.certificate.origin import file_name, quantity_data
 from cmm_uq.certificate.result import StatedUncertainty
+from cmm_uq.certificate.results.contents import covariance_data, head
 from cmm_uq.certificate.sections.results import SIGN, Left, stated_table
 from cmm_uq.certificate.sections.traceability import artefact_rows, certificate_rows, traceability_section
-from cmm_uq.certificate.wording import Summary, figure_row
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.verdicts import NO_VERDICTS
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, error_map_csv
 from cmm_uq.maths.inference.draws import Draws, by_ensemble
 from cmm_uq.maths.inference.ensembles import Chains
@@ -125,13 +126,15 @@ _STILL = 1e-9  # part of the largest spread in a list up to which an item does n
 
 
 class Estimated(Protocol):
-    """All that the readings say: chains, draws (N,) of u of one reading, mm, and what does not fit, mm.
+    """All that the readings say: chains and their seed, draws (N,) of u of one reading, mm, and what does not fit, mm.
 
     The latter with no error of the machine but its scale, and with what was estimated.
     """
 
     @property
     def chains(self) -> Chains: ...
+    @property
+    def seed(self) -> int: ...
     @property
     def sigma(self) -> Floats: ...
     @property
@@ -148,7 +151,7 @@ class ShiftFound(ABC):
     @cached_property
     def disagreement_um(self) -> tuple[float, float]:
         """Root mean square of what the placings disagree by, without and with the machine's errors, µm."""
-        without, with_errors = (_rms_um(values) for values in self.estimate.residuals)
+        without, with_errors = (float((r**2).mean() ** 0.5) / MICROMETRE for r in self.estimate.residuals)
         return without, with_errors
 
     @property
@@ -171,11 +174,10 @@ class ShiftFound(ABC):
 
         What is zero by definition, as a curve at its first position, is left out.
         """
-        found = dict(self.reported)
+        chains, found = self.estimate.chains, dict(self.reported)
         if self.job.facts.recording.u_coordinate_um is None:
             found["noise.coordinate_um"] = self.estimate.sigma / MICROMETRE, unit("µm")
         found |= self.listed
-        chains = self.estimate.chains
         values = np.column_stack([draws for draws, _ in found.values()])
         return Draws(
             {name: unit for name, (_, unit) in found.items()}, by_ensemble(values, chains.steps, len(chains.draws))
@@ -203,18 +205,11 @@ class ShiftFound(ABC):
         return Quantity.of_draws(self.estimate.sigma / MICROMETRE, unit("µm"))
 
 
-def _rms_um(values: Floats) -> float:
-    return float((values**2).mean() ** 0.5) / MICROMETRE
-
-
 def listed_draws(place: str, draws: Floats, unit: str) -> Reported:
     """Draws (N, m) of the items of a list of results.json, but those that do not move: they are zero by definition."""
     spread = np.ptp(draws, axis=0)
     moving = np.flatnonzero(spread > _STILL * spread.max(initial=0.0))
     return {f"{place}[{i}]": (draws[:, i], unit) for i in moving.tolist()}
-
-
-Named = Sequence[Left]  # quantities that are stated, each with its place in results.json and its name
 
 
 def shift_facts(job: Job) -> ShiftFacts:
@@ -225,21 +220,48 @@ def table_file(job: Job) -> str:
     return file_name("correction_table.csv", job.origin)
 
 
-def figures_section(caption: Text, named: Named, meaning: Text) -> Section:
-    notes = (
-        SIGN,
-        meaning,
-        say("U is the expanded uncertainty for a coverage probability of 95 %, from the posterior distribution."),
-    )
-    return Section(
-        say("Figures of performance"),
-        (stated_table(caption, [(name, quantity) for _, _, name, quantity in named], notes),),
-    )
+def shared_results(
+    result: ShiftFound, estimates: Mapping[str, Any], readings: int, further: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What results.json says of every shift job, in its order, with the ``further`` keys of an axis or a plane."""
+    chains, recording = result.estimate.chains, result.job.facts.recording
+    before, after = result.disagreement_um
+    return {
+        **head(result.job, effects=False),
+        "estimates": estimates,
+        "covariance": covariance_data(result.covariance),
+        "observations": readings,
+        "noise": {
+            "stated_coordinate_um": recording.u_coordinate_um, "coordinate_um": quantity_data(result.repeatability),
+        },
+        "sampling": {
+            "sampler": chains.sampler, "seed": result.estimate.seed, "draws": len(result.estimate.sigma),
+            "ess_min": chains.ess_min, "rhat_max": chains.rhat_max, "steps": chains.steps,
+            "autocorrelation_time": chains.autocorrelation_time, "converged": chains.converged,
+        },
+        **further,
+        "improvement": {"rms_before_um": before, "rms_after_um": after},
+        "conformity": [],
+        "verdicts": NO_VERDICTS.data(),
+    }  # fmt: skip
 
 
-def summary_of(job: Job, what: Text, named: Named, warnings: Iterable[Text]) -> Summary:
-    figures = tuple(figure_row(name, quantity) for _, _, name, quantity in named)
-    return Summary(what, day(job.facts.job.date), figures=figures, warnings=tuple(warnings))
+def curve_data(curve: Curve, expanded: Floats, unit: float = MICROMETRE, suffix: str = "um") -> dict[str, Any]:
+    """A curve with its uncertainty, U as it is stated, in a unit with that suffix."""
+    low, high = curve.interval95
+    return {
+        "position_mm": curve.position.tolist(), f"error_{suffix}": (curve.error / unit).tolist(),
+        f"u_{suffix}": (curve.u / unit).tolist(),
+        f"interval95_{suffix}": [(low / unit).tolist(), (high / unit).tolist()],
+        f"U_{suffix}": (expanded / unit).tolist(), f"band_{suffix}": (curve.band / unit).tolist(),
+        "simultaneous_factor95": curve.simultaneous_factor,
+    }  # fmt: skip
+
+
+def figures_section(caption: Text, named: Sequence[Left], meaning: Text) -> Section:
+    u = say("U is the expanded uncertainty for a coverage probability of 95 %, from the posterior distribution.")
+    rows = [(name, quantity) for _, _, name, quantity in named]
+    return Section(say("Figures of performance"), (stated_table(caption, rows, (SIGN, meaning, u)),))
 
 
 def artefact_section(
@@ -257,20 +279,15 @@ def artefact_section(
     return traceability_section(job, (*rows, *certificate_rows(facts.certificate), *shifts), *further)
 
 
-def method_section(text: Text, readings: int, chains: Chains, seed: int, *further: Block) -> Section:
+def method_section(result: ShiftFound, text: Text, readings: int, *further: Block) -> Section:
+    chains = result.estimate.chains
     reached = say(
         "{reached}: {ess:.0f} effective samples, R-hat {rhat:.4f}, autocorrelation time {time:.1f} of {steps} steps",
-        reached=say("reached") if chains.converged else say("NOT reached"),
-        ess=chains.ess_min,
-        rhat=chains.rhat_max,
-        time=chains.autocorrelation_time,
-        steps=chains.steps,
-    )
-    rows = (
-        (say("Readings (means)"), number(readings)),
-        (say("Sampler"), say("{sampler}, seed {seed}", sampler=Verbatim(chains.sampler), seed=seed)),
-        (say("Convergence"), reached),
-    )
+        reached=say("reached") if chains.converged else say("NOT reached"), ess=chains.ess_min, rhat=chains.rhat_max,
+        time=chains.autocorrelation_time, steps=chains.steps,
+    )  # fmt: skip
+    sampler = say("{sampler}, seed {seed}", sampler=Verbatim(chains.sampler), seed=result.estimate.seed)
+    rows = ((say("Readings (means)"), number(readings)), (say("Sampler"), sampler), (say("Convergence"), reached))
     return Section(say("Method"), (Paragraph(text), Facts(rows), *further))
 
 

@@ -158,11 +158,9 @@ def _check_common(series: Ints, point: Ints, numbers: Ints, placings: Ints, wher
     if alone.size:
         there = placings[series[point == alone[0]][0]]
         lengths = ", ".join(str(int((series == s).sum())) for s in range(len(placings)))
-        raise CmmUqError(
-            f"point {numbers[alone[0]]} is read in series {there} only (the series have {lengths} points)",
-            where=where or None,
-            fix=f"Read point {numbers[alone[0]]} in another series as well, or leave it out of series {there}",
-        )
+        problem = f"point {numbers[alone[0]]} is read in series {there} only (the series have {lengths} points)"
+        fix = f"Read point {numbers[alone[0]]} in another series as well, or leave it out of series {there}"
+        raise CmmUqError(problem, where=where or None, fix=fix)
     for s, placing in enumerate(placings):
         if (series == s).sum() < 2:
             raise CmmUqError(f"series {placing} has fewer than two points", where=where or None,
@@ -191,10 +189,9 @@ def _check_places(reading: Floats, series: Ints, point: Ints, shifts: Floats, pl
         ]
         nominal = shifts[s] - shifts[0]
         if moved and abs(np.mean(moved) - nominal) > max(1.0, min(_MISPLACED * length, 0.5 * abs(nominal))):
-            raise CmmUqError(
-                f"series {placing} is shifted by {np.mean(moved):.4g} mm against the first, not by {nominal:g} mm",
-                where="job.toml [artefact] shifts_mm", fix=f"Write {shifts[0] + np.mean(moved):.4g}, or mend the recording",
-            )  # fmt: skip
+            problem = f"series {placing} is shifted by {np.mean(moved):.4g} mm against the first, not by {nominal:g} mm"
+            fix = f"Write {shifts[0] + np.mean(moved):.4g}, or mend the recording"
+            raise CmmUqError(problem, where="job.toml [artefact] shifts_mm", fix=fix)
 
 
 def _cosines(means: Floats, series: Ints, along: int) -> Floats:
@@ -288,9 +285,8 @@ def means_over_repeats(points: Points, where: str = "") -> Means:
     """Means of a recording."""
     ratio = points.columns.get(NOISE_RATIO, np.ones(len(points)))
     if (ratio <= 0).any():
-        raise CmmUqError(
-            "noise_ratio must be positive", where=where, fix="1 is an ordinary reading, 2 one twice as noisy"
-        )
+        problem = "noise_ratio must be positive"
+        raise CmmUqError(problem, where=where, fix="1 is an ordinary reading, 2 one twice as noisy")
     keys, first, of = np.unique(
         np.column_stack([points.measurement, points.point]), axis=0, return_index=True, return_inverse=True
     )

@@ -95,10 +95,8 @@ def outside_effects(own: Container[str]) -> dict[str, EffectPlugin]:
         name = plugin.name
         other = "cmm-uq" if name in own else found[name].package if name in found else None
         if other is not None:
-            raise CmmUqError(
-                f"{plugin.what} comes from {other} and from {plugin.package}",
-                fix=f"Uninstall {plugin.package}, or rename it",
-            )
+            problem = f"{plugin.what} comes from {other} and from {plugin.package}"
+            raise CmmUqError(problem, fix=f"Uninstall {plugin.package}, or rename it")
         found[name] = plugin
     return found
 

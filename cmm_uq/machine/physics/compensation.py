@@ -47,9 +47,8 @@ class Compensation:
     """How the readings of one machine become true coordinates."""
 
     maps: ErrorMaps  # its error maps
-    # its carriages; see :meth:`cmm_uq.machine.physics.kinematics.KinematicChain.of`
     chain: str | KinematicChain = (
-        "XYZ"  # its carriages; see :meth:`cmm_uq.machine.physics.kinematics.KinematicChain.of`.
+        "XYZ"  # its carriages; see :meth:`cmm_uq.machine.physics.kinematics.KinematicChain.of`
     )
     origin: Floats | tuple[float, float, float] = (0.0, 0.0, 0.0)  # (3,) scale reading = coordinate + origin, mm
     # True for exact rigid transformations; False to first order in displacements and rotations (Harris 2004 eq. 10–13), on
@@ -58,13 +57,7 @@ class Compensation:
     beyond: Beyond = "refuse"  # what to do beyond the mapped positions and temperatures
 
     def error(self, indicated: Floats, when: PointConditions = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
-        """Error e (n, 3) in mm of indicated coordinates, and which points (n,) were extrapolated.
-
-        Parameters
-        ----------
-        indicated : (n, 3) mm.
-        when : tip, temperatures.
-        """
+        """Error e (n, 3) in mm of indicated coordinates (n, 3), mm, and which points (n,) were extrapolated."""
         readings = indicated + np.asarray(self.origin)
         form = exact if self.rigid else on_leaning_axes
         e, extrapolated = np.empty(readings.shape), np.empty(len(readings), dtype=bool)
@@ -95,29 +88,20 @@ class Compensation:
                 return indicated, extrapolated
             if not np.isfinite(change):
                 break
-        raise CmmUqError(
-            "no indicated coordinates belong to these true ones",
-            fix="Give finite coordinates; if they are, an error in the map is as large as the step between its positions",
-        )
+        fix = "Give finite coordinates; if they are, an error in the map is as large as the step between its positions"
+        raise CmmUqError("no indicated coordinates belong to these true ones", fix=fix)
 
     def provenance(self) -> dict[str, object]:
         """What a compensated recording says of how it came about: maps with their SHA-256, squareness, chain, form."""
         return {
             "error_maps": [
-                {
-                    "file": m.source,
-                    "sha256": m.sha256,
-                    "temperature_c": m.temperature,
-                    "squareness_arcsec": m.squareness_arcsec,
-                }
-                for m in self.maps.maps
+                {"file": m.source, "sha256": m.sha256, "temperature_c": m.temperature,
+                 "squareness_arcsec": m.squareness_arcsec} for m in self.maps.maps
             ],
-            "chain": KinematicChain.of(self.chain).letters,
-            "origin_mm": [float(o) for o in self.origin],
+            "chain": KinematicChain.of(self.chain).letters, "origin_mm": [float(o) for o in self.origin],
             "form": "rigid transformations" if self.rigid else "first order on exact axes",
-            "sign": "true = indicated + e",
-            "beyond_the_maps": "refused" if self.beyond == "refuse" else "extrapolated",
-        }
+            "sign": "true = indicated + e", "beyond_the_maps": "refused" if self.beyond == "refuse" else "extrapolated",
+        }  # fmt: skip
 
 
 def compensate_points(points: Points, compensation: Compensation) -> Points:
@@ -126,7 +110,8 @@ def compensate_points(points: Points, compensation: Compensation) -> Points:
     Points beyond the maps, where they are allowed, are marked by 1 in the column ``extrapolated``.
     """
     xyz, extrapolated = compensation.compensate(points.xyz, circumstances(points))
-    return _moved(points, xyz, extrapolated)
+    marked = {"extrapolated": extrapolated.astype(np.float64)} if extrapolated.any() else {}
+    return replace(points, xyz=xyz, columns={**points.columns, **marked})
 
 
 def machine_compensation(
@@ -148,13 +133,6 @@ def _three(columns: Mapping[str, Floats], pattern: str) -> Floats | None:
         missing = next(name for name in names if name not in columns)
         raise CmmUqError(f"the recording has {given[0]} but not {missing}", fix="Record all three, or none")
     return np.column_stack([columns[name] for name in names]) if given else None
-
-
-def _moved(points: Points, xyz: Floats, extrapolated: NDArray[np.bool_]) -> Points:
-    columns = dict(points.columns)
-    if extrapolated.any():
-        columns["extrapolated"] = extrapolated.astype(np.float64)
-    return replace(points, xyz=xyz, columns=columns)
 
 
 # the largest angle between normal and approach unless another is chosen, rad; the patent leaves it to the user
@@ -182,33 +160,22 @@ class OffsetPlane:
 
 
 def offset_plane(
-    directions: Floats,
-    contacts: Floats,
-    offset: float,
-    *,
-    first: Ints | None = None,
-    acceptance: float = ACCEPTANCE,
-    u_offset: float = 0.0,
-    u_point: float | None = None,
-) -> OffsetPlane:
+    directions: Floats, contacts: Floats, offset: float, *, first: Ints | None = None, acceptance: float = ACCEPTANCE,
+    u_offset: float = 0.0, u_point: float | None = None,
+) -> OffsetPlane:  # fmt: skip
     """Surface plane from a point just before contact and the points of contact.
 
-    Parameters
-    ----------
-    directions : (3,) or (d, 3) the point D just before contact, or several, mm.
-    contacts : (n, 3) the points C1 … CN in contact, n ≥ 3, mm.
-    first : (d,) which contact C1 each direction point belongs to; the first one by default.
-    offset : of the probe, its effective radius, mm.
-    acceptance : largest angle A between the normal and D − C1 at which D is believed, rad. Every D must be within it.
-    u_offset : standard uncertainty of the offset, mm.
-    u_point : standard uncertainty of a contact point along the normal, mm; from the residuals when left out.
+    ``directions``: (3,) or (d, 3) the point D just before contact, or several, mm. ``contacts``: (n, 3) the points
+    C1 … CN in contact, n ≥ 3, mm. ``offset``: of the probe, its effective radius, mm. ``first``: (d,) which contact C1
+    each direction point belongs to; the first one by default. ``acceptance``: largest angle A between the normal and
+    D − C1 at which D is believed, rad; every D must be within it. ``u_offset``: standard uncertainty of the offset, mm.
+    ``u_point``: that of a contact point along the normal, mm; from the residuals when left out.
     """
     if not (np.isfinite(offset) and offset > 0):
         raise CmmUqError(f"a probe offset of {offset} mm", fix="Give the probe's effective radius in mm, above 0")
     if not 0 < acceptance < np.pi / 2:
-        raise CmmUqError(
-            f"a range of acceptance of {np.degrees(acceptance):.4g}°", fix="Choose an angle between 0° and 90°"
-        )
+        problem = f"a range of acceptance of {np.degrees(acceptance):.4g}°"
+        raise CmmUqError(problem, fix="Choose an angle between 0° and 90°")
     plane = fit_plane(contacts, u_point=u_point)
     ahead = np.atleast_2d(np.asarray(directions, dtype=np.float64))
     touched = np.asarray(contacts, dtype=np.float64)[np.zeros(len(ahead), dtype=np.int64) if first is None else first]

@@ -48,25 +48,20 @@ def scan_plane(readings: Floats, towards: Floats, *, u_point: float | None = Non
     points, else estimated when left out.
     """
     if len(readings) == 3 and u_point is None:
-        raise CmmUqError(
-            "three points leave nothing to estimate their uncertainty from", fix="Give u_point, or more points"
-        )
+        problem = "three points leave nothing to estimate their uncertainty from"
+        raise CmmUqError(problem, fix="Give u_point, or more points")
     plane = fit_plane(readings, u_point=u_point)
     across = float(plane.normal @ towards / np.linalg.norm(towards))
     if abs(across) < 0.1:
-        raise CmmUqError(
-            "the direction of w lies in the scan plane", fix="Give roughly the way the digitizer's back points"
-        )
+        fix = "Give roughly the way the digitizer's back points"
+        raise CmmUqError("the direction of w lies in the scan plane", fix=fix)
     w = plane.normal * np.sign(across)
     level = w[0] ** 2 + w[1] ** 2
     if level < 1e-12:
         raise CmmUqError("w points along Z, so that α is not determined", fix="Use γ alone for this attitude")
     to_angles = np.array([[-w[1] / level, w[0] / level, 0.0], [0.0, 0.0, -1 / np.sqrt(level)]])
-    return ScanPlane(
-        float(np.arctan2(w[0], -w[1])),
-        float(np.arctan2(np.sqrt(level), w[2])),
-        to_angles @ plane.covariance[3:, 3:] @ to_angles.T,
-    )
+    alpha, beta = float(np.arctan2(w[0], -w[1])), float(np.arctan2(np.sqrt(level), w[2]))
+    return ScanPlane(alpha, beta, to_angles @ plane.covariance[3:, 3:] @ to_angles.T)
 
 
 def scan_roll(scan: Floats, readings: Floats, alpha: float, beta: float, nominal: float) -> float:
@@ -99,15 +94,12 @@ def scan_roll(scan: Floats, readings: Floats, alpha: float, beta: float, nominal
 
     found = minimise(np.array([nominal, *plane.normal, 0.0]), linearise, move, "roll of the scan plane")
     if found.condition > 1e6:
-        raise CmmUqError(
-            "these motions do not determine γ", fix="Scan the plane while moving in two directions across it"
-        )
+        fix = "Scan the plane while moving in two directions across it"
+        raise CmmUqError("these motions do not determine γ", fix=fix)
     gamma = float(found.state[0])
     if abs(gamma - nominal) > np.pi / 12:
-        raise CmmUqError(
-            f"γ = {np.degrees(gamma):.2f}° from the scan, the wrist is indexed at {np.degrees(nominal):.2f}°",
-            fix="Check the index of the wrist, and that every point lies on the plane",
-        )
+        problem = f"γ = {np.degrees(gamma):.2f}° from the scan, the wrist is indexed at {np.degrees(nominal):.2f}°"
+        raise CmmUqError(problem, fix="Check the index of the wrist, and that every point lies on the plane")
     return gamma
 
 
@@ -139,17 +131,11 @@ class Digitizer:
     def coordinates(
         self, scan: Floats, readings: Floats, temperatures: Floats | float | None = None
     ) -> tuple[Floats, NDArray[np.bool_]]:
-        """True coordinates of digitized points in the machine's home frame (Harris 2004 eq. 35).
+        """True coordinates (n, 3), mm, of digitized points in the machine's home frame (Harris 2004 eq. 35).
 
-        Parameters
-        ----------
-        scan : (n, 2) u, v in the scan plane, mm.
-        readings : (n, 3) scale readings D, E, F, mm.
-        temperatures : of the scales; see :meth:`cmm_uq.machine.physics.map_interpolation.ErrorMaps.at`.
-
-        Returns
-        -------
-        (n, 3) in mm, and (n,) whether a point was extrapolated beyond the error maps.
+        Also (n,) whether a point was extrapolated beyond the error maps. ``scan``: (n, 2) u, v in the scan plane, mm.
+        ``readings``: (n, 3) scale readings D, E, F, mm. ``temperatures``: of the scales; see
+        :meth:`cmm_uq.machine.physics.map_interpolation.ErrorMaps.at`.
         """
         n, when = len(readings), PointConditions(temperatures=temperatures)
         xyz, extrapolated = np.empty((n, 3)), np.empty(n, dtype=bool)
@@ -165,9 +151,7 @@ class Digitizer:
     ) -> Callable[[Floats], Floats]:
         """Function from rows u, v, D, E, F (and a time, where temperatures are a log) to coordinates (n, 3).
 
-        Parameters
-        ----------
-        temperatures_at : temperatures (n, 3) at times (n,), such as :meth:`TemperatureLog.at`; or one temperature.
+        ``temperatures_at``: temperatures (n, 3) at times (n,), such as :meth:`TemperatureLog.at`; or one temperature.
         """
 
         def coordinates(rows: Floats) -> Floats:
@@ -196,8 +180,7 @@ class Digitizer:
 class Alignment:
     """One pose of the digitizer, aligned."""
 
-    # alpha, beta, gamma: Euler angles 3-1-3, rad
-    alpha: float
+    alpha: float  # alpha, beta, gamma: Euler angles 3-1-3, rad
     beta: float
     gamma: float
     reading: Floats  # (3,) [D0 E0 F0], the scale reading with the scan plane's origin at the centre of the sphere, mm
@@ -244,6 +227,11 @@ class MountOffset:
         return np.asarray(np.sqrt(np.diag(self.covariance)[:3]))
 
 
+THREE_ATTITUDES = (
+    "Align in three attitudes that differ by turns about two axes, such as γ = 0° and 90°, and α = 90° and 180°"
+)
+
+
 def mount_offset(alignments: Sequence[Alignment]) -> MountOffset:
     """Offset [U1 V1 W1] by weighted least squares over all components of all alignments (from eq. 16–18).
 
@@ -253,18 +241,15 @@ def mount_offset(alignments: Sequence[Alignment]) -> MountOffset:
     """
     rows = np.vstack([np.hstack([a.attitude, np.eye(3)]) for a in alignments]) if alignments else np.zeros((0, 6))
     if len(rows) < 6 or np.linalg.matrix_rank(rows, tol=1e-6) < 6:
-        raise CmmUqError(
-            f"{len(alignments)} alignments do not determine the offset of the mount",
-            fix="Align in three attitudes that differ by turns about two axes, such as γ = 0° and 90°, and α = 90° and 180°",
-        )
+        problem = f"{len(alignments)} alignments do not determine the offset of the mount"
+        raise CmmUqError(problem, fix=THREE_ATTITUDES)
     whitened, readings = [], []
     for alignment, block in zip(alignments, np.split(rows, len(alignments)), strict=True):
         try:
             root = np.linalg.cholesky(alignment.covariance)
         except np.linalg.LinAlgError:
-            raise CmmUqError(
-                "the covariance of an alignment is not positive definite", fix="Give every reading an uncertainty"
-            ) from None
+            fix = "Give every reading an uncertainty"
+            raise CmmUqError("the covariance of an alignment is not positive definite", fix=fix) from None
         whitened.append(np.linalg.solve(root, block))
         readings.append(np.linalg.solve(root, alignment.reading))
     A, y = np.vstack(whitened), np.concatenate(readings)
@@ -324,18 +309,16 @@ class DigitizedCloud:
         for number in np.unique(numbers):
             here = numbers == number
             if number not in self.poses:
-                raise CmmUqError(
-                    f"pose {number:g} is not described", where=f"point {np.flatnonzero(here)[0] + 1}",
-                    fix=f"Known: {', '.join(map(str, self.poses))}; add it to [machine] digitizer poses",
-                )  # fmt: skip
+                problem = f"pose {number:g} is not described"
+                fix = f"Known: {', '.join(map(str, self.poses))}; add it to [machine] digitizer poses"
+                raise CmmUqError(problem, where=f"point {np.flatnonzero(here)[0] + 1}", fix=fix)
             part = rows[here]
             given = temperatures[here] if temperatures is not None else None
             try:
                 xyz[here], extrapolated[here] = self.poses[int(number)].coordinates(part[:, :2], part[:, 2:5], given)
             except CmmUqError as error:
-                raise CmmUqError(
-                    error.problem, where=f"pose {number:g}, {error.where} of those in this pose", fix=error.fix
-                ) from error
+                where = f"pose {number:g}, {error.where} of those in this pose"
+                raise CmmUqError(error.problem, where=where, fix=error.fix) from error
         return self._joined(xyz, extrapolated)
 
     def _temperatures(self, rows: Floats) -> Floats | None:
@@ -364,12 +347,8 @@ def columns_for(header: Sequence[str] | None, poses: int, *, logged: bool, where
     if own and logged:
         raise CmmUqError(f"has {own[0]}, and [machine] temperature_log gives it as well", where=where,
                          fix="Leave out one of the two")  # fmt: skip
-    needed = [
-        *DIGITIZER_COLUMNS,
-        *((POSE,) if poses > 1 or POSE in header else ()),
-        *((TIME,) if logged else ()),
-        *(TEMPERATURES if own else ()),
-    ]
+    needed = [*DIGITIZER_COLUMNS, *([POSE] if poses > 1 or POSE in header else []), *([TIME] if logged else [])]
+    needed += TEMPERATURES if own else ()
     missing = [name for name in needed if name not in header]
     if missing:
         raise CmmUqError(f"has no column {missing[0]}", where=where, fix=f"This cloud needs {', '.join(needed)}")

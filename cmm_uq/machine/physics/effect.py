@@ -34,28 +34,18 @@ def filled(text: Text, blanks: Mapping[Text, Text]) -> Text:
     """A message with its blanks filled in."""
     if not isinstance(text, Message):
         return text
-    values = {
-        name: blanks.get(value, value) if isinstance(value, Text) else value for name, value in text.arguments.items()
-    }
-    return Message(text.pattern, values)
+    given = text.arguments.items()
+    return Message(text.pattern, {k: blanks.get(v, v) if isinstance(v, Text) else v for k, v in given})
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that describes how large an effect is.
+    """A number that describes how large an effect is."""
 
-    Parameters
-    ----------
-    name : with its unit, as in results.json: ``angle_arcsec``.
-    unit : as printed: ``″``.
-    prior_sd : standard deviation that physics allows, about zero, in the same unit.
-    what : it is, in words, where an effect has several: ``amplitude``.
-    """
-
-    name: str
-    unit: Unit
-    prior_sd: float
-    what: Text = NOTHING
+    name: str  # with its unit, as in results.json: ``angle_arcsec``
+    unit: Unit  # as printed: ``″``
+    prior_sd: float  # standard deviation that physics allows, about zero, in the same unit
+    what: Text = NOTHING  # it is, in words, where an effect has several: ``amplitude``
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", unit(self.unit))
@@ -63,16 +53,13 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Shape:
-    """A nonlinear parameter: it shapes the basis, and lies between two bounds (uniform in its logarithm).
-
-    ``period_along`` is the axis (x, y, z) of whose reading it is a period, if it is one.
-    """
+    """A nonlinear parameter: it shapes the basis, and lies between two bounds (uniform in its logarithm)."""
 
     name: str
     unit: Unit
     low: float
     high: float
-    period_along: str | None = None
+    period_along: str | None = None  # the axis (x, y, z) of whose reading it is a period, if it is one
     what: Text = NOTHING
 
     def __post_init__(self) -> None:
@@ -98,66 +85,39 @@ class Amount:
 
 @dataclass(frozen=True)
 class Nonparametric:
-    """A function of no particular form, as a diagnosis fits one: what it is a function of, and what it changes.
+    """A function of no particular form, as a diagnosis fits one: what it is a function of, and what it changes."""
 
-    Parameters
-    ----------
-    of : the covariate: a reading (``x_mm``) or a column (``time_s``).
-    along : axis along which it displaces points; ``None`` for a term of the observations themselves.
-    scale : whether the displacement grows in proportion to the reading of that axis.
-    """
-
-    of: str
-    along: str | None = None
-    scale: bool = False
+    of: str  # the covariate: a reading (``x_mm``) or a column (``time_s``)
+    along: str | None = None  # axis along which it displaces points; ``None`` for a term of the observations themselves
+    scale: bool = False  # whether the displacement grows in proportion to the reading of that axis
 
 
 class Effect(ABC):
-    """One physical cause of a difference between true and indicated coordinates.
+    """One physical cause of a difference between true and indicated coordinates."""
 
-    Attributes
-    ----------
-    name : as in ``[model] effects``.
-    title : in words, for certificates.
-    formula : e with its sign, for documents; a and b are the axes in the name.
-    mechanism : where the cause lies, in a word: scale, drive, guideway, frame, temperature, probe, controller, artefact, ….
-    points_to : what a service technician should look at, to follow "What it points to:"; without a full stop.
-    coefficients : what enters e linearly, k of them.
-    shape : what shapes the basis, if anything.
-    columns : columns that the recording must have.
-    tier : ``contract`` or ``further``: how readily it is to be thought of.
-    everywhere : whether every machine has it to some degree, or every artefact made on one, so that a diagnosis takes it
-        together with all such.
-    idealised_over : axis, or column, over which its form is the simplest of many that its mechanism can have, if it is that.
-    imitated_by : nonparametric terms that could pass for it.
-    stands_for : nonparametric terms that are nothing else than it.
-    along_motion : carriage along whose motion e goes, however that leans; ``None`` where e keeps to the coordinates.
-    plane : pair of axes whose squareness it is (``xy``, ``yz``, ``zx``), if it is one; it then gives its :meth:`lean`.
-    of_artefact : whether it is a fault of the artefact itself, which only that artefact can say in full.
-    mostly : part of its prior standard deviation that it mostly keeps to, where a certificate says so and may be wrong.
-    means : what a reported amount means at the machine, in words with blanks; see :meth:`meaning`.
-    sense : one word for a positive amount and one for a negative one, where these words differ in one.
-    """
-
-    name: str
-    title: Text
-    formula: str
-    mechanism: str
-    points_to: Text
-    coefficients: tuple[Parameter, ...]
-    shape: tuple[Shape, ...] = ()
-    columns: tuple[str, ...] = ()
-    tier: str = CONTRACT
-    everywhere: bool = False
-    idealised_over: str | None = None
-    imitated_by: tuple[Nonparametric, ...] = ()
-    stands_for: tuple[Nonparametric, ...] = ()
-    along_motion: str | None = None
-    plane: str | None = None
-    of_artefact: bool = False
-    mostly: float = 1.0
-    means: Text = NOTHING
-    sense: tuple[Text, Text] = (NOTHING, NOTHING)
+    name: str  # as in ``[model] effects``
+    title: Text  # in words, for certificates
+    formula: str  # e with its sign, for documents; a and b are the axes in the name
+    mechanism: str  # where the cause lies: scale, drive, guideway, frame, temperature, probe, controller, artefact, …
+    points_to: Text  # what a service technician should look at, to follow "What it points to:"; without a full stop
+    coefficients: tuple[Parameter, ...]  # what enters e linearly, k of them
+    shape: tuple[Shape, ...] = ()  # what shapes the basis, if anything
+    columns: tuple[str, ...] = ()  # that the recording must have
+    tier: str = CONTRACT  # or ``further``: how readily it is to be thought of
+    everywhere: bool = (
+        False  # whether every machine, or artefact, has it to some degree, so that a diagnosis takes all such
+    )
+    idealised_over: str | None = None  # axis, or column, over which its form is the simplest of many of its mechanism
+    imitated_by: tuple[Nonparametric, ...] = ()  # nonparametric terms that could pass for it
+    stands_for: tuple[Nonparametric, ...] = ()  # nonparametric terms that are nothing else than it
+    along_motion: str | None = None  # carriage along whose motion e goes, however that leans; ``None``: the coordinates
+    plane: str | None = (
+        None  # pair of axes whose squareness it is (``xy``, ``yz``, ``zx``); it then gives its :meth:`lean`
+    )
+    of_artefact: bool = False  # whether it is a fault of the artefact itself, which only that artefact can say in full
+    mostly: float = 1.0  # part of its prior sd that it mostly keeps to, where a certificate says so and may be wrong
+    means: Text = NOTHING  # what a reported amount means at the machine, in words with blanks; see :meth:`meaning`
+    sense: tuple[Text, Text] = (NOTHING, NOTHING)  # a word for a positive and for a negative amount, where these differ
 
     @property
     def prior_weight(self) -> float:
@@ -168,9 +128,7 @@ class Effect(ABC):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         """Displacement e of every point for one unit of each coefficient, (n, 3, k) in mm.
 
-        Raises
-        ------
-        CmmUqError : a column or a machine's figure is missing.
+        A ``CmmUqError`` where a column or a machine's figure is missing.
         """
 
     def unfit(self, points: Points) -> CmmUqError | None:
@@ -182,24 +140,13 @@ class Effect(ABC):
         raise CmmUqError(f"{self.name} is no squareness")
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """What reported parameters mean at the machine, with their signs, in words; nothing where the figures say it.
-
-        Parameters
-        ----------
-        amounts : of each reported parameter, by name.
-        """
+        """What reported parameters, by name, mean at the machine, with their signs; nothing where the figures say it."""
         if not self.means:
             return NOTHING
-        first, *further = (amounts.get(parameter.name) for parameter in self.reported)
-        amount = first or Amount(NOTHING)
-        second = further[0].size if further and further[0] else NOTHING
-        sizes: dict[Text, Text] = {
-            SIZE: amount.size,
-            SIDE: amount.side,
-            SENSE: amount.more(*self.sense),
-            SECOND: second,
-        }
-        return filled(self.means, sizes)
+        nothing = Amount(NOTHING)
+        first, second, *_ = (*(amounts.get(parameter.name, nothing) for parameter in self.reported), nothing)
+        sense = first.more(*self.sense)
+        return filled(self.means, {SIZE: first.size, SIDE: first.side, SENSE: sense, SECOND: second.size})
 
     def belongs_to(self, points: Points) -> bool:
         """Whether a fault of an artefact is that of the artefact in these points."""
@@ -211,15 +158,13 @@ class Effect(ABC):
 
     def course(self, points: Points) -> Floats | None:
         """Where each point is on the axis, or in the column, of ``idealised_over``, (n,); ``None`` without one."""
-        over = self.idealised_over
-        if over is None:
+        if (over := self.idealised_over) is None:
             return None
         return points.readings[over] if over in points.readings else points.column(over)
 
     def trials(self) -> Iterator[tuple[float, ...]]:
         """Values of the shape worth trying, evenly spread in their logarithm; one empty tuple without a shape."""
-        grids = [np.geomspace(s.low, s.high, TRIALS).tolist() for s in self.shape]
-        yield from product(*grids)
+        yield from product(*(np.geomspace(s.low, s.high, TRIALS).tolist() for s in self.shape))
 
     @property
     def reported(self) -> tuple[Parameter | Shape, ...]:
@@ -252,10 +197,7 @@ class Effect(ABC):
 
 
 class Family(Effect):
-    """One of several effects that differ by axes, whose letters fill the blanks of its words.
-
-    In names of columns ``{a}`` is its axis.
-    """
+    """One of several effects that differ by axes, whose letters fill the blanks of its words; ``{a}`` in columns' names."""
 
     family: ClassVar[str]  # first part of the name
 
@@ -267,9 +209,8 @@ class Family(Effect):
 
     def fill(self, letters: Mapping[Text, str]) -> None:
         blanks: dict[Text, Text] = {blank: Verbatim(letter.upper()) for blank, letter in letters.items()}
-        self.title, self.points_to, self.means = (
-            filled(text, blanks) for text in (self.title, self.points_to, self.means)
-        )
+        words = self.title, self.points_to, self.means
+        self.title, self.points_to, self.means = (filled(text, blanks) for text in words)
 
 
 class OfAxis(Family):

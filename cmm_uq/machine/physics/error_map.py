@@ -13,19 +13,21 @@ import hashlib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.csv_table import CsvTable, csv_table, number_problem
+from cmm_uq.base.files.csv_table import csv_table, number_problem
 from cmm_uq.base.files.limits import LINE, MAP_BYTES, MAP_ROWS
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
 
 COLUMNS = ("dx_um", "dy_um", "dz_um", "rx_arcsec", "ry_arcsec", "rz_arcsec")
 UNITS = np.array([MICROMETRE] * 3 + [ARCSECOND] * 3)  # unit of each column, in mm and rad
+PAIRS = ("xy", "yz", "zx")  # of axes, in the order of every squareness
 FINE_UM, STEP_UM = 0.5, 0.01  # A map with no displacement above the one and some below the other was not written in µm
 
 
@@ -58,20 +60,15 @@ class ErrorMap:
     @property
     def squareness_arcsec(self) -> dict[str, float]:
         """Sxy, Syz, Szx in ″ by their pair of axes, as they were stated."""
-        return {
-            pair: round(float(s) / ARCSECOND, 9) for pair, s in zip(("xy", "yz", "zx"), self.squareness, strict=True)
-        }
+        return {pair: round(float(s) / ARCSECOND, 9) for pair, s in zip(PAIRS, self.squareness, strict=True)}
 
     def covers(self, machine: Machine) -> None:
         for axis, carriage in zip(AXES, self.axes, strict=True):
             low, high = machine.travel_mm[AXES.index(axis)]
             first, last = carriage.span
             if first > low or last < high:
-                raise CmmUqError(
-                    f"axis {axis} is mapped from {first:g} to {last:g} mm, the travel is {low:g} to {high:g} mm",
-                    where=self.source or None,
-                    fix=_travel_advice(last - first, high - low),
-                )
+                problem = f"axis {axis} is mapped from {first:g} to {last:g} mm, the travel is {low:g} to {high:g} mm"
+                raise CmmUqError(problem, where=self.source or None, fix=_travel_advice(last - first, high - low))
 
 
 def read_error_map(path: Path, *, temperature: float = 20.0, units_checked: bool = True) -> ErrorMap:
@@ -89,9 +86,8 @@ def parse_error_map(content: bytes, where: str, *, temperature: float = 20.0, un
     table = csv_table(content, where, ("axis", "position_mm", *COLUMNS), most_rows=MAP_ROWS)
     unknown = [name for name in table.header if name not in ("axis", "position_mm", *COLUMNS)]
     if unknown:
-        raise CmmUqError(
-            f"unknown column {unknown[0]!r}", where=where, fix=f"Known: axis, position_mm, {', '.join(COLUMNS)}"
-        )
+        fix = f"Known: axis, position_mm, {', '.join(COLUMNS)}"
+        raise CmmUqError(f"unknown column {unknown[0]!r}", where=where, fix=fix)
     rows_of: dict[str, list[int]] = {axis: [] for axis in AXES}
     for row in range(len(table.rows)):
         axis = table.rows[row][table.header.index("axis")].lower()
@@ -102,7 +98,8 @@ def parse_error_map(content: bytes, where: str, *, temperature: float = 20.0, un
     for axis, rows in rows_of.items():
         positions = [table.number(row, "position_mm") for row in rows]
         check_positions(axis, positions, [table.at(row) for row in rows], where)
-        carriages.append(_carriage(table, rows, positions))
+        values = np.array([[table.number(row, column) for column in COLUMNS] for row in rows])
+        carriages.append(AxisErrors(np.array(positions), values * UNITS))
     if units_checked:
         check_units(carriages, where)
     x, y, z = carriages
@@ -126,43 +123,29 @@ def check_positions(axis: str, positions: Sequence[float], places: Sequence[str]
     if len(positions) < 2:
         raise CmmUqError(f"axis {axis} has {len(positions)} positions", where=where, fix="An axis needs two or more")
     seen = set(positions[:1])
-    for i in range(1, len(positions)):
-        if positions[i] in seen:
-            raise CmmUqError(
-                f"axis {axis}: position {positions[i]:g} mm is there twice", where=places[i], fix="Remove one"
-            )
-        if positions[i] < positions[i - 1]:
-            raise CmmUqError(
-                f"axis {axis}: position {positions[i]:g} mm comes after {positions[i - 1]:g} mm",
-                where=places[i],
-                fix="Sort the positions of each axis, lowest first",
-            )
-        seen.add(positions[i])
+    for (before, here), place in zip(pairwise(positions), places[1:], strict=True):
+        if here in seen:
+            raise CmmUqError(f"axis {axis}: position {here:g} mm is there twice", where=place, fix="Remove one")
+        if here < before:
+            fix = "Sort the positions of each axis, lowest first"
+            raise CmmUqError(f"axis {axis}: position {here:g} mm comes after {before:g} mm", where=place, fix=fix)
+        seen.add(here)
 
 
 def check_units(carriages: Sequence[AxisErrors], where: str) -> None:
     displacements = np.abs(np.concatenate([c.errors[:, :3].ravel() for c in carriages])) / MICROMETRE
     rotations = np.abs(np.concatenate([c.errors[:, 3:].ravel() for c in carriages])) / ARCSECOND
-    fix = "Convert displacements to µm and rotations to arc seconds"
-    if 0 < displacements.max() < FINE_UM and displacements[displacements > 0].min() < STEP_UM:
-        raise CmmUqError(
-            f"the largest displacement is {displacements.max():.3g} µm: the map seems to be in mm, 1000 times off",
-            where=where,
-            fix=fix,
-        )
-    if displacements.max() > 20_000:
-        raise CmmUqError(f"a displacement of {displacements.max():.3g} µm: the map is not in µm", where=where, fix=fix)
-    if 0 < rotations.max() < 1e-3:
-        raise CmmUqError(
-            f"the largest rotation is {rotations.max():.3g}″: the map seems to be in rad or mm/m", where=where, fix=fix
-        )
-    if rotations.max() > 3600:
-        raise CmmUqError(f"a rotation of {rotations.max():.3g}″: the map is not in arc seconds", where=where, fix=fix)
-
-
-def _carriage(table: CsvTable, rows: Sequence[int], positions: Sequence[float]) -> AxisErrors:
-    values = np.array([[table.number(row, column) for column in COLUMNS] for row in rows])
-    return AxisErrors(np.array(positions), values * UNITS)
+    moved, turned, problem = displacements.max(), rotations.max(), None
+    if 0 < moved < FINE_UM and displacements[displacements > 0].min() < STEP_UM:
+        problem = f"the largest displacement is {moved:.3g} µm: the map seems to be in mm, 1000 times off"
+    elif moved > 20_000:
+        problem = f"a displacement of {moved:.3g} µm: the map is not in µm"
+    elif 0 < turned < 1e-3:
+        problem = f"the largest rotation is {turned:.3g}″: the map seems to be in rad or mm/m"
+    elif turned > 3600:
+        problem = f"a rotation of {turned:.3g}″: the map is not in arc seconds"
+    if problem is not None:
+        raise CmmUqError(problem, where=where, fix="Convert displacements to µm and rotations to arc seconds")
 
 
 def _travel_advice(mapped: float, travel: float) -> str:
@@ -203,23 +186,19 @@ def parse_error_map_text(content: bytes, where: str, *, temperature: float = 20.
     reading = _Reading()
     lines = content.decode("utf-8-sig", errors="replace").splitlines()
     if len(lines) > MAP_ROWS.most or len(max(lines, key=len, default="")) > LINE.most:
-        raise CmmUqError(
-            f"has {len(lines)} lines of up to {len(max(lines, key=len))} characters", where=where,
-            fix=f"{MAP_ROWS.most} lines of {LINE.most} characters are the most of an error map",
-        )  # fmt: skip
+        fix = f"{MAP_ROWS.most} lines of {LINE.most} characters are the most of an error map"
+        raise CmmUqError(f"has {len(lines)} lines of up to {len(max(lines, key=len))} characters", where=where, fix=fix)
     for number, line in enumerate(lines, 1):
         _read_line(reading, line.translate(_STRAY).strip(), f"{where} line {number}")
     carriages = [_carriage_of_error_map_text(reading, axis, where) for axis in AXES]
     check_units(carriages, where)
-    missing = [pair for pair in ("xy", "yz", "zx") if pair not in reading.squareness]
-    if missing:
-        raise CmmUqError(
-            f"the squareness {missing[0].upper()} is missing", where=where, fix="Add a line such as  XY: 0.0"
-        )
+    if missing := [pair for pair in PAIRS if pair not in reading.squareness]:
+        problem = f"the squareness {missing[0].upper()} is missing"
+        raise CmmUqError(problem, where=where, fix="Add a line such as  XY: 0.0")
     x, y, z = carriages
     found = ErrorMap((x, y, z), temperature=temperature, source=where, sha256=hashlib.sha256(content).hexdigest())
     # contractors print 90° less the angle; the project's S is the angle less 90°
-    return found.with_squareness_arcsec(*(-reading.squareness[pair] for pair in ("xy", "yz", "zx")))
+    return found.with_squareness_arcsec(*(-reading.squareness[pair] for pair in PAIRS))
 
 
 def tables_of(text: str) -> list[str]:
@@ -234,8 +213,8 @@ def error_map_text(error_map: ErrorMap, *, name: str = "errors.txt") -> str:
         low, high = carriage.span
         lines.append(f"{axis.upper()}\t{low:g}\t{high:g}\t{len(carriage.positions)}")
     lines.append("Squareness Parameters:")
-    for pair, angle in zip(("XY", "YZ", "ZX"), error_map.squareness, strict=True):
-        lines.append(f"{pair}: {-angle / ARCSECOND:.12g}")
+    for pair, angle in zip(PAIRS, error_map.squareness, strict=True):
+        lines.append(f"{pair.upper()}: {-angle / ARCSECOND:.12g}")
     for axis, carriage in zip(AXES, error_map.axes, strict=True):
         order = _ORDER[axis]
         lines += ["", f"Map Data: {axis.upper()} Axis", "", "\t".join((axis + order).upper())]
@@ -252,11 +231,11 @@ def _read_line(reading: _Reading, line: str, where: str) -> None:
     elif reading.axis and _LETTERS.fullmatch(line):
         letters = "".join(line.split()).lower()
         if letters[:2] != 2 * reading.axis or sorted(letters[1:4]) != list(AXES) or sorted(letters[4:]) != list(AXES):
-            raise CmmUqError(
-                f"axis letters {' '.join(letters.upper())} are no heading of axis {reading.axis}",
-                where=where,
-                fix="They are the axis itself, then each axis once for displacements (linear first) and once for rotations",
+            fix = (
+                "They are the axis itself, then each axis once for displacements (linear first) and once for rotations"
             )
+            problem = f"axis letters {' '.join(letters.upper())} are no heading of axis {reading.axis}"
+            raise CmmUqError(problem, where=where, fix=fix)
         reading.columns[reading.axis] = letters[1:]
     elif reading.axis and re.match(r"[-+.\d]", line):
         reading.rows[reading.axis].append((_numbers(line, where), where))
@@ -269,11 +248,8 @@ def _numbers(text: str, where: str, wanted: int = 7) -> list[float]:
     cells = text.split()
     values = [] if any(map(number_problem, cells)) else [float(cell) for cell in cells]
     if len(values) != wanted:
-        raise CmmUqError(
-            f"{text!r} is not {'a number' if wanted == 1 else f'{wanted} numbers'}",
-            where=where,
-            fix="Position, three displacements, three rotations",
-        )
+        problem = f"{text!r} is not {'a number' if wanted == 1 else f'{wanted} numbers'}"
+        raise CmmUqError(problem, where=where, fix="Position, three displacements, three rotations")
     return values
 
 

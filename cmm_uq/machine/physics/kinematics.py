@@ -73,19 +73,16 @@ def parametric_error(name: str) -> ParametricError:
     found = None
     if match := _VDI.fullmatch(text):
         a, kind, b = match.groups()
-        found = (
-            _squareness(a, b) if kind == "w" else ParametricError("displacement" if kind == "t" else "rotation", a, b)
-        )
+        moved = ParametricError("displacement" if kind == "t" else "rotation", a, b)
+        found = _squareness(a, b) if kind == "w" else moved
     elif match := _GREEK.fullmatch(text):
         displaced, _, b, a = match.groups()
         found = ParametricError("displacement" if displaced else "rotation", a, b)
     elif match := _SQUARE.fullmatch(text):
         found = _squareness(*match.groups())
     if found is None:
-        raise CmmUqError(
-            f"no parametric error is named {name!r}",
-            fix=suggestion(text, [e.vdi for e in PARAMETRIC_ERRORS] + [e.symbol for e in PARAMETRIC_ERRORS]),
-        )
+        known = [e.vdi for e in PARAMETRIC_ERRORS] + [e.symbol for e in PARAMETRIC_ERRORS]
+        raise CmmUqError(f"no parametric error is named {name!r}", fix=suggestion(text, known))
     return found
 
 
@@ -135,27 +132,15 @@ def _chain(text: str) -> KinematicChain:
 
 
 def carried_offset(
-    axis: str,
-    readings: Floats,
-    tip: Floats | None = None,
-    chain: str | KinematicChain = "XYZ",
+    axis: str, readings: Floats, tip: Floats | None = None, chain: str | KinematicChain = "XYZ",
     directions: Floats | None = None,
-) -> Floats:
-    """Vector on which a rotation of carriage ``axis`` acts: the probe moves by ε × offset.
+) -> Floats:  # fmt: skip
+    """Vector (n, 3), mm, on which a rotation of carriage ``axis`` acts: the probe moves by ε × offset.
 
     In the chain XYZ it is (0, y, z) of carriage x, (0, 0, z) of y and 0 of z, each with the stylus tip offset added.
-
-    Parameters
-    ----------
-    axis : moving carriage, x, y or z.
-    readings : (n, 3) scale readings, mm.
-    tip : (n, 3) or (3,) stylus tip or digitizer offset from the end of the ram, mm.
-    chain : see :meth:`KinematicChain.of`.
-    directions : of the motions where they lean, see :func:`axis_directions`.
-
-    Returns
-    -------
-    (n, 3) in mm.
+    ``readings``: (n, 3) of the scales, mm. ``tip``: (n, 3) or (3,) stylus tip or digitizer offset from the end of the ram,
+    mm. ``chain``: see :meth:`KinematicChain.of`. ``directions``: of the motions where they lean, see
+    :func:`axis_directions`.
     """
     carried = _carried(AXES.index(axis), KinematicChain.of(chain))
     offset = np.zeros(np.shape(readings))
@@ -172,25 +157,14 @@ def _carried(carriage: int, chain: KinematicChain) -> list[int]:
 
 
 def first_order(
-    readings: Floats,
-    errors: Floats,
-    squareness: Floats | None = None,
-    *,
-    tip: Floats | None = None,
+    readings: Floats, errors: Floats, squareness: Floats | None = None, *, tip: Floats | None = None,
     chain: str | KinematicChain = "XYZ",
-) -> Floats:
-    """Error e of every point to first order in the parametric errors (Harris 2004 eq. 11–13 for the chain XYZ).
+) -> Floats:  # fmt: skip
+    """Error e (n, 3), mm, of every point to first order in the parametric errors (Harris 2004 eq. 11–13 for XYZ).
 
-    Parameters
-    ----------
-    readings : (n, 3) scale readings, mm.
-    errors : (n, 3, 6) of carriages x, y, z: displacements along x, y, z in mm, rotations about x, y, z in rad.
-    squareness : (3,) or (n, 3) Sxy, Syz, Szx, rad.
-    tip, chain : see :func:`carried_offset`.
-
-    Returns
-    -------
-    (n, 3) e in mm, true = indicated + e.
+    ``readings``: (n, 3) of the scales, mm. ``errors``: (n, 3, 6) of carriages x, y, z: displacements along x, y, z in mm,
+    rotations about x, y, z in rad. ``squareness``: (3,) or (n, 3) Sxy, Syz, Szx, rad. ``tip, chain``: see
+    :func:`carried_offset`.
     """
     chain = KinematicChain.of(chain)
     tips = None if tip is None else np.broadcast_to(tip, readings.shape).T
@@ -200,13 +174,9 @@ def first_order(
         rotation = errors[:, i, 3:].T
         carried = _carried(i, chain)
         for j in range(3):
-            along = [
-                a
-                for a in (readings[:, j] if j in carried else None, None if tips is None else tips[j])
-                if a is not None
-            ]
-            if along:
-                offset = along[0] if len(along) == 1 else along[0] + along[1]
+            parts = [*([readings[:, j]] if j in carried else []), *([] if tips is None else [tips[j]])]
+            if parts:
+                offset = parts[0] if len(parts) == 1 else parts[0] + parts[1]
                 e[(j + 1) % 3] += rotation[(j + 2) % 3] * offset
                 e[(j + 2) % 3] -= rotation[(j + 1) % 3] * offset
     if squareness is not None:
@@ -217,11 +187,9 @@ def first_order(
 
 
 def jacobian(readings: Floats, *, tip: Floats | None = None, chain: str | KinematicChain = "XYZ") -> Floats:
-    """Derivative of e with respect to each parametric error, all errors being small.
+    """Derivative (n, 3, 21) of e with respect to each parametric error, all errors being small.
 
-    Returns
-    -------
-    (n, 3, 21), columns as in :data:`PARAMETRIC_ERRORS`: 1 for displacements, mm/rad for rotations and squareness.
+    Columns as in :data:`PARAMETRIC_ERRORS`: 1 for displacements, mm/rad for rotations and squareness.
     """
     J = np.zeros((len(readings), 3, 21))
     for i, axis in enumerate(AXES):
@@ -236,13 +204,9 @@ def jacobian(readings: Floats, *, tip: Floats | None = None, chain: str | Kinema
 
 
 def exact(
-    readings: Floats,
-    errors: Floats,
-    squareness: Floats | None = None,
-    *,
-    tip: Floats | None = None,
+    readings: Floats, errors: Floats, squareness: Floats | None = None, *, tip: Floats | None = None,
     chain: str | KinematicChain = "XYZ",
-) -> Floats:
+) -> Floats:  # fmt: skip
     """Error e of every point by rigid transformations, without neglecting products of errors.
 
     Parameters and result as :func:`first_order`. Rotations are taken as rotation vectors; axes x and y span the plane
@@ -265,13 +229,9 @@ def exact(
 
 
 def on_leaning_axes(
-    readings: Floats,
-    errors: Floats,
-    squareness: Floats | None = None,
-    *,
-    tip: Floats | None = None,
+    readings: Floats, errors: Floats, squareness: Floats | None = None, *, tip: Floats | None = None,
     chain: str | KinematicChain = "XYZ",
-) -> Floats:
+) -> Floats:  # fmt: skip
     """Error e of every point: exact in the squarenesses, to first order in displacements and rotations.
 
     What :func:`exact` gives but for products of rotations with one another and with displacements, in half its time.
@@ -302,11 +262,9 @@ def position_errors(errors: Floats) -> Floats:
 
 
 def axis_directions(squareness: Floats | None) -> Floats:
-    """Unit vectors of the motions of carriages x, y, z that enclose 90° + S with each other.
+    """Unit vectors (..., 3, 3) of the motions of carriages x, y, z, a row each, that enclose 90° + S with each other.
 
     ``squareness``: (..., 3) Sxy, Syz, Szx, rad.
-
-    Returns (..., 3, 3), a row for each carriage.
     """
     s_xy, s_yz, s_zx = np.moveaxis(np.sin(np.zeros(3) if squareness is None else squareness), -1, 0)
     y_y = np.sqrt(1 - s_xy**2)
@@ -317,12 +275,7 @@ def axis_directions(squareness: Floats | None) -> Floats:
 
 
 def direction_derivatives(squareness: Floats) -> Floats:
-    """Derivative of :func:`axis_directions` with respect to Sxy, Syz, Szx, per rad.
-
-    ``squareness``: (..., 3) rad.
-
-    Returns (3, ..., 3, 3), the squarenesses first.
-    """
+    """Derivative (3, ..., 3, 3) of :func:`axis_directions` with respect to Sxy, Syz, Szx (..., 3), per rad."""
     axes = axis_directions(squareness)
     (s_xy, c_xy), (_, c_yz), (s_zx, c_zx) = ((np.sin(s), np.cos(s)) for s in np.moveaxis(squareness, -1, 0))
     z_y, z_z = axes[..., 2, 1], axes[..., 2, 2]
@@ -361,10 +314,6 @@ def euler_313(alpha: float | Floats, beta: float | Floats, gamma: float | Floats
     Angles (n,) give attitudes (3, 3, n).
     """
     ca, sa, cb, sb, cg, sg = (f(a) for a in (alpha, beta, gamma) for f in (np.cos, np.sin))
-    return np.array(
-        [
-            [ca * cg - sa * cb * sg, -ca * sg - sa * cb * cg, sa * sb],
-            [ca * cb * sg + sa * cg, ca * cb * cg - sa * sg, -ca * sb],
-            [sb * sg, sb * cg, cb],
-        ]
-    )
+    first = [ca * cg - sa * cb * sg, -ca * sg - sa * cb * cg, sa * sb]
+    second = [ca * cb * sg + sa * cg, ca * cb * cg - sa * sg, -ca * sb]
+    return np.array([first, second, [sb * sg, sb * cg, cb]])

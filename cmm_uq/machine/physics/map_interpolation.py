@@ -75,15 +75,9 @@ class _Stack:
 
 
 class ErrorMaps:
-    """The error maps of one machine, at one or several temperatures.
+    """The error maps of one machine, one for each temperature.
 
-    Parameters
-    ----------
-    maps : one for each temperature; their axes may have different positions, and the range they share counts.
-
-    Raises
-    ------
-    CmmUqError : no maps, or two at one temperature.
+    Their axes may have different positions, and the range they share counts.
     """
 
     def __init__(self, maps: Sequence[ErrorMap]) -> None:
@@ -93,9 +87,8 @@ class ErrorMaps:
         self.temperatures = np.array([m.temperature for m in self.maps])
         if np.any(np.diff(self.temperatures) == 0):
             same = self.temperatures[np.flatnonzero(np.diff(self.temperatures) == 0)[0]]
-            raise CmmUqError(
-                f"two error maps at {same:g} °C", where="job.toml [machine] error_map", fix="Remove one of them"
-            )
+            where = "job.toml [machine] error_map"
+            raise CmmUqError(f"two error maps at {same:g} °C", where=where, fix="Remove one of them")
         self.squareness = np.array([m.squareness for m in self.maps])
         self._axes = tuple(self._stack(i) for i in range(3))
 
@@ -104,33 +97,22 @@ class ErrorMaps:
         return float(positions[0]), float(positions[-1])
 
     def at(
-        self,
-        readings: Floats,
-        temperatures: Floats | float | None = None,
-        *,
-        beyond: Beyond = "refuse",
-        lines: Ints | None = None,
-        first: int = 1,
-    ) -> LookedUp:
-        """Errors of every carriage at scale readings.
+        self, readings: Floats, temperatures: Floats | float | None = None, *, beyond: Beyond = "refuse",
+        lines: Ints | None = None, first: int = 1,
+    ) -> LookedUp:  # fmt: skip
+        """Errors of every carriage at scale readings (n, 3), mm.
 
-        Parameters
-        ----------
-        readings : (n, 3) mm.
-        temperatures : of the three scales, (n, 3) or (3,), or of all, °C. One map needs none.
-        beyond : what to do beyond the mapped positions and temperatures.
-        lines : (n,) of the points in their file, for messages.
-        first : number of the first point, for messages where there are no lines.
+        ``temperatures``: of the three scales, (n, 3) or (3,), or of all, °C; one map needs none. ``beyond``: what to do
+        beyond the mapped positions and temperatures. ``lines``, ``first``: (n,) of the points in their file, and number of
+        the first point where there are no lines, for messages.
         """
         outside = self._outside(readings)
         if beyond == "refuse" and outside.any():
             row, axis = np.argwhere(outside)[0]
             low, high = self.span(AXES[axis])
-            raise CmmUqError(
-                f"{AXES[axis]} reads {readings[row, axis]:.6g} mm, the error map reaches from {low:g} to {high:g} mm",
-                where=_point(row, lines, first),
-                fix="Check origin_mm and the map's range, or allow it to be extrapolated",
-            )
+            reads = f"{AXES[axis]} reads {readings[row, axis]:.6g} mm"
+            raise CmmUqError(f"{reads}, the error map reaches from {low:g} to {high:g} mm", where=_point(row, lines, first),
+                             fix="Check origin_mm and the map's range, or allow it to be extrapolated")  # fmt: skip
         weights, hot = self._weights(temperatures, len(readings))
         if beyond == "refuse" and hot.any():
             self._refuse_temperature(temperatures, hot, lines, first)
@@ -145,10 +127,9 @@ class ErrorMaps:
         low, high = self.temperatures[0], self.temperatures[-1]
         near = low - TEMPERATURE_MARGIN <= temperature <= high + TEMPERATURE_MARGIN
         if not near and (beyond == "refuse" or not np.isfinite(temperature)):
-            raise CmmUqError(
-                f"no error map at {temperature:g} °C: the error maps are from {low:g} to {high:g} °C",
-                fix="Ask for a temperature between them, add a map, or allow it to be extrapolated",
-            )
+            problem = f"no error map at {temperature:g} °C: the error maps are from {low:g} to {high:g} °C"
+            fix = "Ask for a temperature between them, add a map, or allow it to be extrapolated"
+            raise CmmUqError(problem, fix=fix)
         lower, weight = self._between(np.asarray(temperature, dtype=np.float64))
         upper = min(int(lower) + 1, len(self.maps) - 1)
         x, y, z = (
@@ -169,9 +150,8 @@ class ErrorMaps:
         positions = np.unique(np.concatenate([c.positions for c in carriages]))
         positions = positions[(positions >= low) & (positions <= high)]
         if len(positions) < 2:
-            raise CmmUqError(
-                f"the error maps share no range of axis {AXES[axis]}", fix="Map the same travel at each temperature"
-            )
+            fix = "Map the same travel at each temperature"
+            raise CmmUqError(f"the error maps share no range of axis {AXES[axis]}", fix=fix)
         values = np.array([[np.interp(positions, c.positions, column) for column in c.errors.T] for c in carriages])
         steps = np.diff(positions)
         equal = bool(np.allclose(steps, steps[0], rtol=1e-12))

@@ -73,9 +73,8 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
         with path.open("rb") as file:
             yield file
     except OSError as error:
-        raise CmmUqError(
-            f"cannot be read: {error.strerror}", where=str(path), fix="Check the name of the cloud"
-        ) from error
+        problem = f"cannot be read: {error.strerror}"
+        raise CmmUqError(problem, where=str(path), fix="Check the name of the cloud") from error
 
 
 def _values(lines: list[str], at: list[int], header: Sequence[str], places: Sequence[int], path: Path) -> Floats:
@@ -155,33 +154,16 @@ BLOCK = 262_144  # rows read at a time
 
 
 def transform_cloud(
-    source: Path,
-    target: Path,
-    transform: Callable[[Floats], Floats],
-    *,
-    columns: Sequence[str] = DIGITIZER_COLUMNS,
-    names: Sequence[str] = COORDINATES,
-    mark: str = "",
-    progress: Callable[[float], None] | None = None,
-    block: int = BLOCK,
-) -> int:
-    """Write the transformed cloud, x, y, z in mm, beside or instead of the one read.
+    source: Path, target: Path, transform: Callable[[Floats], Floats], *, columns: Sequence[str] = DIGITIZER_COLUMNS,
+    names: Sequence[str] = COORDINATES, mark: str = "", progress: Callable[[float], None] | None = None, block: int = BLOCK,
+) -> int:  # fmt: skip
+    """Write the transformed cloud, x, y, z in mm, beside or instead of the one read; gives the number of its points.
 
-    Parameters
-    ----------
-    source : ``.npy`` file with rows of ``columns``, folder of such files, or ``.csv`` or ``.parquet`` file with columns of
-        these names.
-    target : ``.csv``, ``.npy`` or ``.parquet`` file to write.
-    transform : from rows (b, k) to coordinates (b, 3), such as :meth:`Digitizer.transform`.
-    columns : names of the k columns.
-    names : of the columns that the transformation gives.
-    mark : first line, or metadata, that says where the result comes from; arrays have no room for it.
-    progress : told the part done.
-    block : rows at a time.
-
-    Returns
-    -------
-    number of points written.
+    ``source``: ``.npy`` file with rows of ``columns``, folder of such files, or ``.csv`` or ``.parquet`` file with columns
+    of these names. ``target``: ``.csv``, ``.npy`` or ``.parquet`` file to write. ``transform``: from rows (b, k) to
+    coordinates (b, 3), such as :meth:`Digitizer.transform`. ``columns``: names of the k columns. ``names``: of the columns
+    that the transformation gives. ``mark``: first line, or metadata, that says where the result comes from; arrays have no
+    room for it. ``progress``: told the part done. ``block``: rows at a time.
     """
     unfinished = target.with_name(f".unfinished-{target.name}")
     writer = {".parquet": _written_parquet, ".csv": written_csv}.get(target.suffix, _written_npy)
@@ -193,17 +175,15 @@ def transform_cloud(
                 try:
                     write(transform(rows))
                 except CmmUqError as error:
-                    raise CmmUqError(
-                        error.problem, where=f"{source}, rows from {count + 1}: {error.where or ''}", fix=error.fix
-                    ) from error
+                    where = f"{source}, rows from {count + 1}: {error.where or ''}"
+                    raise CmmUqError(error.problem, where=where, fix=error.fix) from error
                 count += len(rows)
                 if progress is not None:
                     progress(min(1.0, count / max(length, 1.0)))
         unfinished.replace(target)
     except OSError as error:
-        raise OutputError(
-            f"cannot be written: {error.strerror}", where=str(target), fix="Free the disk, or choose another place"
-        ) from error
+        problem = f"cannot be written: {error.strerror}"
+        raise OutputError(problem, where=str(target), fix="Free the disk, or choose another place") from error
     finally:
         unfinished.unlink(missing_ok=True)
     return count
@@ -257,11 +237,9 @@ def _npy_blocks(path: Path, width: int, block: int) -> Iterator[Floats]:
         with path.open("rb") as file:
             shape, fortran, dtype = _npy_header(file, path)
             if len(shape) != 2 or shape[1] != width or fortran or dtype.kind != "f":
-                raise CmmUqError(
-                    f"holds {dtype} of shape {shape}" + (", column by column" if fortran else ""),
-                    where=str(path),
-                    fix=f"A cloud is rows of {width} floating-point numbers, row by row",
-                )
+                problem = f"holds {dtype} of shape {shape}" + (", column by column" if fortran else "")
+                fix = f"A cloud is rows of {width} floating-point numbers, row by row"
+                raise CmmUqError(problem, where=str(path), fix=fix)
             left = shape[0]
             while left:
                 rows = min(left, block)
@@ -271,9 +249,8 @@ def _npy_blocks(path: Path, width: int, block: int) -> Iterator[Floats]:
                 yield values.reshape(rows, width).astype(np.float64, copy=False)
                 left -= rows
     except OSError as error:
-        raise CmmUqError(
-            f"cannot be read: {error.strerror}", where=str(path), fix="Check the name of the cloud"
-        ) from error
+        problem = f"cannot be read: {error.strerror}"
+        raise CmmUqError(problem, where=str(path), fix="Check the name of the cloud") from error
 
 
 def _npy_header(file: Any, path: Path) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
@@ -345,6 +322,5 @@ def _pyarrow(module: str) -> ModuleType:
     try:
         return import_module(module)
     except ModuleNotFoundError:
-        raise CmmUqError(
-            "Parquet needs pyarrow", fix="Install it (pip install pyarrow), or save the cloud as .npy"
-        ) from None
+        fix = "Install it (pip install pyarrow), or save the cloud as .npy"
+        raise CmmUqError("Parquet needs pyarrow", fix=fix) from None

@@ -14,14 +14,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.machine.physics import kinematics
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.machine.physics.kinematics import (
-    SQUARENESSES,
-    along_directions,
-    axis_directions,
-    direction_derivatives,
-    leaning,
-)
+from cmm_uq.machine.physics.kinematics import SQUARENESSES, along_directions, axis_directions, leaning
 
 _SETTLED = 1e-9  # mm
 _ROUNDS = 50
@@ -51,8 +46,7 @@ class Superposition:
     """Effects that act together."""
 
     effects: tuple[Effect, ...]  # in the order of their coefficients
-    # nonlinear parameters of the effects that have some, by the effect's name
-    shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)  # nonlinear parameters by the effect's name
 
     def errors(self, points: Points, coefficients: Floats) -> Floats:
         """Errors e (n, 3), mm, of points as indicated, for coefficients (k,)."""
@@ -75,7 +69,7 @@ class Superposition:
             return About(true)
         directions = axis_directions(squareness)
         indicated = replace(_indicated(true, directions), directions=directions)
-        return About(indicated, direction_derivatives(squareness))
+        return About(indicated, kinematics.direction_derivatives(squareness))
 
     def derivatives(self, about: About) -> Floats:
         """Change of e, (n, 3, k) in mm, for one unit of each coefficient."""

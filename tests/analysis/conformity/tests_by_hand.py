@@ -159,7 +159,7 @@ def probed(*, size: bool, sensing: str | None = None) -> Callable[..., Hand]:
         facts = artefact_facts(kind="sphere", length_mm=24.99, u_um=None if how == "no u" else 0.1,
                                form_um=None if how == "no u" else 0.2)  # fmt: skip
         artefact = SphereArtefact(facts, artefact.points)
-        found = artefact.probed()
+        found = artefact.forms()
         value = float((found.size if size else found.form)[0]) * 1e3
         under = replace(STATED, probe=ProbeFacts(sensing=sensing))
         if not size:

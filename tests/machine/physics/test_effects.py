@@ -12,6 +12,7 @@ from hypothesis import given, strategies as st
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.machine.physics.catalogue import CATALOGUE, effects
+from tests.machine.physics.effect_table import END, PAGE, START, table
 from tests.recordings import TRAVEL, bars, with_columns
 
 ARCSECOND = np.pi / 648000
@@ -216,3 +217,9 @@ def test_an_effect_that_needs_the_travel_asks_for_it() -> None:
 def test_wrong_parameters_are_refused(wrong: dict[str, float], message: str) -> None:
     with pytest.raises(CmmUqError, match=message):
         CATALOGUE["scale_x"].displacement(POINTS, wrong)
+
+
+def test_the_page_of_effects_is_up_to_date() -> None:
+    """Written anew by ``python -m tests.machine.physics.effect_table``."""
+    text = PAGE.read_text(encoding="utf-8")
+    assert text.partition(START)[2].partition(END)[0].strip() == table()

@@ -151,9 +151,8 @@ class OwnFault(Effect):
 
     def whose(self) -> FaultyArtefact:
         if self.owner is None:
-            raise CmmUqError(
-                f"this kind of artefact has no {self.name}", where="job.toml [model] effects", fix="Leave it out"
-            )
+            problem = f"this kind of artefact has no {self.name}"
+            raise CmmUqError(problem, where="job.toml [model] effects", fix="Leave it out")
         return self.owner
 
 

@@ -165,6 +165,4 @@ SQUARENESS = MappingProxyType({plane: Squareness(plane) for plane in LEANING})  
 # by carriage and direction, and by carriage and the axis about which it turns
 STRAIGHTNESS = MappingProxyType({(a, b): Straightness(a, b) for a in AXES for b in AXES if a != b})
 ROTATION = MappingProxyType({(a, b): Rotation(a, b) for a in AXES for b in AXES})
-EFFECTS: tuple[Effect, ...] = (
-    *SCALE.values(), *SQUARENESS.values(), *STRAIGHTNESS.values(), *ROTATION.values(),
-)  # fmt: skip
+EFFECTS: tuple[Effect, ...] = (*SCALE.values(), *SQUARENESS.values(), *STRAIGHTNESS.values(), *ROTATION.values())

@@ -17,7 +17,7 @@ from cmm_uq.machine.physics.compensation import compensate_points, machine_compe
 from cmm_uq.machine.physics.kinematics import first_order
 from cmm_uq.machine.physics.map_interpolation import ErrorMaps
 from cmm_uq.maths.inference.ensembles import run_ensembles
-from tests.artefacts.shifting.placed import GRID, SHIFTED, TURNED, bent, none, read
+from tests.artefacts.shift.placed import GRID, SHIFTED, TURNED, bent, none, read
 
 DIAGONAL = KnownSpan(0, 15, float(np.linalg.norm(GRID[15])), 0.3e-3)
 NOISE = 0.5e-3

@@ -11,6 +11,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from cmm_uq.maths.geometry import fit_sphere
 from tests.artefacts.constructions import estimated, free, indicated, swept
+from tests.artefacts.simulated import SQUARE, analysed, outcome, results
 
 BAR = artefact_facts(kind="bryan", length_mm=400.0, u_um=0.5)
 EXACT = artefact_facts(kind="bryan", length_mm=400.0)
@@ -97,3 +98,23 @@ def test_a_recording_that_is_none_of_a_swept_bar_is_refused(spoil: object, messa
     assert callable(spoil)
     with pytest.raises(CmmUqError, match=message):
         Bryan(BAR, spoil(swept()))
+
+
+JOB = "bryan-simulated"
+
+
+def test_scales_are_not_determined_by_either_way_without_a_certified_length() -> None:
+    factors = results(JOB)["distance_equations"]["factors"]
+    assert analysed(JOB).free == {"scale_x", "scale_y", "scale_z", "artefact"}
+    for name in ("scale_x", "scale_y", "scale_z"):
+        assert factors[name]["ppm"] == {"value": None, "u": None, "U": None, "k": None}
+    assert outcome(JOB).document is not None
+
+
+@pytest.mark.parametrize("name", SQUARE)
+def test_u_holds_the_bias_of_the_centre(name: str) -> None:
+    """Positions above the fixed ball alone: 3″ to 5″ of the squarenesses with Z go into its centre, beside u = 0.7″."""
+    found = results(JOB)["distance_equations"]["factors"][name]["angle_arcsec"]
+    fitted = results(JOB)["estimates"][name]["angle_arcsec"]["value"]
+    assert abs(found["value"] - SQUARE[name]) < found["U"]
+    assert found["u"] == pytest.approx(np.hypot(0.706, found["value"] - fitted), rel=0.1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -11,7 +13,6 @@ from cmm_uq.artefacts.distance_equations import PLACINGS, missing_placings, quad
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, PPM
-from tests.artefacts.distances.normal_equations import SOLUTIONS, by_doolittle, by_jacobi, jacobi_eigenvalues
 from tests.conftest import ROOT
 
 SCALES = np.array([120.0, -80.0, 45.0])
@@ -142,3 +143,58 @@ def test_singular_equations_are_refused() -> None:
         by_doolittle(singular, np.ones(2))
     with pytest.raises(CmmUqError, match="an eigenvalue is zero"):
         by_jacobi(np.diag([1.0, 0.0]), np.ones(2))
+
+
+_SWEEPS = 30  # of Jacobi rotations; convergence is quadratic, and ten suffice for rounding accuracy at this size
+
+
+def by_doolittle(matrix: Floats, right: Floats) -> Floats:
+    """Solve by matrix = L·U with a unit diagonal in L, in order, without pivoting."""
+    n = len(matrix)
+    L, U = np.eye(n), np.zeros((n, n))
+    for i in range(n):
+        U[i, i:] = matrix[i, i:] - L[i, :i] @ U[:i, i:]
+        if U[i, i] == 0:
+            raise CmmUqError(f"normal equations: pivot {i + 1} is zero", fix="Record placings in more directions")
+        L[i + 1 :, i] = (matrix[i + 1 :, i] - L[i + 1 :, :i] @ U[:i, i]) / U[i, i]
+    return np.asarray(np.linalg.solve(U, np.linalg.solve(L, right)), dtype=np.float64)
+
+
+def by_jacobi(matrix: Floats, right: Floats) -> Floats:
+    """Solve by matrix = V·diag(values)·Vᵀ from Jacobi rotations."""
+    values, V = jacobi_eigenvalues(matrix)
+    if np.abs(values).min() <= np.finfo(np.float64).eps * np.abs(values).max():
+        raise CmmUqError("normal equations: an eigenvalue is zero", fix="Record placings in more directions")
+    return np.asarray(V @ ((V.T @ right) / values), dtype=np.float64)
+
+
+def jacobi_eigenvalues(matrix: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues (n,) and eigenvectors (n, n) of a symmetric matrix, by cyclic Jacobi rotations (Golub & Van Loan, 8.5)."""
+    A, n = matrix.astype(np.float64, copy=True), len(matrix)
+    V = np.eye(n)
+    for _ in range(_SWEEPS):
+        if np.linalg.norm(A - np.diag(np.diag(A))) <= np.finfo(np.float64).eps * np.linalg.norm(A):
+            break
+        for p, q in combinations(range(n), 2):
+            if A[p, q] == 0:
+                continue
+            half = (A[q, q] - A[p, p]) / (2 * A[p, q])
+            t = np.copysign(1.0, half) / (abs(half) + np.hypot(half, 1.0))
+            c = 1 / np.hypot(t, 1.0)
+            turn = np.array([[c, t * c], [-t * c, c]])
+            A[:, [p, q]] = A[:, [p, q]] @ turn
+            A[[p, q], :] = turn.T @ A[[p, q], :]
+            V[:, [p, q]] = V[:, [p, q]] @ turn
+    return np.diag(A).copy(), V
+
+
+def by_qr(A: Floats, b: Floats) -> Floats:
+    Q, R = np.linalg.qr(A)
+    return np.linalg.solve(R, Q.T @ b)
+
+
+SOLUTIONS = {
+    "QR": by_qr,
+    "Doolittle": lambda A, b: by_doolittle(A.T @ A, A.T @ b),
+    "Jacobi": lambda A, b: by_jacobi(A.T @ A, A.T @ b),
+}

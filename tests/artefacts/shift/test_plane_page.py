@@ -10,7 +10,7 @@ import pytest
 from cmm_uq.app.commands.report import outcome_of
 from cmm_uq.artefacts.shift.placed_plate import placed_plate
 from cmm_uq.artefacts.shift.plane import PlaneShiftResult, estimate_plane
-from cmm_uq.artefacts.shift.plane_page import plane_shift_results, sections, warnings
+from cmm_uq.artefacts.shift.plane_page import sections, shift_results, warnings
 from cmm_uq.certificate.document import Document, Paragraph, Plot, Table
 from cmm_uq.certificate.origin import as_json
 from tests.artefacts.reading import number, tables
@@ -93,7 +93,7 @@ def test_every_curve_is_drawn(document: Document) -> None:
 
 
 def test_results_keep_their_contract(result: PlaneShiftResult) -> None:
-    found = json.loads(as_json(plane_shift_results(result)))
+    found = json.loads(as_json(shift_results(result)))
     assert found["schema"] == "cmm-uq/results/1"
     assert found["sampling"]["converged"]
     assert set(found["curves"]) == {

@@ -8,9 +8,13 @@ from hypothesis import given, settings, strategies as st
 
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.gauge_lines import GaugeBlocks, StepGauge
+from cmm_uq.artefacts.gauge_lines_page import lines_of, periodic_part
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
+from cmm_uq.certificate.document import Paragraph, Plot
 from tests.artefacts.constructions import GAUGE_FACES, SEVEN_LINES, estimated, free, indicated, step_gauge
+from tests.artefacts.simulated import SCALE, SQUARE, analysed, blocks, recovered, table
+from tests.conftest import ROOT
 from tests.recordings import with_columns
 
 GAUGE = artefact_facts(kind="step_gauge", u_um=0.5)
@@ -176,3 +180,97 @@ def test_a_recording_that_is_none_of_a_gauge_is_refused(spoil: object, message: 
     assert callable(spoil)
     with pytest.raises(CmmUqError, match=message):
         StepGauge(GAUGE, spoil(step_gauge()))
+
+
+NOMINAL = artefact_facts(kind="step_gauge")
+
+
+def test_a_periodic_error_is_found_with_its_period_and_amplitude() -> None:
+    """2 µm with a period of 70 mm on faces every 20 mm, beside a slope and scatter of 0.3 µm."""
+    x = np.arange(0.0, 821.0, 20.0)
+    wave = 2e-3 * np.sin(2 * np.pi * x / 70 + 1) + 5e-6 * x + 3e-4 * np.random.default_rng(2).standard_normal(len(x))
+    found = periodic_part(x, wave)
+    assert found is not None
+    assert found.period == pytest.approx(70, rel=0.02)
+    assert found.amplitude == pytest.approx(2e-3, rel=0.15)
+    assert found.p_value < 1e-6
+
+
+def test_scatter_alone_is_called_periodic_as_rarely_as_stated() -> None:
+    """1000 lines of pure scatter: one in a hundred is called periodic; 23 or more would be, with probability 0.02 %."""
+    random, x = np.random.default_rng(11), np.arange(0.0, 421.0, 20.0)
+    assert sum(periodic_part(x, random.standard_normal(len(x))) is not None for _ in range(1000)) < 23
+
+
+def test_few_faces_and_perfect_lines_have_no_period() -> None:
+    x = np.arange(0.0, 421.0, 20.0)
+    assert periodic_part(x[:7], np.sin(x[:7])) is None
+    assert periodic_part(x, np.zeros(len(x))) is None
+
+
+def test_each_line_has_slope_linearity_and_backlash() -> None:
+    points = indicated(NOMINAL, step_gauge(both_sides=True), ["scale_x", "hysteresis_y"], [100.0, 6.0])
+    lines = {line.measurement: line for line in lines_of(StepGauge(NOMINAL, points))}
+    assert lines[1].scale_ppm == pytest.approx(-100, abs=0.02)
+    assert lines[1].gap == pytest.approx(0.0, abs=1e-12)
+    assert lines[2].scale_ppm == pytest.approx(0, abs=1e-6)
+    assert lines[2].gap == pytest.approx(-6e-3)
+    assert np.linalg.norm(lines[2].gap_weights) == pytest.approx(np.sqrt(2 / 22))
+    assert lines[1].linearity < 1e-9
+    assert (lines[4].length, lines[4].faces) == (420.0, 22)
+
+
+JOB = "step-gauge-simulated"
+
+
+def test_the_errors_put_into_the_example_are_found() -> None:
+    recovered(JOB, {**SCALE, **SQUARE, "hysteresis_x": 1.8, "hysteresis_y": -0.9, "hysteresis_z": 1.2})
+    recovered("gauge-blocks-simulated", {"scale_x": 9.0, "scale_y": -6.0, "probe_radius": 0.7})
+
+
+def test_each_line_has_its_slope_by_a_regression_of_the_recording() -> None:
+    """numpy's polyfit of the distance along X over the certified one, straight from the file: line 5 lies along X."""
+    rows = np.genfromtxt(ROOT / "examples" / JOB / "recording.csv", delimiter=",", names=True)
+    line = rows[rows["measurement"] == 5]
+    slope = np.polyfit(line["reference_mm"], line["x_mm"], 1)[0] - 1
+    printed = {row[0]: row for row in table(JOB, "Each line by itself, at 20 °C").rows}
+    assert printed["5"][1] == "parallel to X"
+    assert float(printed["5"][4].replace("−", "-")) == round(slope * 1e6, 1)
+    assert [printed[n][1] for n in "1234"] == [
+        "space diagonal +X +Y +Z", "space diagonal +X −Y +Z", "space diagonal −X +Y +Z", "space diagonal −X −Y +Z",
+    ]  # fmt: skip
+
+
+def test_the_bidirectional_error_of_a_line_along_an_axis_is_its_backlash() -> None:
+    """e = ½·gap·approach: outward minus inward is −gap, and X has 1.8 µm."""
+    printed = {row[0]: row for row in table(JOB, "Each line by itself, at 20 °C").rows}
+    assert abs(float(printed["5"][7].replace("−", "-")) + 1.8) < 2 * float(printed["5"][8])
+
+
+def test_lines_too_short_for_the_standard_are_named() -> None:
+    """820 mm on a diagonal of 900 × 1200 × 600 mm, 1615.5 mm long, is 51 %: ISO 10360-2 asks for 66 %."""
+    notes = " ".join(block.text for block in blocks(JOB) if isinstance(block, Paragraph))
+    assert "line 1 (51 %), line 2 (51 %), line 3 (51 %) and line 4 (51 %)" in notes
+    assert "Not measured" not in notes
+
+
+def test_positions_that_were_not_measured_are_named() -> None:
+    notes = " ".join(block.text for block in blocks("gauge-blocks-simulated") if isinstance(block, Paragraph))
+    assert "Not measured of the seven positions of ISO 10360-2:2009: space diagonal +X +Y +Z" in notes
+    assert "and parallel to Z" in notes
+
+
+def test_deviations_and_residuals_are_shown() -> None:
+    captions = [block.caption for block in blocks(JOB) if isinstance(block, Plot)]
+    assert any(caption.startswith("Deviation of each face") for caption in captions)
+    assert any(caption.startswith("Residuals after the fitted model") for caption in captions)
+
+
+def test_the_worst_indication_decides_with_the_uncertainty_of_the_gauge() -> None:
+    (statement,) = analysed(JOB).statements
+    errors = analysed(JOB).artefact.indications()
+    assert errors is not None
+    worst = np.argmax(np.abs(errors.errors) * 1e3 - (4.0 + errors.lengths / 100.0))
+    assert statement.value_um == abs(errors.errors[worst]) * 1e3
+    assert statement.u_um == 0.4 * errors.lengths[worst] / 820
+    assert statement.decision.outcome == "fail"

@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 from cmm_uq.artefacts.shift.placed_plate import placed_plate, rigid_motion, rotations
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
-from tests.artefacts.shifting.placed import GRID, SHIFTED, TURNED, none, read
+from tests.artefacts.shift.placed import GRID, SHIFTED, TURNED, none, read
 
 
 def recorded(*placings: tuple[float, float, float]) -> Points:
