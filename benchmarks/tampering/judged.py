@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.tampering.cases import Case
-from cmm_uq.app.commands.certificates.verify import again, verify
+from cmm_uq.app.commands.certificates.verification import again
+from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.base.errors import CmmUqError
 
 _KNOWN: dict[str, Any] = {}

@@ -14,7 +14,7 @@ from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.affected import AffectedCertificate, FigureChange
-    from cmm_uq.app.commands.certificates.verify import Verification
+    from cmm_uq.app.commands.certificates.verification import Verification
     from cmm_uq.jobs.dcc.figures import CertificateView, Grid
 
 

@@ -16,7 +16,8 @@ import pytest
 from typer.testing import CliRunner
 
 from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
-from cmm_uq.app.commands.certificates.verify import Verification, verify
+from cmm_uq.app.commands.certificates.verification import Verification
+from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.app.commands.certificates.verify_part import to_rerun
 from cmm_uq.app.commands.parts.documents import contents_of, write_part, written
 from cmm_uq.app.commands.parts.machine import state_machine

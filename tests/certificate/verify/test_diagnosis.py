@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from cmm_uq.app.commands import diagnose
-from cmm_uq.app.commands.certificates.verify import again
+from cmm_uq.app.commands.certificates.verification import again
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.results.contents import false_alarms

@@ -15,7 +15,8 @@ from typer.testing import CliRunner
 
 from cmm_uq import __version__
 from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
-from cmm_uq.app.commands.certificates.verify import Verification, verify
+from cmm_uq.app.commands.certificates.verification import Verification
+from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.certificate.verify.again import Again, beyond_sampling, by_other_kernels, differences
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.html_page import read_html

@@ -10,7 +10,13 @@ from typing import Any
 
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import plan_of
-from cmm_uq.app.commands.certificates.verify import Recomputation, as_attached, compute_again, job_of_inputs, recomputed
+from cmm_uq.app.commands.certificates.verification import (
+    Recomputation,
+    as_attached,
+    compute_again,
+    job_of_inputs,
+    recomputed,
+)
 from cmm_uq.app.commands.files import Stage
 from cmm_uq.app.commands.parts.documents import contents_of, in_language
 from cmm_uq.app.commands.parts.drift import FILE as HISTORY
@@ -33,7 +39,7 @@ TRUSTED = "whose signature the machine's certificate has"
 def examine_part(
     inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable[Path] | None, stage: Stage
 ) -> Recomputation | None:
-    """The report of a part; see :func:`cmm_uq.app.commands.certificates.verify.verify_given`."""
+    """The report of a part; see :func:`cmm_uq.app.commands.certificates.verification.verify_given`."""
     if (job := compare_part(inquiry, given, rerun=rerun, trust=trust)) is None or given.results is None:
         return None
     computed = partial(part_again, inquiry, given, job, given.results[1], trust=trust, stage=stage)

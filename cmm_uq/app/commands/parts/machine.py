@@ -17,7 +17,7 @@ from cmm_uq import __version__
 from cmm_uq.analysis.diagnosis.held_out import thin_out
 from cmm_uq.analysis.parts.machine.conditional import given_recording
 from cmm_uq.analysis.parts.machine.state import MachineState, machine_stated
-from cmm_uq.app.commands.certificates.verify import Verification, examine_certificate, verify_given
+from cmm_uq.app.commands.certificates.verification import Verification, examine_certificate, verify_given
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import with_noise
 from cmm_uq.app.commands.files import Stage, silent

@@ -1,0 +1,305 @@
+"""A certificate verified, of a machine or of a part: what both have in common, and the certificate of a machine.
+
+Its files are compared with each other, and with what is computed again from its inputs. What is verified, a machine's
+certificate or a part's report, is examined by a function, so that the evaluation of a part can verify the certificate of its
+machine. Nothing of a given file is run. Inputs are read from memory as the PDF has them, so that a path in them leads nowhere;
+what takes part in the computation is installed here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from cmm_uq import __version__
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.verify import given as files, views
+from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Inquiry
+from cmm_uq.certificate.verify.given import RESULTS, Given
+
+if TYPE_CHECKING:
+    from cmm_uq.app.commands.files import Stage
+    from cmm_uq.certificate.verify.again import Again
+    from cmm_uq.jobs.job import Job
+
+Compute = Callable[["Given", "Job"], "Again"]  # the second computation: of the job that is inside a certificate
+
+
+def compute_again(
+    inquiry: Inquiry, given: Given, compute: Callable[[], Again | None], by_another: Callable[[str], str] | None = None
+) -> bool:  # fmt: skip
+    """Compute everything from the inputs, by this version, and keep what differs: whether the documents are the same.
+
+    ``by_another``: what is said of a certificate by another version.
+    """
+    if given.results is None or plugins_missing(inquiry, given.results[1]):
+        return False
+    if (made := _version(given)) != __version__:
+        told = by_another(made) if by_another else _NEWER
+        inquiry.left(AGAIN, f"made by version {made}, and this is {__version__}{told}")
+        return False
+    from cmm_uq.certificate.verify.again import compare_again
+
+    try:
+        computed = compute()
+        return computed is not None and compare_again(inquiry, given, computed)
+    except CmmUqError as error:
+        inquiry.wrong("again", given.results[0], "", f"cannot be computed again: {error}")
+        return False
+
+
+def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Again:
+    """What the inputs of a certificate give."""
+    from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
+    from cmm_uq.app.commands.diagnose import DIAGNOSE, diagnosis_outcome
+    from cmm_uq.app.commands.report import REPORT, report_outcome
+
+    data = given.results[1] if given.results else {}
+    seed = (data.get("sampling") or {}).get("seed") or 0
+    if not isinstance(seed, int) or seed < 0:
+        raise CmmUqError(f"{seed!r} is no seed", where=f"{RESULTS}: sampling.seed")
+    if "estimates" in data:
+        form, outcome = REPORT, report_outcome(job, seed=seed, stage=stage)
+    else:
+        alpha = (data.get("diagnosis") or {}).get("false_alarms", FALSE_ALARMS)
+        if not isinstance(alpha, float) or not 0.0 < alpha < 1.0:
+            raise CmmUqError(f"{alpha!r} is no rate of false alarms", where=f"{RESULTS}: diagnosis.false_alarms")
+        form, outcome = DIAGNOSE, diagnosis_outcome(job, seed=seed, alpha=alpha, stage=stage)
+    kept: list[str] = []
+    written = form.contents(outcome, stage, finished=partial(as_attached, given, kept))
+    return recomputed(given, written, kept)
+
+
+def recomputed(given: Given, written: Mapping[str, bytes], kept: Sequence[str], beside: Sequence[str] = ()) -> Again:
+    """Files that were made again, with the PDF where it is set by the program that set the given one."""
+    from cmm_uq.certificate.verify.again import Again
+
+    pdf = next((content for name, content in written.items() if name.endswith(".pdf")), None)
+    files = {name: content for name, content in written.items() if not name.endswith(".pdf")}
+    found = Again(files, None, kept=tuple(kept), beside=tuple(beside))
+    if given.pdf is None or pdf is None:
+        return found
+    creator = re.search(rb"/Creator ?\(([^()]*)\)", pdf)
+    made, here = given.pdf[1].information.get("/Creator", ""), creator[1].decode("latin-1") if creator else ""
+    if made != here:
+        return replace(found, why_no_pdf=f"they were set by {made or 'another program'}, and here is {here}")
+    return replace(found, pdf=pdf)
+
+
+def as_attached(given: Given, kept: list[str], name: str, content: bytes) -> bytes:
+    """A file as it is attached where it is the same but for a signature, or for the platform, which is then kept in mind."""
+    from cmm_uq.certificate.results.provenance import FILE, same_but_for_the_platform
+
+    attached = given.files.get(name)
+    if attached is None or attached == content or not (name == FILE or name.endswith(".xml")):
+        return content
+    try:
+        if name.endswith(".xml"):
+            return attached if views.same_unsigned(attached, content, name) else content
+        if not same_but_for_the_platform(attached, content):
+            return content
+    except (CmmUqError, ValueError):
+        return content
+    kept.append(name)
+    return attached
+
+
+def plugins_missing(inquiry: Inquiry, data: Mapping[str, Any]) -> bool:
+    """Packages that took part and are not here as they were then."""
+    missing = False
+    for package, wanted in (data["software"].get("plugins") or {}).items():
+        try:
+            here = version(str(package))
+        except PackageNotFoundError:
+            here = ""
+        if here != wanted:
+            missing = True
+            told = f"version {here} is installed" if here else "it is not installed"
+            inquiry.left(AGAIN, f"{package} {wanted} took part, and {told}")
+    return missing
+
+
+_NEWER = ": install that"
+
+
+def _by_another_version(inquiry: Inquiry, given: Given, job: Job, made: str) -> str:
+    """Say which corrections touch a certificate of another version."""
+    from cmm_uq.app.commands.certificates.affected import JobInputs, between, order, stated_version
+
+    if stated_version(made) >= order(__version__):
+        return _NEWER
+    command = "report" if given.results and "estimates" in given.results[1] else "diagnose"
+    inputs = JobInputs.of(job.inputs)
+    touching = [one for one in between(made, __version__) if one.concerns(command, job.facts.artefact.kind, inputs)]
+    inquiry.notes += [f"Version {one.version} corrects: {one.what}" for one in touching]
+    told = "1 correction since then touches" if len(touching) == 1 else f"{len(touching)} corrections since then touch"
+    return f"; {told} this certificate"
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The forms of a certificate, what was found, and the job of the inputs where these are sound; of a part's report none."""
+
+    given: Given
+    inquiry: Inquiry
+    job: Job | None = None
+
+    @property
+    def subject(self) -> str:
+        """The document that was verified, by title and number; the job where there is none."""
+        if self.given.html is not None:
+            return " ".join(self.given.html[1].title.split())
+        if self.given.pdf is not None and (title := self.given.pdf[1].information.get("/Title")):
+            return " ".join(title.split())
+        return str(self.given.results[1]["job"]["id"]) if self.given.results is not None else ""
+
+
+@dataclass(frozen=True)
+class Recomputation:
+    """What computes a certificate again from its inputs and compares: whether its documents are the same to the byte."""
+
+    compute: Callable[[], bool]
+    job: Job | None = None
+
+
+# compares figures, decisions and inputs; ``None`` where the inputs are not there, or not sound
+Examine = Callable[[Inquiry, Given], "Recomputation | None"]
+
+
+def verify_given(
+    given: Given, examine: Examine, *, rerun: bool = True, trust: Iterable[Path] | None = None,
+    schema: Path | None = None, stage: Stage = lambda what, part: None,
+) -> Verification:  # fmt: skip
+    """Verify files that were read; ``trust``: ``None`` for nobody, and then nothing need be signed."""
+    inquiry = Inquiry()
+    _check_schema(inquiry, given)
+    views.open_digital(inquiry, given)
+    files.check_files(inquiry, given)
+    stage("Comparing the forms", 0.1)
+    trusted = None
+    if trust is not None:
+        from cmm_uq.certificate.sign import trust_of
+
+        trusted = trust_of(tuple(trust))
+    again = examine(inquiry, given)
+    views.check_signatures(inquiry, given, trusted)
+    if schema is not None:
+        views.check_schema(inquiry, given, schema)
+    alike = False
+    if not rerun:
+        inquiry.left(AGAIN, NOT_ASKED)
+    elif again is not None:
+        alike = again.compute()
+    if given.pdf is not None and given.html is not None and not alike:
+        views.compare_views(inquiry, given.pdf[1], given.html[1], files=(given.pdf[0], given.html[0]))
+    if given.of_part and given.pdf is not None and given.html is None and not alike:
+        inquiry.left(
+            f"words of {given.pdf[0]} beside its figures and decisions", "no HTML is given to compare them with"
+        )
+    if given.html is not None and not alike and _version(given) == __version__:
+        views.check_style(inquiry, given.html[1], given.html[0])
+    stage("Done", 1.0)
+    return Verification(given, inquiry, None if again is None else again.job)
+
+
+def _version(given: Given) -> str:
+    """Of the package that made a certificate; empty where nothing says it."""
+    return "" if given.results is None else str(given.results[1]["software"]["version"])
+
+
+def _check_schema(inquiry: Inquiry, given: Given) -> None:
+    """Refuse what is no results.json of a job before anything takes it for one."""
+    if given.results is None:
+        inquiry.left("figures", f"no {RESULTS} is given, and no PDF that has it inside")
+        return
+    name, data, _ = given.results
+    job = data.get("job")
+    hashes = job.get("inputs_sha256") if isinstance(job, dict) else None
+    software = data.get("software")
+    if (
+        data.get("schema") not in (files.RESULTS_SCHEMA, files.PART_SCHEMA)
+        or not isinstance(hashes, dict)
+        or not all(isinstance(one, str) for one in hashes.values())
+        or not isinstance(software, dict)
+        or not isinstance(software.get("version"), str)
+    ):
+        known = f"neither {files.RESULTS_SCHEMA} nor {files.PART_SCHEMA}"
+        raise CmmUqError(f"is {known}, with a job, the hashes of its inputs and the program", where=name,
+                         fix="Give the results.json of cmm-uq report, diagnose or part")  # fmt: skip
+
+
+def examine_certificate(
+    inquiry: Inquiry, given: Given, compute: Compute | None = None, stage: Stage = lambda what, part: None
+) -> Recomputation | None:
+    """The certificate of a machine: its job, computed again by ``compute``, by default as ``report`` and ``diagnose`` do."""
+    if (job := _compare(inquiry, given)) is None:
+        return None
+
+    def computed() -> Again:
+        return compute(given, job) if compute else again(given, job, stage)
+
+    by_another = partial(_by_another_version, inquiry, given, job)
+    return Recomputation(lambda: compute_again(inquiry, given, computed, by_another), job)
+
+
+def _compare(inquiry: Inquiry, given: Given) -> Job | None:
+    """The forms with each other, and figures, decisions, inputs and dates; the job, where its inputs are sound."""
+    if given.results is None:
+        return None
+    from cmm_uq.certificate.verify import again, decisions, figures, stated
+
+    name, data, _ = given.results
+    with inquiry.reading("figures", name):
+        again.check_results(inquiry, given)
+        figures.check_figures(inquiry, data, name)
+        decisions.check_decisions(inquiry, data, name)
+        figures.check_verdicts(inquiry, data, name)
+        if given.html is not None:
+            stated.check_stated(inquiry, data, given.html[1], files=(given.html[0], name))
+    job = job_of_inputs(inquiry, given, _job, "dates")
+    if job is not None:
+        again.check_job(inquiry, job, data, name)
+        again.check_dates(inquiry, job)
+        if given.xml is not None and (made := _version(given)) != __version__:
+            inquiry.left(f"{given.xml[0]} element by element", f"made by version {made}, and this is {__version__}")
+        else:
+            views.check_digital(inquiry, given, job)
+    return job
+
+
+_T = TypeVar("_T")
+
+
+def job_of_inputs(
+    inquiry: Inquiry, given: Given, read: Callable[[Mapping[str, bytes], Mapping[str, Any]], _T], further: str
+) -> _T | None:
+    """The job of sound inputs, read with results.json; ``further``: what besides computing again needs them."""
+    from cmm_uq.certificate.verify.again import inputs_of
+
+    inputs = inputs_of(inquiry, given)
+    if inputs is None or given.results is None:
+        inquiry.left(f"{further} and {AGAIN}", "the inputs are not there as results.json names them")
+        return None
+    try:
+        return read(inputs, given.results[1])
+    except CmmUqError as error:
+        inquiry.wrong("inputs", "inputs", "", f"are no job that this version reads: {error}")
+        return None
+
+
+def _job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> Job:
+    """The job of the inputs; a prediction that the job itself does not name was given with the command."""
+    from cmm_uq.app.commands.reading import in_language, job_of
+
+    job = in_language(job_of(inputs), files.language_of(data))
+    beside = [name for name in inputs if name not in job.inputs]
+    if len(beside) == 1 and (data.get("diagnosis") or {}).get("simulation"):
+        from cmm_uq.jobs.derived_job import against
+
+        return against(job, inputs[beside[0]], beside[0])
+    return job
