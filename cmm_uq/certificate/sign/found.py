@@ -20,7 +20,10 @@ from cmm_uq.base.files.limits import KEY_BYTES
 from cmm_uq.base.messages import Text, say
 
 if TYPE_CHECKING:
+    from asn1crypto import x509
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+
+    from cmm_uq.certificate.sign.chain import Standing
 
 _T = TypeVar("_T")
 _SILENT = logging.NullHandler()
@@ -84,6 +87,8 @@ class Trust:
     revocations: tuple[bytes, ...] = ()  # lists, DER, besides those in the file
 
 
+WEAK = say("the signature is made with an algorithm that is weak or unknown")
+BROKEN = say("the signature does not fit the file: one of them was changed")
 NOBODY = say("nobody is trusted: name the certificates that you trust")
 
 
@@ -110,6 +115,17 @@ class FileSignature:
         """One that counts for nothing."""
         return cls("", "", "", level, None, time_proven=False, intact=False, covers_whole_file=False, trusted=False,
                    revocation="not known", test_key=False, problems=tuple(problems))  # fmt: skip
+
+    @classmethod
+    def of_signer(cls, signer: x509.Certificate, judged: Standing, level: str, at: dt.datetime | None, *, proven: bool,
+                  intact: bool, whole: bool, problems: Sequence[Text], content: bytes) -> FileSignature:  # fmt: skip
+        """One of a certificate, judged at a time; ``problems`` of the signature stand before those of the certificate."""
+        name = str(signer.subject.native.get("common_name", signer.subject.human_friendly))
+        return cls(
+            signer.subject.human_friendly, name, signer.issuer.human_friendly, level, at, time_proven=proven, intact=intact,
+            covers_whole_file=intact and whole, trusted=judged.trusted, revocation=judged.revocation,
+            test_key=judged.test_key, problems=(*problems, *judged.problems), content=content if intact else b"",
+        )  # fmt: skip
 
     @property
     def good(self) -> bool:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import SIGNED_BYTES
 from cmm_uq.base.messages import Text, Verbatim, commas, plural, say
-from cmm_uq.certificate.sign.found import FileSignature, Trust, appending, installed, ran
+from cmm_uq.certificate.sign.found import BROKEN, WEAK, FileSignature, Trust, appending, installed, ran
 from cmm_uq.certificate.sign.signer import ONE_DIGEST, Signer
 
 if TYPE_CHECKING:
@@ -140,8 +140,6 @@ def signing_time() -> dt.datetime:
 DIGESTS = frozenset({"sha256", "sha384", "sha512"})
 MECHANISMS = frozenset({"rsassa_pkcs1v15", "rsassa_pss", "ecdsa"})
 PADES = "/ETSI.CAdES.detached"
-WEAK = say("the signature is made with an algorithm that is weak or unknown")
-BROKEN = say("the signature does not fit the file: one of them was changed")
 UNREADABLE = say("the signature cannot be read")
 STAMP_BROKEN = say("the time stamp does not fit the signature")
 NO_PADES = say("the signature is no PAdES signature")
@@ -202,13 +200,9 @@ def _judged(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
     judged = standing(certificate, evidence, file.trust, at, proven=proven)
     level = _level(file, embedded, stamped, known=judged.revocation == "good")
     signed = embedded.byte_range
-    return FileSignature(
-        certificate.subject.human_friendly,
-        str(certificate.subject.native.get("common_name", certificate.subject.human_friendly)),
-        certificate.issuer.human_friendly, f"PAdES B-{level}", at, time_proven=proven,
-        intact=intact, covers_whole_file=intact and whole, trusted=judged.trusted, revocation=judged.revocation,
-        test_key=judged.test_key, problems=(*problems, *appended, *judged.problems),
-        content=file.data[: int(signed[2]) + int(signed[3])] if intact else b"",
+    return FileSignature.of_signer(
+        certificate, judged, f"PAdES B-{level}", at, proven=proven, intact=intact, whole=whole,
+        problems=(*problems, *appended), content=file.data[: int(signed[2]) + int(signed[3])],
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import SIGNED_BYTES
 from cmm_uq.base.messages import Text, say
-from cmm_uq.certificate.sign.found import FileSignature, Trust, installed
+from cmm_uq.certificate.sign.found import BROKEN, WEAK, FileSignature, Trust, installed
 from cmm_uq.certificate.sign.signer import Signer
 
 if TYPE_CHECKING:
@@ -132,8 +132,6 @@ OF_ANOTHER = say("the signed properties are not those of this signature")
 NO_XADES = say("the signature has no signed properties, as XAdES asks for")
 ELSEWHERE = say("the signature does not stand as the last element of the root")
 PARTIAL = say("the signature covers a part of the file, or more than the file: only one over the whole root counts")
-WEAK = say("the signature is made with an algorithm that is weak or unknown")
-BROKEN = say("the signature does not fit the file: one of them was changed")
 NO_CERTIFICATE = say("the signature has no certificate that can be read")
 SEVERAL = say("the file has several signatures, and one covers the other")
 
@@ -161,11 +159,9 @@ def _found(data: bytes, element: _Element, *, several: bool, trust: Trust) -> Fi
     content = _verified(data, signer, references)
     at = _time(element)
     judged = standing(signer, Evidence(tuple(certificates[1:])), trust, at, proven=False)
-    return FileSignature(
-        signer.subject.human_friendly, str(signer.subject.native.get("common_name", signer.subject.human_friendly)),
-        signer.issuer.human_friendly, LEVEL, at, time_proven=False, intact=bool(content), covers_whole_file=bool(content),
-        trusted=judged.trusted, revocation=judged.revocation, test_key=judged.test_key,
-        problems=(*(() if content else (BROKEN,)), *judged.problems), content=content,
+    return FileSignature.of_signer(
+        signer, judged, LEVEL, at, proven=False, intact=bool(content), whole=True, problems=() if content else (BROKEN,),
+        content=content,
     )  # fmt: skip
 
 

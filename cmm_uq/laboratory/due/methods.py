@@ -29,15 +29,10 @@ def series_from(certificates: Sequence[RecordedCertificate], name: str) -> Serie
     """One value over certificates of one machine, by day, as the records give it."""
     rows = [(one, value) for one in certificates for value in one.values if value.name == name]
     last = rows[-1][1]
-    limits = [value.limit for _, value in rows if value.limit is not None]
-    since = (one.adjusted_since for one, _ in rows)
-    return Series(
-        name, last.quantity, last.unit, limits[-1] if limits else None,
-        np.array([one.day.toordinal() for one, _ in rows]), np.array([value.value for _, value in rows]),
-        np.array([value.u for _, value in rows]), np.array([value.u_artefact for _, value in rows]),
-        np.array([one.artefact for one, _ in rows]), np.array([one.entry for one, _ in rows]),
-        np.array([0 if day is None else day.toordinal() for day in since]), np.array([one.interim for one, _ in rows]),
-    )  # fmt: skip
+    return Series.of(name, last.quantity, last.unit, [value.limit for _, value in rows], [
+        (one.day, value.value, value.u, value.u_artefact, one.artefact, one.entry, one.adjusted_since, one.interim)
+        for one, value in rows
+    ])  # fmt: skip
 
 
 def drift_interval(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import datetime as dt
 import json
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
@@ -196,6 +196,19 @@ class Series:
     entry: NDArray[np.int64]
     adjusted_since: NDArray[np.int64]  # day of the last adjustment before, ordinal; 0 where none is known
     interim: NDArray[np.bool_]  # whether it is of an interim check
+
+    @classmethod
+    def of(cls, name: str, quantity: str, unit: str, limits: Sequence[float | None], rows: Sequence[Any]) -> Series:
+        """Of rows by day: day, value, u, u_artefact, artefact, entry, last adjustment or ``None``, whether a check."""
+        import numpy as np
+
+        day, value, u, u_artefact, artefact, entry, adjusted, interim = zip(*rows, strict=True)
+        since = np.array([0 if one is None else one.toordinal() for one in adjusted])
+        return cls(
+            name, quantity, unit, next((limit for limit in reversed(limits) if limit is not None), None),
+            np.array([one.toordinal() for one in day]), np.array(value, dtype=float), np.array(u, dtype=float),
+            np.array(u_artefact, dtype=float), np.array(artefact), np.array(entry), since, np.array(interim, dtype=bool),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -182,26 +182,18 @@ class RecordQueries:
         self, machine: str, names: Collection[str] | None = None, origin: str = "measured"
     ) -> dict[str, facts.Series]:
         """Each value of a machine over its standing certificates and interim checks."""
-        import numpy as np
-
         by_name: dict[str, list[Any]] = defaultdict(list)
         with self.reading() as connection:
             number = _machine_id(connection, machine)
             for row in connection.execute(_stated(names, origin).where(_C.machine == number)):
                 by_name[row.name].append(row)
             adjusted = _adjusted(connection, [number])[number]
-        found = {}
-        for name, rows in by_name.items():
-            limits = [row.limit for row in rows if row.limit is not None]
-            since = (adjusted_before(row.adjusted_since, row.day, adjusted) for row in rows)
-            value, u, u_artefact = np.array([(row.value, row.u, row.u_artefact) for row in rows], dtype=float).T.copy()
-            found[name] = facts.Series(
-                name, rows[-1].quantity, rows[-1].unit, limits[-1] if limits else None,
-                np.array([dt.date.fromisoformat(row.day).toordinal() for row in rows]), value, u, u_artefact,
-                np.array([row.artefact for row in rows]), np.array([row.entry for row in rows]),
-                np.array([day.toordinal() if day else 0 for day in since]), np.array([bool(row.interim) for row in rows]),
-            )  # fmt: skip
-        return found
+        return {
+            name: facts.Series.of(name, rows[-1].quantity, rows[-1].unit, [row.limit for row in rows], [
+                (dt.date.fromisoformat(row.day), row.value, row.u, row.u_artefact, row.artefact, row.entry,
+                 adjusted_before(row.adjusted_since, row.day, adjusted), bool(row.interim)) for row in rows
+            ]) for name, rows in by_name.items()
+        }  # fmt: skip
 
     def all_series(self, names: Collection[str] | None = None, origin: str = "measured") -> pd.DataFrame:
         """Values of all machines, a row each, by machine, name, day, entry; days are ordinals, 0 where unknown."""
