@@ -27,7 +27,7 @@ from cmm_uq.analysis.conformity.limits import Limits, accepted_by, outcome_of
 from cmm_uq.analysis.conformity.standards import BUILT_IN
 from cmm_uq.analysis.conformity.statement import Decided, Statement
 from cmm_uq.base.messages import NOTHING, Verbatim
-from cmm_uq.certificate.verify.figures import Wrong, is_zone
+from cmm_uq.certificate.verify.figures import Wrong, inside_of, is_zone
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.jobs.tables import conformity as table
 from cmm_uq.jobs.tables.conformity import Rule
@@ -159,12 +159,8 @@ def _whole(entry: Mapping[str, Any], decided: list[Decided], signed: bool, prior
     ):  # fmt: skip
         yield "", "names a value that was not decided", entry["value_um"], whole.value_um
     elif not _same(chance, named.probability_conforming):
-        yield (
-            ".probability_conforming",
-            "is not that of the least favourable value",
-            chance,
-            named.probability_conforming,
-        )
+        should = named.probability_conforming
+        yield ".probability_conforming", "is not that of the least favourable value", chance, should
     elif not _same(entry["value_um"], whole.value_um) and named.probability_conforming not in (0.0, None):
         yield ".value_um", "is not the least favourable", entry["value_um"], whole.value_um
     if not _same(entry["guard_band_um"], named.guard_band, entry["limit_um"]):
@@ -305,19 +301,16 @@ def _decision(each: Mapping[str, Any], rule: Rule, *, known: bool) -> Iterator[W
     accepted = limits["accepted"]
     ends = None if accepted is None else (accepted[0], accepted[1])
     possible = {outcome_of(_limits(each, u * (1 + side * DRAWN)), rule, value, ends) for side in (-1, 0, 1)}
-    tenth_digit_decides = any(
-        end is not None and isclose(value, end, rel_tol=1e-9, abs_tol=1e-12)
-        for end in (limits["lower"], limits["upper"], *(accepted or ()))
-    )
+    edges = [end for end in (limits["lower"], limits["upper"], *(accepted or ())) if end is not None]
+    tenth_digit_decides = any(isclose(value, end, rel_tol=1e-9, abs_tol=1e-12) for end in edges)
     if decision["outcome"] not in possible and not tenth_digit_decides:
         should = " or ".join(sorted(possible))
         yield "decision.outcome", "does not follow from value, u, limits and rule", decision["outcome"], should
     risk, least = largest_risk(rule), least_probability(rule)
     risk = 1 - least if risk is None and least is not None else risk
     if risk is not None and _limits(each, u).inside(value):
-        taken = ends is not None and all(
-            end is None or side * (value - end) >= 0 for end, side in zip(ends, (1, -1), strict=True)
-        )
+        inner = zip(ends or (), (1, -1), strict=False)
+        taken = ends is not None and all(end is None or side * (value - end) >= 0 for end, side in inner)
         if taken != (beyond <= risk) and not tenth_digit_decides:
             yield "limits.accepted", "does not follow from the probability and the rule", accepted, f"{beyond:.4g}"
     if not known and not is_zone(each) and u > 0:
@@ -326,8 +319,7 @@ def _decision(each: Mapping[str, Any], rule: Rule, *, known: bool) -> Iterator[W
 
 def _bounded(limits: Mapping[str, Any], value: float, u: float, inside: float, beyond: float) -> Iterator[Wrong]:
     """No distribution with this u has more beyond a limit than 1/(1 + m²), m standard deviations away."""
-    sides = [(limits["upper"] - value) / u] if limits["upper"] is not None else []
-    sides += [(value - limits["lower"]) / u] if limits["lower"] is not None else []
+    sides = [distance / u for distance in inside_of(limits, value)]
     if min(sides) >= 0:
         most = sum(1 / (1 + side**2) for side in sides)
         if beyond > most:

@@ -204,11 +204,15 @@ def _margin(each: Mapping[str, Any], most: float) -> Iterator[Wrong]:
     decision, limits, u = each["decision"], each["limits"], each["u"]
     if decision is None or limits is None or decision["margin_u"] is None or not u:
         return
-    sides = [limits["upper"] - each["value"]] if limits["upper"] is not None else []
-    sides += [each["value"] - limits["lower"]] if limits["lower"] is not None else []
-    margin, should = decision["margin_u"], min(sides) / u
+    margin, should = decision["margin_u"], min(inside_of(limits, each["value"])) / u
     if abs(margin - should) > 2 * DIGITS * (abs(should) + most / u):
         yield "decision.margin_u", "is not the distance to the nearest limit over u", margin, f"{should:.10g}"
+
+
+def inside_of(limits: Mapping[str, Any], value: float) -> list[float]:
+    """How far a value is inside of each limit that there is, negative where it is outside."""
+    ends = ((limits["upper"], -1.0), (limits["lower"], 1.0))
+    return [side * (value - end) for end, side in ends if end is not None]
 
 
 def _check_matrices(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> None:

@@ -138,15 +138,13 @@ def _check_decisions(inquiry: Inquiry, data: Mapping[str, Any], page: HtmlPage, 
     entries = data.get("conformity") or []
     if "estimates" not in data:
         return
-    if len(entries) > len(page.decisions):
-        inquiry.wrong("figures", name, "statements of conformity", f"are fewer than in {source}",
-                      len(page.decisions), len(entries))  # fmt: skip
+    count = len(page.decisions)
+    if len(entries) > count:
+        inquiry.wrong("figures", name, "statements of conformity", f"are fewer than in {source}", count, len(entries))
         return
-    for i, (entry, shown) in enumerate(zip(entries, page.decisions, strict=False)):
-        inquiry.looked("figures")
-        if shown.outcome != entry["decision"]:
-            inquiry.wrong("figures", name, f"statement of conformity {i + 1}", f"is another decision than in {source}",
-                          shown.outcome, entry["decision"])  # fmt: skip
+    for number, (entry, shown) in enumerate(zip(entries, page.decisions, strict=False), 1):
+        place, problem = f"statement of conformity {number}", f"is another decision than in {source}"
+        inquiry.compare("figures", name, place, problem, shown.outcome, entry["decision"])
         text = shown.text.replace(",", ".")
         # before 0.15.0 a decision had u instead of U, a value to the digits of it, and a limit to four
         for what, figures in (
@@ -155,8 +153,8 @@ def _check_decisions(inquiry: Inquiry, data: Mapping[str, Any], page: HtmlPage, 
             ("standard", [entry["standard"].replace(",", ".")]),
         ):  # fmt: skip
             if not any(re.search(".{1,14}".join(map(re.escape, figure.split(" ± "))), text) for figure in figures):
-                inquiry.wrong("figures", name, f"statement of conformity {i + 1}", f"does not state the {what} of {source}",
-                              " ".join(shown.text.split()), figures[0])  # fmt: skip
+                problem = f"does not state the {what} of {source}"
+                inquiry.wrong("figures", name, place, problem, " ".join(shown.text.split()), figures[0])
 
 
 def _from_zero(entry: Mapping[str, Any]) -> list[str]:
@@ -232,13 +230,13 @@ def check_part_stated(inquiry: Inquiry, data: Mapping[str, Any], text: str, *, f
     whole, at = squashed(text), 0
     for place, words in _expected(data):
         inquiry.looked("figures")
-        wanted = squashed("".join(str.__str__(said_in(word, language)) for word in words))
+        said = [str.__str__(said_in(word, language)) for word in words]
+        wanted = squashed("".join(said))
         found = whole.find(wanted, at)
+        at = at if found < 0 else found + len(wanted)
         if found < 0:
-            inquiry.wrong("figures", name, place, f"does not state the figures of {source} in their place", "",
-                          " ".join(str.__str__(said_in(word, language)) for word in words))  # fmt: skip
-        else:
-            at = found + len(wanted)
+            problem = f"does not state the figures of {source} in their place"
+            inquiry.wrong("figures", name, place, problem, "", " ".join(said))
 
 
 def _expected(data: Mapping[str, Any]) -> Iterator[tuple[str, list[Text]]]:
