@@ -20,44 +20,11 @@ from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.units import UNITS
 from cmm_uq.certificate.clauses import certifies
-from cmm_uq.certificate.digital_certificate import administration
+from cmm_uq.certificate.digital_certificate import administration, figures as plain
 from cmm_uq.certificate.digital_certificate.administration import Languages, english, mark_of, one_line
-from cmm_uq.certificate.digital_certificate.figures import (
-    ONE,
-    P95,
-    DigitalFigures,
-    Part,
-    decimal,
-    decimals,
-    dsi_of,
-    is_quantity,
-    plain_name,
-    product,
-    ratio,
-    without_unit,
-)
 from cmm_uq.certificate.origin import as_json, file_name
 from cmm_uq.certificate.wording import stated_row, stated_value
-from cmm_uq.jobs.dcc.certificate import (
-    Administrative,
-    Attached,
-    Certificate,
-    Data,
-    DccQuantity,
-    DccResult,
-    Measurement,
-    QuantityList,
-    StatementMetadata,
-)
-from cmm_uq.jobs.dcc.quantities import (
-    CovarianceColumn,
-    CovarianceElement,
-    EllipsoidalRegion,
-    Expanded,
-    ExpandedList,
-    Real,
-    RealList,
-)
+from cmm_uq.jobs.dcc import certificate as dcc, quantities as si
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.verdicts import TOLERANCE_RULE, Verdict, Verdicts
 
@@ -81,22 +48,22 @@ _MICROMETRE, _MILLIMETRE = UNITS["µm"].dsi, UNITS["mm"].dsi
 _P_TWICE = Decimal("0.9545")  # probability of a normal distribution within two standard deviations
 
 
-def of_tolerances(verdicts: Verdicts, texts: Languages, *, certifies: bool) -> Mapping[str, StatementMetadata]:
+def of_tolerances(verdicts: Verdicts, texts: Languages, *, certifies: bool) -> Mapping[str, dcc.StatementMetadata]:
     """Statements on parameters that have a tolerance, by their names (``scale_x.ppm``): each stands with its result."""
     return {verdict.name: _of_tolerance(verdict, texts, certifies=certifies) for verdict in verdicts if not verdict.by}
 
 
-def _of_tolerance(verdict: Verdict, texts: Languages, *, certifies: bool) -> StatementMetadata:
-    limit, unit = decimal(verdict.limit or 0.0), dsi_of(verdict.unit)
+def _of_tolerance(verdict: Verdict, texts: Languages, *, certifies: bool) -> dcc.StatementMetadata:
+    limit, unit = plain.decimal(verdict.limit or 0.0), plain.dsi_of(verdict.unit)
     bounds = ((say("Smallest permissible value"), -limit), (say("Largest permissible value"), limit))
-    return StatementMetadata(
+    return dcc.StatementMetadata(
         name=texts.words(say("Conformity with its tolerance")),
         description=english([f"Missing: {what}" for what in verdict.missing]) if verdict.missing else None,
         references=(TOLERANCE_RULE,),
         declaration=texts.rich(Verbatim(verdict.outcome), *_why(verdict.outcome)),
         conformity=IN_THE_SCHEMA[verdict.outcome] if certifies else None,
-        data=Data(parts=tuple(
-            DccQuantity(name=texts.words(name), value=Real(value=bound, unit=unit), ref_type=("cmm_toleranceLimit",))
+        data=dcc.Data(parts=tuple(
+            dcc.DccQuantity(name=texts.words(name), value=si.Real(value=bound, unit=unit), ref_type=("cmm_toleranceLimit",))
             for name, bound in bounds
         )),
         ref_type=_ref_type(verdict.outcome, certifies=certifies),
@@ -111,7 +78,9 @@ def _ref_type(decision: str, *, certifies: bool) -> tuple[str, ...]:
     return ("basic_conformity", f"cmm_{decision.replace(' ', '')}") if certifies else ("cmm_notCertified",)
 
 
-def statement(i: int, entry: Mapping[str, Any], figures: DigitalFigures, *, certifies: bool) -> StatementMetadata:
+def statement(
+    i: int, entry: Mapping[str, Any], figures: plain.DigitalFigures, *, certifies: bool
+) -> dcc.StatementMetadata:
     """Of a decision of results.json, by its number there."""
     texts, decision, path = figures.texts, entry["decision"], ("conformity", str(i))
     standard, characteristic = Verbatim(entry["standard"]), Verbatim(entry["characteristic"])
@@ -121,7 +90,7 @@ def statement(i: int, entry: Mapping[str, Any], figures: DigitalFigures, *, cert
     value = stated_value(entry["value_um"], 2 * entry["u_um"], signed=entry.get("signed", True))
     quantity = say("{decision}: {quantity}", decision=Verbatim(decision), quantity=Verbatim(entry["quantity"]))
     row = stated_row(decision, value, UNITS["µm"], entry["limit_um"])
-    return StatementMetadata(
+    return dcc.StatementMetadata(
         id=figures.id_of(path),
         name=texts.words(named),
         description=english(remarks) if remarks else None,
@@ -129,50 +98,52 @@ def statement(i: int, entry: Mapping[str, Any], figures: DigitalFigures, *, cert
         references=(one_line(entry["rule"]),),
         declaration=texts.rich(quantity, row, *_why(decision)),
         conformity=IN_THE_SCHEMA[decision] if certifies else None,
-        data=Data(parts=tuple(_figures(path, entry, figures))),
+        data=dcc.Data(parts=tuple(_figures(path, entry, figures))),
         ref_type=_ref_type(decision, certifies=certifies),
     )
 
 
-def _figures(path: tuple[str, ...], entry: Mapping[str, Any], figures: DigitalFigures) -> Iterator[Part]:
+def _figures(path: tuple[str, ...], entry: Mapping[str, Any], figures: plain.DigitalFigures) -> Iterator[plain.Part]:
     """The value with its uncertainty, its limit, the acceptance limit of the rule, and probabilities."""
 
     def quantity(
-        keys: str, name: Text, value: Decimal, ref_type: str, unit: str = _MICROMETRE, stated: Expanded | None = None
-    ) -> DccQuantity:
-        real, id_ = Real(value=value, unit=unit, uncertainty=stated), figures.id_of((*path, *keys.split(".")))
-        return DccQuantity(id=id_, name=figures.texts.words(name), value=real, ref_type=(ref_type,))
+        keys: str, name: Text, value: Decimal, ref_type: str, unit: str = _MICROMETRE, stated: si.Expanded | None = None
+    ) -> dcc.DccQuantity:
+        real, id_ = si.Real(value=value, unit=unit, uncertainty=stated), figures.id_of((*path, *keys.split(".")))
+        return dcc.DccQuantity(id=id_, name=figures.texts.words(name), value=real, ref_type=(ref_type,))
 
-    u, limit, guard = decimal(entry["u_um"]), decimal(entry["limit_um"]), entry["guard_band_um"]
+    u, limit, guard = plain.decimal(entry["u_um"]), plain.decimal(entry["limit_um"]), entry["guard_band_um"]
     stated = (
-        Expanded(uncertainty=2 * u, factor=Decimal(2), probability=_P_TWICE, distribution="normal") if u > 0 else None
+        si.Expanded(uncertainty=2 * u, factor=Decimal(2), probability=_P_TWICE, distribution="normal")
+        if u > 0
+        else None
     )
     named = say("Value that is least favourable")
-    yield quantity("value_um", named, decimal(entry["value_um"]), "basic_measuredValue", stated=stated)
+    yield quantity("value_um", named, plain.decimal(entry["value_um"]), "basic_measuredValue", stated=stated)
     yield quantity("limit_um", say("Limit"), limit, "cmm_toleranceLimit")
     if guard is not None:
-        yield quantity("guard_band_um", say("Guard band"), decimal(guard), "cmm_guardBand")
-        accepted = max(limit - decimal(guard), Decimal(0))
+        yield quantity("guard_band_um", say("Guard band"), plain.decimal(guard), "cmm_guardBand")
+        accepted = max(limit - plain.decimal(guard), Decimal(0))
         yield quantity("acceptance_limit_um", say("Acceptance limit"), accepted, "basic_acceptanceLimitUpper")
     for key, name in (
         ("probability_conforming", say("Probability that the value is within its limit")),
         ("probability_all_conform", say("Probability that all values are within their limits")),
     ):
         if entry[key] is not None:
-            yield quantity(key, name, decimal(entry[key]), "cmm_conformanceProbability", ONE.dsi)
-    units = {"a_um": _MICROMETRE, "k": ratio(_MILLIMETRE, _MICROMETRE), "b_um": _MICROMETRE}
+            yield quantity(key, name, plain.decimal(entry[key]), "cmm_conformanceProbability", plain.ONE.dsi)
+    units = {"a_um": _MICROMETRE, "k": plain.ratio(_MILLIMETRE, _MICROMETRE), "b_um": _MICROMETRE}
     for key, value in (entry["mpe"] or {}).items():
         if value is not None:
             letter = Verbatim(key.partition("_")[0].upper())
             name = say("{letter} of the maximum permissible error A + L/K, at most B", letter=letter)
-            yield quantity(f"mpe.{key}", name, decimal(value), "cmm_toleranceLimit", units[key])
+            yield quantity(f"mpe.{key}", name, plain.decimal(value), "cmm_toleranceLimit", units[key])
     for key in ("prior", "global_risks"):
         yield from figures.parts((*path, key), entry[key])
 
 
 def evidence(
-    decided: Sequence[Mapping[str, Any]], figures: DigitalFigures, *, certifies: bool
-) -> tuple[DccResult, ...]:
+    decided: Sequence[Mapping[str, Any]], figures: plain.DigitalFigures, *, certifies: bool
+) -> tuple[dcc.DccResult, ...]:
     """Every value that was decided, and the budget of the one that is named."""
     found = []
     for i, entry in enumerate(decided):
@@ -181,30 +152,32 @@ def evidence(
         parts += figures.parts((*path, "test_uncertainty"), entry["test_uncertainty"])
         if parts:
             name = figures.texts.words(say("All values decided by {standard}", standard=Verbatim(entry["standard"])))
-            found.append(DccResult(name=name, data=Data(parts=tuple(parts)), ref_type=("cmm_conformity",)))
+            found.append(dcc.DccResult(name=name, data=dcc.Data(parts=tuple(parts)), ref_type=("cmm_conformity",)))
     return tuple(found)
 
 
 def _values(
-    path: tuple[str, ...], errors: Sequence[Mapping[str, Any]], figures: DigitalFigures, *, certifies: bool
-) -> Part:
+    path: tuple[str, ...], errors: Sequence[Mapping[str, Any]], figures: plain.DigitalFigures, *, certifies: bool
+) -> plain.Part:
     below, texts = (*path, "errors"), figures.texts
-    uncertainty = ExpandedList(
-        uncertainties=decimals([error["U_um"] for error in errors]), factors=(Decimal(2),), probabilities=(_P_TWICE,),
+    uncertainty = si.ExpandedList(
+        uncertainties=plain.decimals([error["U_um"] for error in errors]), factors=(Decimal(2),), probabilities=(_P_TWICE,),
         distributions=("normal",),
     )  # fmt: skip
     known = all(error["u_um"] > 0 for error in errors)
-    values = decimals([error["error_um"] for error in errors])
-    column = DccQuantity(
+    values = plain.decimals([error["error_um"] for error in errors])
+    column = dcc.DccQuantity(
         id=figures.id_of((*below, "error_um")), name=texts.words(say("Value")), ref_type=("basic_measurementError",),
-        value=RealList(values=values, units=(_MICROMETRE,), uncertainty=uncertainty if known else None),
+        value=si.RealList(values=values, units=(_MICROMETRE,), uncertainty=uncertainty if known else None),
     )  # fmt: skip
     others = [{key: error[key] for key in error if key not in ("error_um", "u_um", "U_um")} for error in errors]
-    rest = [part for table in figures.parts(below, others) if isinstance(table, QuantityList) for part in table.parts]
+    rest = [
+        part for table in figures.parts(below, others) if isinstance(table, dcc.QuantityList) for part in table.parts
+    ]
     words = tuple(IN_THE_SCHEMA[error["outcome"]] for error in errors)
-    outcomes = (StatementMetadata(conformity_list=words, ref_type=("basic_conformity",)),) if certifies else ()
+    outcomes = (dcc.StatementMetadata(conformity_list=words, ref_type=("basic_conformity",)),) if certifies else ()
     name = texts.words(say("Values in the order of the recording"))
-    return QuantityList(name=name, parts=(column, *rest), metadata=outcomes, ref_type=("cmm_table",))
+    return dcc.QuantityList(name=name, parts=(column, *rest), metadata=outcomes, ref_type=("cmm_table",))
 
 
 _TITLES: Mapping[str, Text] = MappingProxyType({
@@ -228,24 +201,24 @@ _MOST = 40  # estimates whose covariance is written out; of more, the attached r
 
 def digital_certificate(
     results: Mapping[str, Any], job: Job, *, html: bytes | None, file: bytes | None = None
-) -> Certificate:
+) -> dcc.Certificate:
     """The certificate, in the language that results.json names, and in English."""
     texts = Languages(results["job"].get("language", ENGLISH))
     real, decided = certifies(job), results.get("conformity", ())
     # estimates that are in a combination that the recording does not determine, ``scale_x.ppm``
     undetermined = results.get("identifiability", {}).get("undetermined", ())
     free = frozenset(name for combination in undetermined for name in combination)
-    figures = DigitalFigures(texts, free, of_tolerances(Verdicts.of_results(results), texts, certifies=real))
+    figures = plain.DigitalFigures(texts, free, of_tolerances(Verdicts.of_results(results), texts, certifies=real))
     stated = [statement(i, entry, figures, certifies=real) for i, entry in enumerate(decided)]
     # results.json itself: what D-SI has no place for stands there
     content = as_json(results) if file is None else file
-    everything = DccResult(
+    everything = dcc.DccResult(
         name=texts.words(say("Every figure, for other programs")), ref_type=("cmm_resultsFile",),
-        data=Data(parts=(Attached(file_name="results.json", mime_type="application/json", data=content),)),
+        data=dcc.Data(parts=(dcc.Attached(file_name="results.json", mime_type="application/json", data=content),)),
     )  # fmt: skip
     mark, title = mark_of(job), Verbatim(job.facts.machine.name)
-    return Certificate(
-        administrative=Administrative(
+    return dcc.Certificate(
+        administrative=dcc.Administrative(
             software=administration.software(results, texts),
             ref_types=administration.ref_types(texts),
             core=administration.core_data(job, texts),
@@ -256,7 +229,7 @@ def digital_certificate(
             statements=(*administration.formal_statements(job, results, texts), *stated),
         ),
         measurements=(
-            Measurement(
+            dcc.Measurement(
                 name=texts.words(
                     say("Calibration of {machine}", machine=title) if mark is None
                     else say("{banner}: {machine}", banner=mark.banner, machine=title)
@@ -271,31 +244,33 @@ def digital_certificate(
                 ref_type=("cmm_calibration",) if real else (f"cmm_{job.origin}", "cmm_notACertificate"),
             ),
         ),
-        document=None if html is None else Attached(
+        document=None if html is None else dcc.Attached(
             file_name=file_name("certificate.html", job.origin), mime_type="text/html", data=html,
             name=texts.words(say("The same certificate for reading")),
         ),
     )  # fmt: skip
 
 
-def _results(results: Mapping[str, Any], figures: DigitalFigures) -> list[DccResult]:
+def _results(results: Mapping[str, Any], figures: plain.DigitalFigures) -> list[dcc.DccResult]:
     found = []
     for key in dict.fromkeys((*_TITLES, *results)):
         if key not in results or key in _NOT_STATED_THERE:
             continue
         data = results[key]
-        if isinstance(data, Mapping) and not is_quantity(data) and "budget" not in data:
+        if isinstance(data, Mapping) and not plain.is_quantity(data) and "budget" not in data:
             parts = tuple(part for name, value in data.items() for part in figures.parts((key, name), value))
         else:
             parts = tuple(figures.parts((key,), data))
         if parts:
-            title = figures.texts.words(_TITLES.get(key, Verbatim(without_unit(key).capitalize())))
-            found.append(DccResult(name=title, data=Data(parts=parts), ref_type=(plain_name(f"cmm_{key}"),)))
+            title = figures.texts.words(_TITLES.get(key, Verbatim(plain.without_unit(key).capitalize())))
+            found.append(
+                dcc.DccResult(name=title, data=dcc.Data(parts=parts), ref_type=(plain.plain_name(f"cmm_{key}"),))
+            )
     together = _together(results, figures)
     return found if together is None else [*found, together]
 
 
-def _together(results: Mapping[str, Any], figures: DigitalFigures) -> DccResult | None:
+def _together(results: Mapping[str, Any], figures: plain.DigitalFigures) -> dcc.DccResult | None:
     """Estimates and their covariance as an ellipsoidal region; without what the recording does not determine."""
     data = results.get("covariance")
     if data is None:
@@ -311,22 +286,22 @@ def _together(results: Mapping[str, Any], figures: DigitalFigures) -> DccResult 
             found.append(quantity)
     if not 1 < len(chosen) <= _MOST or len(found) < len(chosen):
         return None
-    units = [dsi_of(data["units"][i]) for i in chosen]
+    units = [plain.dsi_of(data["units"][i]) for i in chosen]
     columns = tuple(
-        CovarianceColumn(covariances=tuple(
-            CovarianceElement(value=decimal(matrix[row][column]), unit=product(a, b))
+        si.CovarianceColumn(covariances=tuple(
+            si.CovarianceElement(value=plain.decimal(matrix[row][column]), unit=plain.product(a, b))
             for row, a in zip(chosen, units, strict=True)
         ))
         for column, b in zip(chosen, units, strict=True)
     )  # fmt: skip
-    factor = decimal(float(f"{sqrt(special.chdtri(len(chosen), 0.05)):.6f}"))
-    values, U, k = (decimals([quantity[key] for quantity in found]) for key in ("value", "U", "k"))
-    stated = RealList(
+    factor = plain.decimal(float(f"{sqrt(special.chdtri(len(chosen), 0.05)):.6f}"))
+    values, U, k = (plain.decimals([quantity[key] for quantity in found]) for key in ("value", "U", "k"))
+    stated = si.RealList(
         labels=tuple(names[i] for i in chosen), values=values, units=tuple(units),
-        uncertainty=ExpandedList(uncertainties=U, factors=k, probabilities=(P95,)),
-        region=EllipsoidalRegion(columns=columns, factor=factor, probability=P95, distribution="normal"),
+        uncertainty=si.ExpandedList(uncertainties=U, factors=k, probabilities=(plain.P95,)),
+        region=si.EllipsoidalRegion(columns=columns, factor=factor, probability=plain.P95, distribution="normal"),
     )  # fmt: skip
     title = figures.texts.words(say("Estimates together, with their covariance"))
     ref_type = ("cmm_covariance",)
-    quantity = DccQuantity(id=figures.id_of(("covariance",)), name=title, value=stated, ref_type=ref_type)
-    return DccResult(name=title, data=Data(parts=(quantity,)), ref_type=ref_type)
+    quantity = dcc.DccQuantity(id=figures.id_of(("covariance",)), name=title, value=stated, ref_type=ref_type)
+    return dcc.DccResult(name=title, data=dcc.Data(parts=(quantity,)), ref_type=ref_type)

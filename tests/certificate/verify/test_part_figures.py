@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 from typing import Any
 
@@ -14,6 +13,8 @@ from cmm_uq.certificate.verify.figures import check_part_figures, check_verdicts
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.html_page import read_html
 from cmm_uq.certificate.verify.stated import check_part_stated
+from tests.certificate.verify import test_figures
+from tests.certificate.verify.test_figures import places
 from tests.part_reports import plate_report
 
 
@@ -23,20 +24,7 @@ def data() -> dict[str, Any]:
 
 
 def changed(path: str, value: Any) -> dict[str, Any]:
-    """Results with one value in place of another; a function is given the old one."""
-    new = copy.deepcopy(data())
-    *way, last = [int(key) if key.isdigit() else key for key in path.split(".")]
-    inner: Any = new
-    for key in way:
-        inner = inner[key]
-    inner[last] = value(inner[last]) if callable(value) else value
-    return new
-
-
-def places(check: Any, found: dict[str, Any]) -> list[str]:
-    inquiry = Inquiry()
-    check(inquiry, found, "results.json")
-    return [one.place for one in inquiry.findings]
+    return test_figures.changed(data(), path, value)
 
 
 def test_the_figures_of_a_report_agree() -> None:

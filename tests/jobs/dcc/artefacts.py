@@ -6,77 +6,57 @@ import datetime as dt
 from collections.abc import Sequence
 from decimal import Decimal
 
-from cmm_uq.jobs.dcc import Certificate, written
-from cmm_uq.jobs.dcc.certificate import (
-    Data,
-    DccQuantity,
-    DccResult,
-    Measurement,
-    Person,
-    QuantityList,
-    Somebody,
-    StatementMetadata,
-    words,
-)
-from cmm_uq.jobs.dcc.quantities import (
-    CovarianceColumn,
-    CovarianceElement,
-    EllipsoidalRegion,
-    Expanded,
-    ExpandedList,
-    Real,
-    RealList,
-)
+from cmm_uq.jobs.dcc import Certificate, certificate as dcc, quantities as si, written
 from tests.conftest import ROOT
 from tests.jobs.dcc.certificates import certificate
 
 K, P, MM = Decimal(2), Decimal("0.95"), r"\milli\metre"
-DUE = StatementMetadata(ref_type=("basic_recalibration",), date=dt.date(2028, 3, 2))
+DUE = dcc.StatementMetadata(ref_type=("basic_recalibration",), date=dt.date(2028, 3, 2))
 
 
 def value(
     name: str, number: str, U: str | None = None, unit: str = MM, ref_type: str = "basic_measuredValue"
-) -> DccQuantity:
+) -> dcc.DccQuantity:
     """One value with its expanded uncertainty in the same unit."""
-    stated = None if U is None else Expanded(uncertainty=Decimal(U), factor=K, probability=P)
-    return DccQuantity(
-        name=words(name), ref_type=(ref_type,), value=Real(value=Decimal(number), unit=unit, uncertainty=stated)
+    stated = None if U is None else si.Expanded(uncertainty=Decimal(U), factor=K, probability=P)
+    return dcc.DccQuantity(
+        name=dcc.words(name), ref_type=(ref_type,), value=si.Real(value=Decimal(number), unit=unit, uncertainty=stated)
     )
 
 
 def listed(
     name: str, numbers: str, Us: str | None = None, unit: str = MM, covariance: Sequence[Sequence[str]] = ()
-) -> DccQuantity:
+) -> dcc.DccQuantity:
     """A list of values, with one uncertainty for all or one a value."""
-    stated = None if Us is None else ExpandedList(
+    stated = None if Us is None else si.ExpandedList(
         uncertainties=_decimals(Us), factors=(K,), probabilities=(P,)
     )  # fmt: skip
     region = None
     if covariance:
         unit_ = unit + r"\tothe{2}"
         columns = tuple(
-            CovarianceColumn(covariances=tuple(CovarianceElement(value=Decimal(one), unit=unit_) for one in row))
+            si.CovarianceColumn(covariances=tuple(si.CovarianceElement(value=Decimal(one), unit=unit_) for one in row))
             for row in covariance
         )
-        region = EllipsoidalRegion(columns=columns, factor=K, probability=P)
-    found = RealList(values=_decimals(numbers), units=(unit,), uncertainty=stated, region=region)
-    return DccQuantity(name=words(name), value=found)
+        region = si.EllipsoidalRegion(columns=columns, factor=K, probability=P)
+    found = si.RealList(values=_decimals(numbers), units=(unit,), uncertainty=stated, region=region)
+    return dcc.DccQuantity(name=dcc.words(name), value=found)
 
 
 def issued(
-    *parts: DccQuantity, item: str = "Ball bar", result: str = "Certified values", table: bool = False
+    *parts: dcc.DccQuantity, item: str = "Ball bar", result: str = "Certified values", table: bool = False
 ) -> Certificate:
     """A certificate of one item with one result, due on a day."""
-    held = (QuantityList(parts=parts),) if table else parts
+    held = (dcc.QuantityList(parts=parts),) if table else parts
     made = certificate()
     (old,) = made.administrative.items.items
-    items = made.administrative.items.with_changes(items=(old.with_changes(name=words(item)),))
+    items = made.administrative.items.with_changes(items=(old.with_changes(name=dcc.words(item)),))
     core = made.administrative.core.with_changes(identifier="D-K-4711", issued=dt.date(2026, 3, 5))
-    found = DccResult(name=words(result), data=Data(parts=held))
+    found = dcc.DccResult(name=dcc.words(result), data=dcc.Data(parts=held))
     administrative = made.administrative.with_changes(
-        items=items, core=core, statements=(DUE,), persons=(Person(person=Somebody(name=words("A. Huber"))),)
+        items=items, core=core, statements=(DUE,), persons=(dcc.Person(person=dcc.Somebody(name=dcc.words("A. Huber"))),)
     )  # fmt: skip
-    measurement = Measurement(name=words("Calibration"), results=(found,))
+    measurement = dcc.Measurement(name=dcc.words("Calibration"), results=(found,))
     return made.with_changes(administrative=administrative, measurements=(measurement,), document=None)
 
 

@@ -8,34 +8,16 @@ from pathlib import Path
 import lxml.etree
 import pytest
 
-from cmm_uq.jobs.dcc import Certificate, read, written
+from cmm_uq.jobs.dcc import Certificate, quantities as si, read, written
 from cmm_uq.jobs.dcc.certificate import DccQuantity, QuantityList, StatementMetadata, rich, words
 from cmm_uq.jobs.dcc.figures import QuantityFigures, data, figures, shown, statements, unit_shown
-from cmm_uq.jobs.dcc.quantities import (
-    Constant,
-    Expanded,
-    ExpandedListMU,
-    Hybrid,
-    Interval,
-    IntervalList,
-    Lists,
-    ListUncertainty,
-    Real,
-    RealInList,
-    RealList,
-    Reals,
-    StandardListMU,
-    StandardMU,
-    Univariate,
-    UnivariateList,
-)
 from cmm_uq.jobs.dcc.xml_file import checked_by_schema
 from tests.conftest import ROOT
 from tests.jobs.dcc.artefacts import BALL_BAR, MM, PLATE, SPHERE, STEP_GAUGE, TRIANGLE, issued, value
 
 SCHEMAS = ROOT.parent / "shared" / "schemas"
 D = Decimal
-HALF = Expanded(uncertainty=D("0.010"), factor=D(2), probability=D("0.95"))
+HALF = si.Expanded(uncertainty=D("0.010"), factor=D(2), probability=D("0.95"))
 
 
 def of(given: object) -> tuple[QuantityFigures, ...]:
@@ -45,21 +27,22 @@ def of(given: object) -> tuple[QuantityFigures, ...]:
 
 
 ONE_VALUE = {
-    "a value": Real(value=D("1.50"), unit=MM, uncertainty=HALF),
-    "a value with an interval": Real(value=D("1.50"), unit=MM, uncertainty=Interval(
+    "a value": si.Real(value=D("1.50"), unit=MM, uncertainty=HALF),
+    "a value with an interval": si.Real(value=D("1.50"), unit=MM, uncertainty=si.Interval(
         standard=D("0.005"), low=D("1.49"), high=D("1.51"), probability=D("0.95"))),
-    "a value of D-SI 2.2": Real(value=D("1.50"), unit=MM, uncertainty=Univariate(stated=StandardMU(standard=D("0.005")))),
-    "a constant": Constant(value=D("1.50"), unit=MM, uncertainty=D("0.005")),
-    "a list with one for all": RealList(values=(D("1.50"),), units=(MM,), uncertainty=IntervalList(
+    "a value of D-SI 2.2": si.Real(value=D("1.50"), unit=MM, uncertainty=si.Univariate(
+        stated=si.StandardMU(standard=D("0.005")))),
+    "a constant": si.Constant(value=D("1.50"), unit=MM, uncertainty=D("0.005")),
+    "a list with one for all": si.RealList(values=(D("1.50"),), units=(MM,), uncertainty=si.IntervalList(
         standards=(D("0.005"),), lows=(D("1.49"),), highs=(D("1.51"),), probabilities=(D("0.95"),))),
-    "a list of D-SI 2.2": RealList(values=(D("1.50"),), units=(MM,), uncertainty=UnivariateList(
-        stated=StandardListMU(standards=(D("0.005"),)))),
-    "the same expanded": RealList(values=(D("1.50"),), units=(MM,), uncertainty=UnivariateList(
-        stated=ExpandedListMU(uncertainties=(D("0.010"),), factors=(D(2),), probabilities=(D("0.95"),)))),
-    "the first of two units": Hybrid(values=(
-        Real(value=D("1.50"), unit=MM, uncertainty=HALF), Real(value=D("0.0015"), unit=r"\metre"))),
-    "a list one by one, with the list's unit and uncertainty": Lists(lists=(Reals(
-        unit=MM, uncertainty=ListUncertainty(stated=HALF), values=(RealInList(value=D("1.50")),)),)),
+    "a list of D-SI 2.2": si.RealList(values=(D("1.50"),), units=(MM,), uncertainty=si.UnivariateList(
+        stated=si.StandardListMU(standards=(D("0.005"),)))),
+    "the same expanded": si.RealList(values=(D("1.50"),), units=(MM,), uncertainty=si.UnivariateList(
+        stated=si.ExpandedListMU(uncertainties=(D("0.010"),), factors=(D(2),), probabilities=(D("0.95"),)))),
+    "the first of two units": si.Hybrid(values=(
+        si.Real(value=D("1.50"), unit=MM, uncertainty=HALF), si.Real(value=D("0.0015"), unit=r"\metre"))),
+    "a list one by one, with the list's unit and uncertainty": si.Lists(lists=(si.Reals(
+        unit=MM, uncertainty=si.ListUncertainty(stated=HALF), values=(si.RealInList(value=D("1.50")),)),)),
 }  # fmt: skip
 
 
@@ -72,7 +55,7 @@ def test_a_value_is_the_same_in_whichever_form_it_is_given(given: object) -> Non
 
 
 def test_a_value_without_uncertainty_has_none() -> None:
-    (found,) = of(Real(value=D(1), unit=MM))
+    (found,) = of(si.Real(value=D(1), unit=MM))
     assert found.uncertainties[0].u is None
 
 
@@ -84,7 +67,7 @@ def test_one_uncertainty_and_one_unit_are_of_every_value_of_a_list() -> None:
 
 def test_statements_of_lists_and_quantities_are_found_with_those_of_the_measurement() -> None:
     said = StatementMetadata(conformity="pass", norms=("ISO 10360-2:2009",), declaration=rich("within the limit"))
-    inner = DccQuantity(name=words("Q"), value=Real(value=D(1), unit=MM), metadata=(said,))
+    inner = DccQuantity(name=words("Q"), value=si.Real(value=D(1), unit=MM), metadata=(said,))
     made = issued(QuantityList(parts=(inner,), metadata=(said,)))  # type: ignore[arg-type]
     (measurement,) = made.measurements
     assert [one.conformity for one in statements(measurement)] == ["pass", "pass"]

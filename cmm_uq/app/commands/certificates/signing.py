@@ -18,18 +18,7 @@ from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import SIGNED_BYTES
 from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.output import Owner, finish_interrupted, read_manifest, staged
-from cmm_uq.certificate.sign import (
-    LEVELS,
-    Level,
-    Signer,
-    Stamping,
-    sign_pdf,
-    sign_xml,
-    signer_of_file,
-    signing_time,
-    trial_key,
-    trust_of,
-)
+from cmm_uq.certificate import sign
 from cmm_uq.certificate.sign.signer import SCHEME, signer_of_token
 from cmm_uq.laboratory.records.place import beside, place_of
 from cmm_uq.laboratory.schedule import settings as credentials
@@ -54,18 +43,18 @@ class SigningOptions:
     trust: tuple[Path, ...] = ()
 
     @property
-    def stamping(self) -> Stamping | None:
+    def stamping(self) -> sign.Stamping | None:
         """What lifts a signature above B-B."""
-        known = (level for level in LEVELS if (self.level or "").upper() in (level, level.removeprefix("B-")))
-        level: Level | None = next(known, None) if self.level is not None else "B-T" if self.server else "B-B"
+        known = (level for level in sign.LEVELS if (self.level or "").upper() in (level, level.removeprefix("B-")))
+        level: sign.Level | None = next(known, None) if self.level is not None else "B-T" if self.server else "B-B"
         if level is None:
-            fix = f"One of {', '.join(LEVELS)}"
+            fix = f"One of {', '.join(sign.LEVELS)}"
             raise CmmUqError(f"{self.level!r} is no level of a signature", where="--level", fix=fix)
         if level == "B-B":
             return None
         if not self.server:
             raise CmmUqError(f"level {level} needs a time stamp server", where="--level", fix="Add --time-server URL")
-        return Stamping(self.server, level, trust_of(self.trust))
+        return sign.Stamping(self.server, level, sign.trust_of(self.trust))
 
 
 @dataclass(frozen=True)
@@ -75,9 +64,9 @@ class Signing:
     ``signer`` who signs; ``at`` time of signing; ``stamping`` level above B-B; ``None`` for B-B.
     """
 
-    signer: Signer
+    signer: sign.Signer
     at: dt.datetime
-    stamping: Stamping | None = None
+    stamping: sign.Stamping | None = None
 
     def finished(
         self, laboratory: Mapping[str, Any], *, language: str = "en", said: Callable[[Text], Text] | None = None
@@ -86,14 +75,14 @@ class Signing:
 
         def signed(name: str, data: bytes) -> bytes:
             if name.endswith(".xml"):
-                return sign_xml(data, self.signer, at=self.at, where=name)
+                return sign.sign_xml(data, self.signer, at=self.at, where=name)
             if not name.endswith(".pdf"):
                 return data
             from cmm_uq.certificate.render.pdf import same, seal
 
             told = (Verbatim(str(laboratory.get(key) or "")) for key in ("name", "accreditation"))
             seen = seal(self.signer, self.at, *told, language=language, said=said or same)
-            return sign_pdf(data, self.signer, seal=seen, at=self.at, stamping=self.stamping)
+            return sign.sign_pdf(data, self.signer, seal=seen, at=self.at, stamping=self.stamping)
 
         return signed
 
@@ -101,11 +90,11 @@ class Signing:
 def signing(options: SigningOptions, asking: Asking) -> Signing:
     """Open the key, before anything is computed."""
     stamping = options.stamping
-    at = signing_time()
+    at = sign.signing_time()
     if options.key.startswith(SCHEME):
         signer = signer_of_token(options.key, secret("PIN of the token: ", asking))
     else:
-        signer = signer_of_file(Path(options.key), secret("Passphrase of the key: ", asking))
+        signer = sign.signer_of_file(Path(options.key), secret("Passphrase of the key: ", asking))
     signer.check(at)
     return Signing(signer, at, stamping)
 
@@ -240,7 +229,7 @@ def new_test_key(path: Path, name: str, asking: Asking) -> KeyFiles:
     for one in (path, beside):
         if os.path.lexists(one):
             raise CmmUqError("is there already", where=str(one), fix="Choose another name: no key is written over")
-    made = trial_key(name, secret("Passphrase of the new key: ", asking), signing_time())
+    made = sign.trial_key(name, secret("Passphrase of the new key: ", asking), sign.signing_time())
     _write(path, made.key, PRIVATE)
     try:
         _write(beside, made.certificate, PUBLIC)
