@@ -22,8 +22,7 @@ from cmm_uq.base.messages import say
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.verify.pdf_file import PdfFile
 from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.maths.inference.least_squares import LeastSquares
-from cmm_uq.maths.inference.linear_model import LinearModel
+from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel
 from cmm_uq.maths.inference.noise import Components
 from cmm_uq.maths.inference.posterior import NoisyPosterior, sample_with_noise
 from tests.part_machines import by_certificate, plate_of

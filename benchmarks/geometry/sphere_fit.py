@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from cmm_uq.maths.geometry import cap_directions, fit_circle, fit_cone, fit_cylinder, fit_line, fit_plane, fit_sphere
-from cmm_uq.maths.geometry.reference_sets import points_with_known_fit
+from tests.maths.geometry.reference_sets import points_with_known_fit
 
 RADIUS, N, REPEATS = 38.125, 17_000, 15
 

@@ -34,7 +34,7 @@ def read(kind: str, path: Path) -> None:
     from cmm_uq.base.files.limits import JOB_BYTES
     from cmm_uq.base.files.toml_file import checked
     from cmm_uq.jobs.derived_job import Truth
-    from cmm_uq.machine.model.machine_maps import maps_of
+    from cmm_uq.machine.model.predicted_errors import maps_of
     from cmm_uq.maths.uncertainty.models.model_file import read_model_file
 
     if kind == "budget":

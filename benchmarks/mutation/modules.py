@@ -13,7 +13,7 @@ _BY_ROOM = {
     "analysis/diagnosis": "comparison/evidence comparison/conditional comparison/algebra held_out location power",
     "analysis/planning": "exchange identifiability information suggestion",
     "certificate": "wording",
-    "maths/inference": "least_squares linear_model posterior",
+    "maths/inference": "linear_model posterior",
     "maths/uncertainty": "quantity coverage shapes",
 }  # fmt: skip
 MODULES = tuple(f"cmm_uq/{room}/{name}.py" for room, names in _BY_ROOM.items() for name in names.split())

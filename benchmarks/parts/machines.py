@@ -38,7 +38,7 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import effects
-from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
+from cmm_uq.maths.uncertainty.monte_carlo import Source, simulate
 
 PAGE = Path(__file__).parents[2] / "docs" / "parts-study.md"
 BEGIN, END = "<!-- written by benchmarks.parts.machines -->", "<!-- end -->"
@@ -170,7 +170,7 @@ def _measured(cell: Cell, random: np.random.Generator, made: Made) -> dict[str, 
     how = MeasurementConditions(state, (pose,), Surroundings(PART), measured=points)
     virtual = Virtual(plan(), how, dict(_nominal()), PILOT)
     errors = virtual.errors(random, TRIALS)
-    simulated = from_source(Source(virtual.names, lambda _, n: np.ascontiguousarray(errors[:n].T)), TRIALS)
+    simulated = simulate(Source(virtual.names, lambda _, n: np.ascontiguousarray(errors[:n].T)), TRIALS)
     rows = {one.name: [true[one.name], one.value, one.u, *one.interval]
             for one in stated(simulated, evaluated(plan(), points), plan(), errors)}  # fmt: skip
     return {"intervals": rows, "sigma_um": round(1e3 * sigma, 3), "offset_um": round(1e3 * offset, 3)}

@@ -20,8 +20,7 @@ from cmm_uq.analysis.parts.evaluation import Evaluator, characteristics_of
 from cmm_uq.analysis.parts.plan import DIRECTED, FORMS, FeatureKind, Nominal, PartCharacteristic, PartFeature, Plan
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.association import Association
-from cmm_uq.maths.geometry.reference_sets import points_with_known_fit, points_with_known_zone
-from tests.maths.geometry.surfaces import surface
+from tests.maths.geometry.reference_sets import points_with_known_fit, points_with_known_zone, surface
 
 KINDS: tuple[FeatureKind, ...] = ("line", "plane", "circle", "sphere", "cylinder", "cone")
 FORM_OF = dict(zip(("line", "plane", "circle", "cylinder", "sphere"), FORMS, strict=True))

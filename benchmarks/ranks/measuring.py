@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.ranks.drawn import CASES, design, drawn
 from benchmarks.ranks.ranking import ranks
-from cmm_uq.maths.inference.least_squares import solve
+from cmm_uq.maths.inference.linear_model import solve
 from cmm_uq.maths.inference.marginal import Marginal
 from cmm_uq.maths.inference.posterior import sample_with_noise
 

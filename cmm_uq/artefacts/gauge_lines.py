@@ -36,8 +36,8 @@ from cmm_uq.machine.model.artefact_doubt import CertifiedPlaces, by_certificate,
 from cmm_uq.machine.model.recorded import check_length, columns_needed, expansion, place
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_errors import ALONG_A_LINE, Body
-from cmm_uq.maths.inference.doubt import Cause
 from cmm_uq.maths.inference.linear_model import Freedoms
+from cmm_uq.maths.inference.posterior import Cause
 
 PITCH = 20.0  # mm, usual distance of the faces of a step gauge
 FIVE = 5  # lengths on a line (ISO 10360-2:2009, 6.3)

@@ -18,8 +18,8 @@ from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import deviating
 from cmm_uq.machine.model.noise import noise_of
-from cmm_uq.maths.inference.doubt import Doubt
 from cmm_uq.maths.inference.draws import evenly, uncertainty_of_sum
+from cmm_uq.maths.inference.posterior import Doubt
 from cmm_uq.maths.uncertainty.quantity import rounded
 
 LEAST_FACES = 8  # faces on a line from which on a periodic error can be told from scatter

@@ -39,7 +39,7 @@ from cmm_uq.machine.model.recorded import check_length, columns_needed, expansio
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_errors import Body
 from cmm_uq.machine.physics.effects.rigid_body import SCALE
-from cmm_uq.maths.inference.doubt import Cause
+from cmm_uq.maths.inference.posterior import Cause
 from cmm_uq.maths.uncertainty.quantity import Quantity, alike, rounded
 
 DRILLED_UM = 30.0  # standard deviation of holes from their nominal places, and of balls glued to a plate, µm

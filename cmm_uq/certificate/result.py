@@ -29,10 +29,9 @@ from cmm_uq.jobs.verdicts import NO_VERDICTS, Verdicts
 from cmm_uq.machine.model import Estimate, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.artefact_doubt import growth
-from cmm_uq.maths.inference.doubt import Cause, Doubt
 from cmm_uq.maths.inference.draws import Draws
-from cmm_uq.maths.inference.least_squares import LeastSquares
-from cmm_uq.maths.inference.posterior import NoisyPosterior
+from cmm_uq.maths.inference.linear_model import LeastSquares
+from cmm_uq.maths.inference.posterior import Cause, Doubt, NoisyPosterior
 from cmm_uq.maths.uncertainty.correlation import Covariance
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from cmm_uq.maths.uncertainty.type_a import factor_of_noise

@@ -12,7 +12,7 @@ from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
-from cmm_uq.maths.inference.least_squares import LeastSquares
+from cmm_uq.maths.inference.linear_model import LeastSquares
 from tests.recordings import TRAVEL
 
 MACHINE = Machine("test machine", "XYZ", TRAVEL)

@@ -15,7 +15,7 @@ from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.jobs.tables.artefact import ReferencedFacts
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects as effects_of
-from cmm_uq.maths.inference.doubt import Doubt, gain
+from cmm_uq.maths.inference.posterior import Doubt, gain
 
 FACES = np.array([0.0, 20.0, 120.0, 420.0, 720.0, 1020.0])
 

@@ -22,7 +22,7 @@ from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasureme
 from cmm_uq.certificate.wording import effect_title
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.machine.physics.catalogue import effects
-from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
+from cmm_uq.maths.uncertainty.monte_carlo import Source, simulate
 from tests.jobs.part.parts import plate
 
 ERRORS = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_zx", "squareness_yz")
@@ -87,7 +87,7 @@ def found_of(
     virtual = Virtual(plan, given)
     errors = virtual.errors(np.random.default_rng(0), draws)
     blocks = iter((errors.T,))
-    simulated = from_source(Source(virtual.names, lambda _random, _n: next(blocks)), draws, COVERAGE, 0)
+    simulated = simulate(Source(virtual.names, lambda _random, _n: next(blocks)), draws, COVERAGE, 0)
     values = None if points is None else evaluated(plan, points)
     shares = variance_shares(virtual, 1024)
     unseen = tuple(

@@ -32,8 +32,7 @@ from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.recorded import of_last_digit
 from cmm_uq.maths.inference.ensembles import Progress
-from cmm_uq.maths.inference.least_squares import solve, studentised
-from cmm_uq.maths.inference.linear_model import LinearModel
+from cmm_uq.maths.inference.linear_model import LinearModel, solve, studentised
 from cmm_uq.maths.inference.noise import Components
 from cmm_uq.maths.inference.posterior import NoisyPosterior
 from cmm_uq.maths.uncertainty.quantity import Quantity

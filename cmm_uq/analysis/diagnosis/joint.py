@@ -20,7 +20,7 @@ from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.curvature import Shaped, sample_shaped
 from cmm_uq.maths.inference.ensembles import Progress
-from cmm_uq.maths.inference.least_squares import solve
+from cmm_uq.maths.inference.linear_model import solve
 from cmm_uq.maths.inference.noise import Components
 from cmm_uq.maths.inference.posterior import NoisyPosterior, sample_with_noise
 from cmm_uq.maths.uncertainty.quantity import Quantity

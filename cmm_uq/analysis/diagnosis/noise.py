@@ -13,8 +13,7 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.noise import noise_of
-from cmm_uq.maths.inference.least_squares import LeastSquares
-from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel, Unknown
 from cmm_uq.maths.inference.marginal import Marginal
 from cmm_uq.maths.inference.noise import NEGLIGIBLE, SLOW, Components, Sizes
 from cmm_uq.maths.inference.presence import beginning, present

@@ -168,7 +168,7 @@ def _ball(one: PartFeature, points: Floats) -> tuple[Floats, Floats]:
 
 
 def _about_an_axis(one: PartFeature, points: Floats) -> tuple[Floats, Floats]:
-    """Of a circle, cylinder or cone, as :mod:`cmm_uq.maths.geometry.minimax` has them."""
+    """Of a circle, cylinder or cone, as :mod:`cmm_uq.maths.geometry.placed` has them."""
     w, apart = np.asarray(one.nominal.direction), points - one.nominal.point
     height, half = apart @ w, one.nominal.half_angle_rad or 0.0
     across = apart - height[:, :, None] * w

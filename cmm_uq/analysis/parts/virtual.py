@@ -31,7 +31,7 @@ from cmm_uq.analysis.parts.plan import FORMS, Plan
 from cmm_uq.analysis.parts.zones import Inverse, alike, inverse, nodes_of, trial_parts
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
+from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, simulate, simulate_adaptively
 
 CHECKED = 200  # draws that are looked at exactly, beside first order
 FEWEST = 100_000  # virtual measurements, after which u is known to a quarter of a percent
@@ -343,8 +343,8 @@ class Virtual:
 
     def simulated(self, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
         """So many virtual measurements: means, covariance, intervals of the errors."""
-        return from_source(self.source, trials, coverage, seed)
+        return simulate(self.source, trials, coverage, seed)
 
     def settled(self, coverage: float = 0.95, digits: int = 2, seed: int = 0) -> Simulated:
         """As many as the digits of u that are asked for need (JCGM 101, 7.9), a hundred thousand at least."""
-        return settled_source(self.source, coverage, digits, seed, fewest_trials=FEWEST)
+        return simulate_adaptively(self.source, coverage, digits, seed, fewest_trials=FEWEST)

@@ -17,8 +17,7 @@ from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.maths.inference.least_squares import RANK_TOLERANCE, LeastSquares, solve
-from cmm_uq.maths.inference.linear_model import LinearModel, Unknown, reached
+from cmm_uq.maths.inference.linear_model import RANK_TOLERANCE, LeastSquares, LinearModel, Unknown, reached, solve
 from cmm_uq.maths.inference.noise import Components, Sizes
 
 _ROUNDING, _ZERO = 1e-9, 1e-8

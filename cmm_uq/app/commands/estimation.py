@@ -28,11 +28,10 @@ from cmm_uq.machine.model.artefact_doubt import growth
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.model.recorded import of_last_digit
-from cmm_uq.maths.inference.doubt import Cause, Doubt, gain
 from cmm_uq.maths.inference.draws import Draws, by_chain, by_ensemble, evenly, uncertainty_of_sum
 from cmm_uq.maths.inference.linear_model import Freedoms
 from cmm_uq.maths.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
-from cmm_uq.maths.inference.posterior import NoisyPosterior
+from cmm_uq.maths.inference.posterior import Cause, Doubt, NoisyPosterior, gain
 from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of
 
 _LINES = 2000  # draws of the sizes of the noise, over which a line's uncertainty is taken

@@ -25,12 +25,10 @@ from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import LAST_DIGIT, Artefact
 from cmm_uq.machine.model.kind import Kind, Observe
-from cmm_uq.machine.model.machine_maps import maps_named
-from cmm_uq.machine.model.predicted_errors import SAME, PredictedErrors, predicted_errors
+from cmm_uq.machine.model.predicted_errors import SAME, PredictedErrors, maps_named, predicted_errors
 from cmm_uq.machine.model.recorded import NANOMETRE, display_step
 from cmm_uq.machine.physics.catalogue import effects
-from cmm_uq.maths.inference.least_squares import RANK_TOLERANCE
-from cmm_uq.maths.inference.linear_model import Freedoms
+from cmm_uq.maths.inference.linear_model import RANK_TOLERANCE, Freedoms
 
 # observations that the noise is estimated from, beside those that sizes and set-ups could explain
 FEWEST_LEFT = 3

@@ -28,7 +28,7 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
 from cmm_uq.certificate.document import Section, Table, figure_columns, text_columns
 from cmm_uq.jobs.job import Job
-from cmm_uq.machine.model.machine_maps import WHERE, maps_of
+from cmm_uq.machine.model.predicted_errors import WHERE, maps_of
 from cmm_uq.machine.physics.catalogue import effects as effects_named
 from cmm_uq.machine.physics.effects.thermal import ThermalScale
 from cmm_uq.machine.physics.error_map import ErrorMap

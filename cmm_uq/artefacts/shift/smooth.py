@@ -28,7 +28,7 @@ from scipy import linalg
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.inference.draws import evenly
 from cmm_uq.maths.inference.ensembles import Chains, Progress, run_ensembles
-from cmm_uq.maths.inference.posterior import SIGMA_BOUNDS
+from cmm_uq.maths.inference.marginal import SIGMA_BOUNDS
 from cmm_uq.maths.inference.proposals import refined
 
 LONGEST = 0.8  # longest correlation length as a part of the range; a longer one looks the same with a larger amplitude

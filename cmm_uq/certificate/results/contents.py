@@ -27,7 +27,7 @@ from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import every
-from cmm_uq.maths.inference.least_squares import LeastSquares
+from cmm_uq.maths.inference.linear_model import LeastSquares
 from cmm_uq.maths.uncertainty.budget_results import budget_data
 from cmm_uq.maths.uncertainty.correlation import Covariance
 from cmm_uq.maths.uncertainty.quantity import Quantity

@@ -21,8 +21,8 @@ from cmm_uq.base.messages import NOTHING, Text, foreign, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import Unit, unit
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.maths.inference.doubt import Cause
 from cmm_uq.maths.inference.linear_model import Freedoms
+from cmm_uq.maths.inference.posterior import Cause
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +41,8 @@ class Indications:
 class Forms:
     """Form errors of what was probed all around, one for each (measurement, repeat)."""
 
-    # measurement, repeat: (q,)
-    measurement: Ints
-    repeat: Ints
+    measurement: Ints  # (q,)
+    repeat: Ints  # (q,)
     count: Ints  # (q,) points of each
     form: Floats  # (q,) range of the distances from the least-squares feature, mm
     certified: float  # form deviation of the artefact by its certificate, mm; 0 when it is not given
@@ -57,22 +56,10 @@ Role = Literal["dimension", "sought", "set-up"]
 
 @dataclass(frozen=True)
 class Size:
-    """A dimension of the artefact at 20 °C, itself to be estimated.
+    """A dimension of the artefact at 20 °C, itself to be estimated."""
 
-    Parameters
-    ----------
-    name, title : in results.json, and in words.
-    unit : as printed.
-    nominal : where to start, in mm.
-    sd : standard uncertainty of the certificate, mm; infinite without a certificate.
-    what : it is, in words without whose: "length"; its title where left out.
-    role : a dimension of the artefact; a size that the measurement is made for; or what is known of how it was set up
-        (``nominal`` and ``sd`` are then in ``unit``).
-    """
-
-    # name, title: in results.json, and in words.
-    name: str
-    title: Text
+    name: str  # in results.json
+    title: Text  # in words
     unit: Unit  # as printed
     nominal: float  # where to start, in mm
     sd: float  # standard uncertainty of the certificate, mm; infinite without a certificate
@@ -92,27 +79,15 @@ class Size:
 
 
 class Artefact(ABC):
-    """One artefact as recorded: m observations of n points.
-
-    Attributes
-    ----------
-    kind : as in ``[artefact] kind``.
-    title : in words.
-    points : the recording.
-    sizes : dimensions that enter the model.
-    noise_scale : (m,) standard uncertainty of each observation, per unit of that of one coordinate.
-    measurement, repeat : (m,) what each observation belongs to.
-    rows : (m, j) the points that each observation speaks of, as rows of the recording.
-    """
+    """One artefact as recorded: m observations of n points."""
 
     kind: str  # as in ``[artefact] kind``
     title: Text  # in words
     points: Points  # the recording
     sizes: tuple[Size, ...]  # dimensions that enter the model
     noise_scale: Floats  # (m,) standard uncertainty of each observation, per unit of that of one coordinate
-    # measurement, repeat: (m,) what each observation belongs to
-    measurement: Ints
-    repeat: Ints
+    measurement: Ints  # (m,) what each observation belongs to
+    repeat: Ints  # (m,)
     rows: Ints  # (m, j) the points that each observation speaks of, as rows of the recording
 
     @property
@@ -142,20 +117,13 @@ class Artefact(ABC):
         return {effect.name: effect for effect in self.own_faults()}
 
     def acting(self, effect: Effect) -> Effect:
-        """An effect as it acts here: a fault of the artefact is that of this one.
-
-        Raises
-        ------
-        CmmUqError : this kind of artefact has no such fault.
-        """
+        """An effect as it acts here: a fault of the artefact is that of this one, and refused where it has none such."""
         if not effect.of_artefact or effect.belongs_to(self.points):
             return effect
         if effect.name not in self.faults:
-            raise CmmUqError(
-                f"a recording of kind {self.kind!r} has no {effect.name}",
-                where="job.toml [model] effects",
-                fix="Leave it out" + (f"; it has {', '.join(self.faults)}" if self.faults else ""),
-            )
+            fix = "Leave it out" + (f"; it has {', '.join(self.faults)}" if self.faults else "")
+            problem = f"a recording of kind {self.kind!r} has no {effect.name}"
+            raise CmmUqError(problem, where="job.toml [model] effects", fix=fix)
         return self.faults[effect.name]
 
     def words_of(self, observation: int) -> Text:

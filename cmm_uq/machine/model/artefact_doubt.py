@@ -30,8 +30,8 @@ from cmm_uq.machine.model.recorded import stated_sd
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_errors import GEOMETRY, PATTERN, Body, FaultyArtefact, OwnFault, deformations
 from cmm_uq.machine.physics.effects.own_states import BENDING, FIXTURE, FORM, LOBES, SET_UP_TEMPERATURE, TEMPERATURE
-from cmm_uq.maths.inference.doubt import Cause
 from cmm_uq.maths.inference.linear_model import Freedoms
+from cmm_uq.maths.inference.posterior import Cause
 
 CALIBRATION = say("calibration of the artefact")  # name of this cause
 _SAME_MM = 1e-6  # certified distances closer than this are of one place

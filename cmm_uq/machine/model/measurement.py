@@ -25,8 +25,7 @@ from cmm_uq.machine.model.recorded import Noise
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.superposition import About, Superposition
 from cmm_uq.maths.inference.curvature import bend, bent
-from cmm_uq.maths.inference.least_squares import LeastSquares, likeliest, solve
-from cmm_uq.maths.inference.linear_model import Freedoms, LinearModel, Unknown
+from cmm_uq.maths.inference.linear_model import Freedoms, LeastSquares, LinearModel, Unknown, likeliest, solve
 from cmm_uq.maths.inference.noise import Components
 from cmm_uq.maths.inference.posterior import NoisyPosterior
 
@@ -78,11 +77,9 @@ class RecordingModel:
             object.__setattr__(self, "used", np.ones(len(self.artefact.noise_scale), dtype=bool))
         for effect in self.effects:
             if effect.shape and effect.name not in self.shapes:
-                raise CmmUqError(
-                    f"{effect.name} has the nonlinear parameter {effect.shape[0].name}, which a report does not estimate",
-                    where="job.toml [model] effects",
-                    fix="Leave it out",
-                )
+                shape = effect.shape[0].name
+                problem = f"{effect.name} has the nonlinear parameter {shape}, which a report does not estimate"
+                raise CmmUqError(problem, where="job.toml [model] effects", fix="Leave it out")
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -102,10 +99,8 @@ class RecordingModel:
     ) -> dict[tuple[str, str], tuple[Floats, Unit]]:
         """Draws (N,), and unit, of every parameter as it is reported, then of the artefact's sizes, by key.
 
-        Parameters
-        ----------
-        draws : (N, k) of the unknowns.
-        owners : effects that are asked for; by default all, none of which may have a shape, and the artefact.
+        ``draws``: (N, k) of the unknowns. ``owners``: effects that are asked for; by default all, none of which may have a
+        shape, and the artefact.
         """
         found, column = {}, 0
         for effect in self.effects:
@@ -278,12 +273,7 @@ class RecordingModel:
     def simulate(self, coefficients: Floats, sizes: Floats, noise: Noise, random: np.random.Generator) -> Floats:
         """Indicated points (n, 3), mm, of a recording with the placings of this one, errors and noise drawn anew.
 
-        Parameters
-        ----------
-        coefficients : (k,) of the effects, in order.
-        sizes : (s,) true sizes of the artefact, mm.
-        noise : sizes of its components.
-        random : their source.
+        ``coefficients``: (k,) of the effects, in order. ``sizes``: (s,) true sizes of the artefact, mm.
         """
         exact = self.predicted(np.concatenate([coefficients, sizes]))
         return noise.displayed(exact + noise.drawn(self.artefact.points, random))

@@ -25,8 +25,7 @@ from cmm_uq.machine.physics.kinematics import euler_313, on_leaning_axes
 from cmm_uq.machine.physics.map_interpolation import LookedUp
 from cmm_uq.machine.physics.point_cloud import COORDINATES, DIGITIZER_COLUMNS
 from cmm_uq.maths.geometry import fit_plane, fit_sphere
-from cmm_uq.maths.geometry.feature import frame_about
-from cmm_uq.maths.geometry.orthogonal_distance import minimise
+from cmm_uq.maths.geometry.feature import frame_about, minimise
 
 
 @dataclass(frozen=True, eq=False)

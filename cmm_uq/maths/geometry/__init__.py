@@ -14,54 +14,27 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from cmm_uq.maths.geometry.association import Associated, Association, associate
     from cmm_uq.maths.geometry.axial import Cone, Cylinder, fit_cone, fit_cylinder
-    from cmm_uq.maths.geometry.feature import BallForm, Feature
+    from cmm_uq.maths.geometry.feature import BallForm, Feature, cap_directions
     from cmm_uq.maths.geometry.fits import Circle, Line, Plane, Sphere, fit_circle, fit_line, fit_plane, fit_sphere
-    from cmm_uq.maths.geometry.orthogonal_distance import cap_directions
     from cmm_uq.maths.geometry.placed import FeatureKind
     from cmm_uq.maths.geometry.repeated import Drawn, Repeated
 
 __all__ = [
-    "Associated",
-    "Association",
-    "BallForm",
-    "Circle",
-    "Cone",
-    "Cylinder",
-    "Drawn",
-    "Feature",
-    "FeatureKind",
-    "Line",
-    "Plane",
-    "Repeated",
-    "Sphere",
-    "associate",
-    "cap_directions",
-    "fit_circle",
-    "fit_cone",
-    "fit_cylinder",
-    "fit_line",
-    "fit_plane",
-    "fit_sphere",
-]
-
-_PLACES = {
-    "association": ("Associated", "Association", "associate"),
-    "axial": ("Cone", "Cylinder", "fit_cone", "fit_cylinder"),
-    "feature": ("BallForm", "Feature"),
-    "orthogonal_distance": ("cap_directions",),
-    "placed": ("FeatureKind",),
-    "repeated": ("Drawn", "Repeated"),
-    "fits": ("Circle", "Line", "Plane", "Sphere", "fit_circle", "fit_line", "fit_plane", "fit_sphere"),
-}
+    "Associated", "Association", "BallForm", "Circle", "Cone", "Cylinder", "Drawn", "Feature", "FeatureKind", "Line",
+    "Plane", "Repeated", "Sphere", "associate", "cap_directions", "fit_circle", "fit_cone", "fit_cylinder", "fit_line",
+    "fit_plane", "fit_sphere",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> object:
     """Loaded when it is first used: whoever needs a rotation needs no fit of a cone."""
-    place = next((module for module, names in _PLACES.items() if name in names), None)
-    if place is None:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()[name] = found = getattr(import_module(f"{__name__}.{place}"), name)
-    return found
+    # each imports none but those before it
+    for place in ("feature", "fits", "axial", "placed", "association", "repeated") if name in __all__ else ():
+        module = import_module(f"{__name__}.{place}")
+        if hasattr(module, name):
+            globals()[name] = found = getattr(module, name)
+            return found
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -20,14 +20,13 @@ from numpy.typing import ArrayLike
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.geometry.fits import largest_empty, narrower, narrowest, safe_radius
-from cmm_uq.maths.geometry.minimax import CIRCLE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE, Extremum, least_largest
-from cmm_uq.maths.geometry.placed import FeatureKind, Placed, placed
+from cmm_uq.maths.geometry.minimax import Extremum, least_largest
+from cmm_uq.maths.geometry.placed import BALLS, CYLINDER, LINE, PLANE, SIZED, STRAIGHT, FeatureKind, Placed, placed
 
 ROUNDING = 4 * float(np.finfo(np.float64).eps)  # of distances, as a share of the coordinates
 PERFECT = 1e4 * ROUNDING  # share of the coordinates below which contact points cannot be told from their neighbours
 SAME = 1e-9  # mm: two ways to the same optimum agree within this
 LEANING = 1e-6  # cosine between the normals of least squares and of the narrowest zone: they are across each other
-_BALLS = (CIRCLE, SPHERE)
 _NONE = np.zeros(0, dtype=np.int64)
 
 
@@ -99,14 +98,14 @@ def least_zone(of: Placed, local: Floats, near: Floats | None = None) -> Extreme
 
     ``near``: (k,) a state that is thought near it, of cylinders, cones and lines in space.
     """
-    if of.shape in (PLANE, LINE_IN_PLANE):
+    if of.shape in STRAIGHT:
         return _least_slab(of, local)
     sides = (1.0,) if of.shape is LINE else (1.0, -1.0)
     problem = _problem(of, local, sides, sized=True)
     if isinstance(problem, Extreme):
         return problem
     k = len(of.state)
-    if of.shape in _BALLS:
+    if of.shape in BALLS:
         return _least_ring(problem, k)
     first = [] if near is None else [(near - of.state) * of.units() / problem.scale]
     found = problem.solve(chain(first, _starts(k)))
@@ -164,7 +163,7 @@ def _line_gap(problem: _Problem, found: Extremum) -> float:
 
 def circumscribed(of: Placed, local: Floats) -> Extreme:
     """The smallest circle, sphere or cylinder about all points; of circles and spheres there is but one."""
-    return _one_sided(of, local, 1.0, 0.0 if of.shape in _BALLS else np.inf)
+    return _one_sided(of, local, 1.0, 0.0 if of.shape in BALLS else np.inf)
 
 
 def inscribed(of: Placed, local: Floats) -> Extreme:
@@ -196,8 +195,6 @@ def _one_sided(of: Placed, local: Floats, side: float, gap: float, centre: Float
 Association = Literal["least_squares", "minimum_zone", "maximum_inscribed", "minimum_circumscribed", "tangent"]
 ASSOCIATIONS: tuple[Association, ...] = get_args(Association)
 ALONG = 0.05  # cosine of the angle between a normal and ``outward`` below which the latter names no side
-_WITH_SIZE = (CIRCLE, SPHERE, CYLINDER)
-_STRAIGHT = (PLANE, LINE_IN_PLANE)
 _CRITERIA: Mapping[Association, Callable[[Placed, Floats], Extreme]] = {
     "minimum_zone": least_zone,
     "maximum_inscribed": inscribed,
@@ -242,14 +239,10 @@ def associate(
 ) -> Associated:
     """The feature that the criterion asks for.
 
-    Parameters
-    ----------
-    feature : ``"line"``, ``"plane"``, ``"circle"``, ``"sphere"``, ``"cylinder"`` or ``"cone"``.
-    points : (n, 3) in mm; (n, 2) of a line or circle in a plane. Points of a circle in space are projected along the normal
-        of its least-squares plane.
-    association : the criterion. ``"tangent"`` is of planes and of lines in a plane: outside the material, its largest distance
-        from it the least, as ISO 5459 asks of datums. Its direction is that of the minimum zone.
-    outward : (d,) direction out of the material, roughly: needed for ``"tangent"``; gives the normal of any plane its sense.
+    ``points``: (n, 3) in mm; (n, 2) of a line or circle in a plane. Points of a circle in space are projected along the normal
+    of its least-squares plane. ``association``: ``"tangent"`` is of planes and of lines in a plane: outside the material, its
+    largest distance from it the least, as ISO 5459 asks of datums. Its direction is that of the minimum zone. ``outward``:
+    (d,) direction out of the material, roughly: needed for ``"tangent"``; gives the normal of any plane its sense.
 
     Raises :class:`CmmUqError` for an unknown feature or criterion, points that do not determine the feature, or a criterion
     that neither they nor such a feature can meet.
@@ -261,7 +254,7 @@ def associate(
     local = of.local(array)
     if association == "tangent":
         return _tangent(feature, of, local, outward)
-    if association in ("maximum_inscribed", "minimum_circumscribed") and of.shape not in _WITH_SIZE:
+    if association in ("maximum_inscribed", "minimum_circumscribed") and of.shape not in SIZED:
         raise CmmUqError(f"{feature}: it has no size to be inscribed or circumscribed",
                          fix="Ask for circles, spheres and cylinders")  # fmt: skip
     if association == "least_squares":
@@ -298,7 +291,7 @@ def _answer(
 
 def _tangent(feature: FeatureKind, of: Placed, local: Floats, outward: ArrayLike | None) -> Associated:
     """The side of the minimum zone that looks out of the material."""
-    if of.shape not in _STRAIGHT:
+    if of.shape not in STRAIGHT:
         raise CmmUqError(f"{feature}: a tangent feature is a plane, or a line in a plane",
                          fix="Ask for maximum_inscribed or minimum_circumscribed")  # fmt: skip
     if outward is None:

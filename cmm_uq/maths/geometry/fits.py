@@ -1,5 +1,8 @@
 """Least-squares lines, planes, circles and spheres; the narrowest parallels, and a search for narrower rings or shells.
 
+Of every fit ``points`` are (n, 3), mm, of lines and circles also (n, 2), and ``u_point`` is the standard uncertainty of a
+point along the normal, mm, of lines and circles in space in either direction: estimated from the residuals when left out.
+
 The least distance of two parallels that hold all points comes from their convex hull: in a plane one of the lines runs along
 an edge of it; in space the planes touch a face and a corner, or two edges that face each other (M. E. Houle & G. T. Toussaint,
 IEEE Trans. PAMI 10 (1988) 761). All of these are looked at, so that the narrowest is the narrowest of all.
@@ -22,8 +25,8 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.maths.geometry.feature import Feature, frame_about, prepared, tilted, upward, with_known_radius
-from cmm_uq.maths.geometry.orthogonal_distance import Minimum, minimise, minimum_at, principal
+from cmm_uq.maths.geometry import feature
+from cmm_uq.maths.geometry.feature import Feature, Minimum, minimise, minimum_at, prepared, principal
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -46,17 +49,13 @@ class Line(Feature):
 
 
 def fit_line(points: ArrayLike, *, u_point: float | None = None) -> Line:
-    """Line through at least two points that do not coincide.
-
-    ``points``: (n, 3) or (n, 2) in mm. ``u_point``: standard uncertainty of a point across the line in each direction, mm;
-    estimated when left out.
-    """
+    """Line through at least two points that do not coincide."""
     about, centroid, extent = prepared(points, "line", 2, (2, 3), extended=1)
     if extent == 0:
         raise CmmUqError("line: all points are in one place", fix="Measure points that spread along the line")
-    direction = upward(principal(about)[0])
+    direction = feature.upward(principal(about)[0])
     # (d − 1, d) unit vectors across it
-    across = np.array([[-direction[1], direction[0]]]) if len(direction) == 2 else frame_about(direction)[:2]
+    across = np.array([[-direction[1], direction[0]]]) if len(direction) == 2 else feature.frame_about(direction)[:2]
     along, offsets = direction @ about, across @ about
     k = len(across)
     rows = np.zeros((2 * k + 1, k, about.shape[1]))
@@ -82,13 +81,9 @@ class Plane(Feature):
 
 
 def fit_plane(points: ArrayLike, *, u_point: float | None = None) -> Plane:
-    """Plane through at least three points, not on one line.
-
-    ``points``: (n, 3) in mm. ``u_point``: standard uncertainty of a point along the normal, mm; estimated from the residuals
-    when left out.
-    """
+    """Plane through at least three points, not on one line."""
     about, centroid, extent = prepared(points, "plane", 3)
-    frame = frame_about(upward(principal(about)[2]))
+    frame = feature.frame_about(feature.upward(principal(about)[2]))
     x, y, z = frame @ about
     found = minimum_at(frame, np.array([x, y, np.full(len(x), -1.0), z]), "plane")
     natural = np.zeros((6, 3))
@@ -170,16 +165,12 @@ class Sphere(Feature):
 
 
 def fit_sphere(points: ArrayLike, *, u_point: float | None = None) -> Sphere:
-    """Sphere through at least four points, not all in one plane.
-
-    ``points``: (n, 3) in mm. ``u_point``: standard uncertainty of a point along the normal, mm; estimated from the residuals
-    when left out. Raises :class:`CmmUqError` where a cap is so small that the radius is not determined.
-    """
+    """Sphere through at least four points, not all in one plane; refused where a cap leaves the radius open."""
     about, centroid, extent = prepared(points, "sphere", 4, extended=3)
     found = radial_minimum(about, "sphere")
     centre, radius = centroid + extent * found.state[:3], float(extent * found.state[3])
     figures = found, extent, "x y z r", extent * np.eye(4), u_point
-    return with_known_radius(Sphere.of_minimum(*figures, centre=centre, radius=radius), radius)
+    return feature.with_known_radius(Sphere.of_minimum(*figures, centre=centre, radius=radius), radius)
 
 
 def radial_minimum(about: Floats, what: str) -> Minimum[Floats]:
@@ -222,11 +213,7 @@ class Circle(Feature):
 
 
 def fit_circle(points: ArrayLike, *, u_point: float | None = None) -> Circle:
-    """Circle through at least three points, not on one line.
-
-    ``points``: (n, 2), or (n, 3) for a circle in space, mm. ``u_point``: standard uncertainty of a point radially, and in
-    space along the normal, mm; estimated when left out.
-    """
+    """Circle through at least three points, not on one line."""
     about, centroid, extent = prepared(points, "circle", 3, (2, 3))
     if len(about) == 3:
         circle = _circle_in_space(about, centroid, extent, u_point)
@@ -235,7 +222,7 @@ def fit_circle(points: ArrayLike, *, u_point: float | None = None) -> Circle:
         centre, radius = centroid + extent * found.state[:2], float(extent * found.state[2])
         figures = found, extent, "x y r", extent * np.eye(3), u_point
         circle = Circle.of_minimum(*figures, centre=centre, radius=radius, normal=None)
-    return with_known_radius(circle, circle.radius)
+    return feature.with_known_radius(circle, circle.radius)
 
 
 class _Placed(NamedTuple):
@@ -261,9 +248,9 @@ def _circle_in_space(about: Floats, centroid: Floats, extent: float, u_point: fl
 
     def move(state: _Placed, step: Floats) -> _Placed:
         centre = state.centre + step[:3] @ state.frame
-        return _Placed(tilted(state.frame, step[3], step[4]), centre, float(state.radius + step[5]))
+        return _Placed(feature.tilted(state.frame, step[3], step[4]), centre, float(state.radius + step[5]))
 
-    frame = frame_about(upward(principal(about)[2]))
+    frame = feature.frame_about(feature.upward(principal(about)[2]))
     flat = radial_minimum((frame @ about)[:2], "circle")
     start = _Placed(frame, flat.state[:2] @ frame[:2], float(flat.state[2]))
     found = minimise(start, linearise, move, "circle")

@@ -17,9 +17,8 @@ from numpy.typing import ArrayLike
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.association import circumscribed, inscribed as largest_inside, least_zone
-from cmm_uq.maths.geometry.exchange import SCREENED, held, least_zones
-from cmm_uq.maths.geometry.minimax import CIRCLE, CYLINDER, LINE, SPHERE
-from cmm_uq.maths.geometry.placed import FeatureKind, Placed, placed
+from cmm_uq.maths.geometry.minimax import SCREENED, held, least_zones
+from cmm_uq.maths.geometry.placed import LINE, SIZED, FeatureKind, Placed, placed
 
 SETTLED = 1e-9  # steps, mm, below which a draw is at its minimum; what is left is far smaller
 # the first steps are with the normal equations of the nominal points. They settle slowly, or not at all, where points are off
@@ -77,12 +76,9 @@ class Repeated:
 
     ``kind``: ``"line"``, ``"plane"``, ``"circle"``, ``"sphere"``, ``"cylinder"`` or ``"cone"``. ``points``: (n, 3)
     nominal points on it, mm; (n, 2) of a line or circle in a plane. A circle of points in space is the circle of their
-    projections along the nominal normal. Errors of the points, ``displacements``, are (N, n, d) mm, small against the feature.
+    projections along the normal. Errors of the points, ``displacements``, are (N, n, d) mm, small against the feature.
 
-    Raises
-    ------
-    CmmUqError : points that do not determine the feature; displacements of the wrong shape, that are not finite, or so large
-        that a draw does not settle.
+    Refused are points that do not determine the feature, and displacements so large that a draw does not settle.
     """
 
     def __init__(self, kind: FeatureKind, points: ArrayLike) -> None:
@@ -165,7 +161,7 @@ class Repeated:
         where errors leave a feature of few points nearly perfect, one may be larger by less than a nanometre. Raises
         :class:`CmmUqError` for a feature without a size too, or points that hold no such one.
         """
-        if self.placed.shape not in (CIRCLE, SPHERE, CYLINDER):
+        if self.placed.shape not in SIZED:
             raise CmmUqError(f"{self.placed.shape.name}: it has no size to be inscribed or circumscribed",
                              fix="Ask for circles, spheres and cylinders")  # fmt: skip
         errors, alone = self._checked(displacements), largest_inside if inscribed else circumscribed

@@ -27,7 +27,8 @@ from scipy import linalg, special
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.inference.ensembles import ENSEMBLES, Progress, run_ensembles
 from cmm_uq.maths.inference.linear_model import LinearModel
-from cmm_uq.maths.inference.posterior import SIGMA_BOUNDS, NoisyPosterior, Posterior
+from cmm_uq.maths.inference.marginal import SIGMA_BOUNDS
+from cmm_uq.maths.inference.posterior import NoisyPosterior, Posterior
 from cmm_uq.maths.inference.proposals import Proposal
 
 NEGLIGIBLE = 0.02  # of a standard uncertainty

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,26 +28,18 @@ SHARES = (0.9, 0.1)  # how often the step is an independence proposal, and one o
 _AHEAD = 40  # most steps that are drawn ahead
 
 
-@dataclass(frozen=True, eq=False)
-class _Independent:
+class _Independent(NamedTuple):
     """Independence proposals (w, d), logarithms of what they come from and of the density, and what decides on them, (w,)."""
 
     proposed: Floats
     log_proposal: Floats
     log_density: Floats
     uniform: Floats
-    log_before: Floats = field(default_factory=lambda: np.zeros(0))
+    log_before: Floats = np.zeros(0)  # of the proposal, where the walkers are
 
     def rand(self, _: int) -> Floats:
         """What emcee takes from a source of random numbers."""
         return self.uniform
-
-    @classmethod
-    def together(cls, steps: Sequence[_Independent], log_before: Floats) -> _Independent:
-        """Those of several ensembles as those of one; ``log_before``: (w,) of the proposal, where the walkers are."""
-        each = ((step.proposed, step.log_proposal, step.log_density, step.uniform) for step in steps)
-        proposed, log_proposal, log_density, uniform = (np.concatenate(of) for of in zip(*each, strict=True))
-        return cls(proposed, log_proposal, log_density, uniform, log_before)
 
 
 class SideBySide:
@@ -78,7 +70,8 @@ class SideBySide:
                     self._log_proposal[moved] = self._proposal.log_density(state.coords[moved])
         if independent := [step for step in chosen if step is not None]:
             rows = of_ensemble[[step is not None for step in chosen]].ravel()
-            several = _Independent.together(independent, self._log_proposal[rows])
+            each = zip(*(step[:4] for step in independent), strict=True)
+            several = _Independent._make([*map(np.concatenate, each), self._log_proposal[rows]])
             known = model._replace(random=several, compute_log_prob_fn=lambda _: (several.log_density, None))
             self._move(self._independence, known, state, rows, accepted)
             self._log_proposal[rows] = np.where(accepted[rows], several.log_proposal, several.log_before)
@@ -127,20 +120,26 @@ _WINDOW = 5.0  # autocorrelation times that are summed over
 Progress = Callable[[float], None]
 
 
-@dataclass(frozen=True, eq=False)
-class Chains:
-    """Draws from a density, and whether they can be trusted."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Convergence:
+    """Whether draws can be trusted, by the worst of all parameters."""
 
-    draws: Floats  # (N, d) in the density's own parameters: ensembles, steps and walkers in this order
     sampler: str  # program and version
-    ess_min: float  # effective samples, fewest of all parameters
-    rhat_max: float  # rank-normalised R-hat, worst of all parameters
+    ess_min: float  # effective samples, the fewest
+    rhat_max: float  # rank-normalised R-hat, the largest
     steps: int  # of each chain
     autocorrelation_time: float  # the longest
 
     @property
     def converged(self) -> bool:
-        return converged(self.ess_min, self.rhat_max, self.steps, self.autocorrelation_time)
+        """At least 1000 effective samples, R-hat below 1.01, and chains longer than 50 autocorrelation times."""
+        enough, long = self.ess_min >= LEAST_EFFECTIVE_SAMPLES, self.steps > 50 * self.autocorrelation_time
+        return bool(enough and self.rhat_max < LARGEST_RHAT and long)
+
+
+@dataclass(frozen=True, eq=False)
+class Chains(Convergence):
+    draws: Floats  # (N, d) in the density's own parameters: ensembles, steps and walkers in this order
 
     @property
     def quality(self) -> dict[str, Any]:
@@ -153,11 +152,6 @@ class Chains:
     def thinned(self, every: int) -> Floats:
         by_step = self.draws.reshape(ENSEMBLES, self.steps, -1, self.draws.shape[1])
         return np.asarray(by_step[:, every - 1 :: every].reshape(-1, self.draws.shape[1]))
-
-
-def converged(ess_min: float, rhat_max: float, steps: int, autocorrelation_time: float) -> bool:
-    """At least 1000 effective samples, R-hat below 1.01, and chains longer than 50 autocorrelation times."""
-    return bool(ess_min >= LEAST_EFFECTIVE_SAMPLES and rhat_max < LARGEST_RHAT and steps > 50 * autocorrelation_time)
 
 
 def run_ensembles(
@@ -194,7 +188,8 @@ def run_ensembles(
         if (effective >= effective_samples and steps > 50 * time) or steps >= MOST_STEPS:
             break
     draws = proposal.parameters(chains.reshape(-1, d))
-    return Chains(draws, f"emcee {emcee.__version__}", effective, rhat(chains.reshape(ENSEMBLES, -1, d)), steps, time)
+    quality = {"ess_min": effective, "rhat_max": rhat(chains.reshape(ENSEMBLES, -1, d)), "autocorrelation_time": time}
+    return Chains(draws, sampler=f"emcee {emcee.__version__}", steps=steps, **quality)
 
 
 def _randoms(seed: int) -> list[Any]:

@@ -13,8 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.maths.inference.least_squares import LeastSquares
-from cmm_uq.maths.inference.linear_model import Freedoms, LinearModel
+from cmm_uq.maths.inference.linear_model import Freedoms, LeastSquares, LinearModel
 from cmm_uq.maths.inference.noise import GROWING, Components, Sizes, slow_variances
 from cmm_uq.maths.inference.slow import SlowFirst, groups, products
 

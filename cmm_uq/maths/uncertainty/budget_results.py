@@ -9,8 +9,7 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, in_a_row, number, say
-from cmm_uq.maths.uncertainty.budget import Budget
-from cmm_uq.maths.uncertainty.evaluation import NAMES
+from cmm_uq.maths.uncertainty.budget import NAMES, Budget
 from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 
 if TYPE_CHECKING:

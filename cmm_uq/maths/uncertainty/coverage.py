@@ -27,10 +27,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.uncertainty.type_a import check_coverage
 
-_PILOT, _MARGIN = (
-    100_000,
-    6.0,
-)  # draws that say where the tails lie, and standard deviations of that estimate kept besides
+_PILOT, _MARGIN = 100_000, 6.0  # draws that say where the tails lie, and standard deviations of that estimate besides
 _FEWEST_FOR_CURVE, _SPAN, _DEGREE, _POINTS = 500, 1.5, 4, 200
 _EDGE = _LONGER = 0.01
 _FEWEST_FOR_FLATNESS, _FLAT = 5000, 10.0
@@ -219,30 +216,25 @@ def _quantile(distances: Floats, coverage: float) -> float:
     return float(np.sort(distances)[int(np.ceil(coverage * len(distances))) - 1])
 
 
-@dataclass(frozen=True)
-class Tail:
-    shape: float  # k of the generalised Pareto distribution
-    unseen: float  # what draws beyond the largest would add to the mean square about the mean; may be infinite
-
-
 def draws_in_tail(trials: int) -> int:
     """How many of the largest draws are its tail."""
     return int(min(0.2 * trials, 3 * np.sqrt(trials)))
 
 
-def tail_of(largest: Floats, mean: float, trials: int) -> Tail:
+def tail_of(largest: Floats, mean: float, trials: int) -> tuple[float, float]:
+    """Shape k, and what draws beyond the largest would add to the mean square about the mean; it may be infinite."""
     excess = largest[1:] - largest[0]
     if len(excess) < 5 or not excess[-1] > 0 or not np.isfinite(excess[-1]):
-        return Tail(-np.inf, 0.0)
+        return -np.inf, 0.0
     (shape, scale), count = pareto(excess), len(excess)
     heavier = shape + _ERRORS * (1 + max(shape, 0.0)) / np.sqrt(count)
     if heavier >= NO_VARIANCE:
-        return Tail(shape, float("inf"))
+        return shape, float("inf")
     # ∫ (y − mean)² over what is exceeded once in all trials
     further = scale * (np.log(count) if abs(heavier) < 1e-9 else (count**heavier - 1) / heavier)
     start, spread = float(largest[0]) - mean + further, scale + heavier * further
     beyond = start**2 + 2 * start * spread / (1 - heavier) + 2 * spread**2 / ((1 - heavier) * (1 - 2 * heavier))
-    return Tail(shape, float(beyond) / trials)
+    return shape, float(beyond) / trials
 
 
 def pareto(excess: Floats) -> tuple[float, float]:

@@ -55,7 +55,6 @@ def t_shape(dof: float) -> DistributionShape:
 
 
 def gamma_shape(order: float) -> DistributionShape:
-
     return DistributionShape(
         order, lambda rng, n: rng.standard_gamma(order, n), lambda p: np.asarray(special.gammaincinv(order, p))
     )
@@ -147,14 +146,20 @@ def constant(value: Number) -> Distribution:
     return Distribution("constant", value, 0.0, value, 1.0, POINT)
 
 
-def normal(value: Number, u: Number, dof: Number = np.inf) -> Distribution:
+def normal(value: Number, u: Number, dof: Number = np.inf, kind: str = "normal") -> Distribution:
     """Estimate and standard uncertainty (JCGM 101 6.4.7); with finite ``dof`` it is drawn as t (6.4.9.7)."""
-    return _normal_or_t("normal", value, u, dof)
+    _finite(value=value, u=u)
+    _positive(u=u)
+    _known(dof)
+    shape: DistributionShape | None = NORMAL
+    if not np.all(np.isinf(dof)):
+        shape = t_shape(float(dof)) if np.ndim(dof) == 0 else None
+    return Distribution(kind, value, u, value, u, shape, dof)
 
 
 def student_t(value: Number, u: Number, dof: Number) -> Distribution:
     """Scaled and shifted t, as for n indications (JCGM 101 6.4.9): value x̄, u = s/√n, dof = n − 1."""
-    return _normal_or_t("t", value, u, dof)
+    return normal(value, u, dof, "t")
 
 
 def rectangular(low: Number, high: Number, dof: Number = np.inf) -> Distribution:
@@ -227,16 +232,6 @@ def sampled(draws: Floats, together: str = "") -> Distribution:
     _need(shape.variance > 0, "all draws are the same", "Give the value as a constant")
     u = float(np.sqrt(shape.variance))
     return Distribution("sampled", float(values.mean()), u, 0.0, 1.0, shape, together=together, draws=values)
-
-
-def _normal_or_t(kind: str, value: Number, u: Number, dof: Number) -> Distribution:
-    _finite(value=value, u=u)
-    _positive(u=u)
-    _known(dof)
-    shape: DistributionShape | None = NORMAL
-    if not np.all(np.isinf(dof)):
-        shape = t_shape(float(dof)) if np.ndim(dof) == 0 else None
-    return Distribution(kind, value, u, value, u, shape, dof)
 
 
 def _bounded(

@@ -13,7 +13,6 @@ from contextlib import suppress
 from dataclasses import astuple, dataclass, field, replace
 from html import escape
 from math import inf
-from typing import Literal
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, commas, foreign, names, say, semicolons
 from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.uncertainty.budget import Budget, Labels, budget_of, joint_line, line_of
+from cmm_uq.maths.uncertainty.budget import NAMES, Budget, Labels, Method, budget_of, joint_line, line_of
 from cmm_uq.maths.uncertainty.correlation import correlation_of
 from cmm_uq.maths.uncertainty.coverage import NO_VARIANCE
 from cmm_uq.maths.uncertainty.distributions import constant
@@ -38,12 +37,6 @@ from cmm_uq.maths.uncertainty.propagation import Propagated, first_order, second
 from cmm_uq.maths.uncertainty.quantity import figure, rounded
 from cmm_uq.maths.uncertainty.type_a import check_coverage, coverage_factor
 
-Method = Literal["first", "second", "monte_carlo"]
-NAMES: Mapping[Method, Text] = {
-    "first": say("first order"),
-    "second": say("second order"),
-    "monte_carlo": say("Monte Carlo"),
-}
 METHODS = (*NAMES, "auto")
 _OF_TOLERANCE = 5.0  # δ over the error of Monte Carlo that leaves any comparison as it is
 _ROUNDING = 4e-16

@@ -22,8 +22,7 @@ from cmm_uq.maths.uncertainty.type_a import check_coverage
 BLOCK = 10_000
 LARGEST = 20_000_000
 HIGHEST_COVERAGE = 0.9999  # of the adaptive procedure, whose blocks have 100/(1 − p) trials (JCGM 101 7.9.4 b).
-_FEWEST_BLOCKS, _FEWEST_TRIALS = 10, 1_000_000
-_BINS = 200
+_FEWEST_BLOCKS, _BINS = 10, 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +44,7 @@ class Simulated:
     interval: Floats  # (p, 2) shortest coverage intervals
     symmetric_interval: Floats  # (p, 2) probabilistically symmetric coverage intervals
     standard_error: Floats  # (p, 6) of value, u and the ends of both intervals; ``nan`` for fewer than two blocks
-    stable: (
-        bool | None
-    )  # all figures within their numerical tolerance, rare draws included; None when no digits are asked for
+    stable: bool | None  # all figures within their tolerance, rare draws included; None when no digits are asked for
     shape: Floats  # (p,) of the heavier tail of each output (:mod:`cmm_uq.maths.uncertainty.coverage`).
     unseen: Floats  # (p,) by how much u would be larger with draws too rare to have come; may be infinite
     edges: Floats  # (p, b + 1) of the histogram of the output, for pictures
@@ -59,52 +56,33 @@ class Simulated:
         return np.asarray(np.sqrt(np.diagonal(self.covariance)))
 
 
-def simulate(model: MeasurementModel, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
-    return from_source(_source(model), trials, coverage, seed)
-
-
-def from_source(source: Source, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
-    """Make a given number of trials of any source."""
+def simulate(model: MeasurementModel | Source, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
+    """Make a given number of trials."""
     check_coverage(coverage)
     if trials < (fewest := int(np.ceil(2 / (1 - coverage)))):
         problem = f"{trials} trials cannot give a {coverage:.4g} coverage interval"
         raise CmmUqError(problem, fix=f"Make at least {fewest}")
-    run = _Run(source, coverage, seed)
+    run = _Run(_source(model), coverage, seed)
     while run.trials < trials:
         run.advance(min(BLOCK, trials - run.trials))
     return run.result(None)
 
 
 def simulate_adaptively(
-    model: MeasurementModel,
+    model: MeasurementModel | Source,
     coverage: float = 0.95,
     digits: int = 2,
     seed: int = 0,
     largest: int = LARGEST,
     settled: Callable[[Floats, Floats], bool] = lambda figures, errors: True,
+    fewest_trials: int = 1_000_000,
 ) -> Simulated:
     """Make trials until value, u and the ends of the shortest interval are known to ``digits`` digits of u (7.9.4).
 
-    At least a million are made (7.2.2), since the first few blocks can agree by chance and they cost little.
-
     ``largest``: trials after which it stops whether or not the figures are stable. ``settled``: further condition on the
     figures (p, 6) and their standard errors (p, 6), in the order of :class:`Simulated`; a validation asks here for more.
-    """
-    return settled_source(_source(model), coverage, digits, seed, largest, settled)
-
-
-def settled_source(
-    source: Source,
-    coverage: float = 0.95,
-    digits: int = 2,
-    seed: int = 0,
-    largest: int = LARGEST,
-    settled: Callable[[Floats, Floats], bool] = lambda figures, errors: True,
-    fewest_trials: int = _FEWEST_TRIALS,
-) -> Simulated:
-    """The same of any source: see :func:`simulate_adaptively`.
-
-    ``fewest_trials``: before it may stop; fewer than a million where each costs more than arithmetic.
+    ``fewest_trials``: before it may stop. A million (7.2.2) cost little, and the first few blocks can agree by chance; fewer
+    where each costs more than arithmetic.
     """
     check_coverage(coverage)
     if coverage > HIGHEST_COVERAGE:
@@ -112,7 +90,7 @@ def settled_source(
             f"a coverage probability of {coverage} needs {100 / (1 - coverage):.2g} trials for one look at the tails",
             fix=f"Ask for at most {HIGHEST_COVERAGE}, or use the law of propagation",
         )
-    run = _Run(source, coverage, seed)
+    run = _Run(_source(model), coverage, seed)
     block = max(BLOCK, int(np.ceil(100 / (1 - coverage))))
     most = max(largest // block, _FEWEST_BLOCKS)
     fewest = min(max(fewest_trials // block, _FEWEST_BLOCKS), most)
@@ -149,8 +127,10 @@ def numerical_tolerance(u: Floats, digits: int) -> Floats:
     return tolerance
 
 
-def _source(model: MeasurementModel) -> Source:
+def _source(model: MeasurementModel | Source) -> Source:
     """Outputs of a model, of joint draws of its inputs."""
+    if isinstance(model, Source):
+        return model
     model.must_be_at_one_point()
     for name, given in model.inputs.items():
         if not np.isfinite(given.standard_deviation):
@@ -238,10 +218,10 @@ class _Run:
         count, shapes, unseen = draws_in_tail(self.trials) + 1, [], []
         for mean, square, tails in zip(self._mean, np.diagonal(self._comoment), self._tails, strict=True):
             lowest, highest = tails.extremes(count)
-            both = tail_of(highest, mean, self.trials), tail_of(-lowest[::-1], -mean, self.trials)
+            above, below = tail_of(highest, mean, self.trials), tail_of(-lowest[::-1], -mean, self.trials)
             variance = square / (self.trials - 1)
-            shapes.append(max(tail.shape for tail in both))
-            unseen.append(np.sqrt(variance + sum(tail.unseen for tail in both)) - np.sqrt(variance))
+            shapes.append(max(above[0], below[0]))
+            unseen.append(np.sqrt(variance + (above[1] + below[1])) - np.sqrt(variance))
         return np.array(shapes), np.array(unseen)
 
     def result(self, stable: bool | None) -> Simulated:

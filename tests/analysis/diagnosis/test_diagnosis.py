@@ -31,7 +31,7 @@ from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.artefacts.constructions import indicated, plate
 from tests.conftest import ROOT
-from tests.machine.model.test_leaning_axes import LENGTH, recorded
+from tests.machine.model.test_bending import LENGTH, recorded
 from tests.recordings import TRAVEL, bar_facts, bars, suggested, with_columns
 
 SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")

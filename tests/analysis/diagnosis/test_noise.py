@@ -12,7 +12,7 @@ from cmm_uq.analysis.diagnosis.noise import has_heavy_tails, probable_tails
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.machine.model.noise import noise_of
-from cmm_uq.maths.inference.least_squares import studentised
+from cmm_uq.maths.inference.linear_model import studentised
 
 TRIANGLE = Path(__file__).parents[3] / "examples" / "triangle-simulated"
 

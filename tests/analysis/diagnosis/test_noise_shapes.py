@@ -20,8 +20,7 @@ from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.units import unit
 from cmm_uq.machine.model import RecordingModel
-from cmm_uq.maths.inference.least_squares import solve
-from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+from cmm_uq.maths.inference.linear_model import LinearModel, Unknown, solve
 from tests.maths.inference.test_noise import M, components
 
 

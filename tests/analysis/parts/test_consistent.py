@@ -13,7 +13,7 @@ from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
 from cmm_uq.analysis.parts.result import StatedCharacteristic, conforming, middle, stated
 from cmm_uq.app.commands.parts.part import _together
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
+from cmm_uq.maths.uncertainty.monte_carlo import Source, simulate
 from tests.parts_drawn import circle
 
 N = 20_000
@@ -36,7 +36,7 @@ def all_of(
     errors: Floats, measured: Floats, plan: Plan
 ) -> tuple[tuple[StatedCharacteristic, ...], Floats, float, list[LimitDecision]]:
     names = [one.name for one in plan.characteristics]
-    simulated = from_source(Source(names, lambda random, n: errors.T.copy()), N)
+    simulated = simulate(Source(names, lambda random, n: errors.T.copy()), N)
     each, together = conforming(plan, errors, measured)
     decided = []
     for i, one in enumerate(plan.characteristics):

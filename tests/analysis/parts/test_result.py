@@ -15,7 +15,7 @@ from cmm_uq.analysis.conformity.limits import Limits
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, Plan
 from cmm_uq.analysis.parts.result import StatedCharacteristic, conforming, deviations_of, stated, within_bounds
-from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
+from cmm_uq.maths.uncertainty.monte_carlo import Source, simulate
 from tests.parts_drawn import UP, block, circle, plane, spot
 
 PLAN = Plan(
@@ -33,7 +33,7 @@ ERRORS = np.repeat(DRAWS, 2, axis=1)
 def of(value: float) -> tuple[StatedCharacteristic, ...]:
     """What is stated of a zone and a size of the same value, measured 0.25 above it."""
     blocks = iter(np.split(ERRORS.T, 20, axis=1))
-    simulated = from_source(Source(["zone", "size"], lambda random, n: next(blocks).copy()), len(ERRORS))
+    simulated = simulate(Source(["zone", "size"], lambda random, n: next(blocks).copy()), len(ERRORS))
     return stated(simulated, np.full(2, value + 0.25), PLAN, ERRORS)
 
 
@@ -71,7 +71,7 @@ def test_a_zone_far_below_zero_is_zero_and_no_smaller_than_its_error_may_be() ->
 def test_the_value_of_a_zone_is_as_often_too_large_as_too_small() -> None:
     """Errors of an exponential distribution of mean one: ln 2 in the middle. A size is less their mean."""
     errors = np.repeat(np.random.default_rng(1).exponential(size=(200_000, 1)), 2, axis=1)
-    simulated = from_source(Source(["zone", "size"], lambda random, n: errors[:n].T.copy()), 1000)
+    simulated = simulate(Source(["zone", "size"], lambda random, n: errors[:n].T.copy()), 1000)
     zone, size = stated(simulated, np.full(2, 5.0), PLAN, errors)
     assert zone.value == pytest.approx(5 - np.log(2), abs=0.01)
     assert size.value == pytest.approx(4.0, abs=0.1)

@@ -18,7 +18,7 @@ from cmm_uq.artefacts.ballbar import ballbar
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import RecordingModel
-from cmm_uq.maths.inference.least_squares import solve
+from cmm_uq.maths.inference.linear_model import solve
 from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, SIX, setting
 
 SIGMA, OFFSET, GROWTH = 1e-3, 1.5e-3, 2e-3

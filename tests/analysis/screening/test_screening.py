@@ -29,7 +29,7 @@ from cmm_uq.base.points import Points
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
-from cmm_uq.maths.inference.least_squares import LeastSquares
+from cmm_uq.maths.inference.linear_model import LeastSquares
 from tests.recordings import bar_facts, with_columns
 
 

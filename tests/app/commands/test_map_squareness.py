@@ -18,7 +18,7 @@ from cmm_uq.artefacts.error_maps.diagnosis import squareness_findings, squarenes
 from cmm_uq.artefacts.error_maps.page import maps_results
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.machine.model.machine_maps import maps_of
+from cmm_uq.machine.model.predicted_errors import maps_of
 from tests.app.commands.test_compensate import straight
 from tests.conftest import ROOT
 

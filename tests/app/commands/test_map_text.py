@@ -12,7 +12,7 @@ from cmm_uq.app.commands.jobs.compensate import write_compensated
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import ARCSECOND
-from cmm_uq.machine.model.machine_maps import maps_of
+from cmm_uq.machine.model.predicted_errors import maps_of
 from cmm_uq.machine.physics.error_map import parse_map_file, read_error_map, read_error_map_text
 from tests.app.cli.process import run
 from tests.app.commands.test_compensate import straight

@@ -1,4 +1,4 @@
-"""The components that recordings could show, against the covariance of noise drawn at the points."""
+"""Components of noise that a recording could show."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, artefact_of, kind_of
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import Noise, RecordingModel
-from cmm_uq.machine.model.noise import mean_and_contrasts, noise_of
+from cmm_uq.machine.model.noise import mean_and_contrasts, noise_of, repeated_quantity
 from cmm_uq.maths.inference.noise import AXES, GROWTH, PLACING, SLOW, Sizes
 from tests.artefacts.constructions import plate
 
@@ -110,3 +110,24 @@ def test_repeats_are_turned_to_their_mean_and_what_is_orthogonal_to_it(repeats: 
 
 def test_ten_thousand_repeats_take_no_square_matrix() -> None:
     assert mean_and_contrasts(10_000).nnz < 3 * 100 * 10_000
+
+
+@pytest.mark.parametrize(
+    ("example", "observations_a_reading"),
+    [("bryan-simulated", 1), ("step-gauge-simulated", 1), ("sphere-simulated", 1), ("plate-simulated", 3)],
+)
+def test_observations_repeat_each_other_when_they_are_one_quantity_of_one_placing(
+    example: str, observations_a_reading: int
+) -> None:
+    model, _ = screened_model(read_job(EXAMPLES / example))
+    artefact = model.artefact
+    number = repeated_quantity(model, model.used)
+    points = artefact.points.point[artefact.rows][model.used]
+    assert len(number) == model.used.sum()
+    for k in np.unique(number):
+        same = number == k
+        assert len(np.unique(artefact.measurement[model.used][same])) == 1
+        assert len(np.unique(points[same], axis=0)) == 1
+        assert len(np.unique(artefact.repeat[model.used][same])) == same.sum()
+    readings = np.unique(np.column_stack([artefact.measurement[model.used], points]), axis=0)
+    assert len(np.unique(number)) == observations_a_reading * len(readings)

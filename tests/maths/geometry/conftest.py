@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.geometry.reference_sets import points_with_known_fit
+from tests.maths.geometry.reference_sets import points_with_known_fit
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,7 @@ from scipy.optimize import linprog
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.geometry import associate
 from cmm_uq.maths.geometry.placed import placed
-from cmm_uq.maths.geometry.reference_sets import points_with_known_fit, points_with_known_zone
-from tests.maths.geometry.surfaces import surface
+from tests.maths.geometry.reference_sets import points_with_known_fit, points_with_known_zone, surface
 
 TURN = np.linalg.qr(np.random.default_rng(8).normal(size=(3, 3)))[0]
 ROUND = ("circle", "sphere", "cylinder")

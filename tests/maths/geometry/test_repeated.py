@@ -11,16 +11,15 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.geometry import (
     Repeated,
     associate,
-    exchange,
     fit_circle,
     fit_cone,
     fit_cylinder,
     fit_line,
     fit_plane,
     fit_sphere,
+    minimax,
 )  # fmt: skip
-from cmm_uq.maths.geometry.reference_sets import points_with_known_fit, points_with_known_zone
-from tests.maths.geometry.surfaces import surface
+from tests.maths.geometry.reference_sets import points_with_known_fit, points_with_known_zone, surface
 
 FITS = {"line": fit_line, "plane": fit_plane, "circle": fit_circle, "sphere": fit_sphere, "cylinder": fit_cylinder,
         "cone": fit_cone}  # fmt: skip
@@ -154,7 +153,7 @@ def test_draws_that_the_exchange_leaves_open_are_found_one_by_one(monkeypatch):
     displaced = errors(points, 3)
     of = Repeated("cylinder", points)
     expected = of.minimum_zone(displaced)
-    monkeypatch.setattr(exchange, "MOST_STEPS", 0)
+    monkeypatch.setattr(minimax, "MOST_STEPS", 0)
     found = of.minimum_zone(displaced)
     np.testing.assert_allclose(found.form, expected.form, rtol=0, atol=1e-9)
     np.testing.assert_allclose(found.size, expected.size, rtol=0, atol=1e-9)
@@ -166,7 +165,7 @@ def test_the_exchange_leaves_no_plane_circle_or_sphere_open(kind):
     of = Repeated(kind.split(" ", maxsplit=1)[0], points)
     local = of.placed.local(points + errors(points, 200))
     start = np.tile(of.placed.state, (200, 1))
-    left = exchange.least_zones(of.placed.shape, start, local, of.placed.units())[2]
+    left = minimax.least_zones(of.placed.shape, start, local, of.placed.units())[2]
     assert not len(left)
 
 
@@ -210,7 +209,7 @@ def test_each_draw_has_the_extreme_size_that_it_has_alone(kind, inscribed, monke
         alone = associate(kind, points + displaced[i], how)
         assert abs(drawn.size[i] - alone.size) < 1e-9
         assert abs(drawn.form[i] - alone.form) < 1e-6  # where it stands is held less well than how large it is
-    monkeypatch.setattr("cmm_uq.maths.geometry.exchange.MOST_BOXES", 0)
+    monkeypatch.setattr("cmm_uq.maths.geometry.minimax.MOST_BOXES", 0)
     one_by_one = of.one_sided(displaced[:1], inscribed=inscribed)
     np.testing.assert_allclose(one_by_one.size, drawn.size[:1], rtol=0, atol=1e-8)
 

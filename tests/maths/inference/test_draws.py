@@ -1,4 +1,4 @@
-"""Draws by name and chain: which draw belongs to which walker, the file, and what other programs make of it."""
+"""Draws by name and by chain, and uncertainties of sums."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.maths.inference.draws import Draws, by_chain, by_ensemble, evenly
+from cmm_uq.maths.inference.draws import Draws, by_chain, by_ensemble, evenly, uncertainty_of_sum
 from cmm_uq.maths.inference.ensembles import ENSEMBLES, Chains, run_ensembles
+from cmm_uq.maths.inference.noise import Sizes
 from cmm_uq.maths.inference.proposals import Proposal
+from tests.maths.inference.test_noise import SIZES, M, components, covariance
 
 
 def some(chains: int = 6, draws: int = 40) -> Draws:
@@ -56,7 +59,8 @@ def test_thinned_draws_are_whole_steps_of_every_walker(most: int, every: int) ->
     """180 draws of 15 steps, numbered as above."""
     steps, walkers = 15, 3
     e, s, w = np.meshgrid(np.arange(ENSEMBLES), np.arange(steps), np.arange(walkers), indexing="ij")
-    chains = Chains((100 * e + s + 0.1 * w).reshape(-1, 1), "", 0.0, 1.0, steps, 1.0)
+    quality = {"sampler": "", "ess_min": 0.0, "rhat_max": 1.0, "steps": steps, "autocorrelation_time": 1.0}
+    chains = Chains((100 * e + s + 0.1 * w).reshape(-1, 1), **quality)
     assert chains.thinning(most) == every
     kept = by_chain(chains.thinned(every)[:, 0], steps // every)
     for number, chain in enumerate(kept):
@@ -124,3 +128,30 @@ def test_without_arviz_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(CmmUqError, match="pip install"):
         some().to_arviz()
+
+
+WEIGHTS = np.random.default_rng(8).standard_normal(M)
+
+
+def test_given_the_sizes_it_is_that_of_the_whole_covariance_and_normal() -> None:
+    """u² = wᵀ·Σ·w + what comes beside; half the interval is 1.96 u."""
+    noise = components()
+    u, half = uncertainty_of_sum(noise, SIZES, WEIGHTS, beside=0.7)
+    assert u == pytest.approx(np.sqrt(WEIGHTS @ covariance(noise, SIZES) @ WEIGHTS + 0.49))
+    assert half == pytest.approx(stats.norm.ppf(0.975) * u)
+
+
+def test_over_sizes_it_is_a_mixture_whose_interval_holds_95_percent() -> None:
+    """Half of the draws with twice the noise: against the distribution function of the mixture."""
+    both = Sizes(*(np.concatenate([part, f]) for part, f in (
+        (SIZES.reading, 2 * SIZES.reading), (SIZES.placing, 2 * SIZES.placing), (SIZES.growth, 2 * SIZES.growth),
+        (SIZES.slow, 2 * SIZES.slow), (SIZES.rate, SIZES.rate),
+    )))  # fmt: skip
+    small, _ = uncertainty_of_sum(components(), SIZES, WEIGHTS)
+    u, half = uncertainty_of_sum(components(), both, WEIGHTS)
+    assert u == pytest.approx(small * np.sqrt(2.5))
+    assert np.mean(stats.norm.cdf(half, scale=[small, 2 * small])) == pytest.approx(0.975)
+
+
+def test_without_weights_nothing_is_uncertain() -> None:
+    assert uncertainty_of_sum(components(), SIZES, np.zeros(M)) == (0.0, 0.0)

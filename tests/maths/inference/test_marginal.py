@@ -9,8 +9,7 @@ import pytest
 from scipy import stats
 
 from cmm_uq.maths.inference.ensembles import run_ensembles
-from cmm_uq.maths.inference.least_squares import solve
-from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+from cmm_uq.maths.inference.linear_model import LinearModel, Unknown, solve
 from cmm_uq.maths.inference.marginal import Marginal
 from cmm_uq.maths.inference.noise import PLACING, Components
 from cmm_uq.maths.inference.posterior import sample_with_noise, start

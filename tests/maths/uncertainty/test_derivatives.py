@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.maths.uncertainty.jets import ONE, TWO
-from cmm_uq.maths.uncertainty.measurement_model import complex_step, derivatives, hessian_along
+from cmm_uq.maths.uncertainty.measurement_model import ONE, TWO, complex_step, derivatives, hessian_along
 
 H = 1e-40
 KINKED = {np.absolute, np.cbrt, np.deg2rad, np.rad2deg, np.radians, np.degrees}

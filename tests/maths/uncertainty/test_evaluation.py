@@ -1,4 +1,4 @@
-"""Choice of the method and what is stated: JCGM 101:2008 clause 8 on its own examples."""
+"""From a measurement model to a stated result, and the self-test."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from cmm_uq.maths.uncertainty.budget import Labels
 from cmm_uq.maths.uncertainty.distributions import normal, rectangular, student_t
 from cmm_uq.maths.uncertainty.evaluation import Request, compare, evaluate, one_at_a_time
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.maths.uncertainty.reference.jcgm import ReferenceCase
+from cmm_uq.maths.uncertainty.reference.selftest import HEADINGS, REFERENCE_CASES, as_text, run
 
 
 def test_a_linear_model_of_normal_inputs_is_stated_by_first_order() -> None:
@@ -164,3 +166,28 @@ def test_an_evaluation_is_of_one_point() -> None:
 def test_impossible_requests_are_refused(wrong: dict[str, object], problem: str) -> None:
     with pytest.raises(CmmUqError, match=problem):
         Request(**wrong)
+
+
+@pytest.mark.parametrize("case", REFERENCE_CASES, ids=lambda case: case.title)
+def test_the_published_figures_come_out(case: ReferenceCase) -> None:
+    failed = [outcome for outcome in run([case]) if not outcome.passed]
+    assert failed == []
+
+
+def test_a_wrong_figure_or_none_is_noticed() -> None:
+    case = ReferenceCase("sum", "arithmetic", {"a": (2.0, 0.1), "b": (2.0, 0.1), "c": (2.0, 0.1)}, wrong)
+    assert [outcome.passed for outcome in run([case])] == [True, False, False]
+
+
+def wrong() -> list[float]:
+    return [2.05, 2.2, float("nan")]
+
+
+def test_every_row_has_its_source() -> None:
+    case = ReferenceCase("sum", "arithmetic", {"a": (2.0, 0.1), "b": (-2.0, 1e-12)}, lambda: [2.05, -2.0])
+    rows = as_text(run([case]))
+    assert rows == [
+        ("sum: a", "2", "0.1", "2.05", "arithmetic", "pass"),
+        ("sum: b", "−2", "1e−12", "−2", "arithmetic", "pass"),
+    ]
+    assert all(len(row) == len(HEADINGS) for row in rows)

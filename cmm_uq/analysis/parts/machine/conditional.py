@@ -34,8 +34,7 @@ from cmm_uq.machine.model.measurement import ARTEFACT, RecordingModel
 from cmm_uq.machine.model.noise import growing_lengths, noise_of
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import PeriodicScale
-from cmm_uq.maths.inference.least_squares import LeastSquares
-from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel, Unknown
 from cmm_uq.maths.inference.marginal import Marginal
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import sample_with_noise

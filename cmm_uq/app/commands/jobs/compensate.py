@@ -22,7 +22,7 @@ from cmm_uq.jobs.recording.temperature_log import log_of
 from cmm_uq.jobs.reports import DescribedDigitizer, digitizer_of
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.tables.origin import first_line
-from cmm_uq.machine.model.machine_maps import maps_of
+from cmm_uq.machine.model.predicted_errors import maps_of
 from cmm_uq.machine.physics.compensation import Compensation, compensate_points, machine_compensation
 from cmm_uq.machine.physics.digitizer import DigitizedCloud, Digitizer, columns_for
 from cmm_uq.machine.physics.error_map import error_map_text

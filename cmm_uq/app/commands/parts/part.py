@@ -39,7 +39,7 @@ from cmm_uq.certificate.part.measurement import MATTERS, PartMeasurement, Unseen
 from cmm_uq.certificate.wording import effect_title
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
+from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, simulate, simulate_adaptively
 
 # virtual measurements: ten thousand over one less the probability of the interval (JCGM 101:2008, 7.2.2).
 TRIALS = 200_000
@@ -155,8 +155,8 @@ def _simulate(virtual: Virtual, trials: int, digits: int | None, seed: int, stag
 
     source = Source(virtual.names, draw)
     if digits is None:
-        return from_source(source, trials, COVERAGE, seed), np.concatenate(blocks)
-    return settled_source(source, COVERAGE, digits, seed, fewest_trials=trials), np.concatenate(blocks)
+        return simulate(source, trials, COVERAGE, seed), np.concatenate(blocks)
+    return simulate_adaptively(source, COVERAGE, digits, seed, fewest_trials=trials), np.concatenate(blocks)
 
 
 def _unseen(virtual: Virtual, shares: VarianceShares) -> tuple[UnseenError, ...]:

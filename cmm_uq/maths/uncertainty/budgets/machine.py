@@ -51,21 +51,14 @@ def length_test_uncertainty(
 ) -> Budget:
     """Test uncertainty of an error of length measurement E (ISO/TS 23165:2006), mm.
 
-    Parameters
-    ----------
-    u_calibration_mm : of the artefact's calibrated length.
-    temperature_c, cte_per_k : of the artefact during the test.
-    u_alignment_mm, u_fixturing_mm : by misalignment and by what the clamping does to the length.
-    u_beside_mm : of the short gauge measured beside lengths that are not bidirectional by themselves; no line where 0.
-    calibration_dof : degrees of freedom that the artefact's certificate states.
+    ``u_fixturing_mm``: by what the clamping does to the length. ``u_beside_mm``: of the short gauge measured beside lengths
+    that are not bidirectional by themselves; no line where 0. ``calibration_dof``: as the artefact's certificate states.
     """
-    mm, slope = unit("mm"), length_mm * cte_per_k
+    mm, slope, warm = unit("mm"), length_mm * cte_per_k, say("temperature of the artefact")
     lines = [
         BudgetLine(say("calibration of the artefact"), u_calibration_mm, CERTIFICATE, unit=mm, dof=calibration_dof),
         _expansion(say("expansion coefficient of the artefact"), u_cte_per_k, length_mm, temperature_c),
-        BudgetLine(
-            say("temperature of the artefact"), u_temperature_k, JUDGEMENT, temperature_c, unit("K"), sensitivity=slope
-        ),
+        BudgetLine(warm, u_temperature_k, JUDGEMENT, temperature_c, unit("K"), sensitivity=slope),
         BudgetLine(say("alignment of the artefact"), u_alignment_mm, JUDGEMENT, unit=mm),
         BudgetLine(say("fixturing of the artefact"), u_fixturing_mm, JUDGEMENT, unit=mm),
     ]
@@ -101,14 +94,9 @@ def use_by_calibrated_workpiece(
     The value is the systematic error b = mean reading − calibrated value, by which results are corrected; where they
     are not, :func:`expanded_without_correction` says what to state.
 
-    Parameters
-    ----------
-    readings_mm : of the calibrated workpiece, as workpieces are measured; fewer than 20 are refused.
-    temperature_c : mean temperature while reading.
-    u_cte_calibrated_per_k, u_cte_workpieces_per_k : of the expansion coefficients of the calibrated one and the others.
-    u_form_mm : by what differs between workpieces: form, roughness, elasticity.
-    expanding_mm : length whose expansion counts, where it is not the calibrated value.
-    angle : whether values and uncertainties are in rad.
+    ``readings_mm``: of the calibrated workpiece, as workpieces are measured, at a mean ``temperature_c``. ``u_form_mm``: by
+    what differs between workpieces: form, roughness, elasticity. ``expanding_mm``: length whose expansion counts, where it is
+    not the calibrated value. ``angle``: whether values and uncertainties are in rad.
     """
     readings = np.asarray(readings_mm, dtype=np.float64)
     if len(readings) < FEWEST_READINGS:

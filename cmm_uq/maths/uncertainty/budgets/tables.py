@@ -136,28 +136,13 @@ class SimulatedTask(BudgetTable):
         return {"U_without_correction_mm": expanded_without_correction(self.budgets()["error"])}
 
 
-class MachineTest(BudgetTable):
-    """What both tests of ISO/TS 23165 have: an error that was found, and the budget of its test uncertainty."""
-
-    symbol: ClassVar[str]
-
-    error_um: float
-    """Error that the test found."""
-
-    @abstractmethod
-    def uncertainty(self) -> Budget:
-        """Of the test value."""
-
-    def budgets(self) -> Mapping[str, Budget]:
-        return {self.symbol: self.uncertainty().of(self.error_um * MICROMETRE)}
-
-
-class LengthTest(MachineTest):
+class LengthTest(BudgetTable):
     """``method = "ISO/TS 23165 length"``."""
 
     meaning = say("ISO/TS 23165:2006: test uncertainty of an error of length measurement E.")
-    symbol = "E"
 
+    error_um: float
+    """Error that the test found."""
     method: Literal["ISO/TS 23165 length"]
     """Name of the ready budget."""
     length_mm: Length
@@ -177,20 +162,22 @@ class LengthTest(MachineTest):
     u_fixturing_um: Uncertainty = 0.0
     """Standard uncertainty of the length by the clamping."""
 
-    def uncertainty(self) -> Budget:
-        return length_test_uncertainty(
+    def budgets(self) -> Mapping[str, Budget]:
+        budget = length_test_uncertainty(
             self.length_mm, self.u_calibration_um * MICROMETRE, temperature_c=self.temperature_c, cte_per_k=self.cte_per_k,
             u_cte_per_k=self.u_cte_per_k, u_temperature_k=self.u_temperature_k,
             u_alignment_mm=self.u_alignment_um * MICROMETRE, u_fixturing_mm=self.u_fixturing_um * MICROMETRE,
         )  # fmt: skip
+        return {"E": budget.of(self.error_um * MICROMETRE)}
 
 
-class ProbingTest(MachineTest):
+class ProbingTest(BudgetTable):
     """``method = "ISO/TS 23165 probing"``."""
 
     meaning = say("ISO/TS 23165:2006: test uncertainty of a probing error P.")
-    symbol = "P"
 
+    error_um: float
+    """Error that the test found."""
     method: Literal["ISO/TS 23165 probing"]
     """Name of the ready budget."""
     form_um: Uncertainty
@@ -198,8 +185,9 @@ class ProbingTest(MachineTest):
     u_form_um: Uncertainty
     """Standard uncertainty of that form deviation."""
 
-    def uncertainty(self) -> Budget:
-        return probing_test_uncertainty(self.form_um * MICROMETRE, self.u_form_um * MICROMETRE)
+    def budgets(self) -> Mapping[str, Budget]:
+        budget = probing_test_uncertainty(self.form_um * MICROMETRE, self.u_form_um * MICROMETRE)
+        return {"P": budget.of(self.error_um * MICROMETRE)}
 
 
 class BallbarBudget(BudgetTable):

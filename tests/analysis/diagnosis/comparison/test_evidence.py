@@ -30,8 +30,7 @@ from cmm_uq.analysis.diagnosis.noise import (
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
 from cmm_uq.machine.model.recorded import Display
-from cmm_uq.maths.inference.least_squares import solve
-from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+from cmm_uq.maths.inference.linear_model import LinearModel, Unknown, solve
 from cmm_uq.maths.inference.noise import Sizes, slow_variances
 from tests.analysis.diagnosis.dense_noise import PROBABILITY, covariance, paired, rest, some_kinds
 

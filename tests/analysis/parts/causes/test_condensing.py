@@ -15,7 +15,7 @@ from cmm_uq.analysis.parts.plan import Nominal, PartAlignment, PartCharacteristi
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.machine.physics.catalogue import effects
-from cmm_uq.maths.geometry import exchange
+from cmm_uq.maths.geometry import minimax
 from cmm_uq.maths.geometry.repeated import Raised, Repeated
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -100,7 +100,7 @@ def test_zones_of_points_that_stand_out_are_those_of_all_points(
     repeated, random = Repeated(feature.kind, feature.points), np.random.default_rng(5)
     errors = 1e-3 * random.standard_normal((8, 1260, 3)) + 0.01 * np.sin(feature.points / 20)
     screened = repeated.minimum_zone(errors)
-    monkeypatch.setattr(exchange, "SCREENED", 10_000)
+    monkeypatch.setattr(minimax, "SCREENED", 10_000)
     every = repeated.minimum_zone(errors)
     np.testing.assert_allclose(screened.form, every.form, rtol=0, atol=1e-12)
     np.testing.assert_allclose(screened.direction, every.direction, rtol=0, atol=1e-12)

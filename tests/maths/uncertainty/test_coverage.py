@@ -1,19 +1,32 @@
-"""Coverage intervals of JCGM 101:2008 7.7: against brute force, whatever the number of draws."""
+"""Coverage intervals and regions, and tails too heavy for a standard deviation."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from scipy import stats
 
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.uncertainty.coverage import (
     Tails,
     both_intervals,
+    draws_in_tail,
+    elliptical_factor,
+    elliptical_region,
     inner_draws,
+    pareto,
+    rectangular_region,
     settled_shortest_interval,
     shortest_interval,
+    smallest_region,
     symmetric_interval,
+    tail_of,
 )
+from cmm_uq.maths.uncertainty.distributions import normal, rectangular, student_t
+from cmm_uq.maths.uncertainty.evaluation import Request, evaluate, stability
+from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.maths.uncertainty.monte_carlo import draw_outputs, simulate_adaptively
 
 
 def by_definition(draws: np.ndarray, p: float) -> list[float]:
@@ -171,3 +184,140 @@ def test_lengths_that_differ_by_scatter_alone_are_all_alike(n: int, where: int, 
     lengths[10] -= 1e-6  # the very shortest is at the edge
     found = settled_shortest_interval(lowest, lowest + lengths)
     assert found == (symmetric_interval if alike else shortest_interval)(lowest, lowest + lengths)
+
+
+N = 200_000
+
+
+def pair(r: float) -> np.ndarray:
+    inputs = {"a": normal(1.0, 2.0), "b": normal(-3.0, 0.5)}
+    return draw_outputs(
+        MeasurementModel(lambda a, b: {"a": a, "b": b}, inputs, ("a", "b"), {("a", "b"): r} if r else {}), N, seed=2
+    )
+
+
+def test_factors_of_normal_outputs() -> None:
+    # JCGM 102 table 1: 1.96, 2.45, 2.80 for one, two and three outputs and 95 %
+    assert [elliptical_factor(p) for p in (1, 2, 3)] == pytest.approx([1.95996, 2.44775, 2.79548], abs=5e-6)
+    assert elliptical_factor(2, 0.99) == pytest.approx(np.sqrt(-2 * np.log(0.01)))
+
+
+@pytest.mark.parametrize("r", [0.0, 0.9])
+def test_the_ellipse_of_normal_draws_is_the_known_one(r: float) -> None:
+    draws = pair(r)
+    region = elliptical_region(draws)
+    # standard error of the factor: √(p(1−p)/n) over the Rayleigh density at 2.4477
+    error = np.sqrt(0.95 * 0.05 / N) / (2.4477 * 0.05)
+    assert region.factor == pytest.approx(2.4477, abs=5 * error)
+    away = draws - region.centre[:, None]
+    inside = np.einsum("pn,pq,qn->n", away, np.linalg.inv(region.covariance), away) <= region.factor**2 * (1 + 1e-12)
+    assert inside.mean() == pytest.approx(0.95, abs=1e-5)
+    assert region.volume == pytest.approx(np.pi * 2.4477**2 * 2 * 0.5 * np.sqrt(1 - r * r), rel=0.02)
+
+
+def test_the_smallest_region_of_normal_draws_is_that_ellipse() -> None:
+    draws = pair(0.6)
+    region = smallest_region(draws, cells=40)
+    assert region.area == pytest.approx(elliptical_region(draws).volume, rel=0.05)
+
+
+def test_the_smallest_region_of_a_uniform_square_is_most_of_the_square() -> None:
+    inputs = {"a": rectangular(0.0, 1.0), "b": rectangular(0.0, 2.0)}
+    draws = draw_outputs(MeasurementModel(lambda a, b: {"a": a, "b": b}, inputs, ("a", "b")), N, seed=3)
+    assert smallest_region(draws, cells=20).area == pytest.approx(2 * 0.95, rel=0.02)
+    assert elliptical_region(draws).volume > 2.0  # an ellipse wastes the corners
+
+
+def test_the_rectangle_of_independent_normal_draws() -> None:
+    # both within k u with probability 0.95: erf(k/√2)² = 0.95, k = 2.2365
+    draws = pair(0.0)
+    region = rectangular_region(draws)
+    assert region.factor == pytest.approx(2.2365, abs=0.02)
+    assert region.volume == pytest.approx(4 * region.factor**2 * 2 * 0.5, rel=0.02)
+
+
+def test_impossible_regions_are_refused() -> None:
+    a = np.random.default_rng(1).normal(size=1000)
+    with pytest.raises(CmmUqError, match="depend on each other"):
+        elliptical_region(np.array([a, 2 * a]))
+    with pytest.raises(CmmUqError, match="more draws"):
+        smallest_region(np.array([a, a**2]))
+    with pytest.raises(CmmUqError, match="coverage probability"):
+        elliptical_factor(2, 95)
+
+
+def test_draws_are_those_of_the_simulation() -> None:
+    from cmm_uq.maths.uncertainty.monte_carlo import simulate
+
+    model = MeasurementModel(lambda a: a**2, {"a": normal(1.0, 2.0)})
+    assert draw_outputs(model, 25_000, seed=9).mean() == pytest.approx(
+        simulate(model, 25_000, seed=9).value[0], rel=1e-12
+    )
+
+
+@pytest.mark.parametrize("shape", [-0.5, 0.0, 0.25, 0.5, 1.0])
+def test_the_shape_of_a_pareto_distribution_is_found(shape: float) -> None:
+    """Draws at equal steps of probability leave only the estimator's own error: of (1 + k)/√n, and 10 draws' pull to ½."""
+    n, scale = 3000, 2.0
+    excess = stats.genpareto.ppf((np.arange(n) + 0.5) / n, shape, scale=scale)
+    found, spread = pareto(excess)
+    pull = 10 * (0.5 - shape) / (n + 10)
+    assert found - pull == pytest.approx(shape, abs=0.5 * (1 + abs(shape)) / n**0.5)
+    assert spread == pytest.approx(scale, rel=0.02)
+
+
+@pytest.mark.parametrize("dof", [3.0, 4.0, 6.0])
+def test_what_lies_beyond_the_largest_draw_is_that_of_the_distribution(dof: float) -> None:
+    """Second way: ∫ y² f(y) dy beyond the quantile of 1/n by scipy. The tail is taken for heavier, not for lighter."""
+    trials = 1_000_000
+    p = (np.arange(draws_in_tail(trials) + 1)[::-1] + 0.5) / trials
+    found = tail_of(stats.t.isf(p, dof), 0.0, trials)
+    beyond = stats.t.expect(lambda y: y**2, (dof,), lb=stats.t.isf(1 / trials, dof), ub=np.inf, limit=200)
+    assert found[0] == pytest.approx(1 / dof, abs=0.06)
+    assert 0.8 * beyond < found[1] < 3 * beyond
+
+
+def test_the_tail_is_that_of_the_excess_wherever_the_draws_lie() -> None:
+    largest = stats.t.isf((np.arange(3001)[::-1] + 0.5) / 1e6, 4.0)
+    here, there = tail_of(largest, 0.0, 1_000_000), tail_of(1e3 * largest + 7, 7.0, 1_000_000)
+    assert there[0] == pytest.approx(here[0], rel=1e-9)
+    assert there[1] == pytest.approx(1e6 * here[1], rel=1e-6)
+
+
+def test_draws_that_are_all_one_have_no_tail() -> None:
+    assert tail_of(np.full(100, 3.0), 3.0, 10_000)[1] == 0
+
+
+@pytest.mark.parametrize(("dof", "stable"), [(4.0, True), (3.0, True), (2.5, False), (2.1, False)])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_u_of_a_t_distribution_is_called_stable_only_where_it_is_right(dof: float, stable: bool, seed: int) -> None:
+    """u = √(ν/(ν − 2)). With ν = 2.5 a million draws miss it by more than half of its second digit, ever so steadily."""
+    found = simulate_adaptively(
+        MeasurementModel(lambda x: x, {"x": student_t(0.0, 1.0, dof)}), digits=2, seed=seed, largest=2_000_000
+    )
+    assert found.stable is stable
+    if stable:
+        assert found.u[0] == pytest.approx((dof / (dof - 2)) ** 0.5, abs=0.05)
+        assert found.unseen[0] < 0.05
+    assert found.shape[0] == pytest.approx(1 / dof, abs=0.08)
+
+
+def test_a_reciprocal_near_zero_has_no_standard_deviation_and_says_so() -> None:
+    """1/x with x of 1 ± 0.25: P(|y| > t) falls as 1/t, so k is 1 and no variance exists; the interval does."""
+    model = MeasurementModel(lambda x: 1 / x, {"x": normal(1.0, 0.25)})
+    for seed in (1, 2, 3):
+        stated = evaluate(model, Request(method="monte_carlo", seed=seed, largest=1_000_000))
+        assert stated.ways.simulated is not None
+        assert stated.ways.simulated.stable is False
+        said = stated.stated["y"].reason
+        assert "not stable to 2 digits" in said
+        assert "from 0.5 on there is no standard deviation" in said
+        assert "the coverage interval stands" in said
+
+
+def test_of_a_normal_output_nothing_is_said_of_tails() -> None:
+    found = evaluate(MeasurementModel(lambda x: x, {"x": normal(0.0, 1.1)}), Request(method="monte_carlo", digits=1))
+    assert found.ways.simulated is not None
+    assert found.ways.simulated.stable
+    assert abs(found.ways.simulated.shape[0]) < 0.15
+    assert stability(found.ways, 0, 1) == ""

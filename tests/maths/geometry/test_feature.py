@@ -1,12 +1,60 @@
-"""Harris 2004 appendix A: spheres fitted to the visible side of a ball of revolution, 76.25 mm, diameters 5 µm apart."""
+"""The room and its reference sets; spheres fitted to the visible side of a ball of revolution (Harris 2004 appendix A)."""
 
 from __future__ import annotations
 
+import ast
+import subprocess
+import sys
+from importlib import import_module
+from inspect import getsource
+
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.maths import geometry
 from cmm_uq.maths.geometry import BallForm, cap_directions, fit_sphere
+from tests.maths.geometry.reference_sets import points_with_known_fit
+
+TOLD = [(node.module, alias.name) for node in ast.walk(ast.parse(getsource(geometry)))
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("cmm_uq.") for alias in node.names]  # fmt: skip
+
+
+@pytest.mark.parametrize(("module", "name"), TOLD)
+def test_a_name_is_what_its_module_has(module: str, name: str) -> None:
+    assert getattr(geometry, name) is getattr(import_module(module), name)
+
+
+def test_the_room_has_these_names_and_no_others() -> None:
+    assert sorted(name for _, name in TOLD) == sorted(geometry.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'fit_torus'"):
+        _ = geometry.fit_torus
+
+
+def test_a_rotation_loads_no_fit() -> None:
+    code = "import sys, cmm_uq.maths.geometry.feature; sys.exit('cmm_uq.maths.geometry.axial' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_least_squares_of_scipy_finds_the_sphere_that_a_reference_set_was_built_about():
+    n = cap_directions(1.2, 60)
+    points = points_with_known_fit(20.0 * n, n[:, None, :], np.ones((60, 1, 1)), 0.05, seed=1)
+    fitted = least_squares(
+        lambda p: np.linalg.norm(points - p[:3], axis=1) - p[3],
+        [0.1, -0.1, 0.1, 19.0],
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
+    )
+    np.testing.assert_allclose(fitted.x, [0, 0, 0, 20.0], atol=1e-8)
+
+
+def test_the_largest_deviation_is_the_form_asked_for():
+    n = cap_directions(np.pi, 40)
+    points = points_with_known_fit(5.0 * n, n[:, None, :], np.ones((40, 1, 1)), 0.02, seed=2)
+    assert np.isclose(np.abs(np.linalg.norm(points, axis=1) - 5.0).max(), 0.02, rtol=1e-12)
+
 
 EQUATOR = 38.125
 
