@@ -40,7 +40,7 @@ def acquire(
 
     Type help for the words; the same command goes on where the last session ended.
     """
-    from cmm_uq.app.cli.operating import operated
+    from cmm_uq.app.cli.instruments import operated
     from cmm_uq.app.commands.laboratory.acquire import begin_acquisition, write_trial
 
     if out is not None and not simulate:
@@ -230,8 +230,7 @@ def serve(
     quiet: bool = opt.QUIET,
 ) -> None:
     """Show the records in a browser: what is due or fails, trends, certificates, artefacts. Nothing can be changed there."""
-    from cmm_uq.app.serve.server import RecordsServer
-    from cmm_uq.app.serve.site import Site
+    from cmm_uq.app.serve.site import RecordsServer, Site
 
     site = Site(records)
     with (

@@ -20,7 +20,6 @@ from cmm_uq.app.cli.options import Ending
 from cmm_uq.app.cli.terminal import NOT_CONFORMING, Line, columns, folded, on_terminal, put_data, put_json, say, show
 from cmm_uq.base.errors import printable
 from cmm_uq.base.output import MANIFEST
-from cmm_uq.jobs.tables.origin import COMPENSATED, SIMULATED
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.document import Standing
@@ -171,6 +170,8 @@ def file_rows(files: Mapping[str, Path], *, whole: bool) -> list[tuple[str, str]
 
 
 def _what(name: str) -> str:
+    from cmm_uq.jobs.tables.origin import COMPENSATED, SIMULATED
+
     path = PurePosixPath(name)
     plain = path.stem.removesuffix(f"-{SIMULATED}").removesuffix(f"-{COMPENSATED}")
     what = FILES.get(plain + path.suffix, "input of the job")

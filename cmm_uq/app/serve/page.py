@@ -7,6 +7,7 @@ already; an address is a path of this site with its query, quoted.
 from __future__ import annotations
 
 import datetime as dt
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -45,7 +46,7 @@ class Block:
     kind: ClassVar[str]
 
     def __init_subclass__(cls) -> None:
-        cls.kind = cls.__name__.removeprefix("Page").lower()
+        cls.kind = re.sub("^Page(?=[A-Z])", "", cls.__name__).lower()
 
 
 class PageColumn(NamedTuple):

@@ -345,12 +345,12 @@ NO_TEXT = {"address", "place", "name", "value", "sort", "path", "svg", "kept", "
 def texts_of(value: Any) -> Iterator[str]:
     if isinstance(value, str):
         yield value
-    elif is_dataclass(value):
-        for field in fields(value):
-            if field.name == "options":
+    elif is_dataclass(value) or hasattr(value, "_fields"):
+        for name in [field.name for field in fields(value)] if is_dataclass(value) else value._fields:
+            if name == "options":
                 yield from (text for _, text in value.options)
-            elif field.name not in NO_TEXT:
-                yield from texts_of(getattr(value, field.name))
+            elif name not in NO_TEXT:
+                yield from texts_of(getattr(value, name))
     elif isinstance(value, (list, tuple)):
         for item in value:
             yield from texts_of(item)
