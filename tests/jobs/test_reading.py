@@ -180,3 +180,15 @@ def test_references_in_the_recording_count_as_certified_unless_they_are_nominal(
     missing = partial(uncertainty_missing, wish, stated=TestUncertainty(), standards=NAMEABLE.standards)
     assert missing(artefact_facts(kind="step_gauge")) == "u_um"
     assert missing(artefact_facts(kind="step_gauge", nominal=True)) is None
+
+
+def test_an_adjustment_lies_before_the_measurement(job: Path) -> None:
+    toml = job / "job.toml"
+    text = toml.read_text(encoding="utf-8")
+    for day, fine in (("2004-08-31", True), ("2004-09-01", True), ("2004-09-02", False)):
+        toml.write_text(text.replace("[job]\n", f"[job]\nadjusted_since = {day}\n"), encoding="utf-8")
+        if fine:
+            assert str(read_job(job).facts.job.adjusted_since) == day
+        else:
+            with pytest.raises(CmmUqError, match="adjusted_since = 2004-09-02 is after the measurement"):
+                read_job(job)

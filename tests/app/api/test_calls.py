@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import doctest
 import json
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -155,3 +157,11 @@ def test_a_function_has_the_budget_of_the_same_model_in_a_file(tmp_path: Path) -
     assert ours.u == pytest.approx(np.hypot(4 * 0.1, 3 * 0.2))  # JCGM 100:2008, equation 10
     with pytest.raises(cmm_uq.CmmUqError, match="needs its inputs"):
         cmm_uq.budget(lambda a: a)
+
+
+@pytest.mark.parametrize(("module", "least"), [("cmm_uq", 3), ("cmm_uq.app.api.calls", 10)])
+def test_the_examples_of_the_docstrings_hold(module: str, least: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    ran = doctest.testmod(import_module(module), raise_on_error=False)
+    assert ran.attempted >= least
+    assert ran.failed == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import datetime as dt
 import json
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,13 @@ import numpy as np
 import pytest
 
 import cmm_uq
-from cmm_uq.app.api.outcomes import Report
+from cmm_uq.app.api.outcomes import Part, Report
 from cmm_uq.app.commands.report import write_report
+from cmm_uq.jobs.part.job import TABLES
+from tests.app.cli.test_due import recorded
 from tests.conftest import ROOT
+from tests.laboratory.records.histories import certificate
+from tests.part_machines import THERE, by_results, plate_of
 
 IOTA = ROOT / "examples" / "iota-1102-20C"
 
@@ -135,3 +140,70 @@ def test_a_plan_lists_its_placings_and_writes_the_recording_to_fill_in(tmp_path:
     found = cmm_uq.plan(ROOT / "examples" / "plan-ballbar", power=False)
     assert len(found.placings) == 20
     assert {"plan.csv", "plan.html", "results.json", "manifest.json"} == set(found.write(tmp_path / "plan"))
+
+
+@pytest.fixture(scope="module")
+def part() -> Part:
+    job = plate_of(by_results(), np.zeros((60, 3)), characteristic=TABLES["characteristic"][:2], **THERE)
+    return cmm_uq.part(job, trials=1000, seed=2, language="de")
+
+
+def test_figures_are_tables_by_characteristic(part: Part) -> None:
+    assert list(part.characteristics.index) == ["1", "2"]
+    row = part.characteristics.loc["1"]
+    assert row["U"] == pytest.approx((row["interval_upper"] - row["interval_lower"]) / 2)
+    assert (row["unit"], row["lower"], row["upper"]) == ("mm", 29.95, 30.05)
+    assert row["outcome"] == part.results["characteristics"][0]["decision"]["outcome"]
+    assert part.correlation.loc["1", "1"] == 1
+    assert part.budget["1"].sum() == pytest.approx(1, abs=0.1)  # causes of a diameter add up
+
+
+def test_it_says_itself_in_a_line_and_in_a_notebook(part: Part) -> None:
+    assert repr(part).startswith("<Part of plate: 2 characteristics, ")
+    assert "<table" in part._repr_html_()
+    assert part.conforming == (part.found.outcome == "pass")
+
+
+def test_it_writes_what_the_command_writes(part: Part, tmp_path: Path) -> None:
+    files = part.write(tmp_path / "out")
+    data = json.loads(files["results.json"].read_bytes())
+    assert data["simulation"]["seed"] == 2
+    assert data["job"]["language"] == "de"
+    assert 'lang="de"' in files["part-simulated.html"].read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    """Two certificates of one machine, 2 ppm apart."""
+    values = (
+        (("scale_x.ppm", "Scale error of x", "ppm", value, 0.5, value - 1, value + 1, 0.4, 8.0),)
+        for value in (1.0, 3.0)
+    )
+    days = (dt.date(2025, 3, 2), dt.date(2026, 3, 2))
+    return recorded(tmp_path, *(certificate("1102", day, value) for day, value in zip(days, values, strict=True)))
+
+
+def test_what_is_due_is_a_table(place: Path, tmp_path: Path) -> None:
+    found = cmm_uq.due(records=place, on="2026-11-22")
+    assert repr(found) == "<Due on 2026-11-22: 0 overdue, 0 due, 2 later, 0 unknown>"
+    assert found.frame.loc[0, ["serial", "state", "due"]].tolist() == ["1102", "later", "2027-03-02"]
+    assert "1102" in found._repr_html_()
+    assert set(found.write(tmp_path / "out")) == {"due.html", "due.json", "manifest.json"}
+
+
+def test_one_machine_may_be_named_alone(place: Path) -> None:
+    found = cmm_uq.due("1102", records=place, on=dt.date(2027, 3, 3), within=dt.timedelta(days=1))
+    assert found.frame["serial"].tolist() == ["1102"]
+    assert found.frame["state"].tolist() == ["overdue"]
+
+
+def test_a_history_has_its_values_and_all_that_was_recorded(place: Path, tmp_path: Path) -> None:
+    found = cmm_uq.history("1102", records=place, on="2026-11-22")
+    assert repr(found) == "<History of 1102: 2 recordings, 1 values>"
+    row = found.values.loc["scale_x.ppm"]
+    assert (row["value"], row["change"], row["u_change"]) == (3.0, 2.0, pytest.approx(0.18**0.5))
+    assert row["per_year"] == pytest.approx(2 * 365.2425 / 365)
+    assert dt.date(2026, 3, 2) < row["early"] < row["middle"]
+    assert found.recorded["value"].tolist() == [1.0, 3.0]
+    assert "Scale error of x" in found._repr_html_()
+    assert set(found.write(tmp_path / "out")) == {"history.html", "history.json", "manifest.json"}
