@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.planning.advice import Suggestion, suggestions
+from cmm_uq.analysis.planning.set_up import Suggestion, suggestions
 from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.planning.suggestion import next_plan
 from cmm_uq.analysis.screening import screening

@@ -8,8 +8,7 @@ ROOT = Path(__file__).parents[2]
 KEEP = ROOT / "reports" / "mutation"
 
 _BY_ROOM = {
-    "analysis/conformity": "decision standards accuracy statement limits consequences length_conditions plan_conditions rated "
-                           "shared_causes lengths_decided spheres_decided bars_decided",
+    "analysis/conformity": "decision standards accuracy statement limits plan_conditions uncertainty decided",
     "analysis/diagnosis": "comparison/evidence comparison/conditional comparison/algebra held_out location power",
     "analysis/planning": "exchange identifiability information suggestion",
     "certificate": "wording",

@@ -10,11 +10,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.conformity.consequences import Consequences, Costs
+from cmm_uq.analysis.conformity.accuracy import Consequences, Costs
 from cmm_uq.analysis.conformity.statement import Statement, by_standard, by_tolerance
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
-from cmm_uq.analysis.planning.advice import NextPlan, Suggestion
+from cmm_uq.analysis.planning.set_up import NextPlan, Suggestion
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, at_key, say

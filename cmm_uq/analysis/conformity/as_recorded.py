@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,10 +40,13 @@ class OutsideReadings:
 
     @classmethod
     def of(cls, recording: Points, findings: Sequence[Finding], observe: Observed) -> OutsideReadings:
-        lost, copied = _rows(recording, findings), np.isin(recording.group, list(recording.copies))
+        def rows_of(chosen: Sequence[Finding]) -> NDArray[np.bool_]:
+            return np.isin(np.arange(len(recording)), [row for one in chosen for row in one.rows])
+
+        lost, copied = rows_of(findings), np.isin(recording.group, list(recording.copies))
         measured = ~(lost & copied)
         damaged = tuple(f for f in findings if f.kind != REVERSED and any(not copied[row] for row in f.rows))
-        points, outside = with_sound_sensors(recording, findings).select(measured), _rows(recording, damaged)[measured]
+        points, outside = with_sound_sensors(recording, findings).select(measured), rows_of(damaged)[measured]
         artefact = None
         for xyz in (points.xyz, _of_other_repeats(points, outside)) if np.any(lost & measured) else ():
             if artefact is None and xyz is not None:
@@ -65,27 +69,21 @@ class OutsideReadings:
     def in_words(self, measurements: Sequence[int | None]) -> list[Text]:
         """Why readings of some measurements, or of all (``None``), were left out."""
         about = [f.why for f in self.findings if None in measurements or set(f.measurements) & set(measurements)]
-        words: list[Text] = [
-            say("Outside, and left out of the estimates alone: {why}.", why=why) for why in about[:_NAMED]
+        words = [say("Outside, and left out of the estimates alone: {why}.", why=why) for why in about[:_NAMED]]
+        more = len(about) - _NAMED
+        return [
+            *words,
+            *([say("Outside, too, are the readings of {count} findings more.", count=more)] if more > 0 else []),
         ]
-        if len(about) > _NAMED:
-            words.append(say("Outside, too, are the readings of {count} findings more.", count=len(about) - _NAMED))
-        return words
 
 
 class Around(Artefact):
     """An artefact that is as another one but for what its class says otherwise."""
 
     def __init__(self, inner: Artefact, points: Points | None = None) -> None:
-        self.inner = inner
-        self.kind, self.title, self.points, self.sizes = (
-            inner.kind,
-            inner.title,
-            inner.points if points is None else points,
-            inner.sizes,
-        )
-        self.noise_scale, self.rows = inner.noise_scale, inner.rows
-        self.measurement, self.repeat = inner.measurement, inner.repeat
+        self.inner, self.points = inner, inner.points if points is None else points
+        self.kind, self.title, self.sizes, self.rows = inner.kind, inner.title, inner.sizes, inner.rows
+        self.noise_scale, self.measurement, self.repeat = inner.noise_scale, inner.measurement, inner.repeat
 
     def indications(self) -> Indications | None:
         return self.inner.indications()
@@ -138,9 +136,8 @@ class AsRecorded(Around):
         own, raw = self.own.forms(), self.inner.forms()
         if own is None or raw is None:
             return raw
-        runs, counts = (np.column_stack([f.measurement, f.repeat, f.count]).tolist() for f in (raw, own))
-        chosen = {tuple(run): i for i, run in enumerate(counts)}
-        same = [(i, chosen[tuple(run)]) for i, run in enumerate(runs) if tuple(run) in chosen]
+        runs, chosen = (np.column_stack([f.measurement, f.repeat, f.count]).tolist() for f in (raw, own))
+        same = [(i, chosen.index(run)) for i, run in enumerate(runs) if run in chosen]
         to, of = np.array(same, dtype=np.int64).reshape(-1, 2).T
         mixed = {}
         for name in ("form", "size", "centres"):
@@ -172,14 +169,13 @@ def numbered(points: Points, repeats: int | None = None, *, measurements: bool =
     Whoever numbers consecutively and takes a row out leaves a gap: what stood there is not known. ``repeats``: up to which a
     repeat has every point of its measurement; ``measurements``: whether these are numbered consecutively by themselves.
     """
-    absent = _absent(np.unique(points.measurement)) if measurements else []
+    absent = _absent(np.unique(points.measurement).tolist()) if measurements else []
     gaps = [say("measurement {which}: numbered, and not recorded", which=_which(absent))] if absent else []
     gaps += _gaps(points, repeats)
     if not gaps:
         return ()
-    shown = gaps[:_NAMED]
-    if len(gaps) > _NAMED:
-        shown.append(say("{count} gaps more of the numbering", count=len(gaps) - _NAMED))
+    shown, more = gaps[:_NAMED], len(gaps) - _NAMED
+    shown += [say("{count} gaps more of the numbering", count=more)] if more > 0 else []
     return (Condition(say("measurements, repeats and points numbered without a gap"), tuple(shown)),)
 
 
@@ -188,29 +184,28 @@ def _gaps(points: Points, repeats: int | None) -> Iterator[Message]:
     for group, rows in enumerate(points.rows_of_groups):
         measurement, repeat = points.run_of(group)
         runs.setdefault(measurement, {})[repeat] = set(points.point[rows].tolist())
-    lines = {measurement: set().union(*own.values()) for measurement, own in runs.items()}
-    holes = {measurement: _absent(np.array(sorted(numbers))) for measurement, numbers in lines.items()}
+    holes = {measurement: _absent(set().union(*own.values())) for measurement, own in runs.items()}
     consecutive = 2 * sum(not each for each in holes.values()) > len(holes)
-    for measurement, own in runs.items():
-        if absent := _absent(np.array(sorted(own))):
+    for m, own in runs.items():
+        if absent := _absent(own):
             yield say("repeat {which} of measurement {measurement}: numbered, and not recorded", which=_which(absent),
-                      measurement=measurement)  # fmt: skip
-        if consecutive and holes[measurement]:
+                      measurement=m)  # fmt: skip
+        if consecutive and holes[m]:
             yield say("point {which} of measurement {measurement}: numbered, and not recorded",
-                      which=_which(holes[measurement]), measurement=measurement)  # fmt: skip
-        asked = sorted(own)[:repeats]
-        usual = set().union(*(own[repeat] for repeat in asked))
-        for repeat in asked:
+                      which=_which(holes[m]), measurement=m)  # fmt: skip
+        first = sorted(own)[:repeats]
+        usual = set().union(*(own[repeat] for repeat in first))
+        for repeat in first:
             if absent := sorted(usual - own[repeat]):
                 yield say(
                     "point {which} of measurement {measurement}, repeat {repeat}: recorded in its other repeats alone",
-                    which=_which(absent), measurement=measurement, repeat=repeat,
+                    which=_which(absent), measurement=m, repeat=repeat,
                 )  # fmt: skip
 
 
-def _absent(numbers: Ints) -> list[int]:
+def _absent(numbers: Collection[int]) -> list[int]:
     """What lacks between 1, or a lower first number, and the highest."""
-    return sorted(set(range(min(1, int(numbers[0])), int(numbers[-1]) + 1)) - set(numbers.tolist()))
+    return sorted(set(range(min(1, *numbers), max(numbers) + 1)) - set(numbers))
 
 
 def _which(numbers: Sequence[int]) -> Text:
@@ -229,12 +224,6 @@ def _of_other_repeats(points: Points, outside: NDArray[np.bool_]) -> Floats | No
             return None
         xyz[row] = points.xyz[np.argmax(same)]
     return xyz
-
-
-def _rows(points: Points, findings: Sequence[Finding]) -> NDArray[np.bool_]:
-    chosen = np.zeros(len(points), dtype=bool)
-    chosen[[row for found in findings for row in found.rows]] = True
-    return chosen
 
 
 def _merged(raw: Floats, keys: Ints, own: Floats, own_keys: Ints) -> Floats:
@@ -311,21 +300,17 @@ def repeats_of_gauge(
     """That a short gauge which some lengths rest on is short, and was measured as often as these, each time anew."""
     if gauge is None or found.u_beside is None or not found.u_beside.any():
         return ()
-    points = gauge.points
-    counts: dict[int, int] = {}
+    points, counts = gauge.points, Counter[int]()
     for group, own in enumerate(points.rows_of_groups):
-        number = int(points.measurement[own[0]])
-        counts[number] = counts.get(number, 0) + (group not in points.copies)
+        counts[int(points.measurement[own[0]])] += group not in points.copies
     missing = [
         say("{wanted} repetitions of the short gauge in its measurement {number} ({count})",
             wanted=wanted, number=number, count=count)
         for number, count in counts.items() if count < wanted
     ]  # fmt: skip
-    if gauge.facts.length_mm > shortest_mm:
-        missing.append(
-            say("a short gauge of at most {shortest:g} mm ({length} mm)",
-                shortest=shortest_mm, length=nominal(gauge.facts.length_mm))
-        )  # fmt: skip
+    if (length := gauge.facts.length_mm) > shortest_mm:
+        most, length_mm = shortest_mm, nominal(length)
+        missing.append(say("a short gauge of at most {shortest:g} mm ({length} mm)", shortest=most, length=length_mm))
     return (Condition(say("a short gauge, {wanted} times in each place", wanted=wanted), tuple(missing)),)
 
 

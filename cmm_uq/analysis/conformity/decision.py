@@ -8,7 +8,7 @@ or a form on one. Integrals are Gauss–Legendre sums over panels that are narro
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import hypot, isfinite
 from typing import Literal
 
@@ -16,15 +16,8 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.base.messages import Text, say
-from cmm_uq.base.points import Floats
-from cmm_uq.jobs.tables.conformity import (
-    FalseAccept,
-    GuardBand,
-    PosteriorProbability,
-    Rule,
-    UncertaintyRatio,
-    UnconditionalRisk,
-)
+from cmm_uq.jobs.tables import conformity
+from cmm_uq.jobs.tables.conformity import FalseAccept, GuardBand, Rule
 from cmm_uq.maths.inference.slow import root
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -73,16 +66,18 @@ def global_risks(acceptance: float, limit: float, u: float, prior: PriorKnowledg
     low = max(prior.mean - _REACH * prior.sd, -np.inf if signed else 0.0)
     high = max(prior.mean, 0.0) + _REACH * prior.sd
     total = 1.0 if signed else float(special.ndtr(prior.mean / prior.sd))
-    edges = {low, high, *(np.clip(x, low, high) for x in (-limit, limit))}
-    for at in (-acceptance, acceptance):
-        edges |= {float(np.clip(at + k * u, low, high)) for k in range(-8, 9)}
-    edges |= {float(np.clip(prior.mean + k * prior.sd, low, high)) for k in range(-9, 10)}
-    values, weights = _panels(np.array(sorted(edges)))
+    bends = [-limit, limit, *(at + k * u for at in (-acceptance, acceptance) for k in range(-8, 9)),
+             *(prior.mean + k * prior.sd for k in range(-9, 10))]  # fmt: skip
+    edges = np.array(sorted({low, high, *np.clip(bends, low, high).tolist()}))
+    half, middle = 0.5 * np.diff(edges)[:, None], 0.5 * (edges[1:] + edges[:-1])[:, None]
+    values, weights = (middle + half * _NODES).ravel(), (half * _WEIGHTS).ravel()
     density = weights * np.exp(-0.5 * ((values - prior.mean) / prior.sd) ** 2) / (prior.sd * np.sqrt(2 * np.pi) * total)
-    accepted = _accepted(values, acceptance, u, signed=signed)
+    accepted = special.ndtr((acceptance - values) / u)
+    if signed:
+        accepted = np.maximum(0.0, accepted - special.ndtr((-acceptance - values) / u))
     conforming = np.abs(values) <= limit
-    return Risks(float(density[~conforming] @ accepted[~conforming]),
-                 float(density[conforming] @ (1.0 - accepted[conforming])))  # fmt: skip
+    wrongly, rejected = density[~conforming] @ accepted[~conforming], density[conforming] @ (1.0 - accepted[conforming])
+    return Risks(float(wrongly), float(rejected))
 
 
 @lru_cache(maxsize=4096)
@@ -97,18 +92,6 @@ def acceptance_limit(risk: float, limit: float, u: float, prior: PriorKnowledge,
     if excess(0.0) > 0:
         return None
     return root(excess, 0.0, limit, 1e-9 * limit)
-
-
-def _accepted(values: Floats, acceptance: float, u: float, *, signed: bool) -> Floats:
-    upper = special.ndtr((acceptance - values) / u)
-    if not signed:
-        return np.asarray(upper)
-    return np.asarray(np.maximum(0.0, upper - special.ndtr((-acceptance - values) / u)))
-
-
-def _panels(edges: Floats) -> tuple[Floats, Floats]:
-    half, middle = 0.5 * np.diff(edges)[:, None], 0.5 * (edges[1:] + edges[:-1])[:, None]
-    return (middle + half * _NODES).ravel(), (half * _WEIGHTS).ravel()
 
 
 Outcome = Literal["pass", "conditional pass", "undecided", "conditional fail", "fail"]
@@ -166,14 +149,15 @@ def decide(
         return Decision("fail", None, None, 0.0, rule_words(rule))
     if u <= 0:
         return Decision("pass" if size <= limit else "fail", None, None, 0.0, rule_words(rule))
-    beyond = _beyond(size, u, limit, signed)
-    within = _within(size, u, limit, signed, beyond)
-    known = None if prior is None else prior.after(value, u)
-    if known is None:
+    beyond, within = _beyond(size, u, limit, signed), float(special.ndtr((limit - size) / u))
+    if signed:
+        within = max(0.0, 1.0 - beyond) if size <= limit else within - float(special.ndtr((-limit - size) / u))
+    if prior is None:
         outcome, band = _decided(size, u, limit, rule, signed, beyond, unstated)
     else:
+        known = prior.after(value, u)
         within, beyond = known.within(limit, signed=signed), known.beyond(limit, signed=signed)
-        outcome, band = _decided_knowing(value, u, limit, rule, signed, prior or known, unstated)
+        outcome, band = _decided_knowing(value, u, limit, rule, signed, prior, unstated)
     return Decision(outcome, within, beyond, band, rule_words(rule, None if band is None else band / u))
 
 
@@ -225,21 +209,11 @@ def _figure(rule: Rule, of: type, name: str, usual: float) -> float | None:
     return usual if name in rule_name(rule) else None
 
 
-def largest_risk(rule: Rule) -> float | None:
-    """Largest probability of a wrong acceptance, and of a wrong rejection; ``None`` for rules that do not go by it."""
-    return _figure(rule, FalseAccept, "ISO 14253-1", 1 - CONFORMANCE_PROBABILITY)
-
-
-def least_ratio(rule: Rule) -> float | None:
-    return _figure(rule, UncertaintyRatio, "ASME B89.7.3.1", RATIO)
-
-
-def least_probability(rule: Rule) -> float | None:
-    return _figure(rule, PosteriorProbability, "JCGM 106", CONFORMANCE_PROBABILITY)
-
-
-def largest_share(rule: Rule) -> float | None:
-    return _figure(rule, UnconditionalRisk, "Z540.3", UNCONDITIONAL)
+# Largest probability of a wrong acceptance, and of a wrong rejection; None, as of the next three, for rules that go by another
+largest_risk = partial(_figure, of=FalseAccept, name="ISO 14253-1", usual=1 - CONFORMANCE_PROBABILITY)
+least_ratio = partial(_figure, of=conformity.UncertaintyRatio, name="ASME B89.7.3.1", usual=RATIO)
+least_probability = partial(_figure, of=conformity.PosteriorProbability, name="JCGM 106", usual=CONFORMANCE_PROBABILITY)
+largest_share = partial(_figure, of=conformity.UnconditionalRisk, name="Z540.3", usual=UNCONDITIONAL)
 
 
 def guard_width(rule: Rule) -> float:
@@ -256,13 +230,6 @@ def rule_name(rule: Rule) -> str:
         return rule
     ((key, value),) = rule.model_dump().items()
     return f"{key} = {value:g}"
-
-
-def _within(size: float, u: float, limit: float, signed: bool, beyond: float) -> float:
-    nearer = float(special.ndtr((limit - size) / u))
-    if not signed:
-        return nearer
-    return nearer - float(special.ndtr((-limit - size) / u)) if size > limit else max(0.0, 1.0 - beyond)
 
 
 def _beyond(size: float, u: float, limit: float, signed: bool) -> float:
@@ -302,7 +269,6 @@ def _guard_band(u: float, limit: float, risk: float, signed: bool) -> float | No
 def _posterior_band(
     u: float, limit: float, risk: float, signed: bool, prior: PriorKnowledge, side: float
 ) -> float | None:
-
     def excess(size: float) -> float:
         return prior.after(side * size, u).beyond(limit, signed=signed) - risk
 
@@ -321,17 +287,17 @@ def rule_words(rule: Rule, band: float | None = None) -> Text:
     if isinstance(rule, GuardBand):
         return say("guard band {guard_band:g} U, k = 2 (ILAC-G8:09/2019)", guard_band=rule.guard_band)
     if isinstance(rule, FalseAccept):
+        risk = rule.max_false_accept
         return say(
-            "probability of false acceptance at most {max_false_accept:g} (JCGM 106:2012, 9.5)",
-            max_false_accept=rule.max_false_accept,
+            "probability of false acceptance at most {max_false_accept:g} (JCGM 106:2012, 9.5)", max_false_accept=risk
         )
     if (least := least_probability(rule)) is not None:
         return say("posterior probability of conforming at least {least:g} (JCGM 106:2012, 8.3)", least=least)
     if (share := largest_share(rule)) is not None:
         return say("at most {share:g} of all items wrongly accepted (ANSI/NCSL Z540.3-2006, 5.3 b)", share=share)
+    if "non-binary" in rule_name(rule):
+        return say("non-binary, guard band U, k = 2 (ILAC-G8:09/2019, 4.2.3)")
     if rule_name(rule).startswith("ILAC-G8"):
-        if "non-binary" in rule_name(rule):
-            return say("non-binary, guard band U, k = 2 (ILAC-G8:09/2019, 4.2.3)")
         return say("binary, guard band U, k = 2 (ILAC-G8:09/2019, 4.2.2)")
     if band is None:
         return say("ISO 14253-1:2017 (95 %)")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, product
@@ -9,20 +10,9 @@ from itertools import groupby, product
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.conformity.plans import (
-    OFFSET_TOLERANCE_MM,
-    PARALLELS,
-    SPACE_DIAGONALS,
-    BarPlan,
-    Condition,
-    LengthPlan,
-    Plan,
-    SpherePlan,
-    crossed_travel,
-    position_of,
-    position_on,
-)
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, commas, number, plural, say, semicolons
+from cmm_uq.analysis.conformity import plans
+from cmm_uq.analysis.conformity.plans import BarPlan, Condition, LengthPlan, Plan, SpherePlan, position_of
+from cmm_uq.base.messages import NOTHING, Argument, Text, Verbatim, at_key, commas, number, plural, say, semicolons
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.quantity import nominal
@@ -35,14 +25,13 @@ SPACING = 0.75
 
 def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> tuple[Condition, ...]:
     """Positions, longest, different and shortest lengths, and repeats; ``copies`` are groups that do not count."""
-    measured: _Places = {}
-    for found in _lines(plan, artefact, copies):
-        measured.setdefault(found.position, []).append(found)
-    absent = tuple(line for line in plan.positions if line not in measured)
-    asked = commas(plan.positions)
-    if set(plan.positions) == {*SPACE_DIAGONALS, *PARALLELS}:
+    places: _Places = defaultdict(list)
+    for one in _lines(plan, artefact, copies):
+        places[one.position].append(one)
+    absent, wanted = tuple(line for line in plan.positions if line not in places), plan.lengths
+    asked, counts = commas(plan.positions), {line: len(found) for line, found in places.items()}
+    if set(plan.positions) == {*plans.SPACE_DIAGONALS, *plans.PARALLELS}:
         asked = say("four space diagonals and three axes")
-    wanted, counts = plan.lengths, {line: len(found) for line, found in measured.items()}
     missing = tuple(
         say("{lengths} different lengths ({line}: {count})", lengths=wanted, line=line, count=count)
         for line, count in counts.items() if count < wanted
@@ -51,14 +40,11 @@ def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, 
     span = say("{low:.0f} to {high:.0f}", low=min(every), high=max(every)) if every else say("none")
     return (
         Condition(say("{asked}; missing: {absent}", asked=asked, absent=commas(absent)) if absent else asked, absent),
-        _long_enough(plan, artefact.points.machine, measured),
+        _long_enough(plan, artefact.points.machine, places),
         Condition(say("{lengths} lengths on each line: {span}", lengths=wanted, span=span), missing),
-        _spread(plan, measured),
-        _shortest(plan, measured),
-        _repeated(plan, measured),
-        *_both_sides(plan, measured),
+        _spread(plan, places), _shortest(plan, places), _repeated(plan, places), *_both_sides(plan, places),
         *_offset(plan, artefact),
-    )
+    )  # fmt: skip
 
 
 def with_offset(points: Points, rows: Ints, offset_mm: float | None) -> NDArray[np.bool_]:
@@ -66,7 +52,7 @@ def with_offset(points: Points, rows: Ints, offset_mm: float | None) -> NDArray[
     if offset_mm is None or (tips := tip_offsets(points)) is None:
         return np.full(len(rows), not offset_mm)
     across = np.linalg.norm(tips, axis=1)[rows]
-    return np.asarray(np.all(np.abs(across - offset_mm) <= OFFSET_TOLERANCE_MM, axis=1))
+    return np.asarray(np.all(np.abs(across - offset_mm) <= plans.OFFSET_TOLERANCE_MM, axis=1))
 
 
 def tip_offsets(points: Points) -> Floats | None:
@@ -101,11 +87,9 @@ def _both_sides(plan: LengthPlan, places: _Places) -> tuple[Condition, ...]:
         missing = (say("bidirectional lengths: from which side each end was reached is not recorded"),)
         remedy = Verbatim("columns approach_x, approach_y, approach_z")
     elif not any(known):
-        missing = (
-            say(
-                "bidirectional lengths: these are not, and no short gauge reached from both sides was measured beside them"
-            ),
-        )
+        missing = (say(
+            "bidirectional lengths: these are not, and no short gauge reached from both sides was measured beside them"
+        ),)  # fmt: skip
     return (Condition(what, missing, remedy),)
 
 
@@ -114,34 +98,28 @@ class _Measured:
     """All that was measured of one nominal length in one position."""
 
     position: Text
-    nominal: int
     length: float
     share: float | None
     repeats: int
-    bidirectional: bool | None = None
+    bidirectional: bool | None
 
 
 def _lines(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> Iterator[_Measured]:
-    found = artefact.indications()
+    found, points = artefact.indications(), artefact.points
     if found is None:
         return
-    points = artefact.points
-    group = points.group[found.rows[:, 0]]
+    group, both, of = points.group[found.rows[:, 0]], artefact.bidirectional(found.rows), nominals(found.lengths)
     original = ~np.isin(group, list(copies)) & with_offset(points, found.rows, plan.offset_mm)
-    both = artefact.bidirectional(found.rows)
-    nominal = nominals(found.lengths)
-    middles, along = artefact.lines_of(found.rows)
-    positions = np.array([position_on(points.machine, m, d) for m, d in zip(middles, along, strict=True)], dtype=object)
+    lines = list(zip(*artefact.lines_of(found.rows), strict=True))
+    positions = np.array([plans.position_on(points.machine, *line) for line in lines], dtype=object)
     for position in plan.positions:
-        for length in np.unique(nominal):
-            at = np.flatnonzero(original & (positions == position) & (nominal == length))
+        for length in np.unique(of):
+            at = np.flatnonzero(original & (positions == position) & (of == length))
             if not len(at):
                 continue
-            travel = [crossed_travel(points.machine, middles[i], along[i]) for i in at]
-            shares = [
-                float(found.lengths[i] / t) if t else 0.0 for i, t in zip(at, travel, strict=True) if t is not None
-            ]
-            yield _Measured(position, int(length), float(found.lengths[at].mean()), max(shares, default=None),
+            travel = [(i, plans.crossed_travel(points.machine, *lines[i])) for i in at]
+            shares = [float(found.lengths[i] / t) if t else 0.0 for i, t in travel if t is not None]
+            yield _Measured(position, float(found.lengths[at].mean()), max(shares, default=None),
                             len(np.unique(group[at])), None if both is None else bool(both[at].any()))  # fmt: skip
 
 
@@ -193,8 +171,7 @@ def _any_spread(plan: LengthPlan, found: Sequence[_Measured]) -> bool:
 
 def _spaced(lengths: Floats, equally: Floats) -> bool:
     """Whether each of some equally spaced lengths has one of its own (sorted) near it."""
-    reach = SPACING * float(equally[1] - equally[0])
-    at = -1
+    reach, at = SPACING * float(equally[1] - equally[0]), -1
     for wanted in equally:
         near = np.flatnonzero((np.abs(lengths - wanted) <= reach) & (np.arange(len(lengths)) > at))
         if not len(near):
@@ -210,9 +187,8 @@ def _shortest(plan: LengthPlan, places: _Places) -> Condition:
         for line, length in shortest.items() if length > most
     )  # fmt: skip
     longest = say("{shortest} mm", shortest=nominal(max(shortest.values()))) if shortest else say("none")
-    return Condition(
-        say("shortest length at most {shortest_mm:g} mm: {longest}", shortest_mm=most, longest=longest), missing
-    )
+    what = say("shortest length at most {shortest_mm:g} mm: {longest}", shortest_mm=most, longest=longest)
+    return Condition(what, missing)
 
 
 def _repeated(plan: LengthPlan, places: _Places) -> Condition:
@@ -243,26 +219,23 @@ def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) 
     first = np.unique(artefact.measurement, return_index=True)[1]  # bar of each measurement, with its ends (q, 2, 3)
     numbers, ends = artefact.measurement[first].tolist(), np.asarray(points.xyz[artefact.rows[first]], dtype=np.float64)
     # Measurements that are no further position: within how many mm of which other, or a copy of it
-    found: dict[int, tuple[float | None, int]] = {}
-    for later, original in copies.items():
-        (one, _), (two, _) = points.run_of(original), points.run_of(later)
-        if one != two:
-            found[two] = None, one
-    left = [i for i, own in enumerate(numbers) if own not in found]
+    pairs = [(points.run_of(later)[0], points.run_of(original)[0]) for later, original in copies.items()]
+    same: dict[int, tuple[float | None, int]] = {later: (None, one) for later, one in pairs if later != one}
+    copied = set(same)
+    left = [i for i, own in enumerate(numbers) if own not in copied]
     near = {i: {j for j in left if j != i and _apart(ends[i], ends[j]) < plan.apart_mm} for i in left}
-    kept = most_apart(near)
-    same = found | {numbers[i]: (plan.apart_mm, numbers[min(near[i] & kept)]) for i in left if i not in kept}
-    count = sum(number not in same for number in numbers)
-    missing: list[Text] = []
+    chosen = most_apart(near)
+    same |= {numbers[i]: (plan.apart_mm, numbers[min(near[i] & chosen)]) for i in left if i not in chosen}
+    count, missing = sum(number not in same for number in numbers), list[Text]()
     if count < wanted:
         lack = say("{lack} of {wanted} positions: {count} distinct", lack=wanted - count, wanted=wanted, count=count)
         missing.append(commas((lack, *_in_words(same))))
     if not known:
         missing.append(say("the travel of all three axes{key}, by whose proportions the number of positions goes",
                            key=at_key("[machine] travel_mm")))  # fmt: skip
-    copied = {number for number, (apart, _) in same.items() if apart is None}
     taken = {position_of(b - a) for (a, b), number in zip(ends, numbers, strict=True) if number not in copied}
-    absent = [d if d in PARALLELS else say("along {position}", position=d) for d in plan.directions if d not in taken]
+    absent = [line for line in plan.directions if line not in taken]
+    absent = [line if line in plans.PARALLELS else say("along {position}", position=line) for line in absent]
     lines = tuple(say("position {along}", along=along) for along in absent)
     asked = say("along the axes, and the face and space diagonals of the volume")
     if lines:
@@ -284,7 +257,12 @@ def most_apart(near: Mapping[int, Collection[int]]) -> set[int]:
         while further:
             group |= further
             further = {j for i in further for j in near[i]} - group
-        chosen |= _largest(near, group) if len(group) <= _SEARCHED else _in_order(near, group)
+        if len(group) <= _SEARCHED:
+            chosen |= _largest(near, group)
+        else:
+            for i in sorted(group):
+                if chosen.isdisjoint(near[i]):
+                    chosen.add(i)
         left -= group
     return chosen
 
@@ -303,37 +281,26 @@ def _largest(near: Mapping[int, Collection[int]], group: set[int]) -> set[int]:
     return chosen
 
 
-def _in_order(near: Mapping[int, Collection[int]], group: set[int]) -> set[int]:
-    chosen = set[int]()
-    for i in sorted(group):
-        if chosen.isdisjoint(near[i]):
-            chosen.add(i)
-    return chosen
-
-
-def _in_words(same: dict[int, tuple[float | None, int]]) -> list[Text]:
+def _in_words(same: dict[int, tuple[float | None, int]]) -> Iterator[Text]:
     """One sentence for all that are the same of one other; copies come first."""
-    told: list[Text] = []
     for apart, other in sorted(set(same.values()), key=lambda pair: (pair[1], pair[0] is not None)):
         numbers = sorted(own for own, pair in same.items() if pair == (apart, other))
-        which = _listed(numbers)
+        words: dict[str, Argument] = {"which": _listed(numbers), "apart": apart or 0.0, "other": other}
+        one = say("measurement {which} is within {apart:g} mm of {other}", **words)
+        many = say("measurements {which} are within {apart:g} mm of {other}", **words)
         if apart is None:
-            one = say("measurement {which} is a copy of {other}", which=which, other=other)
-            many = say("measurements {which} are copies of {other}", which=which, other=other)
-        else:
-            one = say("measurement {which} is within {apart:g} mm of {other}", which=which, apart=apart, other=other)
-            many = say("measurements {which} are within {apart:g} mm of {other}", which=which, apart=apart, other=other)
-        told.append(plural(len(numbers), one=one, many=many))
-    return told
+            one = say("measurement {which} is a copy of {other}", which=words["which"], other=other)
+            many = say("measurements {which} are copies of {other}", which=words["which"], other=other)
+        yield plural(len(numbers), one=one, many=many)
 
 
 def _listed(numbers: Sequence[int]) -> Text:
     """Numbers in ascending order, those that follow each other as from 2 to 20."""
-    told: list[Text] = []
+    words: list[Text] = []
     for _, run in groupby(enumerate(numbers), key=lambda pair: pair[1] - pair[0]):
         own = [value for _, value in run]
-        told += [say("{first} to {last}", first=own[0], last=own[-1])] if len(own) > 2 else map(number, own)
-    return commas(told)
+        words += [say("{first} to {last}", first=own[0], last=own[-1])] if len(own) > 2 else map(number, own)
+    return commas(words)
 
 
 def _apart(one: Floats, two: Floats) -> float:
@@ -345,7 +312,7 @@ def sphere_points(
     plan: SpherePlan, points: Points, directions: Floats, copies: Mapping[int, int]
 ) -> tuple[Condition, ...]:
     """How many points on each sphere, and whether they cover it; ``directions`` (n, 3) outward from its middle."""
-    wanted, reach, lacking, bare = plan.points, plan.reach_deg, [], []
+    wanted, reach, lacking, bare = plan.points, plan.reach_deg, list[Text](), list[Text]()
     for group, rows in enumerate(points.rows_of_groups):
         if group in copies:
             continue
@@ -358,8 +325,9 @@ def sphere_points(
             bare.append(say("points over a hemisphere on the sphere of {name} (part of it {gap:.0f}° from the nearest point)",
                             name=name, gap=gap))  # fmt: skip
     over = say("every direction of a hemisphere within {reach_deg:g}° of a point", reach_deg=reach)
-    points_over = say("{points} points over the sphere", points=wanted)
-    return Condition(points_over, tuple(lacking)), Condition(over, tuple(bare))
+    return Condition(say("{points} points over the sphere", points=wanted), tuple(lacking)), Condition(
+        over, tuple(bare)
+    )
 
 
 def _farthest(normals: Floats) -> float:

@@ -38,34 +38,36 @@ def position_of(direction: Floats) -> Text:
 
 def position_on(machine: Machine, middle: Floats, direction: Floats) -> Text:
     """Position of a line through ``middle`` (3,), mm in the recorded frame, where the travel is known: by what it crosses."""
-    travel, place = machine.travel_mm, middle + machine.origin_mm
-    return _position_on(tuple(travel.ravel().tolist()), tuple(place.tolist()), tuple(direction.tolist()))
-
-
-@lru_cache(maxsize=16_384)  # conditions, figures and remarks of several standards ask for the same lines
-def _position_on(ends: tuple[float, ...], place: tuple[float, ...], direction: tuple[float, ...]) -> Text:
-    travel, along = np.reshape(ends, (-1, 2)), np.array(direction)
-    crossed = _crossed(ends, place, direction)
-    u = along / np.linalg.norm(along)
-    named = position_of(u)
-    if crossed is None:
-        return named
-    if np.all(crossed * np.abs(u) >= CORNER_TO_CORNER * np.ptp(travel, axis=1)):
-        return say("space diagonal {axes}", axes=_signed(u, np.ones(3, dtype=bool)))
-    if np.all(counts := np.abs(u) > ALIGNED):
-        return say("oblique {axes}", axes=_signed(u, counts))
-    return named
+    return _position_on(*_line(machine, middle, direction))
 
 
 def crossed_travel(machine: Machine, middle: Floats, direction: Floats) -> float | None:
     """Travel, mm, along a line through ``middle`` (3,) in the recorded frame; 0 outside it, ``None`` where none is stated."""
-    travel, place = machine.travel_mm, middle + machine.origin_mm
-    return _crossed(tuple(travel.ravel().tolist()), tuple(place.tolist()), tuple(direction.tolist()))
+    return _crossed(*_line(machine, middle, direction))
+
+
+Numbers = tuple[float, ...]
+
+
+def _line(machine: Machine, middle: Floats, direction: Floats) -> tuple[Numbers, Numbers, Numbers]:
+    """Ends of travel, place in scale readings and direction, as keys."""
+    ends, place, along = (each.ravel().tolist() for each in (machine.travel_mm, middle + machine.origin_mm, direction))
+    return tuple(ends), tuple(place), tuple(along)
+
+
+@lru_cache(maxsize=16_384)  # conditions, figures and remarks of several standards ask for the same lines
+def _position_on(ends: Numbers, place: Numbers, direction: Numbers) -> Text:
+    travel, along = np.reshape(ends, (-1, 2)), np.array(direction)
+    crossed, u = _crossed(ends, place, direction), along / np.linalg.norm(along)
+    if crossed is not None and np.all(crossed * np.abs(u) >= CORNER_TO_CORNER * np.ptp(travel, axis=1)):
+        return say("space diagonal {axes}", axes=_signed(u, np.ones(3, dtype=bool)))
+    if crossed is not None and np.all(counts := np.abs(u) > ALIGNED):
+        return say("oblique {axes}", axes=_signed(u, counts))
+    return position_of(u)
 
 
 @lru_cache(maxsize=16_384)
-def _crossed(ends: tuple[float, ...], place_mm: tuple[float, ...], direction: tuple[float, ...]) -> float | None:
-    """The same of scale readings ``place_mm``."""
+def _crossed(ends: Numbers, place_mm: Numbers, direction: Numbers) -> float | None:
     travel, place, along = np.reshape(ends, (-1, 2)), np.array(place_mm), np.array(direction)
     if not np.all(np.isfinite(travel)):
         return None
@@ -136,20 +138,6 @@ class SpherePlan:
 
 
 @dataclass(frozen=True)
-class RepeatPlan:
-    """A sphere probed again and again in one place."""
-
-    repeats: int
-
-
-@dataclass(frozen=True)
-class OffsetPlan:
-    """A ballbar measured with the stylus tip to either side of the ram."""
-
-    positions: tuple[Text, ...]
-
-
-@dataclass(frozen=True)
 class ShortLengthPlan:
     """A short gauge in several orientations."""
 
@@ -164,18 +152,11 @@ Plan = LengthPlan | BarPlan | SpherePlan
 
 @dataclass(frozen=True)
 class Condition:
-    """One thing that a standard asks for.
+    """One thing that a standard asks for."""
 
-    Parameters
-    ----------
-    what : it asks, and how much of it there is.
-    missing : what is not there, each in words; nothing when the condition is met.
-    remedy : which key of the job states what is missing, for who writes it.
-    """
-
-    what: Text
-    missing: tuple[Text, ...] = ()
-    remedy: Text = NOTHING
+    what: Text  # it asks, and how much of it there is
+    missing: tuple[Text, ...] = ()  # what is not there, each in words; nothing when the condition is met
+    remedy: Text = NOTHING  # which key of the job states what is missing, for who writes it
 
     @property
     def met(self) -> bool:
@@ -191,10 +172,9 @@ ISO_10360_2 = LengthPlan((*SPACE_DIAGONALS, *PARALLELS), 5, 3, 0.66, 30.0, bidir
 # E150, in one of two planes that hold a vertical ram. 150 mm is in the name; two diagonals, five lengths, three repeats, as
 # commonly reported, not verified
 ISO_10360_2_OFFSET = tuple(
-    LengthPlan(tuple(say("face diagonal {axes}", axes=Verbatim(f"{s}{plane[0]} +{plane[1]}")) for s in "+−"), 5, 3, 0.66,
-               30.0, bidirectional=True, offset_mm=150.0)
-    for plane in ("YZ", "XZ")
-)  # fmt: skip
+    LengthPlan(plane, 5, 3, 0.66, 30.0, bidirectional=True, offset_mm=150.0)
+    for plane in (FACE_DIAGONALS[2:4], FACE_DIAGONALS[4:])
+)
 
 # Axial, planar and spatial positions of a step gauge or of gauge blocks: Harris 2004, 2.6.2. How many lengths and repeats,
 # how long and how short: those of ISO 10360-2, this project's choice
@@ -205,12 +185,10 @@ VDI_2617_2_1 = {
 
 # A step gauge or laser along each axis: Harris 2004, 2.6.1. Ten lengths, three repeats, 66 %: this project's choice
 B89_LINEAR = LengthPlan(PARALLELS, 10, 3, 0.66, np.inf)
-B89_REPEATABILITY = RepeatPlan(10)  # Positions of a fixed ball: Harris 2004, 2.6.1. Ten: this project's choice
+B89_REPEATABILITY = 10  # positions of a fixed ball: Harris 2004, 2.6.1. Ten: this project's choice
 # Four diagonals in vertical planes, each with two offsets at right angles to the ram: Harris 2004, 2.6.1. Which four: this
 # project's reading
-B89_OFFSET = OffsetPlan(tuple(
-    say("face diagonal {axes}", axes=Verbatim(f"{s}{plane[0]} +{plane[1]}")) for plane in ("YZ", "XZ") for s in "+−"
-))  # fmt: skip
+B89_OFFSET = FACE_DIAGONALS[2:]
 
 # A short gauge block in four orientations: Harris 2004, 2.6.1. 10°, three repeats, what is short: this project's choice
 B89_BIDIRECTIONAL = ShortLengthPlan(4, 10.0, 3, 50.0)

@@ -10,30 +10,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.analysis.conformity import decision as rules, uncertainty
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings, numbered
-from cmm_uq.analysis.conformity.clauses import Clause, in_words
-from cmm_uq.analysis.conformity.decision import (
-    Decision,
-    PriorKnowledge,
-    Risks,
-    decide,
-    global_risks,
-    needs_uncertainty,
-    rule_words,
-)
+from cmm_uq.analysis.conformity.decision import Decision, PriorKnowledge
 from cmm_uq.analysis.conformity.plans import Condition
-from cmm_uq.analysis.conformity.shared_causes import Causes, probability_of_all
-from cmm_uq.analysis.conformity.statement import Decided, Statement, counted, least_favourable
-from cmm_uq.analysis.conformity.uncertainty_lines import (
-    FORM_LINES,
-    copies_in_words,
-    declared_in_words,
-    rated_conditions,
-    rated_in_words,
-    u_of_unstated,
-    uncertainty_conditions,
-    with_declared,
-)
+from cmm_uq.analysis.conformity.statement import Clause, Decided, Statement, clauses_in_words, counted, least_favourable
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say
 from cmm_uq.base.points import Floats, Ints
@@ -64,107 +45,78 @@ BY_MEASUREMENT_ALONE = say(
 
 @dataclass(frozen=True)
 class Characteristic:
-    """One thing that a standard decides.
+    """One thing that a standard decides."""
 
-    Parameters
-    ----------
-    name : as in ``[[conformity]] characteristic``.
-    observed : what it is decided on, one of ``Kind.tested``.
-    statement : compares and decides; see :meth:`Test.stated`.
-    conditions : what a complete test consists of, and what is missing of it, for an artefact with its points; ``recorded``
-        says whether these were measured or are a plan's.
-    unstated : the key of ``[artefact]`` that a rule with an uncertainty needs and that is not stated; ``None`` when nothing is
-        missing.
-    asks : what a complete test asks of artefact, probe and surroundings beside its points.
-    also : other names of it.
-    needs : the key of ``[test_uncertainty]`` without which a rule with an uncertainty says nothing.
-    beside : how a short gauge recorded beside the artefact enters; not at all where left out.
-    lines : of the test uncertainty that apply; see :mod:`cmm_uq.analysis.conformity.uncertainty_lines`.
-    """
-
-    name: str
-    observed: str
-    statement: Callable[[Test], Statement]
+    name: str  # as in [[conformity]] characteristic
+    observed: str  # what it is decided on, one of Kind.tested
+    statement: Callable[[Test], Statement]  # compares and decides; see Test.stated
+    # what a complete test consists of, and what is missing of it, for an artefact with its points, recorded or a plan's
     conditions: Callable[..., tuple[Condition, ...]] = lambda artefact, *, recorded: ()
+    # key of [artefact] that a rule with an uncertainty needs and that is not stated; None when nothing is missing
     unstated: Callable[[ArtefactFacts], str | None] = lambda artefact: None
+    # what a complete test asks of artefact, probe and surroundings beside its points
     asks: Callable[[Test], tuple[Condition, ...]] = lambda test: ()
-    also: tuple[str, ...] = ()
-    needs: str | None = None
+    also: tuple[str, ...] = ()  # other names of it
+    needs: str | None = None  # key of [test_uncertainty] without which a rule with an uncertainty says nothing
+    # how a short gauge recorded beside the artefact enters; not at all where left out
     beside: Callable[[Artefact, ShortGauge | None], Artefact] | None = None
-    lines: tuple[str, ...] = ()
+    lines: tuple[str, ...] = ()  # of the test uncertainty that apply; see cmm_uq.analysis.conformity.uncertainty
 
 
 @dataclass(frozen=True)
 class Standard:
-    """A standard as it can be stated.
+    """A standard as it can be stated."""
 
-    Parameters
-    ----------
-    name : with its part and edition, as in ``[[conformity]] standard``.
-    characteristics : that are decided; the first is meant where the job names none.
-    remarks : what every statement by it says.
-    sensing : for which probes it is; ``None`` for any.
-    clauses : what it takes the standard to ask, for the form that a laboratory fills in.
-    """
-
-    name: str
-    characteristics: tuple[Characteristic, ...]
-    remarks: tuple[Text, ...] = ()
-    sensing: Literal["contacting", "optical"] | None = None
-    clauses: tuple[Clause, ...] = ()
+    name: str  # with its part and edition, as in [[conformity]] standard
+    characteristics: tuple[Characteristic, ...]  # that are decided; the first is meant where the job names none
+    remarks: tuple[Text, ...] = ()  # what every statement by it says
+    sensing: Literal["contacting", "optical"] | None = None  # for which probes it is; None for any
+    clauses: tuple[Clause, ...] = ()  # what it takes the standard to ask, for the form that a laboratory fills in
 
     @property
     def clause_names(self) -> tuple[str, ...]:
         return tuple(clause.name for clause in self.clauses)
 
     def characteristic(self, name: str | None) -> Characteristic:
-        found = next((each for each in self.characteristics if name in (None, each.name, *each.also)), None)
-        if found is None:
-            known = ", ".join(each.name for each in self.characteristics)
-            raise ValueError(f"characteristic = {name!r} of {self.name} is not decided here: only {known}")
-        return found
+        for each in self.characteristics:
+            if name in (None, each.name, *each.also):
+                return each
+        known = ", ".join(each.name for each in self.characteristics)
+        raise ValueError(f"characteristic = {name!r} of {self.name} is not decided here: only {known}")
 
     def uncertainty_missing(
         self, wish: ConformityFacts, artefact: ArtefactFacts, stated: TestUncertainty
     ) -> str | None:
         if wish.rule == "simple":
             return None
-        asked = self.characteristic(wish.characteristic)
-        if asked.lines and asked.lines != FORM_LINES and all(stated.declared(line) for line in asked.lines):
+        one = self.characteristic(wish.characteristic)
+        if one.lines and one.lines != uncertainty.FORM_LINES and all(stated.declared(line) for line in one.lines):
             return None
-        lines = stated.u_temperature_k or stated.u_fixturing_um
-        if asked.needs is not None and not (getattr(stated, asked.needs) or lines):
-            return asked.needs
-        return asked.unstated(artefact)
+        if one.needs is None or getattr(stated, one.needs) or stated.u_temperature_k or stated.u_fixturing_um:
+            return one.unstated(artefact)
+        return one.needs
 
 
 @dataclass(frozen=True, eq=False)
 class Test:
-    """A test that is to be decided.
-
-    Parameters
-    ----------
-    standard, characteristic : what is tested.
-    facts : limit and rule.
-    artefact : with its recording.
-    recorded : the artefact as it was recorded, where ``artefact`` has been corrected: that makes no copy a measurement.
-    accuracy : figures of performance with uncertainty, by name.
-    key : of job.toml, for messages.
-    circumstances : under which it was carried out.
-    left_out : what the screening left out of the estimates; it is in ``artefact`` and in ``recorded``.
-    """
+    """A test that is to be decided."""
 
     __test__ = False  # no test of pytest's
 
-    standard: Standard
+    standard: Standard  # standard, characteristic: what is tested
     characteristic: Characteristic
-    facts: ConformityFacts
-    artefact: Artefact
-    recorded: Artefact
-    accuracy: Mapping[str, Quantity]
-    key: str
-    circumstances: Circumstances = field(default_factory=Circumstances)
+    facts: ConformityFacts  # limit and rule
+    artefact: Artefact  # with its recording
+    recorded: Artefact  # the same as recorded, where artefact has been corrected: that makes no copy a measurement
+    accuracy: Mapping[str, Quantity]  # figures of performance with uncertainty, by name
+    key: str  # of job.toml, for messages
+    circumstances: Circumstances = field(default_factory=Circumstances)  # under which it was carried out
+    # what the screening left out of the estimates; it is in artefact and in recorded
     left_out: OutsideReadings | None = None
+
+    def error(self, problem: str, of: str = "standard", fix: str = "Leave the statement out") -> CmmUqError:
+        """One of a key of this statement."""
+        return CmmUqError(problem, where=f"job.toml {self.key} {of}", fix=fix)
 
     def set_aside(self, rows: Ints) -> NDArray[np.bool_]:
         """Which values (m,), each of several points (m, j), rest on a reading that the screening left out."""
@@ -180,9 +132,8 @@ class Test:
         """Errors of indication of the calibrated lengths."""
         found = self.artefact.indications()
         if found is None:
-            raise CmmUqError(f"{self.facts.standard} compares with calibrated lengths, and the {self.artefact.kind} has none",
-                             where=f"job.toml {self.key} standard",
-                             fix="Give length_mm and u_um in [artefact], or leave the statement out")  # fmt: skip
+            problem = f"{self.facts.standard} compares with calibrated lengths, and the {self.artefact.kind} has none"
+            raise self.error(problem, fix="Give length_mm and u_um in [artefact], or leave the statement out")
         return found
 
     def limits_um(self, lengths_mm: Floats) -> Floats:
@@ -201,12 +152,16 @@ class Test:
     @cached_property
     def unstated(self) -> tuple[Condition, ...]:
         """Lines of the test uncertainty that are neither stated nor declared."""
-        return uncertainty_conditions(self.characteristic.lines, self.recorded, self.circumstances)
+        return uncertainty.uncertainty_conditions(self.characteristic.lines, self.recorded, self.circumstances)
 
     @property
     def answered(self) -> bool:
         """Whether an uncertainty of nought is one that somebody answers for, and not an unknown one."""
         return bool(self.characteristic.lines) and not self.unstated
+
+    def _length(self, length_mm: float | None) -> float:
+        """A length, the artefact's size by default."""
+        return self.artefact.sizes[0].nominal if length_mm is None else length_mm
 
     def decide(
         self, value_um: float, u_um: float, limit_um: float, *, signed: bool, length_mm: float | None = None
@@ -217,16 +172,17 @@ class Test:
         unknown, what they may well be of the length (of the artefact's size by default) counts before anything is proved to
         be beyond the limit.
         """
-        if u_um <= 0 and self.answered and needs_uncertainty(self.facts.rule):
-            return replace(decide(value_um, 0.0, limit_um, "simple", signed=signed), rule=rule_words(self.facts.rule))
-        unstated = self._u_of_unstated(self.artefact.sizes[0].nominal if length_mm is None else length_mm)
-        prior = self.prior(limit_um)
-        return decide(value_um, u_um, limit_um, self.facts.rule, signed=signed, prior=prior, unstated=unstated)
+        rule = self.facts.rule
+        if u_um <= 0 and self.answered and rules.needs_uncertainty(rule):
+            return replace(rules.decide(value_um, 0.0, limit_um, "simple", signed=signed), rule=rules.rule_words(rule))
+        unstated, prior = self._u_of_unstated(self._length(length_mm)), self.prior(limit_um)
+        return rules.decide(value_um, u_um, limit_um, rule, signed=signed, prior=prior, unstated=unstated)
 
     @cached_property
     def _u_of_unstated(self) -> Callable[[float], float]:
         """Standard uncertainty, µm, that what is not stated may well have, of a length in mm."""
-        return cache(partial(u_of_unstated, self.characteristic.lines, self.recorded, self.circumstances))
+        lines, under = self.characteristic.lines, self.circumstances
+        return cache(partial(uncertainty.u_of_unstated, lines, self.recorded, under))
 
     def decided(
         self, value_um: float, u_um: float, limit_um: float, *, signed: bool, measurement: int | None = None,
@@ -254,22 +210,22 @@ class Test:
 
     def refuse_without_uncertainty(self, u: float, name: str) -> None:
         """Refuse a rule that needs an uncertainty where there is none."""
-        if u <= 0 and needs_uncertainty(self.facts.rule) and not self.answered:
+        if u <= 0 and rules.needs_uncertainty(self.facts.rule) and not self.answered:
             problem, fix = needed(name, self.facts)
-            raise CmmUqError(problem, where=f"job.toml {self.key} rule", fix=fix)
+            raise self.error(problem, "rule", fix)
 
     def refuse_nothing_measured(self, measured: bool, what: str) -> None:
         """Refuse a statement on something of which the recording has nothing."""
         if not measured:
-            name = f"{self.characteristic.name} of {self.facts.standard}"
-            raise CmmUqError(f"{name} is decided on {what}, and the recording has none",
-                             where=f"job.toml {self.key} characteristic",
-                             fix="Record them, or leave the statement out")  # fmt: skip
+            problem = (
+                f"{self.characteristic.name} of {self.facts.standard} is decided on {what}, and the recording has none"
+            )
+            raise self.error(problem, "characteristic", "Record them, or leave the statement out")
 
     def stated(
         self, quantity: Text, measured: Text, items: tuple[Decided, ...], remarks: Sequence[Text], *,
-        signed: bool = True, causes: Causes | None = None, budget: Budget | None = None, repeats: int | None = None,
-        lacking: Sequence[Text] = (),
+        signed: bool = True, causes: uncertainty.Causes | None = None, budget: Budget | None = None,
+        repeats: int | None = None, lacking: Sequence[Text] = (),
     ) -> Statement:  # fmt: skip
         """What was decided, with what the test lacks, and what the rule leaves out.
 
@@ -279,13 +235,14 @@ class Test:
         under, points, left_out = self.circumstances, self.recorded.points, self.left_out
         lines, worst = self.characteristic.lines, least_favourable(items)
         clauses = [one for one in self.standard.clauses if not one.of or self.characteristic.name in one.of]
-        checked, differing = in_words(self.standard.name, clauses, under.clauses.get(self.facts.clauses or ""))
+        form = under.clauses.get(self.facts.clauses or "")
+        checked, differing = clauses_in_words(self.standard.name, clauses, form)
         asked = (
             *self.characteristic.conditions(self.recorded, recorded=True),
             *self.characteristic.asks(self),
             *(Condition(what, (what,)) for what in (*lacking, *differing)),
             *self.unstated,
-            *rated_conditions(under, points),
+            *uncertainty.rated_conditions(under, points),
             *numbered(points if left_out is None else left_out.recording, repeats),
             *self._gaps_of_short_gauge(),
         )
@@ -296,16 +253,19 @@ class Test:
         if left_out is not None and (aside or outside):
             more += left_out.in_words([item.measurement for item in aside] if not outside else [None])
         more += self._of_the_rule(items, worst)
-        if copies := copies_in_words(points):
+        if copies := uncertainty.copies_in_words(points):
             more.append(copies)
-        more += [*declared_in_words(lines, under.uncertainty), *rated_in_words(under.rated), *checked]
+        more += uncertainty.declared_in_words(lines, under.uncertainty)
+        more += [*uncertainty.rated_in_words(under.rated), *checked]
         joint = None
         if causes is not None and not outside and not counted(aside):
             left = [i for i, item in enumerate(items) if item.standing != "replaced"]
             errors, limits = [items[i].error_um for i in left], [items[i].limit_um for i in left]
-            joint = probability_of_all(errors, limits, causes.of(np.array(left, dtype=np.int64)), signed=signed)
+            own = causes.of(np.array(left, dtype=np.int64))
+            joint = uncertainty.probability_of_all(errors, limits, own, signed=signed)
         if budget is not None:
-            budget = with_declared(self._at_least(budget, worst), lines, under.uncertainty) if budget.u > 0 else None
+            declared = uncertainty.with_declared(self._at_least(budget, worst), lines, under.uncertainty)
+            budget = declared if budget.u > 0 else None
         return Statement(
             self.facts, self.characteristic.name, quantity, measured, items, tuple(missing), tuple(more), signed,
             joint, budget, self._risks(worst, signed), outside, tuple(missing.values()),
@@ -313,22 +273,19 @@ class Test:
 
     def _of_the_rule(self, items: Sequence[Decided], worst: Decided) -> list[Text]:
         """What the rule leaves out, what the standard always says, and whether the capability stood for a smaller u."""
-        more: list[Text] = []
-        if self.facts.rule == "simple" and worst.u_um > 0:
-            more.append(NOT_CONSIDERED)
+        more: list[Text] = [NOT_CONSIDERED] if self.facts.rule == "simple" and worst.u_um > 0 else []
         if self.facts.prior is None and worst.u_um > 0:
             more.append(BY_MEASUREMENT_ALONE)
         more += self.standard.remarks
-        nominal = self.artefact.sizes[0].nominal
-        least = self.least_u(np.array([nominal if item.length_mm is None else item.length_mm for item in items]))
+        least = self.least_u(np.array([self._length(item.length_mm) for item in items]))
         if any(0 < item.u_um <= floor * (1 + 1e-9) for item, floor in zip(items, least, strict=True)):
             more.append(RAISED)
         return more
 
     def _at_least(self, budget: Budget, item: Decided) -> Budget:
         """The budget of a value, with a line for what the capability has more."""
-        length = self.artefact.sizes[0].nominal if item.length_mm is None else item.length_mm
-        least = float(self.least_u(np.array([length]))[0]) * (MICROMETRE if budget.unit == unit("mm") else 1.0)
+        least = float(self.least_u(np.array([self._length(item.length_mm)]))[0])
+        least *= MICROMETRE if budget.unit == unit("mm") else 1.0
         if not budget.u < least:
             return budget
         u, what = float(np.sqrt(least**2 - budget.variance)), say("raised to the laboratory's capability")
@@ -341,12 +298,12 @@ class Test:
         gaps = [text for condition in numbered(gauge.points, measurements=False) for text in condition.missing]
         return tuple(Condition(text, (say("short gauge, {gap}", gap=text),)) for text in gaps)
 
-    def _risks(self, worst: Decided, signed: bool) -> Risks | None:
+    def _risks(self, worst: Decided, signed: bool) -> rules.Risks | None:
         prior, band = self.prior(worst.limit_um), worst.decision.guard_band
         if prior is None or worst.u_um <= 0:
             return None
         accepted = -20.0 * worst.u_um if band is None else worst.limit_um - band
-        return global_risks(accepted, worst.limit_um, worst.u_um, prior, signed=signed)
+        return rules.global_risks(accepted, worst.limit_um, worst.u_um, prior, signed=signed)
 
 
 def _set_aside(reasons: Mapping[int, str]) -> list[Text]:

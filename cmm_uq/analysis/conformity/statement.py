@@ -6,6 +6,7 @@ A pass needs a finding and completeness; a finding worse than a conditional pass
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
@@ -14,9 +15,10 @@ from typing import Literal
 import numpy as np
 
 from cmm_uq.analysis.conformity.decision import Decision, Risks
-from cmm_uq.base.messages import NOTHING, Text, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, say
 from cmm_uq.base.points import Ints
 from cmm_uq.base.units import UNITS
+from cmm_uq.jobs.tables.circumstances import ClausesForm, HeldClause
 from cmm_uq.jobs.tables.conformity import ConformityFacts
 from cmm_uq.jobs.verdicts import TOLERANCE_OUTCOMES, Verdict
 from cmm_uq.maths.uncertainty.budget import Budget
@@ -33,29 +35,21 @@ Standing = Literal["counts", "again", "replaced"]
 
 @dataclass(frozen=True)
 class Decided:
-    """One quantity against its own limit, with its own uncertainty.
+    """One quantity against its own limit, with its own uncertainty."""
 
-    Parameters
-    ----------
-    error_um, u_um, limit_um : measured value with its sign, standard uncertainty, limit.
-    decision : what follows.
-    measurement, repeat : that it comes from; ``None`` where it comes from all of them.
-    length_mm : calibrated length or size that it belongs to.
-    position : where it was measured, in words.
-    standing : ``again`` where the standard asks for more readings before it counts, ``replaced`` where these were made.
-    set_aside : whether it rests on a reading that the screening left out of the estimates, and is outside for that.
-    """
-
-    error_um: float
+    error_um: float  # error_um, u_um, limit_um: measured value with its sign, standard uncertainty, limit
     u_um: float
     limit_um: float
-    decision: Decision
-    measurement: int | None = None
+    decision: Decision  # what follows
+    measurement: int | None = None  # measurement, repeat: that it comes from; None where it comes from all of them
     repeat: int | None = None
-    length_mm: float | None = None
-    position: Text = NOTHING
+    length_mm: float | None = None  # calibrated length or size that it belongs to
+    position: Text = NOTHING  # where it was measured, in words
+    # again where the standard asks for more readings before it counts, replaced where these were made
     standing: Standing = "counts"
-    set_aside: bool = False
+    set_aside: bool = (
+        False  # whether it is outside for resting on a reading that the screening left out of the estimates
+    )
 
     @property
     def outcome(self) -> StatementFinding:
@@ -66,38 +60,25 @@ class Decided:
 
 @dataclass(frozen=True)
 class Statement:
-    """A statement of conformity with all it rests on.
+    """A statement of conformity with all it rests on."""
 
-    Parameters
-    ----------
-    facts : the job's wish.
-    characteristic : the one of the standard's that is decided.
-    quantity : what is compared, in words.
-    measured : what was measured, in the plural, for "… conform".
-    errors : all that was decided, in the recording's order.
-    missing : what the test lacks of its standard's plan, or of its uncertainty, in words.
-    remarks : what the reader must know of this use of the standard.
-    signed : whether limits hold on both sides of zero.
-    joint : probability that all quantities conform, what they share being correlated; ``None`` where it is not known.
-    budget : uncertainty of the named quantity, line by line; ``None`` where it has none.
-    risks : of all machines alike, for the named quantity; ``None`` without a prior.
-    outside : readings that the screening left out of the estimates and that have no value, in words: each fails.
-    remedies : of each that is missing, which key of the job would state it; nothing where its words say that.
-    """
-
-    facts: ConformityFacts
-    characteristic: str
-    quantity: Text
-    measured: Text
-    errors: tuple[Decided, ...]
-    missing: tuple[Text, ...]
-    remarks: tuple[Text, ...]
-    signed: bool = True
+    facts: ConformityFacts  # the job's wish
+    characteristic: str  # the one of the standard's that is decided
+    quantity: Text  # what is compared, in words
+    measured: Text  # what was measured, in the plural, for "… conform"
+    errors: tuple[Decided, ...]  # all that was decided, in the recording's order
+    missing: tuple[Text, ...]  # what the test lacks of its standard's plan, or of its uncertainty, in words
+    remarks: tuple[Text, ...]  # what the reader must know of this use of the standard
+    signed: bool = True  # whether limits hold on both sides of zero
+    # probability that all quantities conform, what they share being correlated; None where it is not known
     joint: float | None = None
-    budget: Budget | None = None
-    risks: Risks | None = None
+    budget: Budget | None = None  # uncertainty of the named quantity, line by line; None where it has none
+    risks: Risks | None = None  # of all machines alike, for the named quantity; None without a prior
+    # readings that the screening left out of the estimates and that have no value, in words: each fails
     outside: tuple[Text, ...] = ()
-    remedies: tuple[Text, ...] = ()
+    remedies: tuple[
+        Text, ...
+    ] = ()  # of each that is missing, which key would state it; nothing where its words say that
 
     @property
     def missing_with_remedies(self) -> tuple[Text, ...]:
@@ -204,12 +185,11 @@ def with_standing(items: Sequence[Decided], nominal: Ints, again: Remeasurement)
         each = {key: _not_inside(items, rows, again, not_inside) for key, rows in sets.items()}
         eligible = {key: found for key, found in each.items() if found is not None}
         failed = {key for key, rows in sets.items() if any(items[i].outcome in OUTSIDE for i in rows)}
-        if not_inside is OUTSIDE and failed - set(eligible):
-            break  # the test fails, whatever more is measured
-        if len(eligible) > again.lengths:
+        # the test fails, whatever more is measured
+        if len(eligible) > again.lengths or (not_inside is OUTSIDE and failed - set(eligible)):
             break
         for outside, further in eligible.values():
-            if further and any(items[i].outcome in OUTSIDE for i in further):
+            if any(items[i].outcome in OUTSIDE for i in further):
                 continue
             if len({items[i].repeat for i in further}) >= again.readings:
                 standing |= dict.fromkeys(outside, "replaced")
@@ -231,3 +211,47 @@ def _not_inside(
     if not outside or len({items[i].repeat for i in (*outside, *beyond)}) > again.outside:
         return None
     return outside, [i for i in rows if i not in test]
+
+
+@dataclass(frozen=True)
+class Clause:
+    """What this program takes one clause of a standard to ask, where that comes from, and whether anyone read the text."""
+
+    name: str
+    title: Text
+    does: str
+    source: str  # where that comes from
+    read: bool = (
+        False  # whether the words of the standard were read for it, in its text or as its publisher quotes them
+    )
+    of: tuple[str, ...] = ()  # characteristics that it is for; all of the standard's by default
+
+    def held(self, form: ClausesForm | None) -> HeldClause | None:
+        """What a form says of it; ``None`` where nobody looked, or the program does something else by now."""
+        given = None if form is None else form.clauses.get(self.name)
+        return None if given is None or given.agrees is None or given.does != self.does else given
+
+
+def clauses_in_words(
+    standard: str, asked: Sequence[Clause], form: ClausesForm | None
+) -> tuple[list[Text], tuple[Text, ...]]:
+    """What a certificate says of the clauses that a statement goes by, and what the test lacks by the laboratory's copy."""
+    each = [(one, one.held(form)) for one in asked]
+    said: list[Text] = []
+    who: dict[tuple[str, dt.date, str], list[Text]] = {}
+    for one, given in each:
+        if form is not None and given is not None:
+            key = (given.checked_by or form.checked_by, given.on or form.on, given.edition or form.edition)
+            who.setdefault(key, []).append(one.title)
+    for (name, when, edition), titles in who.items():
+        said.append(say("Clauses checked by {name} on {day}, edition {edition}: {titles}.", name=Verbatim(name), day=day(when),
+                        edition=Verbatim(edition), titles=commas(titles)))  # fmt: skip
+    differing = [(one.title, given) for one, given in each if given is not None and given.agrees is False]
+    for title, given in differing:
+        how = Verbatim(given.differs.rstrip(". "))
+        said.append(say("By the laboratory's copy this differs, {title}: {how}.", title=title, how=how))
+    if unread := [one.title for one, given in each if given is None and not one.read]:
+        said.append(say("Clauses of {standard} that nobody has held against its text: {titles}.", standard=Verbatim(standard),
+                        titles=commas(unread)))  # fmt: skip
+    lacking = (title for title, given in differing if not given.stricter)
+    return said, tuple(say("{title} as the laboratory's copy has it", title=title) for title in lacking)

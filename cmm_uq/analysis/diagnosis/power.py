@@ -7,17 +7,17 @@ that no other is said to be as possible. (Baarda 1968, Teunissen 2018: minimal d
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy import special
 
+from cmm_uq.analysis.diagnosis.comparison.combinations import CombinationPrior
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import DRAWS, draw_nothing, statistic_of
-from cmm_uq.analysis.diagnosis.comparison.prior import CombinationPrior
 from cmm_uq.analysis.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import Unit
@@ -25,6 +25,7 @@ from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.noise import Components, Sizes
+from cmm_uq.maths.inference.slow import root
 
 POWER = 0.8
 # Sizes of an effect that are tried: its rms in all observations together, what is fitted projected out, over the noise
@@ -224,3 +225,66 @@ class _Rule:
         """By how much the statistic (b,) passes the threshold, and the true effect what would let others stand beside it."""
         statistic, odds = statistic_of(self.comparison, data)
         return statistic - self.threshold(data), self._naming(odds, true)
+
+
+# Visible lengths within which one is looked for; beyond the last nothing is said to be found
+SHORTEST, LONGEST = 1.0, 60.0
+_NOISES = 7
+_Z = np.linspace(-5.0, 5.0, 101)
+
+
+@dataclass(frozen=True, eq=False)
+class Thresholds:
+    """What an effect must pass, in terms of z; see :mod:`cmm_uq.analysis.diagnosis.smallest`."""
+
+    detected: float  # z from which on the test rejects
+    named: Floats  # z (r,) from which on it exceeds each of its closest rivals, on average; infinite where never
+    cosines: Floats  # (r,) with these
+    known: float  # degrees of freedom of what was known of σ beforehand
+    left: int  # degrees of freedom of the residuals
+
+    @property
+    def noises(self) -> Floats:
+        """(q,) s/σ at evenly probable sizes of the residuals at right angles to the effect."""
+        count = max(self.left - 1, 1)
+        squares = special.chdtri(count, 1 - (np.arange(_NOISES) + 0.5) / _NOISES)
+        return np.asarray(np.sqrt((self.known + squares) / (self.known + count)))
+
+    def detects(self, length: Floats) -> Floats:
+        """Probability (d,) that the test rejects, for visible lengths (d,)."""
+        gate = self.detected * self.noises[:, None]
+        return np.asarray((special.ndtr(length - gate) + special.ndtr(-length - gate)).mean(axis=0))
+
+    def names(self, length: Floats) -> Floats:
+        """Probability (d,) that it is called by its name."""
+        if not np.all(np.isfinite(self.named)):
+            return np.zeros(len(length))
+        z = length[:, None] + _Z  # (d, z)
+        noises = self.noises[:, None, None]
+        passed = (np.abs(z) > self.detected * noises).astype(np.float64)
+        for named, cosine in zip(self.named, self.cosines, strict=True):
+            beside = 1 - cosine**2
+            room = z**2 - beside * (named * noises) ** 2  # what is left of it for the rival's own z²
+            rival, spread = np.sqrt(np.maximum(room, 0.0)), np.sqrt(beside)
+            below = special.ndtr((rival - cosine * z) / spread) - special.ndtr((-rival - cosine * z) / spread)
+            passed *= np.where(room > 0, below, 0.0)
+        density = np.exp(-0.5 * _Z**2)
+        return np.asarray(passed.mean(axis=0) @ density / density.sum())
+
+    def length_detected(self, power: float) -> float:
+        return _length_of(self.detects, power)
+
+    def length_named(self, power: float) -> float:
+        """Visible length named with this probability; infinite where none is."""
+        return _length_of(self.names, power)
+
+
+def _length_of(probability: Callable[[Floats], Floats], power: float) -> float:
+    """Length at which a probability that grows with it reaches a power; infinite beyond the longest."""
+
+    def short(length: float) -> float:
+        return float(probability(np.array([length]))[0]) - power
+
+    if short(LONGEST) < 0:
+        return float(np.inf)
+    return root(short, SHORTEST, LONGEST, 1e-10) if short(SHORTEST) < 0 else SHORTEST

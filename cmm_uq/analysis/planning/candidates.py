@@ -24,12 +24,9 @@ Attitudes = Callable[[Volume], list[tuple[Text, Floats]]]
 
 @dataclass(frozen=True)
 class RelocatedCandidates:
-    """A recorded artefact, that stands by itself in each set-up, set up in other places.
+    """A recorded artefact, that stands by itself in each set-up, set up in other places."""
 
-    ``attitudes`` in which it is set up, beside that of the recording.
-    """
-
-    attitudes: Attitudes
+    attitudes: Attitudes  # in which it is set up, beside that of the recording
 
     def __call__(self, artefact: Artefact, volume: Volume, count: int) -> tuple[SetUp, ...]:
         first = artefact.points.select(artefact.points.measurement == artefact.measurement[0])
@@ -44,15 +41,11 @@ class RelocatedCandidates:
 
 @dataclass(frozen=True)
 class VolumeCandidates:
-    """Candidates of an artefact that stands by itself in each set-up.
+    """Candidates of an artefact that stands by itself in each set-up."""
 
-    ``attitudes`` in which it is set up; ``shape`` what is measured of it in one set-up; ``elsewhere`` of a recorded
-    one.
-    """
-
-    attitudes: Attitudes
-    shape: Callable[[Setting], PatternFor]
-    elsewhere: RelocatedCandidates
+    attitudes: Attitudes  # in which it is set up
+    shape: Callable[[Setting], PatternFor]  # what is measured of it in one set-up
+    elsewhere: RelocatedCandidates  # of a recorded one
 
     def candidates(self, setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
         """In many places: as the plan says, or as it was recorded."""
@@ -87,15 +80,15 @@ def thinned(placings: Iterator[SetUp], count: int, volume: Volume) -> tuple[SetU
     """At most so many of them, spread evenly over the list."""
     found = tuple(placings)
     if not found:
+        size = " × ".join(f"{v:.0f}" for v in volume.size)
         raise CmmUqError(
             "no placing is possible: the artefact does not fit the volume in any direction that the fixtures allow",
             where="job.toml [plan]",
-            fix=f"The volume is {' × '.join(f'{v:.0f}' for v in volume.size)} mm; allow other directions or heights, or use "
-            "a smaller artefact",
+            fix=f"The volume is {size} mm; allow other directions or heights, or use a smaller artefact",
         )
-    if len(found) <= count:
-        return found
-    return tuple(found[i] for i in np.unique(np.linspace(0, len(found) - 1, count).round().astype(int)))
+    return tuple(
+        found[i] for i in np.unique(np.linspace(0, len(found) - 1, min(count, len(found))).round().astype(int))
+    )
 
 
 def everywhere(volume: Volume, ways: Sequence[tuple[Text, Floats]], shape: PatternFor) -> Iterator[SetUp]:
@@ -106,14 +99,11 @@ def everywhere(volume: Volume, ways: Sequence[tuple[Text, Floats]], shape: Patte
         room = None if pattern is None else volume.room(pattern.turned(attitude))
         if pattern is None or room is None:
             continue
-        spare = room[:, 1] - room[:, 0]
-        seen: set[tuple[float, ...]] = set()
+        middles: dict[tuple[float, ...], Floats] = {}
         for place in product(steps, repeat=3):
-            middle = room[:, 0] + spare * place
-            key = tuple(middle.round(3).tolist())
-            if key not in seen:
-                seen.add(key)
-                yield pattern.placed(volume.machine, attitude, middle, title)
+            middle = room[:, 0] + (room[:, 1] - room[:, 0]) * place
+            middles.setdefault(tuple(middle.round(3).tolist()), middle)
+        yield from (pattern.placed(volume.machine, attitude, middle, title) for middle in middles.values())
 
 
 MIDDLE = (0.5, 0.5, 0.5)  # of the room that a set-up has, along each axis

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from cmm_uq.analysis.planning.information import FAINT, certified, cosines, gram, imitators, left_of, scales, visible
-from cmm_uq.analysis.planning.set_up import SetUp, join
+from cmm_uq.analysis.planning.set_up import SetUp, repeat_points
 from cmm_uq.analysis.planning.setting import PlannedNoise, Setting, uncorrelated, white_noise
-from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.effect import Effect
@@ -36,8 +36,11 @@ def expected_uncertainty(model: RecordingModel, noise: PlannedNoise) -> Expected
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     linear, components = model.linearised(values), noise.components(model, values)
     sizes, weight = noise.spread(components)
-    u, with_prior = uncertainties(linear, components, sizes)
-    return ExpectedUncertainty(_averaged(u, weight), _averaged(with_prior, weight))
+    with np.errstate(divide="ignore"):  # geometric means (k,) of values (w, k), infinite where one is
+        return ExpectedUncertainty(*(
+            np.asarray(np.exp(weight @ np.log(each)) if len(weight) > 1 else each[0])
+            for each in uncertainties(linear, components, sizes)
+        ))  # fmt: skip
 
 
 def uncertainties(linear: LinearModel, components: Components, sizes: Sizes) -> tuple[Floats, Floats]:
@@ -79,12 +82,6 @@ def _determined(reduced: Floats, held: NDArray[np.bool_]) -> tuple[Floats, NDArr
     return basis, free
 
 
-def _averaged(values: Floats, weight: Floats) -> Floats:
-    """Geometric mean (k,) of values (w, k), infinite where one is."""
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.exp(weight @ np.log(values)) if len(weight) > 1 else values[0])
-
-
 @dataclass(frozen=True, eq=False)
 class RepeatsRow:
     """What set-ups tell with a number of repeats."""
@@ -110,62 +107,41 @@ class RepeatsComparison:
     @property
     def enough(self) -> int | None:
         """Repeats from which on a minute of one more set-up lowers every uncertainty more than one of a repeat."""
-        better = [_placing_is_better(one, following) for one, following in pairwise(self.rows)]
+        better = []
+        for row, following in pairwise(self.rows):
+            there = np.isfinite(row.u)
+            by_placing = np.log(row.u[there] / row.u_more[there]) * (following.minutes - row.minutes)
+            by_repeat = np.log(row.u[there] / following.u[there]) * (row.minutes_more - row.minutes)
+            better.append(bool(np.all(by_placing > by_repeat)))
         first = len(better) + 1 - [*reversed(better), False].index(False)
         return first if first <= len(better) else None
 
 
-def _placing_is_better(row: RepeatsRow, following: RepeatsRow) -> bool:
-    there = np.isfinite(row.u)
-    by_placing = np.log(row.u[there] / row.u_more[there]) * (following.minutes - row.minutes)
-    by_repeat = np.log(row.u[there] / following.u[there]) * (row.minutes_more - row.minutes)
-    return bool(np.all(by_placing > by_repeat))
-
-
 def compare_repeats(setting: Setting, placings: Sequence[SetUp]) -> RepeatsComparison | None:
     """Repeats against set-ups; ``None`` where no parameter is determined or the noise is taken as white."""
-    noise, n = setting.noise, len(placings)
+    noise, plan, n, rows = setting.noise, setting.plan, len(placings), []
     if noise is None or not setting.named:
         return None
-    rows = []
-    for repeats in range(1, max(COMPARED, setting.plan.repeats + 1) + 1):
-        points = join(
-            [replace(placing, points=repeat_points(placing.points, repeats)) for placing in placings],
-            seconds_per_point=setting.plan.seconds_per_point, minutes_per_placing=setting.plan.minutes_per_placing,
-            columns=setting.plan.columns,
-        )  # fmt: skip
-        model, minutes = setting.model(points), _minutes(setting, n, len(points))
+
+    def minutes(set_ups: int, readings: float) -> float:
+        return plan.minutes_per_placing * set_ups + plan.seconds_per_point * readings / 60
+
+    for repeats in range(1, max(COMPARED, plan.repeats + 1) + 1):
+        each = [replace(placing, points=repeat_points(placing.points, repeats)) for placing in placings]
+        points = setting.joined(each)
+        model, readings = setting.model(points), len(points)
         sought = [i for i, unknown in enumerate(model.unknowns) if not unknown.known]
         # information of n + 1 set-ups is to that of n as if variances were n / (n + 1) of what they are
-        now, more = (
-            expected_uncertainty(model, each).u[sought] for each in (noise, noise.times(float(np.sqrt(n / (n + 1)))))
-        )
-        with_one_more = len(points) * (1 + 1 / n)
-        rows.append(
-            RepeatsRow(repeats, len(points), minutes, now, with_one_more, _minutes(setting, n + 1, with_one_more), more)
-        )
+        lesser = noise.times(float(np.sqrt(n / (n + 1))))
+        now, later = (expected_uncertainty(model, each).u[sought] for each in (noise, lesser))
+        more = readings * (1 + 1 / n)
+        rows.append(RepeatsRow(repeats, readings, minutes(n, readings), now, more, minutes(n + 1, more), later))
     unknowns = tuple(unknown for unknown in model.unknowns if not unknown.known)
     return RepeatsComparison(unknowns, n, tuple(rows)) if np.any(np.isfinite(rows[0].u)) else None
 
 
-def repeat_points(points: Points, times: int) -> Points:
-    """What was read first, that many times over."""
-    once = points.select(points.repeat == points.repeat.min())
-    n = len(once)
-    return replace(
-        once, xyz=np.tile(once.xyz, (times, 1)), measurement=np.tile(once.measurement, times),
-        point=np.tile(once.point, times), repeat=np.repeat(np.arange(1, times + 1), n), lines=np.zeros(0, dtype=np.int64),
-        columns={name: np.tile(values, times) for name, values in once.columns.items()},
-    )  # fmt: skip
-
-
-def _minutes(setting: Setting, placings: int, readings: float) -> float:
-    return setting.plan.minutes_per_placing * placings + setting.plan.seconds_per_point * readings / 60
-
-
 Pair = tuple[str, str, float]  # two effects and the absolute cosine between them
 NOT_TOLD_APART = 0.98  # cosine from which on a fifth of one effect is all that the other cannot imitate
-_ROUNDING_of_identifiability = 1e-9
 WEAK = 0.1  # part of the prior variance from which on a parameter counts as weakly determined
 
 
@@ -209,16 +185,13 @@ def identifiability(
     linear = model.linearised(values)
     k, free = len(linear.unknowns), linear.freedoms.dense()
     whole = np.linalg.norm(linear.design / linear.noise_scale[:, None], axis=0)
-    there = np.linalg.norm(linear.reduced.design, axis=0) > _ROUNDING_of_identifiability * whole
-    estimate = solve(
-        replace(
-            linear,
-            observed=np.concatenate([linear.observed, np.zeros(k + 1)]),
-            design=np.vstack([linear.design * there, np.zeros((k + 1, k))]),
-            placing=np.vstack([free, np.zeros((k + 1, free.shape[1]))]),
-            noise_scale=np.concatenate([linear.noise_scale, np.ones(k + 1)]),
-        )
-    )
+    there = np.linalg.norm(linear.reduced.design, axis=0) > _ROUNDING * whole
+    estimate = solve(replace(
+        linear, observed=np.append(linear.observed, np.zeros(k + 1)),
+        noise_scale=np.append(linear.noise_scale, np.ones(k + 1)),
+        design=np.vstack([linear.design * there, np.zeros((k + 1, k))]),
+        placing=np.vstack([free, np.zeros((k + 1, free.shape[1]))]),
+    ))  # fmt: skip
     white = white_noise(model) if noise is None else noise.white
     under_white = expected_uncertainty(model, white)
     under_noise = under_white if noise is None else expected_uncertainty(model, noise)
@@ -267,24 +240,18 @@ def _among_rivals(
     wider = replace(model, effects=(*model.effects, *rivals))
     values = np.array([unknown.prior_mean for unknown in wider.unknowns])
     information = gram(wider, values, noise) + certified(wider.unknowns)
-    names = [unknown.key[0] for unknown in wider.unknowns]
-    own = {effect.name for effect in model.effects} | {ARTEFACT}
+    names, own = [unknown.key[0] for unknown in wider.unknowns], {ARTEFACT, *(effect.name for effect in model.effects)}
     fitted = [i for i, name in enumerate(names) if name in own]
     others = [i for i, name in enumerate(names) if name not in own]
     left, alone = left_of(information, others, fitted), np.diag(information)[others]
     seen, cosine = visible(left, alone), cosines(left, alone)
-    alike = (cosine > NOT_TOLD_APART) & seen[:, None] & seen[None, :]
-    found = [
-        (names[others[a]], names[others[b]], float(cosine[a, b]))
-        for a, b in zip(*np.nonzero(np.triu(alike, 1)), strict=True)
-        if names[others[a]] != names[others[b]]
-    ]
-    hidden = [i for i, there in zip(others, seen, strict=True) if not there]
+    alike = np.triu((cosine > NOT_TOLD_APART) & seen[:, None] & seen[None, :], 1)
+    found = [(names[others[a]], names[others[b]], float(cosine[a, b])) for a, b in zip(*np.nonzero(alike), strict=True)]
     shown = {names[i] for i, there in zip(others, seen, strict=True) if there}
+    hidden = [i for i, there in zip(others, seen, strict=True) if not there and names[i] not in shown]
     absorbed = {
         names[i]: tuple(dict.fromkeys(names[j] for j in imitators(information, i, fitted)))
-        for i in hidden
-        if information[i, i] > FAINT and names[i] not in shown
-    }
-    unseen = [names[i] for i in hidden if names[i] not in shown and names[i] not in absorbed]
-    return found, tuple(absorbed.items()), tuple(dict.fromkeys(unseen))
+        for i in hidden if information[i, i] > FAINT
+    }  # fmt: skip
+    unseen = dict.fromkeys(names[i] for i in hidden if names[i] not in absorbed)
+    return [pair for pair in found if pair[0] != pair[1]], tuple(absorbed.items()), tuple(unseen)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.planning.set_up import SetUp, join
+from cmm_uq.analysis.planning.set_up import SetUp
 from cmm_uq.analysis.planning.setting import PlannedNoise, Setting, uncorrelated
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
@@ -45,11 +45,7 @@ class Information:
 
 def set_up_information(setting: Setting, placings: Sequence[SetUp], also: tuple[Effect, ...] = ()) -> Information:
     """What each set-up tells of the effects that the job names, and of some others."""
-    plan = setting.plan
-    points = join(
-        placings, seconds_per_point=plan.seconds_per_point, minutes_per_placing=plan.minutes_per_placing,
-        columns=plan.columns,
-    )  # fmt: skip
+    points = setting.joined(placings)
     if setting.planning.shared:
         return shared(setting.model(points, also), setting.noise)
     numbers = np.unique(points.measurement)
@@ -124,23 +120,20 @@ def left_of(information: Floats, rivals: Sequence[int], base: Sequence[int]) -> 
     own = information[..., rival, :][..., :, rival]
     if not fitted:
         return np.asarray(own)
-    cross = information[..., fitted, :][..., :, rival]
-    within = information[..., fitted, :][..., :, fitted]
+    cross, within = (information[..., fitted, :][..., :, columns] for columns in (rival, fitted))
     scale = np.sqrt(np.maximum(np.einsum("...ii->...i", within), 1e-300))
-    scaled = within / scale[..., :, None] / scale[..., None, :]
-    scaled = scaled + _RIDGE * np.eye(len(fitted))
+    scaled = within / scale[..., :, None] / scale[..., None, :] + _RIDGE * np.eye(len(fitted))
     solved = np.linalg.solve(scaled, cross / scale[..., :, None]) / scale[..., :, None]
     return np.asarray(own - np.swapaxes(cross, -1, -2) @ solved)
 
 
 def cosines(left: Floats, alone: Floats) -> Floats:
     """Absolute cosines (..., r, r) of effects from what is left, 1 where unseen; ``alone`` (..., r) with nothing else."""
-    size = np.einsum("...ii->...i", left)
     seen = visible(left, alone)
-    root = np.sqrt(np.where(seen, size, 1.0))
-    cosine = np.abs(left) / root[..., :, None] / root[..., None, :]
-    cosine = np.where(seen[..., :, None] & seen[..., None, :], np.minimum(cosine, 1.0), 1.0)
-    return np.asarray(np.where(np.eye(left.shape[-1], dtype=bool), 1.0, cosine))
+    root = np.sqrt(np.where(seen, np.einsum("...ii->...i", left), 1.0))
+    cosine = np.minimum(np.abs(left) / root[..., :, None] / root[..., None, :], 1.0)
+    both = seen[..., :, None] & seen[..., None, :] & ~np.eye(left.shape[-1], dtype=bool)
+    return np.asarray(np.where(both, cosine, 1.0))
 
 
 def visible(left: Floats, alone: Floats) -> NDArray[np.bool_]:
@@ -150,8 +143,7 @@ def visible(left: Floats, alone: Floats) -> NDArray[np.bool_]:
 
 def imitators(information: Floats, row: int, base: Sequence[int]) -> list[int]:
     """Rows of the base that together look like an effect: least squares of its column on theirs, the smallest solution."""
-    fitted = list(base)
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    fitted, scale = list(base), np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information / scale[:, None] / scale[None, :]
     parts = np.linalg.lstsq(scaled[np.ix_(fitted, fitted)], scaled[fitted, row], rcond=_RIDGE**0.5)[0]
     return [i for i, part in zip(fitted, parts, strict=True) if abs(part) > _PART]
@@ -176,15 +168,14 @@ class Selection:
 
 
 def score_of(criterion: str, placings_information: Information, targets: Sequence[int]) -> Score:
-    targets, least = list(targets), 2 if criterion == "separation" else 1
+    targets, least, rows = list(targets), 2 if criterion == "separation" else 1, range(len(placings_information.prior))
     if criterion not in CRITERIA:
         raise CmmUqError(f"no criterion {criterion!r}", fix=f"Known: {', '.join(CRITERIA)}")
     if len(targets) < least:
         raise CmmUqError(f"the criterion {criterion!r} needs at least {least} effects", where="job.toml [plan]",
                          fix="Name more effects, or rivals to tell apart")  # fmt: skip
     if criterion == "separation":
-        base = [i for i in range(len(placings_information.prior)) if i not in targets]
-        upper = np.triu_indices(len(targets), 1)
+        base, upper = [i for i in rows if i not in targets], np.triu_indices(len(targets), 1)
 
         def apart(information: Floats) -> Floats:
             alone = np.einsum("...ii->...i", information)[..., targets]
@@ -193,7 +184,7 @@ def score_of(criterion: str, placings_information: Information, targets: Sequenc
 
         return apart
     nuisance = placings_information.nuisance
-    effects = [i for i in range(len(placings_information.prior)) if i not in nuisance]
+    effects = [i for i in rows if i not in nuisance]
     at = [effects.index(i) for i in targets]
 
     def uncertain(information: Floats) -> Floats:

@@ -1,4 +1,7 @@
-"""A set-up: the artefact in one place, and all points that are then measured; its pattern, and directions in words."""
+"""Set-ups: the artefact in one place with all points measured there, its pattern; what to measure next, in words.
+
+How such a plan is found is in :mod:`cmm_uq.analysis.planning.suggestion`.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,11 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Message, Text, Verbatim, in_a_row, say, signed
+from cmm_uq.base.messages import Message, Text, Verbatim, in_a_row, number, plural, say, semicolons, signed
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
+from cmm_uq.machine.physics.catalogue import every
 
 VECTORS: Mapping[str, str] = {
     "approach": "approach_{}",
@@ -24,13 +28,10 @@ _MINUTE = 60.0
 
 @dataclass(frozen=True, eq=False)
 class SetUp:
-    """One setting-up of the artefact.
+    """One setting-up of the artefact."""
 
-    ``title`` in words, for the operator; ``points`` everything measured there, as one measurement.
-    """
-
-    title: Text
-    points: Points
+    title: Text  # in words, for the operator
+    points: Points  # everything measured there, as one measurement
 
     @cached_property
     def middle(self) -> Floats:
@@ -49,51 +50,38 @@ class SetUp:
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """What is measured of an artefact in one set-up.
+    """What is measured of an artefact in one set-up."""
 
-    ``body`` (n, 3) along the artefact's axes about its middle, mm; a bar or gauge lies along the first; ``point``,
-    ``repeat`` (n,) as in a recording; ``columns`` further columns, each (n,); ``vectors`` vectors (n, 3) along the
-    artefact's axes, by the keys of :data:`VECTORS`.
-    """
-
-    body: Floats
-    point: Ints
+    body: Floats  # (n, 3) along the artefact's axes about its middle, mm; a bar or gauge lies along the first
+    point: Ints  # point, repeat: (n,) as in a recording
     repeat: Ints
-    columns: Mapping[str, Floats] = field(default_factory=dict)
+    columns: Mapping[str, Floats] = field(default_factory=dict)  # further columns, each (n,)
+    # vectors (n, 3) along the artefact's axes, by the keys of VECTORS
     vectors: Mapping[str, Floats] = field(default_factory=dict)
 
     @classmethod
     def of_recording(cls, points: Points) -> tuple[Pattern, Floats, Floats]:
         """The pattern of one recorded set-up, with its attitude (3, 3) and its middle (3,) in scale readings."""
-        xyz = points.machine_xyz
-        middle = np.asarray(xyz.mean(axis=0))
-        about = xyz - middle
-        attitude = _attitude(about)
-        turned = {
-            key: np.column_stack([points.columns[name.format(a)] for a in AXES]) @ attitude
-            for key, name in VECTORS.items()
-            if all(name.format(a) in points.columns for a in AXES)
-        }
-        taken = {name.format(a) for key, name in VECTORS.items() if key in turned for a in AXES}
-        columns = {name: values for name, values in points.columns.items() if name not in taken}
+        middle = np.asarray(points.machine_xyz.mean(axis=0))
+        about = points.machine_xyz - middle
+        attitude, columns, turned = _attitude(about), dict(points.columns), {}
+        for key, name in VECTORS.items():
+            names = [name.format(a) for a in AXES]
+            if all(each in columns for each in names):
+                turned[key] = np.column_stack([columns.pop(each) for each in names]) @ attitude
         return cls(about @ attitude, points.point, points.repeat, columns, turned), attitude, middle
 
     def once(self) -> Pattern:
         first = self.repeat == self.repeat.min()
-        return Pattern(
-            self.body[first], self.point[first], np.ones(int(first.sum()), dtype=np.int64),
-            {name: values[first] for name, values in self.columns.items()},
-            {name: values[first] for name, values in self.vectors.items()},
-        )  # fmt: skip
+        columns, vectors = ({name: v[first] for name, v in each.items()} for each in (self.columns, self.vectors))
+        one = np.ones(int(first.sum()), dtype=np.int64)
+        return Pattern(self.body[first], self.point[first], one, columns, vectors)
 
     def repeated(self, times: int) -> Pattern:
-        n = len(self.body)
-        return Pattern(
-            np.tile(self.body, (times, 1)), np.tile(self.point, times),
-            np.repeat(np.arange(1, times + 1), n),
-            {name: np.tile(values, times) for name, values in self.columns.items()},
-            {name: np.tile(values, (times, 1)) for name, values in self.vectors.items()},
-        )  # fmt: skip
+        columns = {name: np.tile(values, times) for name, values in self.columns.items()}
+        vectors = {name: np.tile(values, (times, 1)) for name, values in self.vectors.items()}
+        repeat = np.repeat(np.arange(1, times + 1), len(self.body))
+        return Pattern(np.tile(self.body, (times, 1)), np.tile(self.point, times), repeat, columns, vectors)
 
     def turned(self, attitude: Floats) -> Floats:
         """Body (n, 3) along the machine's axes for an attitude (3, 3), whose columns are the artefact's axes."""
@@ -117,7 +105,10 @@ def attitude_along(direction: Floats) -> Floats:
     across = np.cross([0.0, 0.0, 1.0], u)
     if np.linalg.norm(across) < _LEVEL:
         across = np.cross(u, [1.0, 0.0, 0.0])
-    v = across / np.linalg.norm(across)
+    return _right_handed(u, across / np.linalg.norm(across))
+
+
+def _right_handed(u: Floats, v: Floats) -> Floats:
     return np.column_stack([u, v, np.cross(u, v)])
 
 
@@ -129,13 +120,13 @@ def join(
     if not placings:
         raise CmmUqError("a plan without placings", fix="Ask for at least one")
     parts, clock = [], 0.0
-    for number, placing in enumerate(placings, first):
+    for measurement, placing in enumerate(placings, first):
         points, n = placing.points, len(placing.points)
         clock += _MINUTE * minutes_per_placing
         time = clock + seconds_per_point * np.arange(n)
         clock += seconds_per_point * n
         more = {"time_s": time} | {name: np.full(n, value) for name, value in (columns or {}).items()}
-        parts.append(replace(points, measurement=np.full(n, number), columns={**points.columns, **more}))
+        parts.append(replace(points, measurement=np.full(n, measurement), columns={**points.columns, **more}))
     return _concatenated(parts)
 
 
@@ -157,10 +148,11 @@ def _concatenated(parts: Sequence[Points]) -> Points:
 
 def split(points: Points, title: Callable[[int], Message] | None = None) -> tuple[SetUp, ...]:
     """The set-ups of a recording, in ascending order of their numbers."""
-    numbers = np.unique(points.measurement).tolist()
-    titles = [say("measurement {number}", number=number) if title is None else title(number) for number in numbers]
     return tuple(
-        SetUp(words, points.select(points.measurement == number)) for number, words in zip(numbers, titles, strict=True)
+        SetUp(
+            say("measurement {number}", number=n) if title is None else title(n), points.select(points.measurement == n)
+        )
+        for n in np.unique(points.measurement).tolist()
     )
 
 
@@ -175,10 +167,7 @@ def _attitude(about: Floats) -> Floats:
     off = far - np.outer(far @ u, u)
     v = off[int(np.argmax(np.linalg.norm(off, axis=1)))]
     size = float(np.linalg.norm(v))
-    if size < 1e-3 * length:
-        return attitude_along(u)
-    v = v / size
-    return np.column_stack([u, v, np.cross(u, v)])
+    return attitude_along(u) if size < 1e-3 * length else _right_handed(u, v / size)
 
 
 def direction_words(direction: Floats) -> Text:
@@ -211,9 +200,8 @@ def lines(size: Floats) -> list[Floats]:
 
 
 def _plane(first: tuple[float, float, float], second: tuple[float, float, float]) -> Floats:
-    u, v = np.array(first), np.array(second)
-    u, v = u / np.linalg.norm(u), v / np.linalg.norm(v)
-    return np.column_stack([u, v, np.cross(u, v)])
+    u, v = (np.array(each) / np.linalg.norm(each) for each in (first, second))
+    return _right_handed(u, v)
 
 
 PRINCIPAL_PLANES: tuple[tuple[Text, Floats], ...] = (  # attitudes of a plate
@@ -244,3 +232,111 @@ def planned_length(facts: ArtefactFacts, plan: PlanFacts) -> float:
         raise CmmUqError("the length of the artefact is needed", where="job.toml [plan] length_mm",
                          fix="Give it roughly, in mm; it is not taken as certified")  # fmt: skip
     return length
+
+
+def repeat_points(points: Points, times: int) -> Points:
+    """What was read first, that many times over."""
+    once = points.select(points.repeat == points.repeat.min())
+    measurement, point = np.tile(once.measurement, times), np.tile(once.point, times)
+    repeat, columns = np.repeat(np.arange(1, times + 1), len(once)), once.columns.items()
+    return replace(
+        once, xyz=np.tile(once.xyz, (times, 1)), measurement=measurement, point=point, repeat=repeat,
+        lines=np.zeros(0, dtype=np.int64), columns={name: np.tile(values, times) for name, values in columns},
+    )  # fmt: skip
+
+
+ODDS = 20.0  # odds that a plan is expected to reach for every pair, whichever of the two is true
+_OF_FITS = ("radius_mm", "fit_rms_um", "n_points")  # columns of a recording that tell of the fit that gave a point
+
+
+@dataclass(frozen=True)
+class Separation:
+    """Two effects that the recording cannot tell apart."""
+
+    effects: tuple[str, str]
+    before: float  # odds of the first over the second, by the recording
+    after: float  # odds of the true one over the other that are to be expected, the worse of the two cases
+
+
+@dataclass(frozen=True)
+class DetectionGoal:
+    """An effect that is to be shown."""
+
+    effect: str
+    amplitude: float  # that is to be detected, over its prior standard deviation
+    length: float  # visible length from which on it is detected
+
+
+@dataclass(frozen=True)
+class DetectionChange:
+    """How well an effect that was not seen will show."""
+
+    effect: str
+    # before, after: smallest amplitude that is detected, over its prior standard deviation; infinite where none is
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, eq=False)
+class NextPlan:
+    """What to measure next."""
+
+    placings: tuple[SetUp, ...]
+    repeats: int
+    first: int  # number of the first as a measurement
+    partings: tuple[Separation, ...]  # pairs, with the odds before and after
+    shown: tuple[DetectionChange, ...]
+    reached: bool  # whether every pair reaches ODDS and every effect shows as asked for
+    box: Floats  # (3, 2) the room for the artefact, scale readings, mm
+
+    @property
+    def points(self) -> Points:
+        """All of it as a recording at nominal coordinates, numbered on from what is recorded; without what fits told."""
+        each = [replace(one, points=repeat_points(one.points, self.repeats)) for one in self.placings]
+        points = join(each, first=self.first)
+        return replace(points, columns={k: v for k, v in points.columns.items() if k not in _OF_FITS})
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """What parts two effects."""
+
+    separates: tuple[str, str]
+    what: Text
+    repetitions: int  # how often to measure each set-up
+    odds: float  # of the true one of the two over the other that are then to be expected
+
+
+def suggestions(plan: NextPlan | None, title: Text) -> tuple[Suggestion, ...]:
+    if plan is None:
+        return ()
+    times = plural(plan.repeats, one=say("once"), many=say("{times} times", times=plan.repeats))
+    ends = semicolons(say("{ends} mm", ends=placing.ends) for placing in plan.placings)
+    return tuple(
+        Suggestion(
+            parting.effects,
+            say(
+                "Place the {title:small} at {ends} in scale readings and measure it {times}: odds of {odds} : 1 for the true "
+                "one are to be expected; by this recording they are {before} for {first} over {second}.",
+                title=title, ends=ends, times=times, odds=rounded(parting.after), before=odds_words(parting.before),
+                first=_title(parting.effects[0]), second=_title(parting.effects[1]),
+            ),
+            plan.repeats, parting.after,
+        )
+        for parting in plan.partings
+    )  # fmt: skip
+
+
+def _title(name: str) -> Text:
+    effect = every().get(name)
+    return Verbatim(name) if effect is None else say("{title:small}", title=effect.title)
+
+
+def odds_words(odds: float) -> Text:
+    """Odds as ``3 : 1`` or ``1 : 3``."""
+    return say("{odds} : 1", odds=rounded(odds)) if odds >= 1 else say("1 : {odds}", odds=rounded(1 / odds))
+
+
+def rounded(odds: float) -> Text:
+    """Odds of one or more, as many digits as they are worth."""
+    return say("more than 1000") if odds >= 1000 else number(odds, ".0f" if odds >= 10 else ".2g")

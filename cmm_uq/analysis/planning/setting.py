@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from cmm_uq.analysis.planning.set_up import Pattern, SetUp
+from cmm_uq.analysis.planning.set_up import Pattern, SetUp, join
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Machine, Points
@@ -44,7 +44,7 @@ class Volume:
     @classmethod
     def of(cls, machine: Machine, plan: PlanFacts, recorded: Floats | None = None) -> Volume:
         """What a job says: ``[plan] volume_mm``, else the machine's travel, else where points were recorded (n, 3)."""
-        box = np.empty((3, 2))
+        box, margin = np.empty((3, 2)), plan.margin_mm
         for i, axis in enumerate(AXES):
             low, high = machine.travel_mm[i]
             if axis in plan.volume_mm:
@@ -55,18 +55,17 @@ class Volume:
                         where="job.toml [plan] volume_mm", fix="Keep inside the travel, or mend [machine] travel_mm",
                     )  # fmt: skip
             elif recorded is not None and not np.all(np.isfinite(machine.travel_mm[i])):
-                box[i] = recorded[:, i].min() - plan.margin_mm, recorded[:, i].max() + plan.margin_mm
+                box[i] = recorded[:, i].min() - margin, recorded[:, i].max() + margin
             else:
                 box[i] = machine.travel(axis)
-        box = box + plan.margin_mm * np.array([1.0, -1.0])
-        if np.any(box[:, 0] > box[:, 1]):
-            axis = AXES[int(np.argmax(box[:, 0] > box[:, 1]))]
-            raise CmmUqError(f"a margin of {plan.margin_mm:g} mm leaves nothing of the volume along {axis.upper()}",
+        box = box + margin * np.array([1.0, -1.0])
+        if np.any(nothing := box[:, 0] > box[:, 1]):
+            axis = AXES[int(np.argmax(nothing))]
+            raise CmmUqError(f"a margin of {margin:g} mm leaves nothing of the volume along {axis.upper()}",
                              where="job.toml [plan] margin_mm", fix="Make it smaller, or the volume larger")  # fmt: skip
-        given = np.array(plan.fixtures.directions, dtype=np.float64).reshape(-1, 3)
-        units = given / np.linalg.norm(given, axis=1, keepdims=True) if len(given) else given
+        ways = np.array(plan.fixtures.directions, dtype=np.float64).reshape(-1, 3)
         low, high = plan.fixtures.heights_mm or (-np.inf, np.inf)
-        return cls(machine, box, (low, high), units)
+        return cls(machine, box, (low, high), ways / np.linalg.norm(ways, axis=1, keepdims=True))
 
     @property
     def size(self) -> Floats:
@@ -81,10 +80,8 @@ class Volume:
 
     def allows(self, direction: Floats) -> bool:
         """Whether a fixture holds an artefact along this direction, either way."""
-        if not len(self.directions):
-            return True
         u = direction / np.linalg.norm(direction)
-        return bool(np.any(np.abs(self.directions @ u) > _ALONG))
+        return not len(self.directions) or bool(np.any(np.abs(self.directions @ u) > _ALONG))
 
     def room(self, turned: Floats) -> Floats | None:
         """Range (3, 2) of the middle of a body (n, 3) that keeps it inside; ``None`` where it does not fit."""
@@ -98,8 +95,7 @@ class Volume:
     def set_up(self, pattern: Pattern, attitude: Floats, place: Sequence[float], title: Text) -> SetUp:
         """A pattern at a place (3,) of its room, 0 … 1 along each axis."""
         turned = pattern.turned(attitude)
-        room = self.room(turned)
-        if room is None:
+        if (room := self.room(turned)) is None:
             raise self.too_small(turned, title)
         middle = room[:, 0] + (room[:, 1] - room[:, 0]) * np.asarray(place, dtype=np.float64)
         return pattern.placed(self.machine, attitude, middle, title)
@@ -124,25 +120,23 @@ def turned_set_ups(placings: Sequence[SetUp], volume: Volume) -> Iterator[SetUp]
     """Each set-up with the artefact turned about its own axes, where it then fits."""
     for placing in placings:
         pattern, attitude, _ = Pattern.of_recording(placing.points)
-        for words, turn in _turns(pattern.body):
+        extent = np.ptp(pattern.body, axis=0)
+        for words, turn in _turns(extent):
             wanted = attitude @ turn
             room = volume.room(pattern.turned(wanted))
-            thin = np.ptp(pattern.body, axis=0)[1] < _FLAT * np.ptp(pattern.body, axis=0)[0]
-            if room is None or not volume.allows(wanted[:, 0] if thin else wanted[:, 2]):
+            if room is None or not volume.allows(wanted[:, 0] if extent[1] < _FLAT * extent[0] else wanted[:, 2]):
                 continue
             middle = np.clip(placing.points.machine_xyz.mean(axis=0), room[:, 0], room[:, 1])
             title = say("{title}, {turned}", title=placing.title, turned=words)
             yield pattern.placed(volume.machine, wanted, middle, title)
 
 
-def _turns(body: Floats) -> list[tuple[Text, Floats]]:
-    """Turns (3, 3) about an artefact's own axes that its shape (n, 3) allows, in words."""
-    extent = np.ptp(body, axis=0)
+def _turns(extent: Floats) -> list[tuple[Text, Floats]]:
+    """Turns (3, 3) about an artefact's own axes that its extent along them allows, in words."""
     if extent[0] == 0:
         return []
-    ends: list[tuple[Text, Floats]] = [(say("ends exchanged"), _about(2, 2))]
     if extent[1] < _FLAT * extent[0]:
-        return ends
+        return [(say("ends exchanged"), _about(2, 2))]
     # quarters about the normal
     angles = [(say("turned by {angle:.0f}°", angle=90.0 * quarter), _about(2, quarter)) for quarter in (1, 2, 3)]
     return [*angles, (say("turned over"), _about(0, 2))]
@@ -150,8 +144,7 @@ def _turns(body: Floats) -> list[tuple[Text, Floats]]:
 
 def _about(axis: int, quarters: int) -> Floats:
     """Turn (3, 3) about an own axis by quarters."""
-    u, v = (axis + 1) % 3, (axis + 2) % 3
-    turn = np.eye(3)
+    u, v, turn = (axis + 1) % 3, (axis + 2) % 3, np.eye(3)
     cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[quarters % 4]
     turn[u, u] = turn[v, v] = cosine
     turn[v, u], turn[u, v] = sine, -sine
@@ -199,12 +192,14 @@ class PlannedNoise:
 
     def spread(self, components: Components) -> tuple[Sizes, Floats]:
         """All sizes (w,) that are reckoned with, and their weights (w,), which sum up to one."""
-        placing, p = np.array([self.placing]), np.ones(1)
-        growth, g = np.array([self.growth or 0.0]), np.ones(1)
+        one = np.ones(1)
+        (placing, p), (growth, g) = (np.array([self.placing]), one), (np.array([self.growth or 0.0]), one)
         if self.placing is None:
-            placing, p = _prior(PLACING, self.coordinate)
+            ratio, p = _half_cauchy(ABSENT[PLACING], RATIO[PLACING])
+            placing = self.coordinate * ratio
         if self.growth is None and GROWTH in components.possible:
-            growth, g = _prior(GROWTH, self.coordinate)
+            ratio, g = _half_cauchy(ABSENT[GROWTH], RATIO[GROWTH])
+            growth = self.coordinate * ratio
         sizes = _sizes(self, np.repeat(placing, len(growth)), np.tile(growth, len(placing)))
         return sizes, np.outer(p, g).ravel()
 
@@ -241,14 +236,9 @@ def _sizes(noise: PlannedNoise, placing: Floats | list[float], growth: Floats | 
     return Sizes(reading, np.asarray(placing), np.asarray(growth), nothing, nothing + 1)
 
 
-def _prior(component: str, sigma: float) -> tuple[Floats, Floats]:
-    """Sizes of a component, mm, and their weights, for a reading noise ``sigma``."""
-    ratio, weight = _half_cauchy(ABSENT[component], RATIO[component])
-    return sigma * ratio, weight
-
-
 @cache
 def _half_cauchy(absent: float, scale: float) -> tuple[Floats, Floats]:
+    """Sizes of a component over the reading noise, and their weights."""
     low, high = np.log(_LEAST_RATIO), np.log(LARGEST_RATIO)
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     ratio = np.exp(low + 0.5 * (high - low) * (nodes + 1))
@@ -273,42 +263,33 @@ class Start:
 
 @dataclass(frozen=True)
 class Planning:
-    """What a kind of measurement offers to planning.
+    """What a kind of measurement offers to planning."""
 
-    ``ready`` plans by name, the usual one first; ``candidates`` set-ups that volume and fixtures allow, at most as
-    many as the plan says; ``elsewhere`` a recorded artefact in other places and attitudes, once in each, at most so
-    many; ``shared`` whether the freedoms of its set-up are common to all measurements, so that their information does
-    not add; ``sought`` whether it is sizes of the artefact that are sought, so that no effect need be named; ``free``
-    what set-ups leave open, in words, of a kind that names no effects; ``(setting, points, where)``.
-    """
-
-    ready: Mapping[str, Callable[[Setting], tuple[SetUp, ...]]]
+    ready: Mapping[str, Callable[[Setting], tuple[SetUp, ...]]]  # plans by name, the usual one first
+    # set-ups that volume and fixtures allow, at most as many as the plan says
     candidates: Callable[[Setting, Start | None], tuple[SetUp, ...]]
+    # a recorded artefact in other places and attitudes, once in each, at most so many
     elsewhere: Callable[[Artefact, Volume, int], tuple[SetUp, ...]] | None = None
+    # whether the freedoms of its set-up are common to all measurements, so that their information does not add
     shared: bool = False
-    sought: bool = False
+    sought: bool = False  # whether it is sizes of the artefact that are sought, so that no effect need be named
+    # (setting, points, where): what set-ups leave open, in words, of a kind that names no effects
     free: Callable[[Setting, Points, str], tuple[Text, ...]] | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """An artefact, a plan's wishes, and the room for it.
+    """An artefact, a plan's wishes, and the room for it."""
 
-    ``artefact`` as the job describes it; ``observe``, ``planning`` makes an artefact of that and of points; what its
-    kind offers here; ``plan`` ``[plan]``; ``volume`` room; ``named`` effects that the job's model names; ``sigma``
-    standard uncertainty of one coordinate, mm; ``stated`` the same as the job states it; ``None`` where it does not;
-    ``noise`` with its set-up offsets; ``None`` where it is taken as white.
-    """
-
-    artefact: ArtefactFacts
-    observe: Observe | None
-    planning: Planning
+    artefact: ArtefactFacts  # as the job describes it
+    observe: Observe | None  # makes an artefact of that and of points
+    planning: Planning  # what its kind offers here
     plan: PlanFacts
     volume: Volume
-    named: tuple[Effect, ...]
-    sigma: float
-    stated: float | None = None
-    noise: PlannedNoise | None = None
+    named: tuple[Effect, ...]  # that the job's model names
+    sigma: float  # standard uncertainty of one coordinate, mm
+    stated: float | None = None  # the same as the job states it; None where it does not
+    noise: PlannedNoise | None = None  # with its set-up offsets; None where it is taken as white
 
     @classmethod
     def of(cls, job: Job, kind: Kind) -> Setting:
@@ -330,6 +311,11 @@ class Setting:
     def machine(self) -> Machine:
         return self.volume.machine
 
+    def joined(self, placings: Sequence[SetUp]) -> Points:
+        """Set-ups as one recording, in the order and at the times at which they are measured."""
+        of_point, of_placing = self.plan.seconds_per_point, self.plan.minutes_per_placing
+        return join(placings, seconds_per_point=of_point, minutes_per_placing=of_placing, columns=self.plan.columns)
+
     def sized(self, points: Points) -> Setting:
         """The same with the artefact's length as these points show it, where its certified figures stand in the recording."""
         if not self.artefact.with_references or self.artefact.length_mm is not None:
@@ -348,18 +334,17 @@ class Setting:
 
     def rivals(self, points: Points) -> tuple[Effect, ...]:
         """Effects that the job does not name: those that the plan lists, else all of the first tier that could act here."""
-        named = {effect.name for effect in self.named}
-        if self.plan.rivals is not None:
-            where = "job.toml [plan] rivals"
-            artefact = self.observed(points)
-            chosen = tuple(artefact.acting(effect) for effect in effects(self.plan.rivals, where=where))
-            for effect in chosen:
-                if missing := [column for column in effect.columns if column not in points.columns]:
-                    raise CmmUqError(f"{effect.name} needs the column {missing[0]}, which this plan does not record",
-                                     where=where, fix="Leave it out, or give its value in [plan] columns")  # fmt: skip
-            return tuple(effect for effect in chosen if effect.name not in named and not effect.shape)
-        free = [e for e in every().values() if e.tier == CONTRACT and e.name not in named and not e.shape]
-        return tuple(e for e in free if all(column in points.columns for column in e.columns))
+        named, where, columns = {effect.name for effect in self.named}, "job.toml [plan] rivals", points.columns
+        if self.plan.rivals is None:
+            free = [e for e in every().values() if e.tier == CONTRACT and e.name not in named and not e.shape]
+            return tuple(e for e in free if all(column in columns for column in e.columns))
+        artefact = self.observed(points)
+        chosen = tuple(artefact.acting(effect) for effect in effects(self.plan.rivals, where=where))
+        for effect in chosen:
+            if missing := [column for column in effect.columns if column not in columns]:
+                raise CmmUqError(f"{effect.name} needs the column {missing[0]}, which this plan does not record",
+                                 where=where, fix="Leave it out, or give its value in [plan] columns")  # fmt: skip
+        return tuple(effect for effect in chosen if effect.name not in named and not effect.shape)
 
 
 def _noise(job: Job) -> PlannedNoise:

@@ -15,19 +15,9 @@ import numpy as np
 
 from cmm_uq.analysis.diagnosis.comparison.explanations import shapes
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
-from cmm_uq.analysis.planning.advice import ODDS, DetectionChange, DetectionGoal, NextPlan, Separation
-from cmm_uq.analysis.planning.information import (
-    Information,
-    Selection,
-    by_measurement,
-    certified,
-    choose,
-    gram,
-    left_of,
-    scales,
-    shared,
-)
-from cmm_uq.analysis.planning.set_up import SetUp, append
+from cmm_uq.analysis.planning import information as content
+from cmm_uq.analysis.planning.information import Information, Selection, left_of, scales
+from cmm_uq.analysis.planning.set_up import ODDS, DetectionChange, DetectionGoal, NextPlan, Separation, SetUp, append
 from cmm_uq.analysis.planning.setting import Planning, Volume, turned_set_ups
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
@@ -82,24 +72,18 @@ class _Information:
 
 
 def next_plan(
-    diagnosis: Diagnosis,
-    facts: ArtefactFacts,
-    observe: Observe,
-    planning: Planning | None,
-    plan: PlanFacts | None = None,
+    diagnosis: Diagnosis, facts: ArtefactFacts, observe: Observe, planning: Planning | None, plan: PlanFacts | None = None,
     goals: Sequence[DetectionGoal] = (),
-) -> NextPlan | None:
+) -> NextPlan | None:  # fmt: skip
     """The fewest set-ups that part all that cannot be told apart; ``None`` where nothing is to be parted or none helps."""
-    groups = _groups(diagnosis)
+    groups, after = _groups(diagnosis), diagnosis.after
     if not (groups or goals) or planning is None or planning.elsewhere is None:
         return None
-    after = diagnosis.after
     names = sorted({name for group in groups for name in group.names} | {one.effect for one in goals})
-    model = _with_all(after, names)
+    model, points = _with_all(after, names), after.artefact.points
     if facts.with_references:  # one set-up alone does not show how long the artefact is
         facts = facts.model_copy(update={"length_mm": after.artefact.sizes[0].nominal})
     try:
-        points = after.artefact.points
         volume = Volume.of(points.machine, plan or PlanFacts(margin_mm=0.0), points.carriages)
         places = planning.elsewhere(after.artefact, volume, _CANDIDATES)
         if not planning.shared:
@@ -109,11 +93,15 @@ def next_plan(
     except CmmUqError:  # nowhere else to put it
         return None
     sizes = {(group.names[0], name): _size(after, name, group.names) for group in groups for name in group.names}
-    aims = _Aims(known, groups, (), sizes, _variances(diagnosis))
+    # variance of a reading, which repeats average, and of a set-up, over that of a coordinate; each half without repeats
+    variances = 0.5, 0.5
+    if int(points.group.max()) + 1 != len(np.unique(points.measurement)):
+        coordinate, placing = diagnosis.noise.coordinate.value, diagnosis.noise.placing.value
+        variances = 1.0, (placing / coordinate if coordinate > 0 else 0.0) ** 2
+    aims = _Aims(known, groups, (), sizes, variances)
     most = aims.amplitudes((known.recorded + known.told.each.sum(axis=0))[None], goals)[0]
     aims = replace(aims, wanted=tuple(one for one, size in zip(goals, most, strict=True) if size < _NEVER))
-    found = _within_reach(aims)
-    if found is None:
+    if (found := _within_reach(aims)) is None:
         return None
     chosen, repeats = found
     after_all = aims.after(chosen, repeats)
@@ -135,20 +123,11 @@ def _groups(diagnosis: Diagnosis) -> list[_Group]:
     return [group for group in found if group.pairs]
 
 
-def _variances(diagnosis: Diagnosis) -> tuple[float, float]:
-    """Of a reading, which repeats average, and of a set-up, over that of a coordinate; each half without repeats."""
-    noise, points = diagnosis.noise, diagnosis.after.artefact.points
-    if int(points.group.max()) + 1 == len(np.unique(points.measurement)):
-        return 0.5, 0.5
-    offset = noise.placing.value / noise.coordinate.value if noise.coordinate.value > 0 else 0.0
-    return 1.0, offset**2
-
-
 def _with_all(after: RecordingModel, names: Sequence[str]) -> RecordingModel:
     shape = dict(after.shapes)
-    for name in names:
+    for name in (name for name in names if name not in shape):
         effect = after.artefact.acting(every()[name])
-        if effect.shape and name not in shape:
+        if effect.shape:
             shape[name] = next(iter(shapes(effect, after.artefact.points)))
     others = tuple(effect for effect in after.effects if effect.name not in names)
     return replace(after, effects=(*others, *(every()[name] for name in names)), shapes=shape)
@@ -157,21 +136,22 @@ def _with_all(after: RecordingModel, names: Sequence[str]) -> RecordingModel:
 def _information(
     after: RecordingModel, model: RecordingModel, observe: Observed, places: Sequence[SetUp], *, shared_freedoms: bool
 ) -> _Information:
-    fitted = frozenset({ARTEFACT, *(effect.name for effect in after.effects)})
     joint = observe(append(model.artefact.points, places))
     together = RecordingModel(joint, model.effects, model.sigma, shapes=model.shapes)
     names = tuple(unknown.key[0] for unknown in together.unknowns)
+    values = np.array([unknown.prior_mean for unknown in together.unknowns])
     if shared_freedoms:
-        whole = shared(together)
-        more = len(whole.prior) - len(names)
+        whole = content.shared(together)
     else:
-        values = np.array([unknown.prior_mean for unknown in together.unknowns])
-        whole, more = Information(together.unknowns, by_measurement(together, values), certified(together.unknowns)), 0
+        each, certified = content.by_measurement(together, values), content.certified(together.unknowns)
+        whole = Information(together.unknowns, each, certified)
     count = len(whole.each) - len(places)
     recorded = whole.each[:count].sum(axis=0)
     if not shared_freedoms and len(names) == len(model.unknowns):  # without observations that were set aside
-        recorded = gram(model, values)
-    return _Information(replace(whole, each=whole.each[count:]), (*names, *[ARTEFACT] * more), fitted, recorded)
+        recorded = content.gram(model, values)
+    names = (*names, *[ARTEFACT] * (len(whole.prior) - len(names)))
+    fitted = frozenset({ARTEFACT, *(effect.name for effect in after.effects)})
+    return _Information(replace(whole, each=whole.each[count:]), names, fitted, recorded)
 
 
 def _size(after: RecordingModel, name: str, group: Sequence[str]) -> Floats:
@@ -179,10 +159,7 @@ def _size(after: RecordingModel, name: str, group: Sequence[str]) -> Floats:
     model = _with_all(replace(after, effects=others), [name])
     try:
         value = model.estimate().least_squares.value / scales(model.unknowns)
-    except (
-        CmmUqError,
-        np.linalg.LinAlgError,
-    ):  # alone it would have to be larger than any machine's: the largest, then
+    except (CmmUqError, np.linalg.LinAlgError):  # alone it would be larger than any machine's: the largest, then
         value = np.ones(len(model.unknowns))
     return np.asarray([v for v, u in zip(value, model.unknowns, strict=True) if u.key[0] == name], dtype=np.float64)
 
@@ -278,14 +255,12 @@ class _Aims:
 def _within_reach(aims: _Aims) -> tuple[Selection, int] | None:
     found = _fewest(aims)
     while found is not None and found[0].after > 0 and aims.wanted:
-        shown = aims.amplitudes(aims.after(*found)[None], aims.wanted)[0]
-        missing = shown / np.array([one.amplitude for one in aims.wanted])
+        missing = aims.amplitudes(aims.after(*found)[None], aims.wanted)[0] / [one.amplitude for one in aims.wanted]
         worst = int(np.argmax(missing))
         if missing[worst] <= 1:
             break
         aims = replace(aims, wanted=aims.wanted[:worst] + aims.wanted[worst + 1 :])
-        nearer = _fewest(aims)
-        found = found if nearer is None else nearer
+        found = _fewest(aims) or found
     return found
 
 
@@ -293,7 +268,9 @@ def _fewest(aims: _Aims) -> tuple[Selection, int] | None:
     """As few set-ups as reach all aims, each repeated no more often than that needs; what comes closest where none does."""
 
     def chosen(count: int, repeats: int) -> Selection:
-        return choose(replace(aims.known.told, each=aims.added(repeats)), aims.known.recorded, aims.short, count)
+        return content.choose(
+            replace(aims.known.told, each=aims.added(repeats)), aims.known.recorded, aims.short, count
+        )
 
     most = min(SET_UPS, len(aims.known.told.each))
     best = chosen(most, REPEATS)

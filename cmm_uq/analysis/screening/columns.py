@@ -63,6 +63,7 @@ TEMPERATURES = (*SCALES, "temp_artefact_c", "temp_table_top_c", "temp_table_bott
 # s between points of one set-up that no operator waits, and that no machine probes a ball in
 LONGEST_PAUSE, SHORTEST_BALL = 6 * 3600.0, 0.6
 _STUCK_ROWS, _STUCK_PART, _MOVING = 8, 0.15, 0.9
+WAYS = ((-1, say("down")), (1, say("up")))  # that a column slipped by a row, and how to roll it back
 
 
 @dataclass(frozen=True)
@@ -80,10 +81,8 @@ class Bounds:
 
     def unit(self, values: Floats) -> Text | None:
         """The unit in which all these values are plausible: value · factor + offset."""
-        for name, factor, offset in self.units:
-            if not np.any(self.wrong(factor * values + offset)):
-                return name
-        return None
+        plausible = (name for name, factor, off in self.units if not np.any(self.wrong(factor * values + off)))
+        return next(plausible, None)
 
 
 _TEMPERATURE = Bounds(
@@ -93,51 +92,45 @@ _TEMPERATURE = Bounds(
 
 # What each column may hold
 BOUNDS: Mapping[str, Bounds] = {
-        "radius_mm": Bounds(1e-9, np.inf, say("a radius is positive")),
-        "fit_rms_um": Bounds(0.0, np.inf, say("an rms is not negative")),
-        "n_points": Bounds(1.0, np.inf, say("a fit needs points")),
-        "humidity_pct": Bounds(0.0, 100.0, say("relative humidity lies between 0 and 100 %")),
-        "pressure_hpa": Bounds(
-            500.0, 1100.0, say("air pressure lies between 500 and 1100 hPa; is it in hPa?"),
-            (
-                (Verbatim("Pa"), 1e-2, 0.0), (Verbatim("kPa"), 10.0, 0.0), (Verbatim("bar"), 1e3, 0.0),
-                (Verbatim("inHg"), 33.86, 0.0),
-            ),
-        ),
-        "speed_mm_s": Bounds(0.0, np.inf, say("a speed is not negative")),
-        **dict.fromkeys(TEMPERATURES, _TEMPERATURE),
-    }  # fmt: skip
+    "radius_mm": Bounds(1e-9, np.inf, say("a radius is positive")),
+    "fit_rms_um": Bounds(0.0, np.inf, say("an rms is not negative")),
+    "n_points": Bounds(1.0, np.inf, say("a fit needs points")),
+    "humidity_pct": Bounds(0.0, 100.0, say("relative humidity lies between 0 and 100 %")),
+    "pressure_hpa": Bounds(
+        500.0, 1100.0, say("air pressure lies between 500 and 1100 hPa; is it in hPa?"),
+        tuple((Verbatim(name), factor, 0.0) for name, factor in (("Pa", 1e-2), ("kPa", 10.0), ("bar", 1e3), ("inHg", 33.86))),
+    ),
+    "speed_mm_s": Bounds(0.0, np.inf, say("a speed is not negative")),
+    **dict.fromkeys(TEMPERATURES, _TEMPERATURE),
+}  # fmt: skip
 
 SENSORS = (*BOUNDS, "time_s")  # columns that are left out where they cannot be trusted
 
 
 def column_findings(points: Points, *, balls: bool) -> list[Finding]:
     """All that is odd beside the coordinates, a finding a column."""
-    found = [*_impossible(points), *_fraction(points), *_time(points, balls), *_stuck(points), *_slipped(points)]
-    return [*found, *_approach(points)]
+    of_values, of_time = (*_impossible(points), *_fraction(points)), _time(points, balls)
+    return [*of_values, *of_time, *_stuck(points), *_slipped(points), *_approach(points)]
 
 
 def _impossible(points: Points) -> Iterator[Finding]:
     for column, bounds in BOUNDS.items():
-        if column not in points.columns or not np.any(rows := bounds.wrong(points.columns[column])):
-            continue
-        values = points.columns[column][rows]
-        unit = bounds.unit(values)
-        why = say("{column} = {span}: {why}", column=Verbatim(column), span=span(values), why=bounds.why)
-        if unit is not None:
-            why = say("{told} It looks like {unit}: convert it", told=why, unit=unit)
-        yield finding("impossible" if unit is None else "unit", points, rows, why, column)
+        if column in points.columns and np.any(rows := bounds.wrong(points.columns[column])):
+            values = points.columns[column][rows]
+            why = say("{column} = {span}: {why}", column=Verbatim(column), span=span(values), why=bounds.why)
+            if (unit := bounds.unit(values)) is not None:
+                why = say("{told} It looks like {unit}: convert it", told=why, unit=unit)
+            yield finding("impossible" if unit is None else "unit", points, rows, why, column)
 
 
 def _fraction(points: Points) -> Iterator[Finding]:
     humidity = points.columns.get("humidity_pct", np.zeros(0))
     if np.any(humidity > 0) and np.all(humidity <= 1):
-        every = np.ones(len(points), dtype=bool)
         why = say(
             "humidity_pct = {span}: no air is so dry; it looks like a fraction of 1, not %: multiply by 100",
             span=span(humidity),
         )
-        yield finding("unit", points, every, why, "humidity_pct")
+        yield finding("unit", points, _every(points), why, "humidity_pct")
 
 
 def _time(points: Points, balls: bool) -> Iterator[Finding]:
@@ -145,25 +138,18 @@ def _time(points: Points, balls: bool) -> Iterator[Finding]:
     if "time_s" not in points.columns:
         return
     time = points.columns["time_s"]
-    within = np.diff(points.group) == 0
-    steps = np.abs(np.diff(time))[within]
-    usual, every = float(np.median(steps)) if len(steps) else 0.0, np.ones(len(points), dtype=bool)
+    steps = np.abs(np.diff(time))[np.diff(points.group) == 0]
+    usual = float(np.median(steps)) if len(steps) else 0.0
     if usual > LONGEST_PAUSE:
-        why = say(
-            "time_s: {usual:.3g} s from point to point of one placing is longer than anybody waits; it "
-            "looks like milliseconds: divide by 1000",
-            usual=usual,
-        )
+        why = say("time_s: {usual:.3g} s from point to point of one placing is longer than anybody waits; it "
+                  "looks like milliseconds: divide by 1000", usual=usual)  # fmt: skip
     elif balls and 0 < usual < SHORTEST_BALL:
-        why = say(
-            "time_s: {usual:.3g} s from ball to ball is shorter than a machine can probe one; it looks "
-            "like minutes or hours: give seconds",
-            usual=usual,
-        )
+        why = say("time_s: {usual:.3g} s from ball to ball is shorter than a machine can probe one; it looks "
+                  "like minutes or hours: give seconds", usual=usual)  # fmt: skip
     else:
         yield from _moments(points, time)
         return
-    yield finding("unit", points, every, why, "time_s")
+    yield finding("unit", points, _every(points), why, "time_s")
 
 
 def _moments(points: Points, time: Floats) -> Iterator[Finding]:
@@ -172,23 +158,16 @@ def _moments(points: Points, time: Floats) -> Iterator[Finding]:
     before, after = np.maximum.accumulate(time), np.minimum.accumulate(time[::-1])[::-1]
     broken = np.flatnonzero((time[1:-1] > after[2:]) | (time[1:-1] < before[:-2])) + 1
     for row in broken.tolist():
-        low, high = time[row - 1], time[row + 1]
-        if not low <= high or low <= time[row] <= high:
+        low, now, high = time[row - 1 : row + 2]
+        if not low <= high or low <= now <= high or np.any(np.diff(np.delete(time, row)) < 0):
             continue
-        rest = np.delete(time, row)
-        unit = next((u for f, u in ((1e-3, say("milliseconds")), (60.0, say("minutes")), (3600.0, say("hours")))
-                     if low <= f * time[row] * (1 + 1e-9) and f * time[row] <= high * (1 + 1e-9)), None)  # fmt: skip
-        if unit is not None and np.all(np.diff(rest) >= 0):
-            rows = np.array([row])
-            why = say(
-                "{at_lines}: time_s = {time:g} between {low:g} and {high:g} looks like {unit}: give seconds",
-                at_lines=at_lines(points, rows),
-                time=time[row],
-                low=low,
-                high=high,
-                unit=unit,
-            )
-            yield finding("unit", points, rows, why, "time_s")
+        for factor, unit in ((1e-3, say("milliseconds")), (60.0, say("minutes")), (3600.0, say("hours"))):
+            if low <= factor * now * (1 + 1e-9) and factor * now <= high * (1 + 1e-9):
+                rows = np.array([row])
+                why = say("{at_lines}: time_s = {time:g} between {low:g} and {high:g} looks like {unit}: give seconds",
+                          at_lines=at_lines(points, rows), time=now, low=low, high=high, unit=unit)  # fmt: skip
+                yield finding("unit", points, rows, why, "time_s")
+                break
 
 
 def _stuck(points: Points) -> Iterator[Finding]:
@@ -203,37 +182,30 @@ def _stuck(points: Points) -> Iterator[Finding]:
         if length < max(_STUCK_ROWS, _STUCK_PART * len(sequence)) or len(outside) < _STUCK_ROWS:
             continue
         if np.mean(outside != 0) >= _MOVING:
-            last = firsts[start + length] if start + length < len(firsts) else len(values)
-            rows = np.arange(firsts[start], last)
+            rows = np.arange(firsts[start], [*firsts, len(values)][start + length])
             why = say(
                 "{column} is stuck at {values:g} in {at_lines}, where it changed from placing to placing "
                 "before or after: look at the sensor",
-                column=Verbatim(column),
-                values=values[rows[0]],
-                at_lines=at_lines(points, rows),
-            )
+                column=Verbatim(column), values=values[rows[0]], at_lines=at_lines(points, rows),
+            )  # fmt: skip
             yield finding("stuck", points, rows, why, column)
 
 
 def _slipped(points: Points) -> Iterator[Finding]:
     firsts = _firsts(points.group)
     sizes = np.diff([*firsts, len(points)])
-    if len(firsts) < _STUCK_ROWS or sizes.min() < 2 or not _in_blocks(points.group):
+    if len(firsts) < _STUCK_ROWS or sizes.min() < 2 or len(firsts) != len(np.unique(points.group)):
         return
     for column, values in _measured(points):
         if _constant_in_groups(points.group, values):
             continue
-        ways = [
-            way for by, way in ((-1, say("down")), (1, say("up"))) if _of_placings(np.roll(values, by), firsts, sizes)
-        ]
-        if ways:
+        if ways := [way for by, way in WAYS if _of_placings(np.roll(values, by), firsts, sizes)]:
             why = say(
                 "{column} changes inside every placing and would be the same for all points of each if it "
                 "were moved back: it is shifted {ways} by one row against the other columns: move it back",
-                column=Verbatim(column),
-                ways=alternatives(ways),
-            )
-            yield finding("shifted column", points, np.ones(len(points), dtype=bool), why, column)
+                column=Verbatim(column), ways=alternatives(ways),
+            )  # fmt: skip
+            yield finding("shifted column", points, _every(points), why, column)
 
 
 def _of_placings(values: Floats, firsts: Ints, sizes: Ints) -> bool:
@@ -248,17 +220,13 @@ def _approach(points: Points) -> Iterator[Finding]:
     travel = np.column_stack([points.columns[name] for name in names])
     normals = np.column_stack([points.columns[f"n{a}"] for a in AXES])
     outward = np.einsum("ni,ni->n", travel, normals) > 0.3
-    if not outward.any():
-        return
-    every = np.ones(len(points), dtype=bool)
-    for by, way in ((-1, say("down")), (1, say("up"))):
-        back = np.einsum("ni,ni->n", np.roll(travel, by, axis=0), normals) > 0.3
-        if outward.mean() > 0.1 and back.sum() <= 1:
+    for by, way in WAYS if outward.mean() > 0.1 else ():
+        if np.count_nonzero(np.einsum("ni,ni->n", np.roll(travel, by, axis=0), normals) > 0.3) <= 1:
             why = say(
                 "approach_x, approach_y, approach_z are shifted {way} by one row against the normals: move them back",
                 way=way,
             )
-            yield finding("shifted column", points, every, why, "approach_x")
+            yield finding("shifted column", points, _every(points), why, "approach_x")
             return
     if outward.mean() > 0.95:
         why = say(
@@ -266,6 +234,10 @@ def _approach(points: Points) -> Iterator[Finding]:
             "surface from inside: turn their signs round"
         )
         yield finding("sign", points, outward, why, "approach_x")
+
+
+def _every(points: Points) -> Rows:
+    return np.ones(len(points), dtype=bool)
 
 
 def _measured(points: Points) -> Iterator[tuple[str, Floats]]:
@@ -277,10 +249,6 @@ def _measured(points: Points) -> Iterator[tuple[str, Floats]]:
 def _firsts(group: Ints) -> Ints:
     """First row of every run of rows of one (measurement, repeat)."""
     return np.concatenate([[0], np.flatnonzero(np.diff(group)) + 1])
-
-
-def _in_blocks(group: Ints) -> bool:
-    return len(_firsts(group)) == len(np.unique(group))
 
 
 def _constant_in_groups(group: Ints, values: Floats) -> bool:

@@ -85,15 +85,14 @@ class DamageSearch:
         return np.asarray(missed | astray if astray.mean() <= MOST else missed)
 
     def _finding(self, cause: Damage) -> Finding:
-        rows = cause.rows
-        amount = float(self.misfit[rows].max())
+        rows, amount = cause.rows, float(self.misfit[cause.rows].max())
         what = say("the readings lie far outside the travel")
         if amount > self.shape.tolerance and np.isfinite(amount):
             what = say("the artefact is missed by {amount:.3g} mm, far more than any machine's error", amount=amount)
         elif amount > self.shape.tolerance:
             what = say("the artefact is missed far more than any machine's error")
         why = say("{at_lines}: {what}; {why}", at_lines=at_lines(self.points, rows), what=what, why=cause.why)
-        lost = tuple(int(row) for row in self._lost_with(rows))
+        lost = tuple(self._lost_with(rows).tolist())
         return replace(finding(cause.kind, self.points, rows, why, cause.column), set_aside=True, rows=lost)
 
     def _lost_with(self, rows: Ints) -> Ints:
@@ -114,18 +113,14 @@ class DamageSearch:
         offset = np.diff(block - source, prepend=0, append=0) if len(block) else block
         for start, end in pairwise(sorted({0, *np.flatnonzero(offset).tolist(), len(block)})):
             lines = at_lines(self.points, source[start:end])
-            why = plural(
-                end - start,
-                one=say("it has the coordinates of {lines} to the last digit: copied, not measured", lines=lines),
-                many=say("they have the coordinates of {lines} to the last digit: copied, not measured", lines=lines),
-            )
+            one = say("it has the coordinates of {lines} to the last digit: copied, not measured", lines=lines)
+            many = say("they have the coordinates of {lines} to the last digit: copied, not measured", lines=lines)
+            why = plural(end - start, one=one, many=many)
             yield Damage("duplicate" if end - start == 1 else "repeated block", block[start:end], why)
 
     def _swapped(self, most: int) -> Iterator[Damage]:
-        rows = np.flatnonzero(self._open)
-        if len(rows) > most:
-            return
-        for pair in combinations(rows.tolist(), 2):
+        rows, points = np.flatnonzero(self._open), self.points
+        for pair in combinations(rows.tolist(), 2) if len(rows) <= most else ():
             chosen = np.array(pair)
             if not self._open[chosen].all() or (self.shape.together and np.ptp(self._placing[chosen]) == 0):
                 continue
@@ -134,9 +129,7 @@ class DamageSearch:
             if self._fit(chosen, xyz, self._reference):
                 one, other = (
                     say("point {point} of measurement {measurement}", point=point, measurement=measurement)
-                    for point, measurement in zip(
-                        self.points.point[chosen], self.points.measurement[chosen], strict=True
-                    )
+                    for point, measurement in zip(points.point[chosen], points.measurement[chosen], strict=True)
                 )
                 why = say("{one} and {other} are exchanged: exchange their coordinates", one=one, other=other)
                 if self.shape.is_bar:
@@ -217,8 +210,7 @@ class DamageSearch:
 
 def outside_travel(points: Points) -> NDArray[np.bool_]:
     """(n, 3) whether a scale reading lies outside its travel."""
-    low, high = points.machine.travel_mm.T
-    readings = points.carriages
+    (low, high), readings = points.machine.travel_mm.T, points.carriages
     return np.asarray((readings < low - _TRAVEL_TOLERANCE) | (readings > high + _TRAVEL_TOLERANCE))
 
 
@@ -243,9 +235,8 @@ def coordinate_findings(
     lost = {row for f in found for row in f.rows if counted[row]}
     if len(lost) > max(MOST * len(points), 2):
         problem = f"{len(lost)} of {len(points)} points do not fit the artefact; {found[0].why}"
-        raise CmmUqError(
-            problem, where=where, fix="So much of a recording cannot be left out: mend it, or measure again"
-        )
+        fix = "So much of a recording cannot be left out: mend it, or measure again"
+        raise CmmUqError(problem, where=where, fix=fix)
     return found + _reversed_bars(points, shape)
 
 
@@ -279,8 +270,7 @@ def _reversed_bars(points: Points, shape: ArtefactShape) -> list[Finding]:
     if not shape.together or shape.reference.shape[1]:
         return []
     ends = np.array([rows[np.argsort(points.point[rows])] for rows in shape.rows])
-    bars = points.xyz[ends[:, 1]] - points.xyz[ends[:, 0]]
-    found = []
+    bars, found = points.xyz[ends[:, 1]] - points.xyz[ends[:, 0]], []
     placings = Placings.of(points.measurement[ends[:, 0]])
     for number, own in zip(placings.numbers, placings.rows, strict=True):
         against = bars[own] @ bars[own[0]] < 0
@@ -290,9 +280,7 @@ def _reversed_bars(points: Points, shape: ArtefactShape) -> list[Finding]:
         why = say(
             "{at_lines}: balls 1 and 2 of measurement {number} are exchanged against its other repeats. "
             "The length does not show it; what was recorded beside each ball (approach, temperatures) "
-            "may be exchanged too",
-            at_lines=at_lines(points, rows),
-            number=number,
-        )
+            "may be exchanged too", at_lines=at_lines(points, rows), number=number,
+        )  # fmt: skip
         found.append(finding("swapped", points, rows, why))
     return found

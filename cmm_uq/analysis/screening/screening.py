@@ -13,7 +13,7 @@ from scipy import linalg, special
 
 from cmm_uq.analysis.screening.columns import SENSORS, Finding, about_whole_column, column_findings, finding, span
 from cmm_uq.analysis.screening.damage import coordinate_findings, outside_travel
-from cmm_uq.analysis.screening.shape import Screening
+from cmm_uq.analysis.screening.shape import COORDINATES, Screening
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, comma_or, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
@@ -24,11 +24,8 @@ from cmm_uq.maths.inference.linear_model import LinearModel
 
 def copied_measurements(points: Points) -> dict[int, int]:
     """Groups that repeat one of another measurement to the last digit, with that other (see :attr:`Points.copies`)."""
-    return {
-        later: original
-        for later, original in points.copies.items()
-        if points.run_of(later)[0] != points.run_of(original)[0]
-    }
+    run, copies = points.run_of, points.copies.items()
+    return {later: original for later, original in copies if run(later)[0] != run(original)[0]}
 
 
 def counted_with(points: Points, set_aside: Collection[int] = ()) -> Ints:
@@ -67,10 +64,12 @@ def screen_recording(
     odd = screen(points, needed=needed, set_aside=set_aside, where=where, balls=balls)
     if shape and shape.together:
         damaged = [_reversal(found, points, needed) for found in damaged]
-    findings = (*damaged, *(_left_out(f) for f in odd if not _told(f, damaged)))
+    lines = {line for found in damaged for line in found.lines}
+    coordinates = [f for f in odd if f.kind == "impossible" and f.column in COORDINATES and set(f.lines) <= lines]
+    findings = (*damaged, *(_left_out(f) for f in odd if f not in coordinates))
     lost = sorted({row for found in findings for row in found.rows})
-    kept = points.select(np.delete(np.arange(len(points)), lost)) if lost else points
-    return ScreenedRecording(with_sound_sensors(kept, findings), findings)
+    left = points.select(np.delete(np.arange(len(points)), lost)) if lost else points
+    return ScreenedRecording(with_sound_sensors(left, findings), findings)
 
 
 def with_sound_sensors(points: Points, findings: Sequence[Finding]) -> Points:
@@ -85,11 +84,13 @@ def screen(
     """All that is odd in a recording without regard to its artefact's shape. ``where`` the recording's name, for messages."""
     impossible = impossible_values(points, balls=balls)
     for found in impossible:
+        line = f" line {found.lines[0]}" if found.lines else ""
         if found.column in needed:
-            raise CmmUqError(found.why, where=_place(where, found),
+            raise CmmUqError(found.why, where=f"{where}{line}, column {found.column}",
                              fix="The model uses this column: mend it, or leave out the effect that needs it")  # fmt: skip
         if found.kind in _REFUSED_WHOLE and about_whole_column(found, points):
-            raise CmmUqError(found.why, where=_place(where, found), fix="Mend the column, or remove it")
+            place = f"{where}{line}, column {found.column}"
+            raise CmmUqError(found.why, where=place, fix="Mend the column, or remove it")
     odd = (*impossible, *repeated_figures(points))
     return tuple(replace(f, set_aside=_aside(f, set_aside)) for f in odd)
 
@@ -101,20 +102,15 @@ def impossible_values(points: Points, *, balls: bool = False) -> list[Finding]:
         norm = np.linalg.norm([points.columns[f"n{a}"] for a in AXES], axis=0)
         if np.any(rows := np.abs(norm - 1) > _UNIT_LENGTH):
             found.append(finding("impossible", points, rows, say("the normal nx, ny, nz has no unit length"), "nx"))
-    outside = outside_travel(points)
-    for i, axis in enumerate(AXES):
-        if np.any(rows := outside[:, i]):
+    for i, (axis, rows) in enumerate(zip(AXES, outside_travel(points).T, strict=True)):
+        if np.any(rows):
             low, high = points.machine.travel_mm[i]
             why = say(
                 "scale readings of {axis} ({column}_mm + origin) of {span} mm lie outside the travel {low:g} "
                 "to {high:g} mm{hint}",
-                axis=Verbatim(axis.upper()),
-                column=Verbatim(axis),
-                span=span(points.readings[axis][rows]),
-                low=low,
-                high=high,
-                hint=_hint(points, i),
-            )
+                axis=Verbatim(axis.upper()), column=Verbatim(axis), span=span(points.readings[axis][rows]), low=low,
+                high=high, hint=_hint(points, i) if rows.mean() >= 0.5 else NOTHING,
+            )  # fmt: skip
             found.append(finding("impossible", points, rows, why, f"{axis}_mm"))
     return found
 
@@ -159,25 +155,19 @@ def gross_outliers(linear: LinearModel, measurement: NDArray[np.int64], least: f
 def _copied(points: Points, run: Sequence[tuple[int, int]]) -> Finding:
     originals, later = zip(*run, strict=True)
     both = np.isin(points.group, (*originals, *later))
-    first, last, original, final = (
-        points.run_of(group)[0] for group in (later[0], later[-1], originals[0], originals[-1])
-    )
+    ends = (later[0], later[-1], originals[0], originals[-1])
+    first, last, original, final = (points.run_of(group)[0] for group in ends)
     if len(run) == 1:
         why = say(
             "measurement {b} repeats the coordinates of measurement {a} to the last digit: a copy, not a measurement, and "
-            "counts once",
-            b=first,
-            a=original,
-        )
+            "counts once", b=first, a=original,
+        )  # fmt: skip
         return replace(finding("duplicate", points, both, why), measurements=(original, first))
     block = say(
         "measurements {first} to {last} repeat the coordinates of measurements {original} to {final} to the last digit: a "
         "block pasted twice, whose copies say nothing: remove them, or record what was measured",
-        first=first,
-        last=last,
-        original=original,
-        final=final,
-    )
+        first=first, last=last, original=original, final=final,
+    )  # fmt: skip
     rows = tuple(np.flatnonzero(np.isin(points.group, later)).tolist())
     return replace(finding("repeated block", points, both, block), rows=rows)
 
@@ -193,11 +183,8 @@ def _reversal(item: Finding, points: Points, needed: Collection[str]) -> Finding
     rows = np.flatnonzero(np.isin(points.lines, item.lines)) if len(points.lines) else np.zeros(0, dtype=np.int64)
     for name in needed:
         if any(np.ptp(points.column(name)[points.group == group]) > 0 for group in np.unique(points.group[rows])):
-            why = say(
-                "{why}; the model uses {differing}: number the balls as in the other repeats",
-                why=item.why,
-                differing=Verbatim(name),
-            )
+            words = {"why": item.why, "differing": Verbatim(name)}
+            why = say("{why}; the model uses {differing}: number the balls as in the other repeats", **words)
             return replace(item, kind=REVERSED, set_aside=True, rows=tuple(rows.tolist()), why=why)
     return item
 
@@ -206,35 +193,23 @@ def _left_out(item: Finding) -> Finding:
     return replace(item, set_aside=item.set_aside or bool(item.rows) or item.column in SENSORS)
 
 
-def _told(item: Finding, damaged: Sequence[Finding]) -> bool:
-    lines = {line for other in damaged for line in other.lines}
-    return item.kind == "impossible" and item.column in ("x_mm", "y_mm", "z_mm") and set(item.lines) <= lines
-
-
 def _hint(points: Points, axis: int) -> Text:
-    if outside_travel(points)[:, axis].mean() < 0.5:
-        return NOTHING
-    low, high = points.machine.travel_mm[axis]
+    """Where to look if an axis leaves its travel more often than not."""
+    (low, high), origin = points.machine.travel_mm[axis], points.machine.origin_mm
 
     def inside(readings: Floats) -> bool:
         return bool(np.mean((readings >= low) & (readings <= high)) > 0.95)
 
-    origin = points.machine.origin_mm
-    own = Verbatim(f"{AXES[axis]}_mm")
+    own = Verbatim(COORDINATES[axis])
     hints = [say("a missing origin_mm")]
     if inside(origin[axis] - points.xyz[:, axis]):
         hints.append(say("{column} with the wrong sign", column=own))
     hints += [
-        say("{column} exchanged with {other}", column=own, other=Verbatim(f"{AXES[j]}_mm"))
+        say("{column} exchanged with {other}", column=own, other=Verbatim(COORDINATES[j]))
         for j in range(3)
         if j != axis and inside(origin[axis] + points.xyz[:, j])
     ]
     return say(": look for {hints}", hints=comma_or(hints))
-
-
-def _place(where: str, item: Finding) -> str:
-    line = f" line {item.lines[0]}" if item.lines else ""
-    return f"{where}{line}, column {item.column}"
 
 
 LEAST = 3  # points that follow one another; two may be neighbours by chance

@@ -9,6 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
+from cmm_uq.analysis.screening.columns import WAYS
 from cmm_uq.base.messages import Text, Verbatim, commas, plural, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.machine.model.artefact import Placings
@@ -24,21 +25,16 @@ Misfit = Callable[[Floats, Floats, float], Floats]
 
 @dataclass(frozen=True, eq=False)
 class ArtefactShape:
-    """What one kind of artefact asks of the points of each of its set-ups.
+    """What one kind of artefact asks of the points of each of its set-ups."""
 
-    ``rows`` points of each set-up, as rows of the recording; ``misfit_of`` misfit (k,), mm, of a set-up's points (k,
-    3) and references (k, j) for the size common to all set-ups; ``size`` that size by the certificate, mm; not finite
-    without one; ``extent`` of the artefact, mm, for the tolerance; ``together`` whether a set-up is lost with one of
-    its points; ``names`` columns of the references; ``reference`` (n, j) what the recording says of each point.
-    """
-
-    rows: tuple[Ints, ...]
+    rows: tuple[Ints, ...]  # points of each set-up, as rows of the recording
+    # misfit (k,), mm, of a set-up's points (k, 3) and references (k, j) for the size common to all set-ups
     misfit_of: Misfit
-    size: float
-    extent: float
-    together: bool = False
-    names: tuple[str, ...] = ()
-    reference: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    size: float  # that size by the certificate, mm; not finite without one
+    extent: float  # of the artefact, mm, for the tolerance
+    together: bool = False  # whether a set-up is lost with one of its points
+    names: tuple[str, ...] = ()  # columns of the references
+    reference: Floats = field(default_factory=lambda: np.zeros((0, 0)))  # (n, j) what the recording says of each point
 
     @property
     def is_bar(self) -> bool:
@@ -52,9 +48,8 @@ class ArtefactShape:
 
     def misfit(self, xyz: Floats, reference: Floats, placings: Iterable[int] | None = None) -> Floats:
         """Distance (n,), mm, of every point from where the artefact would have it; zero outside the set-ups asked for."""
-        found = np.zeros(len(xyz))
-        one_length = self.misfit_of is bar_misfit and not np.isfinite(self.size)
-        size = common_length(xyz, self.rows) if one_length else self.size
+        found, unknown = np.zeros(len(xyz)), self.misfit_of is bar_misfit and not np.isfinite(self.size)
+        size = common_length(xyz, self.rows) if unknown else self.size
         for placing in range(len(self.rows)) if placings is None else placings:
             rows = self.rows[placing]
             found[rows] = self.misfit_of(xyz[rows], reference[rows], size)
@@ -63,14 +58,11 @@ class ArtefactShape:
 
 @dataclass(frozen=True)
 class Screening:
-    """What a kind of measurement offers to the screening.
+    """What a kind of measurement offers to the screening."""
 
-    ``shape_of`` ``(facts, points)``: what its artefact asks of the points; ``None`` where the recording lacks what that
-    needs; ``balls`` whether its points are centres of balls or cylinders, each of several touches.
-    """
-
+    # (facts, points): what its artefact asks of the points; None where the recording lacks what that needs
     shape_of: Callable[..., ArtefactShape | None]
-    balls: bool = False
+    balls: bool = False  # whether its points are centres of balls or cylinders, each of several touches
 
 
 def bar_misfit(xyz: Floats, _: Floats, length: float) -> Floats:
@@ -238,16 +230,13 @@ def row_mistakes(shape: ArtefactShape) -> tuple[Mistake, ...]:
 
 def block_mistakes(shape: ArtefactShape) -> tuple[Mistake, ...]:
     """Mistakes that concern many rows together, or none: columns that slipped by a row, faces counted from the other end."""
-    mistakes = []
-    for by, way in ((-1, say("down")), (1, say("up"))):
-        mistakes += [_shift((i,), (name,), by, way) for i, name in enumerate(COORDINATES)]
-        if shape.names:
-            mistakes.append(_shift(tuple(range(len(shape.names))), shape.names, by, way, of_references=True))
-        if len(shape.names) > 1:
-            mistakes += [_shift((i,), (name,), by, way, of_references=True) for i, name in enumerate(shape.names)]
+    mistakes, count = [], len(shape.names)
+    of_references = [tuple(range(count))] * (count > 0) + [(i,) for i in range(count) if count > 1]
+    for by, way in WAYS:
+        mistakes += [_shift((i,), COORDINATES, by, way) for i in range(3)]
+        mistakes += [_shift(chosen, shape.names, by, way, of_references=True) for chosen in of_references]
     if shape.names == ("reference_mm",):
-        what = say("its faces seem counted from the other end")
-        fix = say("Turn the order of reference_mm round")
+        what, fix = say("its faces seem counted from the other end"), say("Turn the order of reference_mm round")
         mistakes.append(Mistake("swapped", what, fix, shape.names, _from_the_other_end, of_references=True))
     return tuple(mistakes)
 
@@ -257,25 +246,22 @@ def _units(
 ) -> Iterator[Mistake]:
     for factor, unit in units:
         for chosen in (tuple(range(len(names))), *((i,) for i in range(len(names)) if len(names) > 1)):
-            concerned = tuple(names[i] for i in chosen)
-            columns, scale = _named(concerned), np.where(np.isin(np.arange(len(names)), chosen), factor, 1.0)
+            columns, concerned = _named(names, chosen)
             one = say("{columns} looks like {unit}, not mm", columns=columns, unit=unit)
             many = say("{columns} look like {unit}, not mm", columns=columns, unit=unit)
-            what, fix = (
-                plural(len(concerned), one=one, many=many),
-                say("Convert to mm (times {factor:g})", factor=factor),
-            )
-            yield Mistake("unit", what, fix, concerned, partial(np.multiply, scale), of_references)
+            what, fix = plural(len(chosen), one=one, many=many), say("Convert to mm (times {factor:g})", factor=factor)
+            undo = partial(np.multiply, np.where(np.isin(np.arange(len(names)), chosen), factor, 1.0))
+            yield Mistake("unit", what, fix, concerned, undo, of_references)
 
 
 def _signs(names: tuple[str, ...], *, of_references: bool = False) -> Iterator[Mistake]:
     for chosen in (*((i,) for i in range(3)), *([(0, 1, 2)] if of_references else [])):
-        concerned = tuple(names[i] for i in chosen)
-        columns, sign = _named(concerned), np.where(np.isin(np.arange(3), chosen), -1.0, 1.0)
+        columns, concerned = _named(names, chosen)
         one = say("{columns} seems to have the wrong sign", columns=columns)
         many = say("{columns} seem to have the wrong sign", columns=columns)
-        what = plural(len(concerned), one=one, many=many)
-        yield Mistake("sign", what, say("Turn the sign round"), concerned, partial(np.multiply, sign), of_references)
+        what = plural(len(chosen), one=one, many=many)
+        undo = partial(np.multiply, np.where(np.isin(np.arange(3), chosen), -1.0, 1.0))
+        yield Mistake("sign", what, say("Turn the sign round"), concerned, undo, of_references)
 
 
 def _exchanges(names: tuple[str, ...], *, of_references: bool = False) -> Iterator[Mistake]:
@@ -295,10 +281,11 @@ def _shift(
         values[:, chosen] = np.roll(values[:, chosen], by, axis=0)
         return values
 
-    columns, fix = _named(names), say("Move the column back beside the others")
+    (columns, concerned), fix = _named(names, chosen), say("Move the column back beside the others")
     one = say("{columns} seems shifted {way} by one row against the other columns", columns=columns, way=way)
     many = say("{columns} seem shifted {way} by one row against the other columns", columns=columns, way=way)
-    return Mistake("shifted column", plural(len(names), one=one, many=many), fix, names, undo, of_references, 1)
+    what = plural(len(chosen), one=one, many=many)
+    return Mistake("shifted column", what, fix, concerned, undo, of_references, 1)
 
 
 def _from_the_other_end(reference: Floats) -> Floats:
@@ -306,5 +293,7 @@ def _from_the_other_end(reference: Floats) -> Floats:
     return np.asarray(faces[::-1][rank].reshape(reference.shape), dtype=np.float64)
 
 
-def _named(columns: tuple[str, ...]) -> Text:
-    return commas(Verbatim(column) for column in columns)
+def _named(names: tuple[str, ...], chosen: tuple[int, ...]) -> tuple[Text, tuple[str, ...]]:
+    """Some of the columns in words, and their names."""
+    concerned = tuple(names[i] for i in chosen)
+    return commas(map(Verbatim, concerned)), concerned

@@ -7,12 +7,12 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from cmm_uq.analysis.conformity.accuracy import consequences, costs
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
-from cmm_uq.analysis.conformity.consequences import consequences, costs
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, diagnose
 from cmm_uq.analysis.diagnosis.power import ALLOWED
 from cmm_uq.analysis.diagnosis.smallest import USUAL_LENGTH, SmallestEffect, smallest_effects
-from cmm_uq.analysis.planning.advice import DetectionGoal, suggestions
+from cmm_uq.analysis.planning.set_up import DetectionGoal, suggestions
 from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.planning.suggestion import next_plan
 from cmm_uq.analysis.screening.columns import Finding

@@ -7,9 +7,8 @@ from collections.abc import Iterator
 from cmm_uq.analysis.conformity.accuracy import TITLES, UNITS
 from cmm_uq.analysis.diagnosis.model_average import Rival
 from cmm_uq.analysis.diagnosis.power import ALLOWED
-from cmm_uq.analysis.diagnosis.smallest import POWER, PeriodRange, SmallestEffect
-from cmm_uq.analysis.diagnosis.visibility import PLACES
-from cmm_uq.analysis.planning.advice import ODDS, NextPlan, odds_words, rounded
+from cmm_uq.analysis.diagnosis.smallest import PLACES, POWER, PeriodRange, SmallestEffect
+from cmm_uq.analysis.planning.set_up import ODDS, NextPlan, odds_words, rounded
 from cmm_uq.base.messages import (
     DASH,
     NOTHING,

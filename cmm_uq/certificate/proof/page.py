@@ -17,10 +17,8 @@ from cmm_uq.certificate.results.contents import head
 from cmm_uq.certificate.wording import Headline, Summary, titles
 from cmm_uq.laboratory.proving import judgement as judged
 from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH
-from cmm_uq.laboratory.proving.cases import KINDS, STRONGEST, WEAKEST, micrometres
-from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, REFUSED, VERDICTS
-from cmm_uq.laboratory.proving.rates import Rate
-from cmm_uq.laboratory.proving.sensitivity import ALLOWED
+from cmm_uq.laboratory.proving.cases import ALLOWED, KINDS, STRONGEST, WEAKEST, micrometres
+from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, REFUSED, VERDICTS, Rate
 
 # Purpose, cases, strengths, noise, seal
 METHOD: tuple[Text, ...] = (

@@ -19,8 +19,20 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.proving import cases, design as set_ups, judgement
 from cmm_uq.laboratory.proving.cases import canonical_json, micrometres, sha256_of
 from cmm_uq.laboratory.proving.design import Design, FaultReach, Reach, fault_reaches, reaches
-from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, REFUSED, VERDICTS, AcceptanceFigure, ProofJudgement
-from cmm_uq.laboratory.proving.rates import FEWEST, LARGEST, OFTEN, DetectionCurve, Rate, Tenth
+from cmm_uq.laboratory.proving.judgement import (
+    FEWEST,
+    LARGEST,
+    MISSED,
+    OFTEN,
+    OPEN,
+    REFUSED,
+    VERDICTS,
+    AcceptanceFigure,
+    DetectionCurve,
+    ProofJudgement,
+    Rate,
+    Tenth,
+)
 
 KIND_WORDS: Mapping[str, Text] = {
     cases.NOTHING: say("nothing"),

@@ -13,9 +13,8 @@ from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
 from cmm_uq.analysis.diagnosis.power import ALLOWED
-from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
-from cmm_uq.analysis.diagnosis.visibility import PLACES
-from cmm_uq.analysis.planning.advice import NextPlan
+from cmm_uq.analysis.diagnosis.smallest import PLACES, SmallestEffect
+from cmm_uq.analysis.planning.set_up import NextPlan
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.units import MICROMETRE

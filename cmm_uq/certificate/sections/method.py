@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmm_uq.analysis.conformity.lengths_decided import unknown_expansion
+from cmm_uq.analysis.conformity.uncertainty import unknown_expansion
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, listed, number, say, sentences
 from cmm_uq.certificate.diagnosis.overview import VERDICTS

@@ -1,41 +1,39 @@
-"""What is true of a case, causes of no catalogue included, written down and hashed before it is diagnosed."""
+"""What is true of a case, causes of no catalogue included, written down and hashed before it is diagnosed; what shows of it.
+
+The length √λ of a column, all that the job names projected out, is that of the least-squares test for it, which somebody
+would make who knows the noise exactly: so strengths of different errors, under different noise, on different artefacts can
+be compared.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from cmm_uq.base import messages
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
+from cmm_uq.base.plugins import BrokenPluginError
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.model import Noise, RecordingModel
+from cmm_uq.machine.model.noise import noise_of
+from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect, Parameter
+from cmm_uq.maths.inference.noise import FASTEST, Sizes
 
 FUNCTIONS = ("step", "cubic", "bump", "wave", "jump", "load")
 FAULTS = ("length", "nodes", "warm", "warming")
 _SAME_MM = 0.05  # up to which nodes of two set-ups are the same node
 _FLAT = 1e-4  # second over first extent of a set-up from which on its nodes do not lie along one line
 _NO_RATE = 11.5e-6  # 1/K, expansion of steel, for an artefact whose own is not stated
-
-
-class ForeignEffect(Effect):
-    """An error whose place and form are given, one unit of which is a micrometre at its largest."""
-
-    mechanism = "outside the catalogue"
-    title: Text = say("A cause outside the catalogue")
-    formula = "e = size · form"
-    points_to: Text = messages.NOTHING
-    coefficients = (Parameter("size_um", unit("µm"), 1.0),)
-
-    def __init__(self, name: str) -> None:
-        self.name = name
 
 
 @dataclass(frozen=True)
@@ -53,8 +51,7 @@ class FunctionForm:
 
     def displacement(self, points: Points) -> Floats:
         """(n, 3, 1), mm, for a size of one micrometre."""
-        u = self._scaled(points.carriages[:, AXES.index(self.over)])
-        along = points.carriages[:, AXES.index(self.along)]
+        u, along = self._scaled(points.carriages[:, AXES.index(self.over)]), points.carriages[:, AXES.index(self.along)]
         match self.what:
             case "step":
                 value = np.asarray(u > self.at, dtype=np.float64)
@@ -65,9 +62,8 @@ class FunctionForm:
             case "wave":
                 value = np.asarray(np.sin(np.pi * self.width * u + self.at))
             case "jump":
-                value = (self._scaled(points.column("time_s")) > self.at) * (
-                    along / max(float(np.abs(along).max()), 1e-9)
-                )
+                part = along / max(float(np.abs(along).max()), 1e-9)
+                value = (self._scaled(points.column("time_s")) > self.at) * part
             case _:
                 value = np.asarray((points.measurement == self.measurement) * u**2)
         found = np.zeros((len(points), 3, 1))
@@ -78,26 +74,20 @@ class FunctionForm:
         return np.asarray((2 * value - self.low - self.high) / max(self.high - self.low, 1e-9))
 
 
-class FormEffect(ForeignEffect):
-    """An error of such a form."""
+class ForeignEffect(Effect):
+    """An error whose place and form are given: of points, their displacement (n, 3, 1), mm, for a size of one micrometre."""
 
-    def __init__(self, form: FunctionForm) -> None:
-        super().__init__(f"outside: {form.what}")
-        self.form = form
+    mechanism = "outside the catalogue"
+    title: Text = say("A cause outside the catalogue")
+    formula = "e = size · form"
+    points_to: Text = messages.NOTHING
+    coefficients = (Parameter("size_um", unit("µm"), 1.0),)
 
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return self.form.displacement(points)
-
-
-class UnknownArtefactFault(ForeignEffect):
-    """An error given point by point, (n, 3, 1) mm for a size of one micrometre."""
-
-    def __init__(self, name: str, displacement: Floats) -> None:
-        super().__init__(name)
-        self.displacement_of_rows = displacement
+    def __init__(self, name: str, displaced: Callable[[Points], Floats]) -> None:
+        self.name, self.displaced = name, displaced
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return self.displacement_of_rows
+        return self.displaced(points)
 
 
 def drawn_form(points: Points, what: str, random: np.random.Generator) -> FunctionForm | None:
@@ -126,13 +116,14 @@ def possible_faults(model: RecordingModel) -> Iterator[str]:
 
 def artefact_fault(
     model: RecordingModel, values: Floats, what: str, cte_per_k: float, errors: Sequence[Sequence[float]] = ()
-) -> UnknownArtefactFault:
+) -> ForeignEffect:
     """A fault of the artefact as an error of its points. ``model``, ``values`` with the artefact, and its parameters (k,)."""
     xyz, points = model.placed(values), model.artefact.points
     if what == "length":
         sizes = values[len(values) - len(model.artefact.sizes) :].copy()
-        first = next(i for i, s in enumerate(model.artefact.sizes) if s.certified and s.role == "dimension")
-        sizes[first] += MICROMETRE
+        sizes[next(i for i, s in enumerate(model.artefact.sizes) if s.certified and s.role == "dimension")] += (
+            MICROMETRE
+        )
         moved = model.artefact.fit(xyz, sizes) - xyz
     elif what == "nodes":
         number, frames = nodes(xyz, points)
@@ -145,22 +136,23 @@ def artefact_fault(
         warm = index / max(int(index.max()), 1) if what == "warming" else np.ones(len(xyz))
         moved = (cte_per_k or _NO_RATE) * warm[:, None] * from_middle
         moved = np.asarray(MICROMETRE * moved / max(float(np.linalg.norm(moved, axis=1).max()), 1e-12))
-    return UnknownArtefactFault(f"artefact: {what}", -moved[:, :, None])
+    return ForeignEffect(f"artefact: {what}", lambda _: -moved[:, :, None])
 
 
 def nodes(xyz: Floats, points: Points) -> tuple[Ints, Floats]:
     """Node of the artefact of each point (n,), and its axes there (n, 3, a); those whose points lie otherwise have others."""
-    known: list[Floats] = []
-    number = np.zeros(len(xyz), dtype=np.int64)
-    lines = all(_is_line(xyz[points.measurement == m]) for m in np.unique(points.measurement))
-    frames = np.zeros((len(xyz), 3, 1 if lines else 3))
+    set_ups = [np.flatnonzero(points.measurement == m) for m in np.unique(points.measurement)]
+    lines = all(_is_line(xyz[rows]) for rows in set_ups)
+    known, number, frames = (
+        list[Floats](),
+        np.zeros(len(xyz), dtype=np.int64),
+        np.zeros((len(xyz), 3, 1 if lines else 3)),
+    )
     first: tuple[Ints, Floats] | None = None
-    for m in np.unique(points.measurement):
-        rows = np.flatnonzero(points.measurement == m)
+    for rows in set_ups:
         own = xyz[rows]
         if lines:
-            start = own[points.point[rows].argmin()]
-            away = own - start
+            away = own - own[points.point[rows].argmin()]
             farthest = away[np.linalg.norm(away, axis=1).argmax()]
             direction = farthest / max(float(np.linalg.norm(farthest)), 1e-12)
             frame, place = direction[:, None], np.column_stack([away @ direction, np.zeros((len(rows), 2))])
@@ -169,10 +161,11 @@ def nodes(xyz: Floats, points: Points) -> tuple[Ints, Floats]:
             first = first or (points.point[rows], place)
         frames[rows] = frame
         for row, here in zip(rows, place, strict=True):
-            near = [i for i, there in enumerate(known) if float(np.linalg.norm(here - there)) < _SAME_MM]
-            if not near:
-                known.append(here)
-            number[row] = near[0] if near else len(known) - 1
+            near = next(
+                (i for i, there in enumerate(known) if float(np.linalg.norm(here - there)) < _SAME_MM), len(known)
+            )
+            known += [here] if near == len(known) else []
+            number[row] = near
     return number, frames
 
 
@@ -271,3 +264,95 @@ def canonical_json(data: Any) -> bytes:
 
 def sha256_of(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
+
+
+ALLOWED = 3.0  # prior standard deviations up to which an effect is reckoned with, as a plan does
+_RANK = 1e-9  # part of the largest singular value from which on a direction counts as taken by what the job names
+_SHAPES = 6  # nonlinear parameters of an effect by which it is judged whether anything looks like it
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """What observations show under one noise."""
+
+    model: RecordingModel  # model, values: what the job names, and its parameters (k,)
+    values: Floats
+    white: Callable[[Floats], Floats]  # makes columns (m, b) of the observations white
+    sigma: float  # standard deviation of what is white, mm
+    taken: Floats  # (m, r) orthonormal, what the job names takes of white columns
+
+    @classmethod
+    def of(cls, model: RecordingModel, values: Floats, noise: Noise) -> Sensitivity:
+        components, linear = noise_of(model, values=values), model.linearised(values)
+        coordinate = np.broadcast_to(np.asarray(noise.coordinate, dtype=np.float64), 3)
+        reading = np.hypot(coordinate, noise.resolution / np.sqrt(12))
+        time = model.artefact.points.columns.get("time_s")
+        slow = noise.slow if components.slow.shape[1] else 0.0
+        duration = 0.0 if time is None else float(np.ptp(time))
+        rate = min(FASTEST, max(duration / noise.slow_time_s, 1e-3)) if np.isfinite(noise.slow_time_s) else 0.0
+        sizes = Sizes(reading[None, :], *(np.array([size]) for size in (noise.placing, noise.growth, slow, rate)))
+        white, sigma = components.white(sizes), float(sizes.coordinate[0])
+        open_ = ~np.array([unknown.known for unknown in model.unknowns], dtype=bool)
+        named = white(np.hstack([linear.design[:, open_], linear.freedoms.dense()]))
+        length = np.linalg.norm(named, axis=0)
+        U, s, _ = np.linalg.svd(named / np.where(length > 0, length, 1.0), full_matrices=False)
+        return cls(model, values, white, sigma, U[:, s > _RANK * s.max(initial=0.0)])
+
+    def seen(self, displacement: Floats) -> Floats:
+        """What is left (m, b) of errors e of the points (n, 3, b), mm, over the noise."""
+        columns = self.white(self.model.seen(displacement, self.values)) / self.sigma
+        return np.asarray(columns - self.taken @ (self.taken.T @ columns))
+
+    def effect(self, effect: Effect, shape: tuple[float, ...] = ()) -> Floats:
+        """The same (m, j) for one prior standard deviation of each coefficient of an effect."""
+        scale = np.array([c.prior_sd for c in effect.coefficients])
+        return self.seen(self.model.columns(effect, shape, self.values) * scale)
+
+    @cached_property
+    def candidates(self) -> dict[str, list[Floats]]:
+        """What every effect that could act here shows, by its name, for a few values of its nonlinear parameter."""
+        trials = {effect: list(effect.trials()) for effect in possible_effects(self.model)}
+        return {
+            effect.name: [self.effect(effect, shape) for shape in shapes[:: max(1, len(shapes) // _SHAPES)]]
+            for effect, shapes in trials.items()
+        }
+
+    def nearest(self, column: Floats) -> tuple[str, float]:
+        """The effect that comes nearest to a column (m,), and the length of what it leaves of it."""
+        best, least = "", float(np.linalg.norm(column))
+        for name, versions in self.candidates.items():
+            if (left := min(remaining_length(column, columns) for columns in versions)) < least:
+                best, least = name, left
+        return best, least
+
+
+def remaining_length(column: Floats, others: Floats) -> float:
+    """Length of a column (m,) once others (m, j) have taken what they can."""
+    U, s, _ = np.linalg.svd(others, full_matrices=False)
+    U = U[:, s > _RANK * s.max(initial=0.0)] if s.max(initial=0.0) > 0 else U[:, :0]
+    return float(np.linalg.norm(column - U @ (U.T @ column)))
+
+
+def possible_effects(model: RecordingModel) -> Iterator[Effect]:
+    """Effects of the catalogue that the job does not name and that its columns and its machine allow to act."""
+    named = {effect.name for effect in model.effects}
+    for effect in every().values():
+        if effect.name in named or unrecorded(model, effect):
+            continue
+        try:
+            effect.basis(model.artefact.points, next(iter(effect.trials())))
+        except BrokenPluginError:
+            raise
+        except CmmUqError:  # the job does not give the travel that this effect needs
+            continue
+        yield effect
+
+
+def unrecorded(model: RecordingModel, effect: Effect) -> tuple[str, ...]:
+    return tuple(column for column in effect.columns if column not in model.artefact.points.columns)
+
+
+def white_of(noise: Noise) -> Noise:
+    """Readings alone, of the same size along all axes."""
+    sigma = float(np.sqrt(np.mean(np.square(np.broadcast_to(np.asarray(noise.coordinate), 3)))))
+    return replace(Noise(), coordinate=(sigma, sigma, sigma))

@@ -14,27 +14,7 @@ from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import Unit
 from cmm_uq.laboratory.proving import cases
-from cmm_uq.laboratory.proving.cases import (
-    FUNCTIONS,
-    Case,
-    ForeignEffect,
-    FormEffect,
-    FunctionForm,
-    HiddenEffect,
-    UnknownCause,
-    artefact_fault,
-    drawn_form,
-    nodes,
-    possible_faults,
-)
-from cmm_uq.laboratory.proving.sensitivity import (
-    ALLOWED,
-    Sensitivity,
-    possible_effects,
-    remaining_length,
-    unrecorded,
-    white_of,
-)
+from cmm_uq.laboratory.proving.cases import ALLOWED, Case, HiddenEffect, Sensitivity, UnknownCause, remaining_length
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.artefact import LAST_DIGIT
 from cmm_uq.machine.model.noise import noise_of
@@ -47,6 +27,15 @@ _SHORTEST_PERIOD_MM = 6.0  # as the diagnosis tries them; beyond the range of th
 _ATTEMPTS = 40
 # how kinds of noise differ from the job's own, in units of its reading noise; forgetting over a part of the duration
 _AXIS_TIMES, _GROWN_TIMES, _DOF, _STEP_TIMES, _SLOW_PART, _WALKED_TIMES = 3.0, 2.0, 4.0, 3.0, 0.125, 2.0
+
+
+_COMPONENTS = {
+    cases.SET_UP: PLACING,
+    cases.AXIS: AXIS_NOISE,
+    cases.GROWING: GROWTH,
+    cases.SLOWLY: SLOW,
+    cases.WALKING: SLOW,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,28 +65,17 @@ class Design:
     def noises(self) -> tuple[str, ...]:
         """Kinds of noise that these set-ups could show, in the order of cases: every other one the job's own."""
         possible = noise_of(self.model, values=self.values).possible
-        asked = {
-            cases.SET_UP: PLACING,
-            cases.AXIS: AXIS_NOISE,
-            cases.GROWING: GROWTH,
-            cases.SLOWLY: SLOW,
-            cases.WALKING: SLOW,
-        }
-        shown = (kind for kind, component in asked.items() if component in possible)
-        return tuple(
-            each for kind in (cases.WHITE, *shown, cases.TAILS, cases.RESOLUTION) for each in (cases.OWN, kind)
-        )
+        shown = [cases.WHITE, *(kind for kind, component in _COMPONENTS.items() if component in possible)]
+        return tuple(each for kind in (*shown, cases.TAILS, cases.RESOLUTION) for each in (cases.OWN, kind))
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
         """That could act, and whose largest sizes would show under the job's own noise."""
-        sight = self.sight(self.noise)
-        reach = {name: max(_length(c) for c in versions) for name, versions in sight.candidates.items()}
+        reach = {name: max(map(_length, versions)) for name, versions in self.sight(self.noise).candidates.items()}
         return tuple(
-            effect
-            for effect in possible_effects(self.model)
+            effect for effect in cases.possible_effects(self.model)
             if ALLOWED * reach[effect.name] >= cases.WEAKEST and self._between(effect) is not None
-        )
+        )  # fmt: skip
 
     def _between(self, effect: Effect) -> list[tuple[float, float]] | None:
         """Lowest and highest nonlinear parameters to draw; ``None`` where the readings could show none of them."""
@@ -114,7 +92,7 @@ class Design:
 
     def noise_of_kind(self, kind: str, random: np.random.Generator) -> Noise:
         """The noise of a kind, as large as the job's own readings."""
-        own, white = self.noise, white_of(self.noise)
+        own, white = self.noise, cases.white_of(self.noise)
         sigma = float(np.asarray(white.coordinate)[0])
         if kind == cases.AXIS:
             worse = int(random.integers(3))
@@ -182,36 +160,36 @@ class Design:
             most = min(cases.STRONGEST, ALLOWED * length)
             if most < cases.WEAKEST:
                 return ()
-            strength = float(random.uniform(cases.WEAKEST, most))
-            prior = np.array([c.prior_sd for c in effect.coefficients])
+            strength, prior = (
+                float(random.uniform(cases.WEAKEST, most)),
+                np.array([c.prior_sd for c in effect.coefficients]),
+            )
             coefficients = strength / length * prior * ways[i] * random.choice([-1.0, 1.0])
-            told = effect.to_reported(coefficients, np.array(shapes[i], dtype=np.float64))
-            found.append(HiddenEffect(effect.name, {name: float(value) for name, value in told.items()}, strength))
+            reported = effect.to_reported(coefficients, np.array(shapes[i], dtype=np.float64))
+            found.append(HiddenEffect(effect.name, {name: float(value) for name, value in reported.items()}, strength))
         return tuple(found)
 
     def _stranger(self, sight: Sensitivity, kind: str, random: np.random.Generator) -> UnknownCause | None:
-        faults = tuple(possible_faults(self.model))
+        what = cases.FUNCTIONS if kind == cases.OUTSIDE else tuple(cases.possible_faults(self.model))
         for _ in range(_ATTEMPTS):
-            found = self.stranger(sight, str(random.choice(FUNCTIONS if kind == cases.OUTSIDE else faults)), random)
+            found = self.stranger(sight, str(random.choice(what)), random)
             if found is not None and found.left >= cases.WEAKEST:
                 return found
         return None
 
     def stranger(self, sight: Sensitivity, what: str, random: np.random.Generator) -> UnknownCause | None:
         """A function or a fault with a strength at random; ``None`` where it shows at no size that is possible."""
-        form: FunctionForm | None = None
-        errors: tuple[tuple[float, ...], ...] = ()
-        if what in FUNCTIONS:
-            form = drawn_form(self.model.artefact.points, what, random)
-            if form is None:
+        form, errors, points = None, tuple[tuple[float, ...], ...](), self.model.artefact.points
+        if what in cases.FUNCTIONS:
+            if (form := cases.drawn_form(points, what, random)) is None:
                 return None
         elif what == "nodes":
-            number, frames = nodes(self.model.placed(self.values), self.model.artefact.points)
+            number, frames = cases.nodes(self.model.placed(self.values), points)
             drawn = random.standard_normal((int(number.max()) + 1, frames.shape[2]))
-            errors = tuple(tuple(float(value) for value in row) for row in drawn)
+            errors = tuple(map(tuple, drawn.tolist()))
         strength = float(random.uniform(cases.WEAKEST, cases.STRONGEST))
         unit = UnknownCause(what, 1.0, strength, 0.0, "", form, errors)
-        column = sight.seen(self.effect_of(unit).basis(self.model.artefact.points))[:, 0]
+        column = sight.seen(self.effect_of(unit).basis(points))[:, 0]
         length = _length(column)
         if strength > _LARGEST_FOREIGN_UM * length:
             return None
@@ -219,11 +197,11 @@ class Design:
         like, left = sight.nearest(column * size)
         return replace(unit, size_um=size, left=left, like=like)
 
-    def effect_of(self, stranger: UnknownCause) -> ForeignEffect:
+    def effect_of(self, stranger: UnknownCause) -> cases.ForeignEffect:
         """Its error, of a micrometre."""
-        if stranger.form is not None:
-            return FormEffect(stranger.form)
-        return artefact_fault(self.model, self.values, stranger.what, self.cte_per_k, stranger.errors)
+        if (form := stranger.form) is not None:
+            return cases.ForeignEffect(f"outside: {form.what}", form.displacement)
+        return cases.artefact_fault(self.model, self.values, stranger.what, self.cte_per_k, stranger.errors)
 
     def recording(self, case: Case, seed: int, effects: Mapping[str, Effect]) -> Points:
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(case.number, 1)))
@@ -283,38 +261,36 @@ class Reach:
 
 
 def reaches(design: Design) -> tuple[Reach, ...]:
-    sight = design.sight(design.noise)
-    named = {effect.name for effect in design.model.effects}
-    possible = {effect.name for effect in possible_effects(design.model)}
+    sight, named = design.sight(design.noise), {effect.name for effect in design.model.effects}
+    possible = {effect.name for effect in cases.possible_effects(design.model)}
     drawn, found = {effect.name for effect in design.effects}, []
     for effect in every().values():
         if effect.name in named:
             continue
-        first, prior = effect.reported[0], effect.coefficients[0].prior_sd
-        columns = unrecorded(design.model, effect)
-        common = (effect.name, effect.title)
+        first, prior, columns = (
+            effect.reported[0],
+            effect.coefficients[0].prior_sd,
+            cases.unrecorded(design.model, effect),
+        )
         if effect.name not in possible:
             standing = UNRECORDED if columns else NO_TRAVEL
-            found.append(Reach(*common, standing, first.name, first.unit, columns=columns))
+            found.append(Reach(effect.name, effect.title, standing, first.name, first.unit, columns=columns))
             continue
-        versions = sight.candidates[effect.name]
-        typical = float(np.median([np.sqrt(np.sum(v**2) / v.shape[1]) for v in versions]))
+        typical = float(np.median([np.sqrt(np.sum(v**2) / v.shape[1]) for v in sight.candidates[effect.name]]))
         standing = DRAWN if effect.name in drawn else TAKEN if typical * ALLOWED < _NOTHING_SHOWS else TOO_SMALL
         alike = _alike(sight, effect.name) if standing == DRAWN and not effect.shape else ""
-        found.append(Reach(*common, standing, first.name, first.unit, typical / prior, ALLOWED * prior, alike=alike))
+        size = typical / prior, ALLOWED * prior
+        found.append(Reach(effect.name, effect.title, standing, first.name, first.unit, *size, alike=alike))
     return tuple(found)
 
 
 def _alike(sight: Sensitivity, name: str) -> str:
     column = sight.candidates[name][0][:, 0]
-    length = float(np.linalg.norm(column))
-    others = [
+    left, nearest = min((
         (min(remaining_length(column, version) for version in versions), other)
-        for other, versions in sight.candidates.items()
-        if other != name
-    ]
-    left, nearest = min(others, default=(np.inf, ""))
-    return nearest if left < _ALIKE * length else ""
+        for other, versions in sight.candidates.items() if other != name
+    ), default=(np.inf, ""))  # fmt: skip
+    return nearest if left < _ALIKE * float(np.linalg.norm(column)) else ""
 
 
 @dataclass(frozen=True)
@@ -334,10 +310,8 @@ class FaultReach:
 
 def fault_reaches(design: Design) -> Iterator[FaultReach]:
     sight = design.sight(design.noise)
-    for what in possible_faults(design.model):
-        tried = [
-            design.stranger(sight, what, np.random.default_rng(np.random.SeedSequence(0, spawn_key=(7, i))))
-            for i in range(_TRIALS)
-        ]
+    for what in cases.possible_faults(design.model):
+        random = [np.random.default_rng(np.random.SeedSequence(0, spawn_key=(7, i))) for i in range(_TRIALS)]
+        tried = [design.stranger(sight, what, own) for own in random]
         seen = sorted((one.left / one.strength, one.like) for one in tried if one is not None)
         yield FaultReach(what, True, *seen[len(seen) // 2]) if seen else FaultReach(what, False)

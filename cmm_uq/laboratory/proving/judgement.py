@@ -4,7 +4,10 @@
 named*: an effect is asserted that does not act, and no group with one that does is named with it; of a fault of the
 artefact, any effect of the machine. The *verdict is right* when it says *consistent* of nothing, *explained* of effects
 of the catalogue that are all found without a wrong name, and of any other cause that something is there which no effect
-explains, or that it is the artefact.
+explains, or that it is the artefact. A hidden effect of strength s is found with the probability 1/(1 + exp(−b·(s − m))).
+Both numbers are averaged over, on a grid, with flat priors for m and ln b: that has an answer where every effect is found,
+or none, and an interval that says how little was measured. Effects are taken together, for their strength is what the
+noise lets anyone see of them.
 """
 
 from __future__ import annotations
@@ -17,11 +20,133 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy import special
 
 from cmm_uq.base.messages import Text, say
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.tables.plan import ProveFacts
 from cmm_uq.laboratory.proving.cases import ARTEFACT, KINDS, NOTHING, ONE, OUTSIDE, TWO, Case
-from cmm_uq.laboratory.proving.rates import DetectionCurve, Rate, Tenth, cases_to_decide, detection_curve, tenths
+
+LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class Rate:
+    """So many of so many, with the interval of Clopper and Pearson (Biometrika 26 (1934), 404–413)."""
+
+    count: int  # count, of: how many of how many
+    of: int
+    # where those come in clusters, such as the intervals of one recording, (count, of) of each: what one cluster says
+    # is then worth less than as many that know nothing of each other
+    clusters: tuple[tuple[int, int], ...] = ()
+
+    @classmethod
+    def pooled(cls, clusters: Iterable[tuple[int, int]]) -> Rate:
+        kept = tuple((k, n) for k, n in clusters if n)
+        return cls(sum(k for k, _ in kept), sum(n for _, n in kept), kept)
+
+    @property
+    def value(self) -> float | None:
+        return self.count / self.of if self.of else None
+
+    @cached_property
+    def interval(self) -> tuple[float, float]:
+        """Lower and upper end, 95 %, each missed with half of the rest; all there is where nothing was counted."""
+        n = self._effective
+        return clopper_pearson(n * self.count / self.of if self.of else 0.0, n)
+
+    @property
+    def _effective(self) -> float:
+        each = np.array(self.clusters, dtype=np.float64).reshape(-1, 2)
+        clusters, total = len(each), each[:, 1].sum()
+        if clusters < 2 or (p := each[:, 0].sum() / total) in (0.0, 1.0):
+            return float(self.of)
+        off = each[:, 0] - p * each[:, 1]
+        # variance of a ratio of sums over clusters (Cochran, Sampling Techniques, 1977, 6.3)
+        variance = clusters / (clusters - 1) * float(off @ off) / total**2
+        return float(min(self.of, p * (1 - p) / variance)) if variance > 0 else float(self.of)
+
+
+def clopper_pearson(count: float, of: float, level: float = LEVEL) -> tuple[float, float]:
+    tail = 0.5 * (1 - level)
+    low = float(special.betaincinv(count, of - count + 1, tail)) if count > 0 else 0.0
+    high = float(special.betaincinv(count + 1, of - count, 1 - tail)) if count < of else 1.0
+    return low, high
+
+
+def cases_to_decide(limit: float, level: float = LEVEL) -> int:
+    """Fewest cases after which a rate of zero is known to lie below a limit."""
+    return int(np.ceil(np.log(0.5 * (1 - level)) / np.log1p(-limit)))
+
+
+@dataclass(frozen=True)
+class Tenth:
+    """Probabilities said between two tenths: how many, their mean, and how many of these were right."""
+
+    low: float
+    high: float
+    said: float
+    right: Rate
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the mean that was said lies in the interval of what was right."""
+        low, high = self.right.interval
+        return low <= self.said <= high
+
+
+def tenths(said: Sequence[tuple[float, bool]]) -> tuple[Tenth, ...]:
+    """Probabilities that were said, and whether it was so, by tenths; without those in which nothing was said."""
+    own = [[(p, right) for p, right in said if min(int(10 * p), 9) == i] for i in range(10)]
+    return tuple(
+        Tenth(i / 10, (i + 1) / 10, float(np.mean([p for p, _ in some])), Rate(sum(right for _, right in some), len(some)))
+        for i, some in enumerate(own) if some
+    )  # fmt: skip
+
+
+OFTEN = 0.9
+LARGEST = 30.0  # strength up to which the answer is looked for: twice the strongest that is drawn
+FEWEST = 8  # hidden effects from which on there is an answer
+_MIDDLE, _SLOPE, _CURVE = np.linspace(0.0, LARGEST, 241), np.geomspace(0.15, 6.0, 40), np.linspace(3.0, 15.0, 49)
+
+
+@dataclass(frozen=True, eq=False)
+class DetectionCurve:
+    """How finding grows with strength."""
+
+    # often, interval: strength found in nine of ten, median and 95 % interval; beyond LARGEST it is infinite
+    often: float
+    interval: tuple[float, float]
+    # strengths, curve, low, high: (p,) strengths, and the probability to be found there, median and 95 % interval
+    strengths: Floats
+    curve: Floats
+    low: Floats
+    high: Floats
+
+
+def detection_curve(strengths: Sequence[float], detected: Sequence[bool]) -> DetectionCurve | None:
+    """How it grows with strength, from what was hidden and what was found; ``None`` of too few."""
+    if len(strengths) < FEWEST:
+        return None
+    m, b = (grid.ravel() for grid in np.meshgrid(_MIDDLE, _SLOPE, indexing="ij"))
+    z = b[:, None] * (np.asarray(strengths, dtype=np.float64) - m[:, None])
+    log = np.where(np.asarray(detected, dtype=bool), -np.logaddexp(0, -z), -np.logaddexp(0, z)).sum(axis=1)
+    weight = np.exp(log - log.max())
+    weight /= weight.sum()
+    often = m + np.log(OFTEN / (1 - OFTEN)) / b
+    low, middle, high = (float(np.inf) if q > LARGEST else q for q in _quantiles(often, weight))
+    curve = 1 / (1 + np.exp(-b[:, None] * (_CURVE - m[:, None])))
+    ends = np.array([_quantiles(column, weight) for column in curve.T])
+    return DetectionCurve(middle, (low, high), _CURVE, ends[:, 1], ends[:, 0], ends[:, 2])
+
+
+def _quantiles(values: Floats, weight: Floats) -> tuple[float, float, float]:
+    """Of 2.5 %, one half and 97.5 % of the weight."""
+    order = np.argsort(values)
+    total = np.cumsum(weight[order])
+    low, middle, high = values[order][np.minimum(np.searchsorted(total, (0.025, 0.5, 0.975)), len(values) - 1)]
+    return float(low), float(middle), float(high)
+
 
 CONSISTENT, EXPLAINED, PARTIAL, UNEXPLAINED = "consistent", "explained", "partial", "unexplained"
 VERDICTS = (CONSISTENT, EXPLAINED, PARTIAL, UNEXPLAINED)
@@ -60,8 +185,7 @@ def judge(
 ) -> JudgedCase:
     if REFUSED in record:
         return JudgedCase(case, REFUSED)
-    hidden = {h.effect: h for h in case.hidden}
-    groups = [set(group) for group in record["groups"]]
+    hidden, groups = {h.effect: h for h in case.hidden}, [set(group) for group in record["groups"]]
     asserted = {each["effect"]: each for each in record["effects"]}
     with_group = {name: {name}.union(*(group for group in groups if name in group)) for name in asserted}
     reached = set().union(*with_group.values()) & set(hidden)
@@ -70,15 +194,12 @@ def judge(
         name for name, group in with_group.items()
         if not group & set(hidden) and not (case.kind == ARTEFACT and of_artefact(name))
     )  # fmt: skip
-    counted = [
-        _inside(each["parameters"], hidden[name].parameters) for name, each in asserted.items() if name in hidden
-    ]
+    counted = [_inside(asserted[name]["parameters"], hidden[name].parameters) for name in asserted if name in hidden]
     intervals = [(STATED, k, n) for k, n in counted]
     whole, apart, verdict = reached == set(hidden) and not wrong, alone == set(hidden), record["verdict"]
     if case.kind in (NOTHING, ONE, TWO):
-        sort = (
-            NAMED if case.kind == NOTHING else NAMED_MISSED if not whole else NAMED_BESIDE if apart else NAMED_GROUPED
-        )
+        sort = NAMED if case.kind == NOTHING else NAMED_BESIDE if apart else NAMED_GROUPED
+        sort = sort if whole or case.kind == NOTHING else NAMED_MISSED
         intervals.append((sort, *_inside(record["named"], named)))
     fitting = {NOTHING: (CONSISTENT,), ONE: (EXPLAINED,), TWO: (EXPLAINED,), OUTSIDE: (PARTIAL, UNEXPLAINED)}
     right = verdict in fitting.get(case.kind, (EXPLAINED, PARTIAL, UNEXPLAINED)) and (whole or case.kind == NOTHING)
@@ -148,13 +269,8 @@ class ProofJudgement:
 
     def coverage_of(self, *sorts: str) -> Rate:
         """The same of some sorts of intervals; those of one recording are not independent of each other."""
-        return Rate.pooled(
-            (
-                sum(k for sort, k, _ in one.intervals if sort in sorts),
-                sum(n for sort, _, n in one.intervals if sort in sorts),
-            )
-            for one in self.answered
-        )
+        each = [[(k, n) for sort, k, n in one.intervals if sort in sorts] for one in self.answered]
+        return Rate.pooled((sum(k for k, _ in own), sum(n for _, n in own)) for own in each)
 
     @cached_property
     def recognised(self) -> Rate:
@@ -194,11 +310,9 @@ class ProofJudgement:
     @cached_property
     def in_bins(self) -> tuple[tuple[float, float, Rate], ...]:
         """Hidden effects that are found, by their strength: from, to, and how many."""
-        own = {
-            (low, high): [f for s, f in self._strengths if low <= s < high or s == high == _BINS[-1]]
-            for low, high in pairwise(_BINS)
-        }
-        return tuple((low, high, Rate(sum(some), len(some))) for (low, high), some in own.items())
+        ends, each = list(pairwise(_BINS)), self._strengths
+        own = [[found for s, found in each if low <= s < high or s == high == _BINS[-1]] for low, high in ends]
+        return tuple((*end, Rate(sum(some), len(some))) for end, some in zip(ends, own, strict=True))
 
     def of_effect(self, name: str) -> tuple[Rate, int]:
         """How often an effect was found where it was hidden, and how often it was named where it did not act."""
@@ -254,18 +368,17 @@ class AcceptanceFigure:
 
 
 def acceptance_figures(judgement: ProofJudgement, facts: ProveFacts) -> tuple[AcceptanceFigure, ...]:
-    low, high = (each / 100 for each in facts.coverage_pct)
-    every = (
-        ("false_alarms", say("False alarms"), judgement.false_alarms, 0.0, facts.false_alarms_pct / 100),
-        ("coverage", say("95 % intervals that hold the truth"), judgement.coverage, low, high),
-        (
-            "wrong_names",
-            say("Cases with a wrong name"),
-            judgement.wrong_names,
-            0.0,
-            (facts.wrong_names_pct or 0.0) / 100,
+    (low, high), wrong, found = (each / 100 for each in facts.coverage_pct), facts.wrong_names_pct, facts.found_pct
+    every = [
+        AcceptanceFigure(
+            "false_alarms", say("False alarms"), judgement.false_alarms, 0.0, facts.false_alarms_pct / 100
         ),
-        ("found", say("Hidden effects found"), judgement.found, (facts.found_pct or 0.0) / 100, 1.0),
-    )
-    left_out = {"wrong_names": facts.wrong_names_pct is None, "found": facts.found_pct is None}
-    return tuple(AcceptanceFigure(*figure) for figure in every if not left_out.get(figure[0]))
+        AcceptanceFigure("coverage", say("95 % intervals that hold the truth"), judgement.coverage, low, high),
+    ]
+    if wrong is not None:
+        every.append(
+            AcceptanceFigure("wrong_names", say("Cases with a wrong name"), judgement.wrong_names, 0.0, wrong / 100)
+        )
+    if found is not None:
+        every.append(AcceptanceFigure("found", say("Hidden effects found"), judgement.found, found / 100, 1.0))
+    return tuple(every)

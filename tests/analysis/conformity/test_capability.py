@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.conformity.shared_causes import Causes
 from cmm_uq.analysis.conformity.standard import RAISED
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
+from cmm_uq.analysis.conformity.uncertainty import Causes
 from cmm_uq.jobs.tables.circumstances import Circumstances, TestUncertainty
 from cmm_uq.jobs.tables.conformity import ConformityFacts
 from cmm_uq.jobs.tables.identification import Capability, LengthCapability

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.analysis.conformity.clauses import CLAUSES, in_words
-from cmm_uq.analysis.conformity.standards import BUILT_IN, statement
-from cmm_uq.analysis.conformity.statement import Statement
+from cmm_uq.analysis.conformity.standards import BUILT_IN, CLAUSES, statement
+from cmm_uq.analysis.conformity.statement import Statement, clauses_in_words
 from cmm_uq.app.commands.certificates.standards import form, write_form
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.artefacts import kind_of
@@ -131,7 +130,7 @@ def test_every_characteristic_goes_by_some_clause_and_every_clause_is_of_one(nam
     for clause in BUILT_IN[name].clauses:
         assert not clause.of or set(clause.of) & characteristics or name == "VDI/VDE 2617"
     for one in characteristics:
-        assert in_words(name, [c for c in BUILT_IN[name].clauses if not c.of or one in c.of], None)[0]
+        assert clauses_in_words(name, [c for c in BUILT_IN[name].clauses if not c.of or one in c.of], None)[0]
 
 
 def test_nothing_is_written_over_a_form(tmp_path: Path) -> None:

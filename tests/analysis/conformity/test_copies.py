@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.uncertainty_lines import copies_in_words
+from cmm_uq.analysis.conformity.uncertainty import copies_in_words
 from cmm_uq.base.points import Points
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.conformity.consequences import Consequences, consequences
+from cmm_uq.analysis.conformity.accuracy import Consequences, consequences
 from cmm_uq.artefacts import artefact_facts, kind_named
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge

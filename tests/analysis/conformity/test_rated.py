@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.conformity.uncertainty_lines import rated_conditions
+from cmm_uq.analysis.conformity.uncertainty import rated_conditions
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.tables.circumstances import Circumstances, Declared, ProbeFacts, RatedConditions
 

@@ -11,7 +11,7 @@ import pytest
 
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
-from cmm_uq.analysis.conformity.uncertainty_lines import LENGTH_LINES, u_of_unstated
+from cmm_uq.analysis.conformity.uncertainty import LENGTH_LINES, u_of_unstated
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.tables.circumstances import Circumstances, NegligibleLines, RatedConditions, TestUncertainty

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.analysis.diagnosis.visibility import Thresholds
+from cmm_uq.analysis.diagnosis.power import Thresholds
 
 DRAWS = 400_000
 

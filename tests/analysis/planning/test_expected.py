@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.planning.candidates import ready_plan
-from cmm_uq.analysis.planning.identifiability import compare_repeats, repeat_points
-from cmm_uq.analysis.planning.set_up import join
+from cmm_uq.analysis.planning.identifiability import compare_repeats
+from cmm_uq.analysis.planning.set_up import join, repeat_points
 from cmm_uq.analysis.planning.setting import PlannedNoise
 from cmm_uq.artefacts import artefact_facts
 from tests.analysis.planning.plans import setting

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.planning.advice import ODDS, DetectionGoal, NextPlan, suggestions
 from cmm_uq.analysis.planning.candidates import ready_plan
-from cmm_uq.analysis.planning.set_up import SetUp, attitude_along, join
+from cmm_uq.analysis.planning.set_up import ODDS, DetectionGoal, NextPlan, SetUp, attitude_along, join, suggestions
 from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.planning.suggestion import next_plan
 from cmm_uq.artefacts import artefact_of, kind_named

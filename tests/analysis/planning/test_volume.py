@@ -12,9 +12,8 @@ import pytest
 from scipy.spatial.distance import pdist
 
 from cmm_uq.analysis.planning import suggestion
-from cmm_uq.analysis.planning.advice import NextPlan
 from cmm_uq.analysis.planning.candidates import ready_plan
-from cmm_uq.analysis.planning.set_up import attitude_along
+from cmm_uq.analysis.planning.set_up import NextPlan, attitude_along
 from cmm_uq.analysis.planning.setting import Planning, Volume, turned_set_ups
 from cmm_uq.analysis.planning.suggestion import next_plan
 from cmm_uq.artefacts import kind_named

@@ -14,7 +14,7 @@ import pytest
 
 import cmm_uq
 from cmm_uq.analysis.diagnosis.model_average import ModelAverage, Rival
-from cmm_uq.analysis.planning.advice import DetectionChange, NextPlan, Separation
+from cmm_uq.analysis.planning.set_up import DetectionChange, NextPlan, Separation
 from cmm_uq.app.commands.diagnose import diagnose_job
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.base.messages import say

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy import stats
 
-from cmm_uq.laboratory.proving.rates import Rate, cases_to_decide, clopper_pearson, detection_curve, tenths
+from cmm_uq.laboratory.proving.judgement import Rate, cases_to_decide, clopper_pearson, detection_curve, tenths
 
 
 @pytest.mark.parametrize(("count", "of", "low", "high"), [

@@ -1,19 +1,119 @@
-"""Which explanations hold together: the posterior over combinations of them, found best first."""
+"""Which explanations hold together: the posterior over combinations of them, found best first, and how probable each was.
+
+Known effects act by themselves, or a machine is out of adjustment and has several of what every machine has to some degree,
+its scales and squarenesses: how readily each of these acts is the same for all of one machine, and unknown. So it is for the
+artefact, which was made or calibrated on another machine. Six effects of such a machine are then not six coincidences.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from scipy import special
 
-from cmm_uq.analysis.diagnosis.comparison.conditional import Version
+from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
-from cmm_uq.analysis.diagnosis.comparison.prior import ALIKE, EFFECTS, CombinationPrior, with_two_more
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.machine.physics.catalogue import every
+
+# Probability of none, one, two, three and four known effects that the job does not name
+EFFECTS = (0.5, 0.27, 0.14, 0.06, 0.03)
+FURTHER = 0.5  # how many times less probable each further effect is where four are found
+UNKNOWNS = (0.85, 0.12, 0.03)  # of none, one and two nonparametric terms
+# Probability that scales and squarenesses belong together so, where nothing is said of any of them
+OUT_OF_ADJUSTMENT = 0.05
+# Parameters of the beta distribution of how readily each of them then acts: mostly all of them, or nearly so
+READILY = (6.0, 1.0)
+ALIKE = 10.0  # ratio within which what is shown of them then lies
+# By how much each further one is more probable at its size: three of the sizes that are tried lie so near the first
+_NARROWER = float(np.log(AMPLITUDES / 3))
+
+
+def with_two_more(counts: tuple[float, ...]) -> tuple[float, ...]:
+    """Probabilities of none, one, two … known effects, continued by two more."""
+    return (*counts, counts[-1] * FURTHER, counts[-1] * FURTHER**2)
+
+
+class CombinationPrior:
+    """Probability, beforehand, of every combination: of how many, and among as many by the product of their weights.
+
+    ``explanations`` of which combinations are made; ``counts`` probability of none, one, two … known effects that act
+    by themselves; ``visible`` explanations of which a recording shows anything; all by default. ``machine`` scales and
+    squarenesses that may belong together: those that are seen, where the job names none.
+    """
+
+    def __init__(
+        self, explanations: Sequence[Explanation], counts: tuple[float, ...] = EFFECTS,
+        visible: Collection[int] | None = None,
+    ) -> None:  # fmt: skip
+        self.counts, weights = counts, [e.weight for e in explanations]
+        self._weight = [(e.kind, float(np.log(e.weight))) for e in explanations]
+        together = [e.effect if e.together else None for e in explanations]
+        machine = {i for i, effect in enumerate(together) if effect is not None and not effect.of_artefact}
+        artefact = {i for i, effect in enumerate(together) if effect is not None and effect.of_artefact}
+        if len(machine) < sum(effect.everywhere and not effect.of_artefact for effect in every().values()):
+            machine = artefact = set()  # the job says what the machine is like
+        shown = frozenset(range(len(explanations)) if visible is None else visible)
+        self.machine, self._artefact = shown & machine, shown & artefact
+        effects = [i for i, e in enumerate(explanations) if e.kind == EFFECT]
+        beside = [i for i in effects if i not in self.machine | self._artefact]
+        self._alone, self._beside = (_of_counts([weights[i] for i in own], counts) for own in (effects, beside))
+        self._unknown = _of_counts([e.weight for e in explanations if e.kind == UNKNOWN], UNKNOWNS)
+        self._of_machine = _of_subsets(len(self.machine), 1.0)
+        mean = float(np.mean([weights[i] for i in self._artefact] or [1.0]))
+        self._of_artefact = _of_subsets(len(self._artefact), mean)
+
+    def log(self, key: Iterable[int], *, alike: bool = False) -> float:
+        """Logarithm of the probability; minus infinity for a combination that is not considered."""
+        effects, rest, machine, artefact, functions = 0, 0, 0, 0, 0
+        of_effects = of_rest = of_functions = 0.0
+        for i in key:
+            kind, weight = self._weight[i]
+            if kind == UNKNOWN:
+                functions, of_functions = functions + 1, of_functions + weight
+                continue
+            if kind != EFFECT:
+                return -np.inf
+            effects, of_effects = effects + 1, of_effects + weight
+            if i in self.machine:
+                machine += 1
+            elif i in self._artefact:
+                artefact += 1
+            else:
+                rest, of_rest = rest + 1, of_rest + weight
+        if functions >= len(self._unknown) or effects >= len(self._alone):
+            return -np.inf
+        of_functions += float(self._unknown[functions])
+        alone = float(self._alone[effects]) + of_effects
+        if not self.machine:
+            return of_functions + alone
+        together = float(self._beside[rest] + self._of_machine[machine] + self._of_artefact[artefact]) + of_rest
+        together += max(machine - 1, 0) * _NARROWER * alike
+        either = np.logaddexp(np.log(1 - OUT_OF_ADJUSTMENT) + alone, np.log(OUT_OF_ADJUSTMENT) + together)
+        return of_functions + float(either)
+
+
+def _of_counts(weights: Sequence[float], counts: Sequence[float]) -> Floats:
+    """Log probability of one set (``len(counts)``,) of none, one, two … effects, but for the product of their weights."""
+    sums = np.zeros(len(counts))
+    sums[0] = 1.0
+    for weight in weights:
+        sums[1:] += weight * sums[:-1]
+    return np.asarray(np.log(counts) - np.log(np.where(sums > 0, sums, 1.0)), dtype=np.float64)
+
+
+def _of_subsets(count: int, weight: float) -> Floats:
+    """Log probability (``count`` + 1,) of one set of none, one, two … of some effects that act as readily as one another."""
+    a, b = READILY
+    size = np.arange(count + 1)
+    log = special.betaln(a + size, b + count - size) - special.betaln(a, b)
+    log[1:] += np.log(weight)
+    return np.asarray(log - np.log(1 + (weight - 1) * -np.expm1(log[0])), dtype=np.float64)
+
 
 MOST = 12  # the most known effects that are looked for
 WINDOW = 7.0  # a combination less probable than one of its parts by more than this, in logarithm, is not followed
@@ -69,11 +169,6 @@ class Combinations:
     def most_probable(self) -> Key:
         return max(self.of_effects, key=lambda key: self.of_effects[key])
 
-    @property
-    def most_members(self) -> int:
-        """How many explanations, unknown functions too, the most probable combination has."""
-        return len(self.likeliest(self.by_key))
-
     def versions(self, effects: Key) -> tuple[Version, ...]:
         """Of the most probable combination with these known effects, or more."""
         keys = [key for key in self.by_key if self.effects_of(key) >= effects]
@@ -106,8 +201,7 @@ class Combinations:
         rest, whole = self.of_effects.get(effects - {index}, 0.0), self.of_effects.get(effects, 0.0)
         odds: dict[int, float] = {}
         for other, p in self.of_effects.items() if whole else ():
-            more = other - effects
-            if len(more) == 1 and index not in other and (len(other) == len(effects) or p > rest):
+            if len(more := other - effects) == 1 and index not in other and (len(other) == len(effects) or p > rest):
                 (it,) = more
                 odds[it] = odds.get(it, 0.0) + p / whole
         return odds
@@ -122,7 +216,7 @@ def explore(
         counts = with_two_more(counts)
     found = _explored(comparison, before, changed, counts)
     # there may be more than were looked for; unknown functions may stand for several of them
-    while len(found.counts) - 1 <= min(found.most_members, MOST - 2):
+    while len(found.counts) - 1 <= min(len(found.likeliest(found.by_key)), MOST - 2):
         found = _explored(comparison, found, frozenset(), with_two_more(found.counts))
     return found
 
@@ -138,16 +232,15 @@ def effects_of_every_machine(comparison: CandidateComparison) -> list[int]:
 def _explored(
     comparison: CandidateComparison, before: Combinations | None, changed: Key, counts: tuple[float, ...]
 ) -> Combinations:
-    known = {} if before is None else before.by_key
     # one of more effects than were looked for may be possible now
+    known = {} if before is None else before.by_key
     known = {key: one for key, one in known.items() if not key & changed and np.isfinite(one.log_posterior)}
-    search = _Search(comparison, known, counts)
+    search, exchanged = _Search(comparison, known, counts), set[Key]()
     search.climb(frozenset())
     # one of many coefficients can explain all of these at once, and then none of them is worth adding by itself
     if together := search.with_more((), effects_of_every_machine(comparison)):
         search.settle(together)
         search.climb(key_of(together))
-    exchanged: set[Key] = set()
     while (best := search.best()) not in exchanged:
         exchanged.add(best)
         for i in best:
@@ -206,11 +299,11 @@ class _Search:
         known = self.settled[key]
         base = known.log_posterior - known.log_prior - float(self.comparison.log_evidence_of(known.versions)[0])
         for i, (total, version) in self.comparison.beside(known.versions, self.candidates).items():
-            if i in key or i not in self.candidates:
-                continue
             larger, versions = key | {i}, (*known.versions, version)
+            if i in key or i not in self.candidates or larger in self.settled:
+                continue
             estimate = base + total + self.prior.log(larger, alike=self.alike(versions))
-            if larger not in self.settled and estimate > self._waiting.get(larger, (-np.inf, ()))[0]:
+            if estimate > self._waiting.get(larger, (-np.inf, ()))[0]:
                 self._waiting[larger] = estimate, versions
 
     def settle_best(self, size: int, count: int, within: Key = frozenset()) -> list[Key]:
@@ -224,25 +317,22 @@ class _Search:
     @cached_property
     def _forms(self) -> tuple[Ints, Floats]:
         """Known effects of one coefficient that are seen, and the form (m, n) of each, of length one."""
-        numbers, forms = list[int](), list[Floats]()
+        forms: dict[int, Floats] = {}
         for i in sorted(self.candidates & self.comparison.visible):
-            first = self.comparison.explanations[i].members[0]
-            if self.comparison.explanations[i].kind == EFFECT and first.columns.shape[1] == 1 and not first.shape:
+            explanation, first = self.comparison.explanations[i], self.comparison.explanations[i].members[0]
+            if explanation.kind == EFFECT and first.columns.shape[1] == 1 and not first.shape:
                 form = self.comparison.rest(first.columns / self.comparison.noise_scale[:, None])[:, 0]
-                length = float(np.linalg.norm(form))
-                if length > 0:
-                    numbers.append(i)
-                    forms.append(form / length)
-        return np.array(numbers, dtype=np.intp), np.array(forms).T
+                if (length := float(np.linalg.norm(form))) > 0:
+                    forms[i] = form / length
+        return np.array(list(forms), dtype=np.intp), np.array(list(forms.values())).T
 
     def pairs_like(self, index: int) -> list[tuple[int, int]]:
         """Pairs of other known effects that together leave next to nothing of one, and neither of them does alone."""
         numbers, forms = self._forms
-        own = np.flatnonzero(numbers == index)
-        if not len(own):
+        if index not in numbers:
             return []
-        others = np.flatnonzero(numbers != index)
-        cosines, among = forms[:, others].T @ forms[:, own[0]], forms[:, others].T @ forms[:, others]
+        own, others = np.flatnonzero(numbers == index)[0], np.flatnonzero(numbers != index)
+        cosines, among = forms[:, others].T @ forms[:, own], forms[:, others].T @ forms[:, others]
         a, b = np.triu_indices(len(others), 1)
         apart = 1 - among[a, b] ** 2
         together = cosines[a] ** 2 + cosines[b] ** 2 - 2 * cosines[a] * cosines[b] * among[a, b]

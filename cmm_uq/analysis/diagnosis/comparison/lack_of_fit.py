@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse, special
 
+from cmm_uq.analysis.diagnosis.comparison.combinations import EFFECTS
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation
-from cmm_uq.analysis.diagnosis.comparison.prior import EFFECTS
 from cmm_uq.analysis.diagnosis.noise import NoiseKind, probable_tails, tail_precision, with_tails
 from cmm_uq.base.points import Floats, Ints
 

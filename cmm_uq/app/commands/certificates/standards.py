@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cmm_uq import __version__
-from cmm_uq.analysis.conformity.clauses import CLAUSES, Clause
-from cmm_uq.analysis.conformity.standards import names, standard_named
+from cmm_uq.analysis.conformity.standards import CLAUSES, names, standard_named
+from cmm_uq.analysis.conformity.statement import Clause
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.output.new_file import refuse_taken, write_new
 from cmm_uq.base.plugins import naming_package

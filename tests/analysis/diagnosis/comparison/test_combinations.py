@@ -9,11 +9,16 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from cmm_uq.analysis.diagnosis.comparison.combinations import Combination, Combinations, explore, log_evidence_together
+from cmm_uq.analysis.diagnosis.comparison.combinations import (
+    EFFECTS,
+    Combination,
+    Combinations,
+    explore,
+    log_evidence_together,
+)
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
-from cmm_uq.analysis.diagnosis.comparison.prior import EFFECTS
 from cmm_uq.analysis.diagnosis.noise import sigma_grid
 from cmm_uq.base.points import Floats
 from tests.analysis.diagnosis.dense_noise import covariance, rest, some_kinds

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation, Member
-from cmm_uq.analysis.diagnosis.comparison.prior import (
+from cmm_uq.analysis.diagnosis.comparison.combinations import (
     EFFECTS,
     OUT_OF_ADJUSTMENT,
     READILY,
@@ -19,6 +18,7 @@ from cmm_uq.analysis.diagnosis.comparison.prior import (
     CombinationPrior,
     with_two_more,
 )
+from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation, Member
 from cmm_uq.machine.physics.catalogue import every
 
 MEMBER = (Member(np.ones((3, 1))),)

@@ -1,18 +1,23 @@
-"""Whether each line of the test uncertainty (ISO/TS 23165:2006) and each rated condition is stated, met, or answered for."""
+"""Test uncertainty: its lines and the rated conditions, stated, met or answered for; its causes, and that all values conform.
+
+Calibration, expansion and temperature of the artefact are shared by all values of a test, alignment and fixturing by those of
+one set-up (ISO/TS 23165:2006): the probability that all conform is not the product of their own.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import special
 
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say, semicolons
-from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.circumstances import LINE_KEYS, Circumstances, RatedConditions, TestUncertainty
-from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.budget import Budget
 
 LENGTH_LINES = ("calibration", "expansion", "temperature", "alignment", "fixturing")  # in the order of their budget
@@ -20,6 +25,10 @@ SIZE_LINES, FORM_LINES, REPEAT_LINES = LENGTH_LINES[:3], ("form",), ("repeat",)
 WARM = 0.5  # K from 20 °C from which on an unknown expansion matters
 # what a line that is not stated may well be: of the temperature, of the coefficient (1/K), of all others
 UNSTATED_K, UNSTATED_EXPANSION, UNSTATED_UM = 0.3, 1e-6, 1.0
+NORMAL_EXPANSION = (
+    8e-6,
+    13e-6,
+)  # 1/K; a gauge outside is not of normal expansion (ISO 10360-2:2009, as commonly reported)
 STEEL, LARGEST_EXPANSION = 11.5e-6, 25e-6  # 1/K; of what gauges are made of, aluminium expands most
 
 _NAMES = {
@@ -40,16 +49,13 @@ def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Ci
         if not _met(line, artefact, under):
             key = "u_um in [artefact]" if line == "calibration" else f"{LINE_KEYS[line]} in [test_uncertainty]"
             what = say("uncertainty: {line} is neither stated nor declared negligible", line=_NAMES[line])
-            found.append(
-                _lacks(what, f'{key}, or {line} = {{ by = "…", reason = "…" }} in [test_uncertainty.negligible]')
-            )
+            declared = f'{line} = {{ by = "…", reason = "…" }} in [test_uncertainty.negligible]'
+            found.append(_lacks(what, f"{key}, or {declared}"))
     probed = artefact.forms()
     if "form" in lines and (probed is None or probed.certified <= 0):
         what = say("uncertainty: the form deviation of the test sphere is not stated")
         found.append(_lacks(what, "form_um in [artefact]"))
-    if "expansion" in lines:
-        found += _thermal(artefact, under)
-    return tuple(found)
+    return (*found, *(_thermal(artefact, under) if "expansion" in lines else ()))
 
 
 def u_of_unstated(lines: Collection[str], artefact: Artefact, under: Circumstances, length_mm: float) -> float:
@@ -58,10 +64,9 @@ def u_of_unstated(lines: Collection[str], artefact: Artefact, under: Circumstanc
     It counts before a value is called nonconforming, and for nothing else. The figures are this project's, larger than a
     laboratory that controls its temperature has; an expansion of which no coefficient is stated was not corrected at all.
     """
-    away = away_from_20(artefact)
     per_length = {
         "temperature": abs(under.cte_per_k or STEEL) * UNSTATED_K,
-        "expansion": away * (UNSTATED_EXPANSION if under.cte_per_k else LARGEST_EXPANSION),
+        "expansion": away_from_20(artefact) * (UNSTATED_EXPANSION if under.cte_per_k else LARGEST_EXPANSION),
     }
     missing = {line for line in lines if not _met(line, artefact, under)}
     if "expansion" in lines and not under.cte_per_k and not under.uncertainty.declared("expansion"):
@@ -119,20 +124,45 @@ def _thermal(artefact: Artefact, under: Circumstances) -> Iterator[Condition]:
         return
     if stated.machine.temperature is None:
         what = say("uncertainty: the temperature of the artefact during the test was not recorded")
-        measured = "temperature in [test_uncertainty.machine] of a machine that measures and corrects it"
-        yield _lacks(what, f"column temp_artefact_c, or {measured}")
+        other = "temperature in [test_uncertainty.machine] of a machine that measures and corrects it"
     elif not stated.declared("expansion"):
         what = say(
             "uncertainty: how far the artefact was from 20 °C, on which that of its expansion coefficient depends"
         )
-        declared = "expansion in [test_uncertainty.machine] or [test_uncertainty.negligible]"
-        yield _lacks(what, f"column temp_artefact_c, or {declared}")
+        other = "expansion in [test_uncertainty.machine] or [test_uncertainty.negligible]"
+    else:
+        return
+    yield _lacks(what, f"column temp_artefact_c, or {other}")
 
 
 def away_from_20(artefact: Artefact) -> float:
     """How far the artefact was from 20 °C at most, K; 0 where its temperature was not recorded."""
     recorded = artefact.points.columns.get("temp_artefact_c")
     return 0.0 if recorded is None else float(np.abs(recorded - REFERENCE_TEMPERATURE).max(initial=0.0))
+
+
+def normal_expansion(cte: float | None) -> tuple[Condition, ...]:
+    """A length of normal expansion, where that of the gauge is stated and is another (ISO 10360-2:2009)."""
+    low, high = NORMAL_EXPANSION
+    if not cte or low <= cte <= high:
+        return ()
+    what = say(
+        "a length of normal expansion, {low:g} to {high:g} × 10⁻⁶ /K (that of the gauge is {cte:.3g} × 10⁻⁶ /K)",
+        low=low * 1e6, high=high * 1e6, cte=cte * 1e6,
+    )  # fmt: skip
+    return (Condition(what, (what,)),)
+
+
+def unknown_expansion(artefact: Artefact, cte_per_k: float | None) -> Text:
+    """What a reader must know of lengths measured away from 20 °C on a gauge of unknown expansion; else nothing."""
+    away = away_from_20(artefact)
+    if cte_per_k or away < WARM:
+        return NOTHING
+    return say(
+        "The artefact was up to {away:.2g} K from 20 °C and its expansion is not stated{key}: its lengths "
+        "are taken as those at 20 °C, which for steel is {steel:.2g} µm wrong in a metre.",
+        away=away, steel=11.5 * away, key=at_key("[artefact] cte_per_k"),
+    )  # fmt: skip
 
 
 def _lacks(what: Text, remedy: str) -> Condition:
@@ -142,13 +172,12 @@ def _lacks(what: Text, remedy: str) -> Condition:
 def declared_in_words(lines: Collection[str], stated: TestUncertainty) -> list[Text]:
     found: list[Text] = []
     for line in ("temperature", "fixturing", *lines) if lines == REPEAT_LINES else lines:
-        negligible, own = (getattr(table, line, None) for table in (stated.negligible, stated.machine))
-        if negligible:
-            found.append(say("{line:capital}: declared negligible by {by}: {reason}.", line=_NAMES[line],
-                             by=Verbatim(negligible.by), reason=Verbatim(negligible.reason.rstrip(". "))))  # fmt: skip
-        if own:
-            found.append(say("{line:capital}: declared the machine's own by {by}: {reason}.", line=_NAMES[line],
-                             by=Verbatim(own.by), reason=Verbatim(own.reason.rstrip(". "))))  # fmt: skip
+        for table in (stated.negligible, stated.machine):
+            if one := getattr(table, line, None):
+                words = {"line": _NAMES[line], "by": Verbatim(one.by), "reason": Verbatim(one.reason.rstrip(". "))}
+                negligible = say("{line:capital}: declared negligible by {by}: {reason}.", **words)
+                own = say("{line:capital}: declared the machine's own by {by}: {reason}.", **words)
+                found.append(negligible if table is stated.negligible else own)
     return found
 
 
@@ -173,8 +202,9 @@ def rated_conditions(circumstances: Circumstances, points: Points) -> tuple[Cond
     rated, used, found = circumstances.rated, circumstances.probe, []
     if rated.temperature_c is None and rated.declared is None:
         what = say("rated conditions: the temperatures for which the limits hold are not stated")
-        remedy = Verbatim('temperature_c in [rated_conditions], or there declared = { by = "…", reason = "…" }')
-        found.append(Condition(what, (what,), remedy))
+        found.append(
+            _lacks(what, 'temperature_c in [rated_conditions], or there declared = { by = "…", reason = "…" }')
+        )
     columns = {k: v for k, v in points.columns.items() if k.startswith("temp_") and k.endswith("_c")}
     if rated.temperature_c is not None:
         found.append(_temperature(columns, *rated.temperature_c))
@@ -233,14 +263,133 @@ def _difference(columns: Mapping[str, Floats], most: float) -> Condition:
 def copies_in_words(points: Points) -> Text:
     """Which measurements are copies of which; empty when none is."""
     runs = sorted((*points.run_of(original), *points.run_of(later)) for later, original in points.copies.items())
-    told = [
+    each = [
         say("measurement {two}, repeat {repeat} of measurement {one}, repeat {first}",
             two=two, repeat=repeat, one=one, first=first)
         for one, first, two, repeat in runs
     ]  # fmt: skip
-    if not told:
+    if not each:
         return NOTHING
-    copies, more = semicolons(told[:_NAMED]), len(told) - _NAMED
+    copies, more = semicolons(each[:_NAMED]), len(each) - _NAMED
     if more <= 0:
         return say("Copies to the last digit, which do not count: {copies}.", copies=copies)
     return say("Copies to the last digit, which do not count: {copies} and {count} more.", copies=copies, count=more)
+
+
+_SETTINGS = 4096  # Of the shared causes, over which is averaged: the joint probability of 105 lengths is good to 0.001
+_AT_ONCE = 2_000_000  # Numbers that are held at once
+
+
+@dataclass(frozen=True, eq=False)
+class Causes:
+    """What makes m test values uncertain."""
+
+    # (m, s) by how much one standard uncertainty of each cause that all values share changes each value, µm, with sign
+    shared: Floats
+    own: Floats  # (m,) standard uncertainty that values of one set-up share, µm
+    set_up: Ints  # (m,) number of the set-up
+
+    @property
+    def u(self) -> Floats:
+        """(m,) standard uncertainty of each value, µm."""
+        return np.asarray(np.sqrt((self.shared**2).sum(axis=1) + self.own**2), dtype=np.float64)
+
+    def at_least(self, least_um: Floats) -> Causes:
+        """The same with u not below some (m,), µm: what these have more is shared by all; where u is 0 it stays so."""
+        u = self.u
+        more = np.where((u > 0) & (u < least_um), np.sqrt(np.maximum(least_um**2 - u**2, 0.0)), 0.0)
+        return Causes(np.column_stack([self.shared, more]), self.own, self.set_up) if more.any() else self
+
+    def of(self, chosen: Ints) -> Causes:
+        return Causes(self.shared[chosen], self.own[chosen], self.set_up[chosen])
+
+
+def temperatures(found: Indications, artefact: Artefact) -> Floats | None:
+    """Temperature of the artefact at each length, (m,) °C; ``None`` where it was not recorded."""
+    recorded = artefact.points.columns.get("temp_artefact_c")
+    return None if recorded is None else np.asarray(recorded[found.rows].mean(axis=1), dtype=np.float64)
+
+
+def length_budget(
+    length_mm: float, u_mm: float, temperature_c: float, circumstances: Circumstances, u_beside_mm: float = 0.0
+) -> Budget:
+    """Test uncertainty of one length (ISO/TS 23165:2006); ``u_mm`` includes ``u_beside_mm`` of a short gauge beside it."""
+    from cmm_uq.maths.uncertainty.budgets.machine import length_test_uncertainty
+
+    stated = circumstances.uncertainty
+    return length_test_uncertainty(
+        length_mm, float(_own(np.array(u_mm), u_beside_mm)), temperature_c=temperature_c,
+        cte_per_k=circumstances.cte_per_k or 0.0, u_cte_per_k=stated.u_cte_per_k, u_temperature_k=stated.u_temperature_k,
+        u_alignment_mm=stated.u_alignment_um * MICROMETRE, u_fixturing_mm=stated.u_fixturing_um * MICROMETRE,
+        u_beside_mm=u_beside_mm, calibration_dof=circumstances.calibration_dof,
+    )  # fmt: skip
+
+
+def causes_of_lengths(found: Indications, artefact: Artefact, circumstances: Circumstances) -> Causes:
+    """Of every length of a recording, by the same budget."""
+    recorded = temperatures(found, artefact)
+    degrees = np.full(len(found.lengths), REFERENCE_TEMPERATURE) if recorded is None else recorded
+    beside = np.zeros(len(found.u)) if found.u_beside is None else found.u_beside
+    each = np.column_stack([found.lengths, _own(found.u, beside), degrees])
+    different, which = np.unique(each, axis=0, return_inverse=True)
+    budgets = [length_budget(length, u, t, circumstances).lines for length, u, t in different.tolist()]
+    lines = np.array([[line.contribution for line in own] for own in budgets])[which.ravel()] / MICROMETRE
+    calibration, expansion, temperature, alignment, fixturing = lines.T
+    signed = np.sign(degrees - REFERENCE_TEMPERATURE) * expansion
+    further = [] if found.u_beside is None else [beside / MICROMETRE]
+    shared = np.column_stack([calibration, signed, temperature, *further])
+    return Causes(shared, np.hypot(alignment, fixturing), artefact.points.measurement[found.rows[:, 0]])
+
+
+def _own(u: Floats, beside: Floats | float) -> Floats:
+    return np.asarray(np.where(np.asarray(beside) > 0, np.sqrt(np.maximum(u**2 - np.asarray(beside) ** 2, 0.0)), u))
+
+
+def probability_of_all(values: Sequence[float] | Floats, limits: Sequence[float] | Floats, causes: Causes, *,
+                       signed: bool) -> float | None:  # fmt: skip
+    """Probability that all quantities lie within their limits, given what was measured; ``None`` without an uncertainty.
+
+    Of what is shared the largest cause, or of each set-up its own, is integrated exactly; over the others an even sequence
+    of settings is averaged, the same on every run.
+
+    ``values, limits``: (m,) of what was measured, µm.
+    """
+    if not len(causes.own) or not np.all(causes.u > 0):
+        return None
+    value, limit = np.asarray(values, dtype=np.float64), np.asarray(limits, dtype=np.float64)
+    shared = causes.shared[:, np.any(causes.shared, axis=0)]
+    if np.any(causes.own > 0):
+        return _averaged(value, limit, shared, causes.own, causes.set_up, signed)
+    largest = int(np.argmax((shared**2).sum(axis=0)))
+    others, all_alike = np.delete(shared, largest, axis=1), np.zeros(len(value), dtype=np.int64)
+    return _averaged(value, limit, others, shared[:, largest], all_alike, signed)
+
+
+def _averaged(value: Floats, limit: Floats, shared: Floats, slope: Floats, group: Ints, signed: bool) -> float:
+    order = np.argsort(group, kind="stable")
+    starts = np.flatnonzero(np.diff(group[order], prepend=group[order][0] - 1))
+    settings = _normal(_SETTINGS if shared.shape[1] else 1, shared.shape[1])
+    total = 0.0
+    for block in np.array_split(settings, max(1, len(settings) * len(value) // _AT_ONCE)):
+        moved = (value[:, None] + shared @ block.T)[order]
+        s, top = slope[order][:, None], limit[order][:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.stack([-top - moved if signed else np.full_like(moved, -np.inf), top - moved]) / s
+            lower, upper = (
+                np.where(s == 0, beyond, end(axis=0)) for beyond, end in ((-np.inf, ends.min), (np.inf, ends.max))
+            )
+        outside = (s == 0) & ((moved > top) | (signed & (moved < -top)))
+        chance = special.ndtr(np.minimum.reduceat(upper, starts)) - special.ndtr(np.maximum.reduceat(lower, starts))
+        chance = np.maximum(0.0, chance)
+        chance = np.where(np.logical_or.reduceat(outside, starts, axis=0), 0.0, chance)
+        total += float(chance.prod(axis=0).sum())
+    return total / len(settings)
+
+
+def _normal(count: int, dimensions: int) -> Floats:
+    """Normal deviates (count, dimensions) spread evenly: Kronecker's sequence of the generalised golden ratio."""
+    ratio = 2.0  # root of x^(d + 1) = x + 1
+    for _ in range(40):
+        ratio = (1 + ratio) ** (1 / (dimensions + 1))
+    steps = ratio ** -np.arange(1, dimensions + 1)
+    return np.asarray(special.ndtri((0.5 + np.outer(np.arange(1, count + 1), steps)) % 1), dtype=np.float64)
