@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
-from cmm_uq.analysis.parts.placing import PartPose
-from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature
+from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, PartPose
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.geometry.association import Association

@@ -29,7 +29,7 @@ from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.evaluation import Evaluator, Known
 from cmm_uq.analysis.parts.machine.conditional import given_recording, joint_posterior
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
-from cmm_uq.analysis.parts.placing import PartPose
+from cmm_uq.analysis.parts.plan import PartPose
 from cmm_uq.analysis.parts.result import evaluated, stated
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.artefacts.ballbar import Ballbar

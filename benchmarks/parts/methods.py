@@ -21,8 +21,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes.machine import MACHINE
-from cmm_uq.analysis.parts.causes.stylus import STYLUS
+from cmm_uq.analysis.parts.causes.machine import MACHINE, STYLUS
 from cmm_uq.analysis.parts.causes.surroundings import TEMPERATURE, Expansion, Surroundings
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
 from cmm_uq.analysis.parts.methods.method import (
@@ -34,8 +33,7 @@ from cmm_uq.analysis.parts.methods.method import (
     by_orientations,
 )
 from cmm_uq.analysis.parts.methods.of_job import sensitivities
-from cmm_uq.analysis.parts.placing import PartPose
-from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan, Stylus
+from cmm_uq.analysis.parts.plan import PartCharacteristic, PartPose, Plan, Stylus
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.base.points import Floats, Machine

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
-from cmm_uq.analysis.parts.placing import PartPose
-from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, Plan
+from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, PartPose, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.maths.geometry import fit_circle

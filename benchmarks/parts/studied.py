@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from benchmarks.parts import truth
-from cmm_uq.analysis.parts.plan import FeatureKind, Nominal, PartCharacteristic, PartFeature, Plan, Stylus
+from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, Plan, Stylus
 from cmm_uq.base.points import Floats, Machine, Points
+from cmm_uq.jobs.part.feature import Kind as FeatureKind
 
 KINDS: Mapping[str, FeatureKind] = {
     "A": "plane", "B": "plane", "C": "plane", "D": "plane", "h1": "cylinder", "h2": "cylinder", "S": "sphere",

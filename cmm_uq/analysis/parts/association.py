@@ -6,22 +6,25 @@ is from the association itself is looked at in every run (:mod:`cmm_uq.analysis.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from cmm_uq.analysis.parts.plan import DIRECTED, FeatureKind, PartFeature
+from cmm_uq.analysis.parts.plan import PartFeature
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.jobs.part.characteristic import DIRECTED
+from cmm_uq.jobs.part.feature import Kind
 from cmm_uq.maths.geometry.association import Association
 from cmm_uq.maths.geometry.repeated import MANY, Drawn, Raised, Repeated, one_by_one
 
 _STEP = 1e-3  # mm: of central differences, whose error is the square of step over radius
 _NEAR = 1e-2  # of a feature's extent: how far points may be from those that it was prepared for
 # features that lie anywhere along their axis by their fit
-_SLIDING: tuple[FeatureKind, ...] = ("line", "circle", "cylinder", "cone")
+_SLIDING: tuple[Kind, ...] = ("line", "circle", "cylinder", "cone")
 VALUES = 8  # numbers that a feature is told by: position (3), direction (3), diameter, half angle
 
 
@@ -62,8 +65,7 @@ class ProbedFeature:
     def __init__(
         self, feature: PartFeature, points: Floats, association: Association, looked_at: ProbedFeature | None = None
     ) -> None:
-        self.feature, self.points, self.association = feature, points, association
-        self.n = len(points)
+        self.feature, self.points, self.association, self.n = feature, points, association, len(points)
         self._offset = np.zeros_like(points)
         self._repeated: Repeated
         if feature.kind == "point":
@@ -72,10 +74,16 @@ class ProbedFeature:
             self._repeated = looked_at._repeated
             self._offset = points - (looked_at.points - looked_at._offset)
             return
-        try:
+        with self._named():
             self._repeated = Repeated(feature.kind, self._in_own_plane(points))
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """What a fit refuses, by the name of the feature."""
+        try:
+            yield
         except CmmUqError as error:
-            raise CmmUqError(error.problem, where=f"feature {feature.name!r}", fix=error.fix) from error
+            raise CmmUqError(error.problem, where=f"feature {self.feature.name!r}", fix=error.fix) from error
 
     def is_near(self, points: Floats) -> bool:
         """Whether points (n, 3) are so near to its own that these serve for them too; only of what takes long to prepare.
@@ -100,9 +108,16 @@ class ProbedFeature:
 
     def of(self, displacements: Floats, *, with_points: bool = False) -> Features:
         """Features of displacements (N, n, 3) from ``points``, mm, by the association itself; (N, n) along the normals."""
-        if displacements.ndim < self.points.ndim + 1:
-            return self._of_raised(displacements, with_points=with_points)
-        points = self.points + displacements if with_points else np.zeros((0, 0, 3))
+        normals, raised = self.feature.normals, displacements.ndim < self.points.ndim + 1
+        points = np.zeros((0, 0, 3))
+        if with_points:
+            points = self.points + (displacements[:, :, None] * normals if raised else displacements)
+        if raised:
+            drawn = self._associated(
+                Raised(displacements, self._in_own_plane(normals), self._in_own_plane(self._offset))
+            )
+            mean = self._offset.mean(axis=0) + displacements @ normals / self.n
+            return Features(self._slid(self._values(drawn), mean), drawn.form, points)
         if self.feature.kind == "point":
             values = np.zeros((len(displacements), VALUES))
             values[:, :3] = (self.points + displacements).mean(axis=1)
@@ -111,34 +126,22 @@ class ProbedFeature:
         drawn = self._associated(self._in_own_plane(moved))
         return Features(self._slid(self._values(drawn), moved.mean(axis=1)), drawn.form, points)
 
-    def _of_raised(self, heights: Floats, *, with_points: bool) -> Features:
-        normals = self.feature.normals
-        raised = Raised(heights, self._in_own_plane(normals), self._in_own_plane(self._offset))
-        points = self.points + heights[:, :, None] * normals if with_points else np.zeros((0, 0, 3))
-        drawn = self._associated(raised)
-        mean = self._offset.mean(axis=0) + heights @ normals / self.n
-        return Features(self._slid(self._values(drawn), mean), drawn.form, points)
-
     def _associated(self, displacements: Floats | Raised) -> Drawn:
         if self.association == "least_squares":
             return self._repeated.least_squares(displacements)
         if self.association in ("minimum_zone", "tangent"):
             drawn = self._repeated.minimum_zone(displacements)
             return self._outside(drawn) if self.association == "tangent" else drawn
-        try:
+        with self._named():
             return self._repeated.one_sided(displacements, inscribed=self.association == "maximum_inscribed")
-        except CmmUqError as error:
-            raise CmmUqError(error.problem, where=f"feature {self.feature.name!r}", fix=error.fix) from error
 
     def _outside(self, drawn: Drawn) -> Drawn:
         """The side of a minimum zone that looks out of the material."""
-        if self.feature.kind == "line":
-            across = self._plane @ self.feature.normals.mean(axis=0)
-        elif self.feature.kind == "plane":
-            across = self.feature.normals.mean(axis=0)
-        else:
+        if self.feature.kind not in ("line", "plane"):
             raise CmmUqError(f"a {self.feature.kind} has no tangent feature", where=f"feature {self.feature.name!r}",
                              fix="Use maximum_inscribed or minimum_circumscribed")  # fmt: skip
+        out = self.feature.normals.mean(axis=0)
+        across = self._plane @ out if self.feature.kind == "line" else out
         return replace(drawn, position=drawn.position + 0.5 * drawn.form[:, None] * across / np.linalg.norm(across))
 
     def _values(self, drawn: Drawn) -> Floats:
@@ -154,10 +157,9 @@ class ProbedFeature:
         if self.feature.kind in DIRECTED and nominal is not None:
             sensed = np.broadcast_to(nominal, position.shape) if direction is None else direction
             values[:, 3:6] = sensed * np.sign(sensed @ nominal)[:, None]
-        if drawn.size is not None:
-            values[:, 6] = drawn.size
-        if drawn.half_angle is not None:
-            values[:, 7] = drawn.half_angle
+        for column, value in ((6, drawn.size), (7, drawn.half_angle)):
+            if value is not None:
+                values[:, column] = value
         return values
 
     @cached_property
@@ -189,13 +191,21 @@ class ProbedFeature:
     @cached_property
     def base(self) -> Floats:
         """(8,) values without any draw."""
-        return np.asarray(self.of(np.zeros((1, self.n, 3))).values[0])
+        return np.asarray(self.values(np.zeros((1, self.n, 3)))[0])
+
+    def values(self, displacements: Floats) -> Floats:
+        """(N, 8) values of displacements (N, n, 3)."""
+        return self.of(displacements).values
 
     @cached_property
     def derivative(self) -> Floats:
         """(8, n, 3) of the values by the coordinates of each point."""
-        if self.feature.kind == "point" or self.n <= MANY:
-            return self.by_differences(lambda displacements: self.of(displacements).values)
+        if self.feature.kind == "point" or self.feature.members or self.n <= MANY:
+            found = []
+            for unit in one_by_one(self.n, 3):
+                step = _STEP * unit
+                found.append((self.values(step) - self.values(-step)) / (2 * _STEP))
+            return np.concatenate(found).T.reshape(VALUES, self.n, 3)
         states, followed = self._repeated.followed(self._in_own_plane(self._offset), _STEP)
         up, down = np.split(self._slid(self._values(self._repeated.drawn(states)), self._offset.mean(axis=0)), 2)
         by_coordinate = (0.5 * followed @ (up - down)).reshape(self.n, -1, VALUES)
@@ -204,14 +214,6 @@ class ProbedFeature:
         sliding = [each[0] for each in self._sliding(self.base[None])]
         slid = np.einsum("kv,ki->vi", np.array(sliding).reshape(-1, VALUES), self._unsaid) / self.n
         return np.asarray(np.moveaxis(by_coordinate, 2, 0) + slid[:, None])
-
-    def by_differences(self, values: Callable[[Floats], Floats]) -> Floats:
-        """(8, n, 3) derivative of values (N, 8) of displacements (N, n, 3) by the coordinates of each point."""
-        found = []
-        for unit in one_by_one(self.n, 3):
-            steps = _STEP * unit
-            found.append((values(steps) - values(-steps)) / (2 * _STEP))
-        return np.concatenate(found).T.reshape(VALUES, self.n, 3)
 
     @property
     def undisturbed(self) -> Features:
@@ -224,3 +226,13 @@ class ProbedFeature:
         if self.feature.kind in DIRECTED:
             values[:, 3:6] /= np.linalg.norm(values[:, 3:6], axis=1, keepdims=True)
         return Features(values)
+
+
+def component(vectors: Floats, directions: Floats) -> Floats:
+    """(N, 3) of vectors along unit vectors."""
+    return np.asarray(np.einsum("ni,ni->n", vectors, directions)[:, None] * directions)
+
+
+def normed(vectors: Floats) -> Floats:
+    """Unit vectors (…, 3)."""
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

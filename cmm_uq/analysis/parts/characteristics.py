@@ -17,24 +17,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.parts.association import VALUES, Features
+from cmm_uq.analysis.parts.association import VALUES, Features, component, normed
 from cmm_uq.analysis.parts.datums import BEST_FIT, PartFrame
-from cmm_uq.analysis.parts.plan import (
-    DIRECTED,
-    FORMS,
-    LOCATIONS,
-    ORIENTATIONS,
-    RELATIONS,
-    RUNOUTS,
-    SIZED,
-    ZONES,
-    FeatureKind,
-    PartCharacteristic,
-    PartFeature,
-    Plan,
-)
+from cmm_uq.analysis.parts.plan import FORMS, ORIENTATIONS, RUNOUTS, ZONES, PartCharacteristic, PartFeature, Plan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints
+from cmm_uq.jobs.part.characteristic import ASKS, AXIAL
 from cmm_uq.maths.geometry.association import Association
 from cmm_uq.maths.geometry.repeated import Repeated
 
@@ -44,14 +32,6 @@ _ALONG = 0.999
 SECTION = 0.01  # mm: how far points of one section may lie apart along the datum's axis; of a plane, across it
 _COINCIDE = 1e-6  # mm and rad: a nominal distance or angle below which there is none
 _FEWEST_IN_SECTION = 3  # points by which a section shows any runout beyond where the axis stands
-# features whose axis is what a tolerance of orientation or location is of
-_ROUND: tuple[FeatureKind, ...] = ("line", "cylinder", "cone")
-
-FORM_OF: Mapping[str, tuple[FeatureKind, ...]] = {
-    "straightness": ("line",), "flatness": ("plane",), "roundness": ("circle",), "cylindricity": ("cylinder",),
-    "sphericity": ("sphere",),
-}  # fmt: skip
-"""Of what each form is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +51,31 @@ class CharacteristicEvaluation:
     nominal: Mapping[str, Features]  # values of its features, without errors, by name
 
     def __post_init__(self) -> None:
-        _refuse(self.characteristic, self.plan)
+        """What it needs of its features and datums."""
+        one, plan = self.characteristic, self.plan
+        where, kinds, asks = (
+            f"characteristic {one.name!r}",
+            [plan.feature(name).kind for name in one.features],
+            ASKS[one.what],
+        )
+        counts = (1, 2) if asks.alone else (asks.features,)
+        if len(kinds) not in counts:
+            said = f"{one.what} is of {' or '.join(map(str, counts))} features, not {len(kinds)}"
+            raise CmmUqError(said, where=where)
+        fitting = (
+            asks.alone if len(kinds) < asks.features else (*asks.kinds, *(("cone",) if one.what == "size" else ()))
+        )
+        anywhere = asks.framed or one.what == "coaxiality"  # what has a place has these, here
+        for kind in kinds:
+            if kind not in fitting and not anywhere:
+                raise CmmUqError(f"a {kind} has no {one.what}", where=where, fix=f"It is of {', '.join(fitting)}")
+        if asks.datums and not one.datums:
+            raise CmmUqError(f"{one.what} needs a datum", where=where, fix="Name one")
+        if asks.datums and (kind := plan.feature(one.datums[0]).kind) not in asks.datum_kinds:
+            fix = f"Take a {' or '.join(asks.datum_kinds)}"
+            raise CmmUqError(f"the datum of {one.what} is a {kind}", where=where, fix=fix)
+        if asks.framed and not (one.datums or plan.alignment.datums or plan.alignment.best_fit):
+            raise CmmUqError(f"{one.what} needs datums", where=where, fix="Name datums, or an alignment of the plan")
 
     @property
     def keys(self) -> tuple[Key, ...]:
@@ -99,22 +103,15 @@ class CharacteristicEvaluation:
     def of_points(self) -> bool:
         """Whether it is of measured points, and not of features alone."""
         what = self.characteristic.what
-        if what in FORMS or what in RUNOUTS:
-            return True
-        return self.feature.kind == "plane" and what in (*ORIENTATIONS, "position")
+        return what in (*FORMS, *RUNOUTS) or (self.feature.kind == "plane" and what in (*ORIENTATIONS, "position"))
 
     def __call__(self, measured: MeasuredFeatures) -> Floats:
         """Values (N,), mm or rad."""
-        what = self.characteristic.what
-        return np.asarray(_OF[what](self, measured), dtype=np.float64)
+        return np.asarray(_OF[self.characteristic.what](self, measured), dtype=np.float64)
 
     def first(self, measured: MeasuredFeatures) -> Features:
         """Its first feature."""
         return measured.features[self.keys[0]]
-
-    def frame(self, measured: MeasuredFeatures) -> PartFrame:
-        """The frame of its datums."""
-        return measured.frames[self.frame_of]
 
     @cached_property
     def feature(self) -> PartFeature:
@@ -134,7 +131,8 @@ class CharacteristicEvaluation:
     def ends(self) -> Floats:
         """(2,) of the first feature's measured length along its axis, from its position, mm."""
         of = self.nominal[self.feature.name]
-        return _extent(self.feature.points, of.position[0], of.direction[0])
+        along = (self.feature.points - of.position[0]) @ of.direction[0]
+        return np.array([along.min(), along.max()])
 
     @cached_property
     def sections(self) -> tuple[Ints, ...]:
@@ -181,44 +179,33 @@ def never_negative(plan: Plan) -> NDArray[np.bool_]:
 
     Such are widths of zones, and the angle or the distance of two features that are meant to coincide.
     """
-    found = [one.what in ZONES or _coinciding(one, plan) for one in plan.characteristics]
-    return np.array(found, dtype=bool)
+    return np.array([one.what in ZONES or _coinciding(one, plan) for one in plan.characteristics], dtype=bool)
 
 
 def _coinciding(one: PartCharacteristic, plan: Plan) -> bool:
-    if one.what not in RELATIONS or len(one.features) < 2:
+    if one.what not in ("distance", "angle") or len(one.features) < 2:
         return False
     of = CharacteristicEvaluation(one, plan, {})
-    nominal = {key: Features(_values(plan.feature(key[0]))) for key in of.keys}
+    nominal = {}
+    for key in of.keys:
+        feature = plan.feature(key[0]).nominal
+        direction = np.zeros(3) if feature.direction is None else feature.direction
+        nominal[key] = Features(np.hstack([feature.point, direction, np.zeros(VALUES - 6)])[None])
     return bool(of(MeasuredFeatures(nominal, {}))[0] < _COINCIDE)
-
-
-def _values(feature: PartFeature) -> Floats:
-    """(1, 8) of a nominal feature, as far as relations are of it."""
-    place, direction = feature.nominal.point, feature.nominal.direction
-    return np.hstack([place, np.zeros(3) if direction is None else direction, np.zeros(VALUES - 6)])[None]
-
-
-def _size(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
-    return of.first(measured).diameter
-
-
-def _form(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
-    return of.first(measured).form
 
 
 def _distance(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
     """Along the normal of a plane, else across an axis, else between two places; of two alike, the first's."""
     first, second = of.characteristic.features
     kinds = [of.plan.feature(name).kind for name in (first, second)]
-    if kinds[0] != "plane" and (kinds[1] == "plane" or kinds[0] not in _ROUND):
+    if kinds[0] != "plane" and (kinds[1] == "plane" or kinds[0] not in AXIAL):
         first, second, kinds = second, first, kinds[::-1]
     one, other = (measured.features[key] for name in (first, second) for key in of.keys if key[0] == name)
     apart = of.place(second, other) - of.place(first, one)
     if kinds[0] == "plane":
         return np.asarray(np.abs(np.einsum("ni,ni->n", apart, one.direction)))
-    if kinds[0] in _ROUND:
-        apart = apart - np.einsum("ni,ni->n", apart, one.direction)[:, None] * one.direction
+    if kinds[0] in AXIAL:
+        apart = apart - component(apart, one.direction)
     return np.asarray(np.linalg.norm(apart, axis=1))
 
 
@@ -243,24 +230,24 @@ def _orientation(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Fl
         return np.asarray(np.ptp(np.einsum("npi,ni->np", own.points, datum), axis=1))
     normal = own.direction
     if abs(cosine) < np.sqrt(1 - _ALONG**2):
-        u = _unit(np.cross(datum, normal))
+        u = normed(np.cross(datum, normal))
         seen = np.stack([u, np.cross(u, datum)], axis=1)
         # the first coordinate only says where along the line: the measured direction is at right angles to the datum
         flat = np.einsum("npi,nki->npk", own.points, seen)
         return of.across.minimum_zone(flat - of.across.points).form
-    beside = _unit(normal - np.einsum("ni,ni->n", normal, datum)[:, None] * datum)
+    beside = normed(normal - component(normal, datum))
     tilted = cosine * datum + np.sqrt(1 - cosine**2) * beside
     return np.asarray(np.ptp(np.einsum("npi,ni->np", own.points, tilted), axis=1))
 
 
 def _position(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
     """Twice the largest distance from the nominal place, in the frame of the datums."""
-    own, frame, nominal = of.first(measured), of.frame(measured), of.nominal[of.feature.name]
+    own, frame, nominal = of.first(measured), measured.frames[of.frame_of], of.nominal[of.feature.name]
     place, direction = nominal.position[0], nominal.direction[0]
     if of.feature.kind == "plane":
         return np.asarray(2 * np.abs((frame.points(own.points) - place) @ direction).max(axis=1))
     off = frame.points(own.position) - place
-    if of.feature.kind in _ROUND:
+    if of.feature.kind in AXIAL:
         return _farthest(off, frame.vectors(own.direction), of.ends, direction)
     if of.feature.kind == "circle":
         off = off - np.outer(off @ direction, direction)
@@ -271,13 +258,13 @@ def _coaxiality(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Flo
     """Twice the largest distance of the axis, or of the centre, from that of the datum."""
     own, datum = of.first(measured), measured.features[of.datums[0]]
     off = own.position - datum.position
-    if of.feature.kind in _ROUND:
+    if of.feature.kind in AXIAL:
         return _farthest(off, own.direction, of.ends, datum.direction)
-    return np.asarray(2 * np.linalg.norm(off - _along(off, datum.direction), axis=1))
+    return np.asarray(2 * np.linalg.norm(off - component(off, datum.direction), axis=1))
 
 
 def _coordinate(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
-    at = of.frame(measured).points(of.place(of.feature.name, of.first(measured)))
+    at = measured.frames[of.frame_of].points(of.place(of.feature.name, of.first(measured)))
     return np.asarray(at[:, AXES.index(of.characteristic.what)])
 
 
@@ -293,49 +280,10 @@ def _runout(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
 
 
 _OF: Mapping[str, Callable[[CharacteristicEvaluation, MeasuredFeatures], Floats]] = {
-    "size": _size, "distance": _distance, "angle": _angle, "position": _position, "coaxiality": _coaxiality,
-    **dict.fromkeys(FORMS, _form), **dict.fromkeys(ORIENTATIONS, _orientation), **dict.fromkeys(AXES, _coordinate),
-    **dict.fromkeys(RUNOUTS, _runout),
+    "size": lambda of, measured: of.first(measured).diameter, "distance": _distance, "angle": _angle,
+    "position": _position, "coaxiality": _coaxiality, **dict.fromkeys(FORMS, lambda of, measured: of.first(measured).form),
+    **dict.fromkeys(ORIENTATIONS, _orientation), **dict.fromkeys(AXES, _coordinate), **dict.fromkeys(RUNOUTS, _runout),
 }  # fmt: skip
-
-
-def _refuse(one: PartCharacteristic, plan: Plan) -> None:
-    """What a characteristic needs of its features and datums."""
-    where, kinds = f"characteristic {one.name!r}", [plan.feature(name).kind for name in one.features]
-    wanted = {"distance": (2,), "angle": (1, 2)}.get(one.what, (1,))
-    if len(kinds) not in wanted:
-        raise CmmUqError(f"{one.what} is of {' or '.join(map(str, wanted))} features, not {len(kinds)}", where=where)
-    allowed: tuple[FeatureKind, ...] | None = FORM_OF.get(one.what)
-    if one.what == "size":
-        allowed = (*SIZED, "cone")
-    if one.what == "angle":
-        allowed = ("cone",) if len(kinds) == 1 else ("line", "plane", "cylinder", "cone")
-    if one.what in ORIENTATIONS:
-        allowed = ("line", "plane", "cylinder", "cone")
-    if one.what in RUNOUTS:
-        allowed = ("plane", "circle", "cylinder") if one.what == "circular_runout" else ("plane", "cylinder")
-    for kind in kinds:
-        if allowed and kind not in allowed:
-            raise CmmUqError(f"a {kind} has no {one.what}", where=where, fix=f"It is of {', '.join(allowed)}")
-    if one.what in (*ORIENTATIONS, *RUNOUTS, "coaxiality"):
-        _refuse_without_datum(one, plan, where)
-    aligned = one.datums or plan.alignment.datums or plan.alignment.best_fit
-    if one.what in LOCATIONS and one.what != "coaxiality" and not aligned:
-        raise CmmUqError(f"{one.what} needs datums", where=where, fix="Name datums, or an alignment of the plan")
-
-
-def _refuse_without_datum(one: PartCharacteristic, plan: Plan, where: str) -> None:
-    if not one.datums:
-        raise CmmUqError(f"{one.what} needs a datum", where=where, fix="Name one")
-    kind = plan.feature(one.datums[0]).kind
-    fitting = DIRECTED if one.what in ORIENTATIONS else _ROUND
-    if kind not in fitting:
-        raise CmmUqError(f"the datum of {one.what} is a {kind}", where=where, fix=f"Take a {' or '.join(fitting)}")
-
-
-def _extent(points: Floats, position: Floats, direction: Floats) -> Floats:
-    along = (points - position) @ direction
-    return np.array([along.min(), along.max()])
 
 
 def _farthest(off: Floats, direction: Floats, ends: Floats, axis: Floats) -> Floats:
@@ -343,18 +291,10 @@ def _farthest(off: Floats, direction: Floats, ends: Floats, axis: Floats) -> Flo
     found = np.zeros(len(off))
     for end in ends:
         at = off + end * direction
-        found = np.maximum(found, np.linalg.norm(at - _along(at, np.broadcast_to(axis, at.shape)), axis=1))
+        found = np.maximum(found, np.linalg.norm(at - component(at, np.broadcast_to(axis, at.shape)), axis=1))
     return 2 * found
-
-
-def _along(vectors: Floats, directions: Floats) -> Floats:
-    return np.asarray(np.einsum("ni,ni->n", vectors, directions)[:, None] * directions)
 
 
 def _between(one: Floats, other: Floats) -> Floats:
     """Angles (N,) in [0, π], exact also where they are small."""
     return np.asarray(np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.einsum("ni,ni->n", one, other)))
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

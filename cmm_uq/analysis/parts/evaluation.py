@@ -16,8 +16,7 @@ import numpy as np
 from cmm_uq.analysis.parts.association import VALUES, Features, ProbedFeature
 from cmm_uq.analysis.parts.causes.cause import Drawn, PartCause, Rows
 from cmm_uq.analysis.parts.characteristics import CharacteristicEvaluation, Key, MeasuredFeatures
-from cmm_uq.analysis.parts.common_datums import ProbedCommon
-from cmm_uq.analysis.parts.datums import BEST_FIT, BestFit, DatumSystem
+from cmm_uq.analysis.parts.datums import BEST_FIT, BestFit, DatumSystem, ProbedCommon
 from cmm_uq.analysis.parts.plan import FORMS, PartFeature, Plan
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.geometry.association import Association
@@ -74,49 +73,38 @@ class Evaluator:
         self._known: Known = {} if known is None else known
         self._followed: dict[object, tuple[Floats, Floats]] = {}
         asked = [name for one in plan.characteristics for name in (*one.features, *one.datums)]
-        self.nominal = {name: self._nominal(name) for name in dict.fromkeys((*asked, *plan.alignment.datums))}
+        self.nominal = {
+            name: self._probed(name, EXACT, plan.feature(name).points).undisturbed
+            for name in dict.fromkeys((*asked, *plan.alignment.datums))
+        }
         self.evaluations = [CharacteristicEvaluation(one, plan, self.nominal) for one in plan.characteristics]
         self.keys = list(dict.fromkeys(key for one in self.evaluations for key in (*one.keys, *one.datums)))
         self.of_points = {one.keys[0] for one in self.evaluations if one.of_points}
         self.seen = {one.keys[0] for one in self.evaluations if one.of_points and one.characteristic.what not in FORMS}
+        # features that are taken to first order
+        self.linear = [key for key in self.keys if key[1] == EXACT and key not in self.of_points]
         for one in self.evaluations:
             one.refuse_unfit()
-        self.associated = {(name, how): self._associated(name, how) for name, how in self.keys}
-        self.frames = {
-            one.frame_of: DatumSystem(
-                [plan.feature(name) for name in one.frame_of],
-                [self.nominal[name] for name in one.frame_of],
-            )
-            for one in self.evaluations
-            if one.frame_of and one.frame_of != BEST_FIT
+        self.associated = {
+            (name, how): self._probed(name, how, plan.feature(name).points + base[plan.rows_of(name)])
+            for name, how in self.keys
         }
-        fitted = any(one.frame_of == BEST_FIT for one in self.evaluations)
-        self.best_fit = BestFit(plan.points, plan.normals) if fitted else None
-
-    def _nominal(self, name: str) -> Features:
-        return self._probed(name, EXACT, self.plan.feature(name).points).undisturbed
-
-    def _associated(self, name: str, how: Association) -> ProbedFeature:
-        return self._probed(name, how, self.plan.feature(name).points + self.base[self.plan.rows_of(name)])
+        framed = dict.fromkeys(one.frame_of for one in self.evaluations if one.frame_of)
+        self.frames = {
+            names: DatumSystem([plan.feature(name) for name in names], [self.nominal[name] for name in names])
+            for names in framed
+            if names != BEST_FIT
+        }
+        self.best_fit = BestFit(plan.points, plan.normals) if BEST_FIT in framed else None
 
     def _probed(self, name: str, how: Association, points: Floats) -> ProbedFeature:
         feature = self.plan.feature(name)
-        first = name, EXACT, feature.points.tobytes()
+        first, key = (name, EXACT, feature.points.tobytes()), (name, how, points.tobytes())
         if first not in self._known:
             self._known[first] = _of(feature, feature.points, EXACT)
-        key = name, how, points.tobytes()
         if key not in self._known:
             self._known[key] = _of(feature, points, how, self._known[first])
         return self._known[key]
-
-    def to_first_order(self, key: Key) -> bool:
-        """Whether a feature is taken to first order."""
-        return key[1] == EXACT and key not in self.of_points
-
-    @cached_property
-    def linear(self) -> list[Key]:
-        """Features that are taken to first order."""
-        return [key for key in self.keys if self.to_first_order(key)]
 
     @cached_property
     def transfers(self) -> list[Floats | None]:
@@ -136,7 +124,7 @@ class Evaluator:
 
     def on_points(self, *, exact: bool = False) -> list[str]:
         """Names of the features and common datums that are taken on their points."""
-        return list(dict.fromkeys(name for name, how in self.keys if exact or not self.to_first_order((name, how))))
+        return list(dict.fromkeys(key[0] for key in self.keys if exact or key not in self.linear))
 
     def __call__(self, coefficients: Coefficients, *, exact: bool = False) -> Floats:
         """Characteristics (N, c), mm and rad, for coefficients (N, K) of each cause; one row where there is none."""
@@ -144,9 +132,9 @@ class Evaluator:
 
     def of(self, movement: Movement, *, exact: bool = False, only: int | None = None) -> Floats:
         """Characteristics (N, c) of a :meth:`movement`, mm and rad; of ``only`` one, (N, 1)."""
-        features: dict[Key, Features] = {}
         change, asked = movement.change, self.evaluations if only is None else [self.evaluations[only]]
         keys = {key for one in asked for key in (*one.keys, *one.datums)}
+        features: dict[Key, Features] = {}
         for i, key in enumerate([] if exact else self.linear):
             if key in keys:
                 features[key] = self.associated[key].to_first_order(change[:, VALUES * i : VALUES * (i + 1)])
@@ -157,13 +145,12 @@ class Evaluator:
             names: self.frames[names].frames([features[name, self.plan.feature(name).association] for name in names])
             for names in {one.frame_of for one in asked if one.frame_of in self.frames}
         }
-        if any(one.frame_of == BEST_FIT for one in asked) and self.best_fit is not None:
-            start = self.best_fit.motion(self.base[None])[0]
-            frames[BEST_FIT] = self.best_fit.frame(
-                start + change[:, VALUES * len(self.linear) :]
-                if movement.whole is None
-                else self.best_fit.motion(self.base + movement.whole)
-            )
+        if self.best_fit is not None and any(one.frame_of == BEST_FIT for one in asked):
+            if movement.whole is None:
+                motion = self.best_fit.motion(self.base[None])[0] + change[:, VALUES * len(self.linear) :]
+            else:
+                motion = self.best_fit.motion(self.base + movement.whole)
+            frames[BEST_FIT] = self.best_fit.frame(motion)
         measured = MeasuredFeatures(features, frames)
         return np.column_stack([one(measured) for one in asked])
 
@@ -184,14 +171,9 @@ class Evaluator:
 
     def _moved_of(self, coefficients: Coefficients, name: str) -> Floats:
         """(N, m, 3) displacements of the points of a feature or common datum; (N, m) along their normals."""
-        if name in self.along:
-            return self._raised(coefficients, name)
-        rows = [self.plan.rows[member] for member in self.plan.members(name)]
-        moved = [self.moved(coefficients, each) for each in rows]
-        return moved[0] if len(moved) == 1 else np.concatenate(moved, axis=1)
-
-    def _raised(self, coefficients: Coefficients, name: str) -> Floats:
-        """(N, m) displacements of the points of a feature along their normals, mm."""
+        if name not in self.along:
+            moved = [self.moved(coefficients, self.plan.rows[member]) for member in self.plan.members(name)]
+            return moved[0] if len(moved) == 1 else np.concatenate(moved, axis=1)
         rows = self.plan.rows[name]
         normals, found = self.plan.normals[rows], np.zeros((_count(coefficients), rows.stop - rows.start))
         for cause, drawn in zip(self.causes, coefficients, strict=True):
@@ -205,7 +187,7 @@ class Evaluator:
         change = np.zeros((_count(coefficients), columns))
         for i, (drawn, transfer) in enumerate(zip(coefficients, self.transfers, strict=True)):
             if transfer is not None and drawn is not None:
-                change += self._follow(i, drawn, partial(_through, transfer))
+                change += self._follow(i, drawn, partial(np.dot, b=transfer))
         return change
 
     def moved(self, coefficients: Coefficients, rows: slice) -> Floats:
@@ -237,10 +219,6 @@ def _of(
 def characteristics_of(plan: Plan, points: Floats, known: Known | None = None) -> Floats:
     """Characteristics (c,) of points (n, 3) in the frame of the part, mm."""
     return np.asarray(Evaluator(plan, points - plan.points, [], known)([], exact=True)[0])
-
-
-def _through(transfer: Floats, coefficients: Floats) -> Floats:
-    return np.asarray(coefficients @ transfer)
 
 
 def _count(coefficients: Coefficients) -> int:

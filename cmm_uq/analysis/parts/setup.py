@@ -6,41 +6,32 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes.cause import PartCause, PointScatter
-from cmm_uq.analysis.parts.causes.condensing import LARGE
-from cmm_uq.analysis.parts.causes.form import SurfaceForm
-from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings, of_points, reproducibility
+from cmm_uq.analysis.parts import plan as plans
+from cmm_uq.analysis.parts.causes import surroundings as causes
+from cmm_uq.analysis.parts.causes.cause import LARGE, PartCause, PointScatter
+from cmm_uq.analysis.parts.causes.surroundings import Expansion, SurfaceForm, Surroundings
 from cmm_uq.analysis.parts.evaluation import characteristics_of
 from cmm_uq.analysis.parts.machine.state import MachineState
-from cmm_uq.analysis.parts.placing import PartPose, around, placed
-from cmm_uq.analysis.parts.plan import (
-    CommonDatum,
-    Nominal,
-    PartAlignment,
-    PartCharacteristic,
-    PartFeature,
-    Plan,
-    Stylus,
-)
+from cmm_uq.analysis.parts.plan import Nominal, PartPose, Plan, around, placed
 from cmm_uq.analysis.parts.virtual import MeasurementConditions
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
-from cmm_uq.jobs.part.checks import readings, rotation
-from cmm_uq.jobs.part.datums import as_one, members
+from cmm_uq.jobs.part.checks import as_one, members, readings, rotation
 from cmm_uq.jobs.part.feature import FormFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.part.probed import Probed, probed, whole_surface
-from cmm_uq.jobs.part.tables import StylusFacts
 
 PLACES = 16  # places of the part that are drawn where it does not lie in the same one each time
 
 
 def plan_of(job: PartJob) -> Plan:
     """The plan of a job that was read: geometry alone, in mm and rad, in the frame of the part."""
-    facts, styli = job.facts, [one.name for one in job.facts.stylus]
-    features = tuple(_feature(one, one.facts.stylus or styli[0], one.facts.form or facts.form) for one in job.features)
+    facts = job.facts
+    features = tuple(
+        _feature(one, facts.stylus_of(one.facts).name, one.facts.form or facts.form) for one in job.features
+    )
     names = [one.name for one in features]
     ends = np.cumsum([0, *(len(one.points) for one in features)])
     order = [names.index(name) for name in facts.probing.order] or list(range(len(names)))
@@ -49,18 +40,37 @@ def plan_of(job: PartJob) -> Plan:
     if facts.probing.seconds_per_point:
         times = np.empty(len(rows))
         times[rows] = facts.probing.seconds_per_point * np.arange(len(rows))
-    return Plan(
-        features,
-        tuple(_characteristic(one) for one in facts.characteristic),
-        tuple(_stylus(one) for one in facts.stylus),
-        PartAlignment(tuple(facts.alignment.datums), facts.alignment.best_fit),
-        rows.astype(np.int64),
-        times,
-        _common(job),
-    )
+    styli = tuple(
+        plans.Stylus(one.name, np.array(one.offset_mm), one.diameter_mm, one.u_diameter_um, np.array(one.u_offset_um),
+                     one.lobing_um, None if one.qualified_at_mm is None else np.array(one.qualified_at_mm))
+        for one in facts.stylus
+    )  # fmt: skip
+    alignment = plans.PartAlignment(tuple(facts.alignment.datums), facts.alignment.best_fit)
+    characteristics = tuple(_characteristic(one) for one in facts.characteristic)
+    return Plan(features, characteristics, styli, alignment, rows.astype(np.int64), times, _common(job))
 
 
-def _common(job: PartJob) -> tuple[CommonDatum, ...]:
+def _feature(one: Probed, stylus: str, form: FormFacts) -> plans.PartFeature:
+    facts = one.facts
+    half = None if facts.angle_deg is None else float(np.radians(facts.angle_deg / 2))
+    sized = facts.diameter_mm if facts.kind != "plane" else None
+    nominal = Nominal(np.array(facts.point_mm), one.direction, sized, half)
+    given = plans.PartFeature(facts.name, facts.kind, one.points, one.normals, stylus, nominal, facts.association)
+    whole = whole_surface(facts, form.surface_points)
+    return given if whole is None else replace(given, surface=whole.points, surface_normals=whole.normals)
+
+
+def _characteristic(one: CharacteristicFacts) -> plans.PartCharacteristic:
+    lower, upper = one.lower_mm, one.upper_mm
+    if one.asks.limits == "angles":
+        lower, upper = (None if limit is None else float(np.radians(limit)) for limit in (one.lower_deg, one.upper_deg))
+    elif one.asks.limits == "zone":
+        upper = one.tolerance_mm
+    features, datums = tuple(one.features), tuple(one.datums)
+    return plans.PartCharacteristic(one.name, one.what, features, datums, lower, upper, one.association)
+
+
+def _common(job: PartJob) -> tuple[plans.CommonDatum, ...]:
     """Datums on several features, which alignment and characteristics name."""
     features = {one.facts.name: one for one in job.features}
     named = [*job.facts.alignment.datums, *(name for one in job.facts.characteristic for name in one.datums)]
@@ -69,7 +79,7 @@ def _common(job: PartJob) -> tuple[CommonDatum, ...]:
         own = members(name, features)
         if len(own) > 1:
             kind, point, direction = as_one([features[each] for each in own])
-            found.append(CommonDatum(name, own, kind, Nominal(point, direction)))
+            found.append(plans.CommonDatum(name, own, kind, Nominal(point, direction)))
     return tuple(found)
 
 
@@ -101,10 +111,18 @@ def refuse_out_of_reach(job: PartJob, machine: Machine) -> None:
 
 def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: int) -> MeasurementConditions:
     """How and where the part is measured."""
-    return MeasurementConditions(
-        machine, poses_of(job, places, machine.machine), surroundings_of(job), forms_of(job), job.facts.probing.repeats,
-        (*clamping_of(job, plan), *operators_of(job, plan)),
-    )  # fmt: skip
+    further, size = list[PartCause](), MICROMETRE * job.facts.placing.u_fixture_um
+    if size:  # what clamping does to each point on its own
+        further.append(PointScatter.of(causes.FIXTURE, "fixture", np.full((len(plan.points), 3), size)))
+    # what who measures does to each point, and to characteristics
+    if job.facts.probing.u_operator_um:
+        further.append(causes.of_points(plan, job.facts.probing.u_operator_um))
+    asked = [one for one in job.facts.characteristic if one.u_operator_um or one.u_operator_deg]
+    if asked:
+        u = {one.name: MICROMETRE * one.u_operator_um + float(np.radians(one.u_operator_deg)) for one in asked}
+        further.append(causes.reproducibility(plan, u))
+    poses, repeats = poses_of(job, places, machine.machine), job.facts.probing.repeats
+    return MeasurementConditions(machine, poses, surroundings_of(job), forms_of(job), repeats, tuple(further))
 
 
 def poses_of(job: PartJob, count: int, machine: Machine) -> tuple[PartPose, ...]:
@@ -120,14 +138,8 @@ def origin_of(job: PartJob, machine: Machine) -> Floats:
     """(3,) where the part's origin lies in coordinates of the machine, as the job says; else in the middle of the travel."""
     if job.facts.placing.origin_mm is not None:
         return np.array(job.facts.placing.origin_mm, dtype=np.float64)
-    return _in_the_middle(job, machine)
-
-
-def _in_the_middle(job: PartJob, machine: Machine) -> Floats:
-    """(3,) where the part's origin lies so that its points are in the middle of the travel, to the mm."""
-    styli = {one.name: one for one in job.facts.stylus}
-    first = job.facts.stylus[0].name
-    read = np.concatenate([readings(one, styli[one.facts.stylus or first], job.facts) for one in job.features])
+    # so that its points are in the middle of the travel, to the mm
+    read = np.concatenate([readings(one, job.facts) for one in job.features])
     read = read - job.facts.machine_state.origin_mm + machine.origin_mm
     return np.asarray(np.round(machine.travel_mm.mean(axis=1) - 0.5 * (read.min(axis=0) + read.max(axis=0))))
 
@@ -148,7 +160,7 @@ def forms_of(job: PartJob) -> tuple[SurfaceForm, ...]:
     found = []
     for one in job.features:
         given = one.facts.form or job.facts.form
-        lobed = one.facts.kind in _LOBED
+        lobed = one.facts.kind in ("circle", "cylinder", "cone")
         harmonics = tuple((int(count), size) for count, size in given.harmonics_um.items()) if lobed else ()
         form = SurfaceForm(one.facts.name, harmonics, given.field_um, given.correlation_mm, given.roughness_um)
         if form.field_um or form.harmonics_um or form.roughness_um:
@@ -156,69 +168,20 @@ def forms_of(job: PartJob) -> tuple[SurfaceForm, ...]:
     return tuple(found)
 
 
-def clamping_of(job: PartJob, plan: Plan) -> tuple[PartCause, ...]:
-    """What clamping does to each point on its own; none where nothing is stated."""
-    size = MICROMETRE * job.facts.placing.u_fixture_um
-    return (PointScatter.of("fixture", "fixture", np.full((len(plan.points), 3), size)),) if size else ()
-
-
-def operators_of(job: PartJob, plan: Plan) -> tuple[PartCause, ...]:
-    """What who measures does to each point, and to characteristics; none where nothing is stated."""
-    found: list[PartCause] = []
-    if job.facts.probing.u_operator_um:
-        found.append(of_points(plan, job.facts.probing.u_operator_um))
-    stated = {
-        one.name: MICROMETRE * one.u_operator_um + float(np.radians(one.u_operator_deg))
-        for one in job.facts.characteristic
-        if one.u_operator_um or one.u_operator_deg
-    }
-    return (*found, reproducibility(plan, stated)) if stated else tuple(found)
-
-
 def doubled(job: PartJob) -> PartJob:
     """The job with twice the points in every feature that is probed by a pattern, and nothing measured."""
+    where = str(job.folder / "job.toml")
     if any(len(one.points) >= LARGE for one in job.features):
-        raise CmmUqError("has a feature of thousands of points", where=str(job.folder / "job.toml"),
-                         fix="More of them change nothing")  # fmt: skip
-    features = tuple(_doubled(one) for one in job.features)
-    if all(one is other for one, other in zip(features, job.features, strict=True)):
-        raise CmmUqError("has no feature that is probed by a pattern", where=str(job.folder / "job.toml"),
-                         fix="Give strategy in place of points_mm")  # fmt: skip
-    return replace(job, features=features, measured=None)
+        raise CmmUqError("has a feature of thousands of points", where=where, fix="More of them change nothing")
+    if all(one.facts.strategy is None for one in job.features):
+        fix = "Give strategy in place of points_mm"
+        raise CmmUqError("has no feature that is probed by a pattern", where=where, fix=fix)
+    return replace(job, features=tuple(map(_doubled, job.features)), measured=None)
 
 
 def _doubled(one: Probed) -> Probed:
-    pattern = one.facts.strategy
-    if pattern is None:
+    if (pattern := one.facts.strategy) is None:
         return one
     key = "columns" if pattern.pattern == "grid" else "points"
     more = pattern.model_copy(update={key: 2 * (getattr(pattern, key) or 1)})
     return probed(one.facts.model_copy(update={"strategy": more}), one.facts.name)
-
-
-_LOBED = ("circle", "cylinder", "cone")
-
-
-def _stylus(one: StylusFacts) -> Stylus:
-    at = None if one.qualified_at_mm is None else np.array(one.qualified_at_mm)
-    return Stylus(one.name, np.array(one.offset_mm), one.diameter_mm, one.u_diameter_um, np.array(one.u_offset_um),
-                  one.lobing_um, at)  # fmt: skip
-
-
-def _feature(one: Probed, stylus: str, form: FormFacts) -> PartFeature:
-    facts = one.facts
-    half = None if facts.angle_deg is None else float(np.radians(facts.angle_deg / 2))
-    sized = facts.diameter_mm if facts.kind != "plane" else None
-    nominal = Nominal(np.array(facts.point_mm), one.direction, sized, half)
-    given = PartFeature(facts.name, facts.kind, one.points, one.normals, stylus, nominal, facts.association)
-    whole = whole_surface(facts, form.surface_points)
-    return given if whole is None else replace(given, surface=whole.points, surface_normals=whole.normals)
-
-
-def _characteristic(one: CharacteristicFacts) -> PartCharacteristic:
-    lower, upper = one.lower_mm, one.upper_mm
-    if one.asks.limits == "angles":
-        lower, upper = (None if limit is None else float(np.radians(limit)) for limit in (one.lower_deg, one.upper_deg))
-    elif one.asks.limits == "zone":
-        upper = one.tolerance_mm
-    return PartCharacteristic(one.name, one.what, tuple(one.features), tuple(one.datums), lower, upper, one.association)

@@ -4,7 +4,7 @@ The error is what is measured less what is true: of the nominal part, or, where 
 part with the form that was drawn. A characteristic that was measured as y is then y less the errors.
 
 What is never negative, such as a zone, is widened by errors whatever their sign. Where points were measured, its true value is
-inferred from what was measured by turning the measurement round (:mod:`cmm_uq.analysis.parts.zones`).
+inferred from what was measured by turning the measurement round (:mod:`cmm_uq.analysis.parts.result`).
 """
 
 from __future__ import annotations
@@ -17,18 +17,22 @@ from functools import cache, cached_property, partial
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes.cause import CommonCause, Drawn, PartCause, normal
-from cmm_uq.analysis.parts.causes.condensing import LARGE, condensed
-from cmm_uq.analysis.parts.causes.form import SurfaceForm, forms, whole_surfaces
-from cmm_uq.analysis.parts.causes.machine import mean_errors, modelled, noise, not_modelled
-from cmm_uq.analysis.parts.causes.stylus import Qualified, styli
-from cmm_uq.analysis.parts.causes.surroundings import Reproducibility, Surroundings, mean_expansion, temperatures
+from cmm_uq.analysis.parts.causes.cause import LARGE, CommonCause, Drawn, PartCause, condensed, normal
+from cmm_uq.analysis.parts.causes.machine import Qualified, mean_errors, modelled, noise, not_modelled, styli
+from cmm_uq.analysis.parts.causes.surroundings import (
+    Reproducibility,
+    SurfaceForm,
+    Surroundings,
+    forms,
+    mean_expansion,
+    temperatures,
+    whole_surfaces,
+)
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.evaluation import Evaluator, Known, Movement, characteristics_of
 from cmm_uq.analysis.parts.machine.state import MachineState
-from cmm_uq.analysis.parts.placing import PartPose, placed
-from cmm_uq.analysis.parts.plan import FORMS, Plan
-from cmm_uq.analysis.parts.zones import Inverse, alike, inverse, nodes_of, trial_parts
+from cmm_uq.analysis.parts.plan import FORMS, PartPose, Plan, placed
+from cmm_uq.analysis.parts.result import Inverse, alike, inverse, nodes_of, trial_parts
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, simulate, simulate_adaptively
@@ -54,27 +58,16 @@ _PilotBlock = Callable[[], tuple[Movement, Floats]]
 
 @dataclass(frozen=True, eq=False)
 class MeasurementConditions:
-    """How and where a part is measured.
+    """How and where a part is measured."""
 
-    Parameters
-    ----------
-    machine : as its certificate states it.
-    poses : where the part lies; several where nobody knows, each as likely.
-    surroundings : temperatures.
-    forms : what is known of the form of its features.
-    repeats : of each point, of whose readings the mean is taken.
-    further : causes of another kind, of the plan's points.
-    measured : (n, 3) points of the part as they were measured, in its frame, mm, about which errors are then drawn: a position
-        that is off errs as a distance does. The nominal points without them, and of a part whose
-        whole surfaces are drawn.
-    """
-
-    machine: MachineState
-    poses: tuple[PartPose, ...] = (PartPose(),)
+    machine: MachineState  # as its certificate states it
+    poses: tuple[PartPose, ...] = (PartPose(),)  # where the part lies; several where nobody knows, each as likely
     surroundings: Surroundings = field(default_factory=Surroundings)
-    forms: tuple[SurfaceForm, ...] = ()
-    repeats: int = 1
-    further: tuple[PartCause, ...] = ()
+    forms: tuple[SurfaceForm, ...] = ()  # what is known of the form of its features
+    repeats: int = 1  # of each point, of whose readings the mean is taken
+    further: tuple[PartCause, ...] = ()  # causes of another kind, of the plan's points
+    # (n, 3) points of the part as they were measured, in its frame, mm, about which errors are then drawn: a position that is
+    # off errs as a distance does. The nominal points without them, and of a part whose whole surfaces are drawn.
     measured: Floats | None = None
 
 
@@ -108,7 +101,8 @@ class AtPose:
         self.base = mean_errors(given.machine, qualified, pose, beside) + mean_expansion(
             surroundings, plan, points, pose
         )
-        self.pilot, self._inverses = _affordable(pilot, plan), dict[bool, dict[int, Inverse]]()
+        self.pilot = max(pilot // 4, min(pilot, pilot * LARGE // len(plan.points)))
+        self._inverses = dict[bool, dict[int, Inverse]]()
         drawn = any(len(feature.surface) for feature in plan.features)
         self.true: Evaluator | None = None
         if drawn or given.measured is None:
@@ -121,7 +115,10 @@ class AtPose:
             self.still = characteristics_of(plan, plan.points + deviations, known)
             self.measured = Evaluator(plan, deviations, self.causes, known)
             self.inferred = np.flatnonzero(never_negative(plan)).tolist()
-            self.measured.causes = [*self.causes, _multiples(deviations)]
+            # deviations of the part, as often again as the coefficient says
+            draw = normal(np.zeros(1))
+            again = CommonCause(name="part", factors=("deviations",), draw=draw, basis=deviations[None])
+            self.measured.causes = [*self.causes, again]
             self.shift = characteristics_of(plan, given.measured, known) - self.still
         self._known = known
         if drawn:
@@ -165,13 +162,9 @@ class AtPose:
         found = self.read(coefficients, exact=exact)
         true = self.still if self.true is None else self.true(coefficients, exact=exact)
         errors = found + self.shift - true
-        for i, inverted in (self._inverse(exact=exact) if inferred else {}).items():
+        for i, inverted in (self.inverses(exact=exact) if inferred else {}).items():
             errors[:, i] = self.shift[i] + self.still[i] - inverted(found[:, i])
         return errors
-
-    def prepare(self, *, exact: bool) -> None:
-        """Turn the measurement round, once for all draws."""
-        self._inverse(exact=exact)
 
     def read(self, coefficients: Sequence[Drawn], *, exact: bool = False) -> Floats:
         """(n, c) characteristics as they would be measured, mm and rad.
@@ -192,8 +185,8 @@ class AtPose:
         """Coefficients of the evaluator's causes: of errors, and none of further deviations of the part."""
         return [*coefficients, *[None] * (len(self.measured.causes) - len(self.causes))]
 
-    def _inverse(self, *, exact: bool) -> dict[int, Inverse]:
-        """By place of what is never negative, the map from what is read to what is true."""
+    def inverses(self, *, exact: bool) -> dict[int, Inverse]:
+        """By place of what is never negative, the map from what is read to what is true; made once for all draws."""
         if exact not in self._inverses:
             self._inverses[exact] = self._inverted(exact=exact) if self.inferred else {}
         return self._inverses[exact]
@@ -202,15 +195,16 @@ class AtPose:
         """Of trial parts with zones of several widths, which may be what was measured with other errors (:func:`.alike`)."""
         perfect = self.measured.movement([*[None] * len(self.causes), -np.ones((1, 1))], exact=exact)
         blocks = self._pilot_blocks(exact=exact)
-        again = np.concatenate([self.measured.of(moved, exact=exact) + beside for moved, beside in map(_made, blocks)])
+        of = self.measured.of
+        again = np.concatenate([of(moved, exact=exact) + beside for moved, beside in (make() for make in blocks)])
         alone = np.concatenate(
-            [self.measured.of(moved.plus(perfect), exact=exact) + beside for moved, beside in map(_made, blocks)]
+            [of(moved.plus(perfect), exact=exact) + beside for moved, beside in (make() for make in blocks)]
         )
-        nodes = {
-            i: nodes_of(float(self.still[i]), alone[:, i]) for i in self.inferred if np.ptp(alone[:, i]) > ROUNDING
-        }
+        inferred = [i for i in self.inferred if np.ptp(alone[:, i]) > ROUNDING]
+        nodes = {i: nodes_of(float(self.still[i]), alone[:, i]) for i in inferred}
         read: dict[int, list[Floats]] = {i: [] for i in nodes}
-        for moved, beside in map(_made, blocks):
+        for make in blocks:
+            moved, beside = make()
             for i, sizes in nodes.items():
                 read[i].append(self._trials(i, sizes, moved, perfect, exact=exact) + beside[:, i])
         return {
@@ -262,36 +256,12 @@ def in_parts(plan: Plan, draws: int) -> list[int]:
     return [min(at_once, draws - first) for first in range(0, draws, at_once)]
 
 
-def _affordable(pilot: int, plan: Plan) -> int:
-    """So many draws, or fewer of a plan of thousands of points, a quarter at least."""
-    return max(pilot // 4, min(pilot, pilot * LARGE // len(plan.points)))
-
-
-def _multiples(deviations: Floats) -> CommonCause:
-    """Deviations (n, 3) of a part, as often again as the coefficient says."""
-    return CommonCause(name="part", factors=("deviations",), draw=normal(np.zeros(1)), basis=deviations[None])
-
-
-def _made(block: _PilotBlock) -> tuple[Movement, Floats]:
-    return block()
-
-
 class Virtual:
     """Virtual measurements of a part in all of its places, to be drawn in blocks.
 
-    Parameters
-    ----------
-    plan, given : of the measurement, and its circumstances.
-    known : features that were looked at before (:class:`Evaluator`).
-    pilot : draws by which the measurement of what is never negative is turned round.
-
-    Attributes
-    ----------
-    known : those, and its own.
-    places : one a pose, of large features with as few coefficients as serve.
-    whole : the same with those of every point.
-    exact : whether nothing is taken to first order, because that is off by more than a hundredth of an uncertainty.
-    off : (c,) by how much first order is off in the first place, of the standard deviation.
+    ``known``, ``pilot``: as of :class:`AtPose`. ``places``: one a pose, of large features with as few coefficients as serve;
+    ``whole``: the same with those of every point. ``exact``: whether nothing is taken to first order, because that is off by
+    more than a hundredth of an uncertainty; ``off``: (c,) by how much it is in the first place, of the standard deviation.
     """
 
     def __init__(
@@ -314,7 +284,7 @@ class Virtual:
     def errors(self, random: np.random.Generator, n: int) -> Floats:
         """(n, c) errors, each place as often as the others."""
         for place in self.places:
-            place.prepare(exact=self.exact)
+            place.inverses(exact=self.exact)
         if n < 2 * THREADED:
             return self._drawn(random, n)
         halves = n // 2, n - n // 2  # of streams of their own: the same numbers on any number of cores

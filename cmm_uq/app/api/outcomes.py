@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from cmm_uq.app.commands.diagnose import DIAGNOSE
 from cmm_uq.app.commands.files import Form
-from cmm_uq.app.commands.parts.documents import written
+from cmm_uq.app.commands.parts.part import written
 from cmm_uq.app.commands.plans.plan import PLAN
 from cmm_uq.app.commands.prove import PROVE
 from cmm_uq.app.commands.report import REPORT

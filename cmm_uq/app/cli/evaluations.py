@@ -179,8 +179,7 @@ def part(
     """Verify the machine's certificate, measure the part virtually, and write part.html, part.pdf and results.json."""
     with end.progress() as stage:
         from cmm_uq.app.commands.files import silent
-        from cmm_uq.app.commands.parts.documents import write_part
-        from cmm_uq.app.commands.parts.part import PartOptions
+        from cmm_uq.app.commands.parts.part import PartOptions, write_part
 
         options = PartOptions(seed, trials, digits, rerun, None if trust is None else tuple(trust), records)
         written = write_part(job, out, options=options, force=force, stage=stage or silent, language=language)

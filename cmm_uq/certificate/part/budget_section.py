@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from cmm_uq.analysis.parts.budget import FAMILIES, family_of, line_in_words
 from cmm_uq.analysis.parts.characteristics import never_negative
-from cmm_uq.analysis.parts.in_words import FAMILIES, family_of, line_in_words
 from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, after, commas, number, plural, say, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
@@ -41,8 +41,7 @@ def budget_section(found: PartMeasurement) -> Section:
     blocks += shares_plots([one.titled for one in every], causes, shares)
     detailed = sorted(by_margin(found)[:DETAILED], key=lambda one: one.place)
     blocks.append(_lines(detailed, len(every)))
-    within = _factors(detailed)
-    if within.rows:
+    if (within := _factors(detailed)).rows:
         blocks.append(within)
     return Section(say("What the uncertainty is made of"), tuple(blocks))
 
@@ -65,12 +64,7 @@ def largest_words(one: CharacteristicFigures) -> Text:
     budget = one.found.budget
     line = budget.worst(one.stated.name)
     return say("The largest part of the uncertainty of {name} comes from {cause:small} ({share} % of the variance).",
-               name=one.called, cause=line_words(line), share=_percent(share_of(one, line)))  # fmt: skip
-
-
-def share_of(one: CharacteristicFigures, line: str) -> float:
-    """Share of a line, or of a factor of the machine, in the variance of a characteristic."""
-    return one.found.budget.share(line, one.place)
+               name=one.called, cause=line_words(line), share=_percent(budget.share(line, one.place)))  # fmt: skip
 
 
 def _percent(share: float) -> Number:
@@ -114,13 +108,8 @@ def _budget(one: CharacteristicFigures) -> Iterable[tuple[Text, ...]]:
     rest = [g for g in order if g not in kept and total[g] > 0]
     if rest:
         others = plural(len(rest), one=say("another cause"), many=say("{count} other causes", count=len(rest)))
-        yield (
-            one.number,
-            NOTHING if kept else one.beside,
-            others,
-            DASH,
-            say("each below {share}", share=_percent(_above(total[rest]))),
-        )
+        below = say("each below {share}", share=_percent(_above(total[rest])))
+        yield one.number, NOTHING if kept else one.beside, others, DASH, below
 
 
 def _above(shares: Floats) -> float:
@@ -170,10 +159,8 @@ def unseen_section(found: PartMeasurement) -> Section:
     blocks.append(Table(say("Errors that are drawn as large as they may be"), columns, rows))
     if found.further is not None:
         blocks.append(Paragraph(found.further.text))
-        if found.further.command:
-            blocks.append(
-                Paragraph(say("The set-ups are planned by: {command}", command=Verbatim(found.further.command)))
-            )
+        if command := found.further.command:
+            blocks.append(Paragraph(say("The set-ups are planned by: {command}", command=Verbatim(command))))
     return Section(say("What the calibration did not see"), tuple(blocks))
 
 

@@ -5,6 +5,7 @@ A part in a few lines, for the end of a command: decisions, figures, what makes 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import degrees, isfinite
@@ -12,13 +13,14 @@ from math import degrees, isfinite
 import numpy as np
 
 from cmm_uq.analysis.conformity.limits import LimitDecision
+from cmm_uq.analysis.parts.budget import CHARACTERISTICS
 from cmm_uq.analysis.parts.characteristics import never_negative
-from cmm_uq.analysis.parts.in_words import CHARACTERISTICS
 from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, commas, day, names, number, plural, say, signed
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
 from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement
 from cmm_uq.certificate.wording import Figure, Headline, Summary, probability, titles
+from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.verdicts import standing_of
 from cmm_uq.maths.uncertainty.quantity import rounded, significant
 
@@ -27,10 +29,9 @@ from cmm_uq.maths.uncertainty.quantity import rounded, significant
 class PrintedUnits:
     """Units in which a value and its uncertainty are printed."""
 
-    # value, small: units of values and limits, and of uncertainties
-    value: Unit
-    small: Unit
-    # per_value, per_small: one of each in the units inside, mm or rad
+    value: Unit  # of values and limits
+    small: Unit  # of uncertainties
+    # one of each in the units inside, mm or rad
     per_value: float
     per_small: float
 
@@ -107,13 +108,15 @@ class CharacteristicFigures(PrintedFigures):
     found: PartMeasurement
 
     @property
+    def facts(self) -> CharacteristicFacts:
+        return self.found.characteristics[self.place]
+
+    @property
     def stated(self) -> StatedCharacteristic:
-        """What is stated of it."""
         return self.found.stated[self.place]
 
     @property
     def judged(self) -> LimitDecision | None:
-        """What follows from its limits."""
         return self.found.judged[self.place]
 
     @cached_property
@@ -122,13 +125,12 @@ class CharacteristicFigures(PrintedFigures):
 
     @property
     def angular(self) -> bool:
-        """Whether it is an angle."""
-        return self.found.characteristics[self.place].asks.limits == "angles"
+        return self.facts.asks.limits == "angles"
 
     @property
     def zone(self) -> bool:
         """Whether it is the width of a zone, which is never negative."""
-        return self.found.characteristics[self.place].asks.limits == "zone"
+        return self.facts.asks.limits == "zone"
 
     @property
     def number(self) -> Number:
@@ -137,19 +139,17 @@ class CharacteristicFigures(PrintedFigures):
 
     @property
     def name(self) -> Text:
-        """As the drawing has it."""
         return Verbatim(self.stated.name)
 
     @property
     def what(self) -> Text:
         """What it is of which features: ``position of bore | A, B``."""
-        facts = self.found.characteristics[self.place]
+        facts = self.facts
         told = say("{what} of {features}", what=CHARACTERISTICS[facts.what], features=commas(names(facts.features)))
         return say("{what} to {datums}", what=told, datums=commas(names(facts.datums))) if facts.datums else told
 
     @property
     def titled(self) -> Text:
-        """Name and what it is."""
         return say("{name}: {what}", name=self.name, what=self.what)
 
     @property
@@ -159,17 +159,14 @@ class CharacteristicFigures(PrintedFigures):
 
     @property
     def called(self) -> Text:
-        """In a sentence."""
         return say("characteristic {name}", name=self.name)
 
     @property
     def expanded(self) -> float:
-        """Half of the shortest 95 % interval of the errors, mm or rad."""
         return self.stated.U
 
     @cached_property
     def one_sided(self) -> bool:
-        """Whether it is a measured width, which is never negative."""
         return self.stated.value is not None and bool(never_negative(self.found.plan)[self.place])
 
     @property
@@ -234,22 +231,20 @@ def by_margin(found: PartMeasurement) -> list[CharacteristicFigures]:
 
 def part_summary(found: PartMeasurement) -> Summary:
     """What was found, in short."""
-    facts = found.job.facts
+    facts, every = found.job.facts, figures_of(found)
     return Summary(
-        Verbatim(facts.part.name), day(facts.job.date), tuple(_verdicts(found)),
-        tuple(_figure(found, i) for i in range(len(found.stated))), tuple(_remarks(found)), warnings=found.warnings,
+        Verbatim(facts.part.name), day(facts.job.date), tuple(_verdicts(found, every)), tuple(map(_figure, every)),
+        tuple(_remarks(found)), warnings=found.warnings,
     )  # fmt: skip
 
 
-def _verdicts(found: PartMeasurement) -> list[Headline]:
+def _verdicts(found: PartMeasurement, every: Sequence[CharacteristicFigures]) -> list[Headline]:
     told = []
-    for i, judged in enumerate(found.judged):
-        if judged is None or judged.outcome is None:
-            continue
-        chance = say("conforms with {p}", p=probability(judged.probability or 0.0))
-        told.append(
-            Headline(judged.outcome.upper(), standing_of(judged.outcome), _named(found, i), (chance, judged.rule))
-        )
+    for one in every:
+        if (judged := one.judged) is not None and judged.outcome is not None:
+            chance = say("conforms with {p}", p=probability(judged.probability or 0.0))
+            standing = standing_of(judged.outcome)
+            told.append(Headline(judged.outcome.upper(), standing, _named(one), (chance, judged.rule)))
     if found.together is not None and len(told) > 1:
         whole = found.outcome or "undecided"
         chance = say("all conform with {p}", p=probability(found.together))
@@ -257,27 +252,24 @@ def _verdicts(found: PartMeasurement) -> list[Headline]:
     return told
 
 
-def _named(found: PartMeasurement, i: int) -> Text:
-    one = found.characteristics[i]
-    return say("{name}, {what} of {features}", name=Verbatim(one.name), what=CHARACTERISTICS[one.what],
-               features=commas(Verbatim(name) for name in one.features))  # fmt: skip
+def _named(one: CharacteristicFigures) -> Text:
+    return say("{name}, {what} of {features}", name=one.name, what=CHARACTERISTICS[one.facts.what],
+               features=commas(names(one.facts.features)))  # fmt: skip
 
 
-def _figure(found: PartMeasurement, i: int) -> Figure:
+def _figure(one: CharacteristicFigures) -> Figure:
     """Value with U, or U alone where nothing was measured."""
-    facts, stated = found.characteristics[i], found.stated[i]
-    angle = facts.asks.limits == "angles"
-    own = unit("°") if angle else unit("mm")
-    factor = degrees(1.0) if angle else 1.0
+    stated, unit_of = one.stated, one.scale.value
+    factor = degrees(1.0) if one.angular else 1.0
     U = factor * stated.U
     k = say("k = {k}", k=number(stated.k, ".2f")) if stated.u and isfinite(stated.k) else NOTHING
     if stated.value is None:
-        return _named(found, i), say("U = {u} {unit}", u=significant(U), unit=own), k
-    value, u = rounded(factor * stated.value, U)
-    if never_negative(found.plan)[i]:
+        return _named(one), say("U = {u} {unit}", u=significant(U), unit=unit_of), k
+    if one.one_sided:
         low, high = (rounded(factor * end, U)[0] for end in stated.interval)
-        return _named(found, i), say("{low} to {high} {unit}", low=low, high=high, unit=own), say("95 % interval")
-    return _named(found, i), say("{value} ± {u} {unit}", value=value, u=u, unit=own), k
+        return _named(one), say("{low} to {high} {unit}", low=low, high=high, unit=unit_of), say("95 % interval")
+    value, u = rounded(factor * stated.value, U)
+    return _named(one), say("{value} ± {u} {unit}", value=value, u=u, unit=unit_of), k
 
 
 def _remarks(found: PartMeasurement) -> list[Text]:

@@ -12,12 +12,11 @@ import numpy as np
 
 from cmm_uq.analysis.conformity.decision import Outcome, rule_words
 from cmm_uq.analysis.conformity.limits import LimitDecision
-from cmm_uq.analysis.parts.budget import PointErrors, VarianceShares
+from cmm_uq.analysis.parts.budget import PointErrors, VarianceShares, Way
 from cmm_uq.analysis.parts.methods.method import MethodComparison
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
-from cmm_uq.analysis.parts.ways import Way
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts

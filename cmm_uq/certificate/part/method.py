@@ -1,16 +1,49 @@
-"""By what method a part's uncertainty was found, which standards it follows how far, and what it does not cover."""
+"""By what method a part's uncertainty was found, what it does not cover, and other methods beside it.
+
+Other methods stand on the page with figures, why they differ, what each sees, conditions and budgets; in ``results.json`` with
+values and uncertainties in mm or °, shares from 0 to 1.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from math import degrees, isfinite, log
+from typing import Any
+
 from cmm_uq import __version__
-from cmm_uq.analysis.parts.in_words import FAMILIES, family_of
+from cmm_uq.analysis.parts.budget import FAMILIES, family_of
+from cmm_uq.analysis.parts.methods.method import (
+    ComparedCharacteristic,
+    Method,
+    MethodComparison,
+    MethodFigure,
+    MethodResult,
+    Seen,
+)
+from cmm_uq.analysis.parts.methods.of_job import METHODS
 from cmm_uq.analysis.parts.virtual import AGREES, CHECKED
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, listed, names, number, plural, say, signed
-from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
+from cmm_uq.base.messages import (
+    DASH,
+    NOTHING,
+    Number,
+    Text,
+    Verbatim,
+    commas,
+    listed,
+    names,
+    number,
+    plural,
+    say,
+    sentences,
+    signed,
+)
+from cmm_uq.base.units import unit
+from cmm_uq.certificate.document import Block, Column, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.origin import NAME
-from cmm_uq.certificate.part.figures import figures_of
+from cmm_uq.certificate.part.figures import ANGLES, LENGTHS, figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.wording import titles
+from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 
 
 def method_section(found: PartMeasurement) -> Section:
@@ -109,13 +142,7 @@ def again(found: PartMeasurement) -> Text:
 
 
 def not_covered_section(found: PartMeasurement) -> Section:
-    """What must not be read out of the figures."""
-    blocks: list[Block] = [Paragraph(text) for text in not_covered(found)]
-    return Section(say("What is not covered"), tuple(blocks))
-
-
-def not_covered(found: PartMeasurement) -> tuple[Text, ...]:
-    """Left out of this job, then of every one."""
+    """What must not be read out of the figures: left out of this job, then of every one."""
     facts, told = found.job.facts, list[Text]()
     if facts.part.not_measured:
         told.append(
@@ -143,29 +170,225 @@ def not_covered(found: PartMeasurement) -> tuple[Text, ...]:
             "truth in 94 to 96 of 100 cases."
         )
     )
-    return tuple(told)
+    return Section(say("What is not covered"), tuple(Paragraph(text) for text in told))
 
 
 def _unstated(found: PartMeasurement) -> list[Text]:
     facts = found.job.facts
-    surroundings = facts.environment
-    lacking = (
-        (
-            any(s.u_diameter_um or s.lobing_um or any(s.u_offset_um) for s in facts.stylus),
-            say("qualification of the styli"),
-        ),
-        (bool(surroundings.u_part_k or surroundings.u_scales_k), say("temperatures")),
-        (bool(facts.part.u_cte_per_k), say("expansion of the part")),
-        (bool(found.given.forms), say("form and roughness of the part")),
-        (bool(facts.placing.u_fixture_um), say("clamping")),
-        (_operators(found), say("operators")),
-    )
-    return [what for stated, what in lacking if not stated]
+    each, room = facts.characteristic, facts.environment
+    operators = facts.probing.u_operator_um or any(one.u_operator_um or one.u_operator_deg for one in each)
+    styli = any(one.u_diameter_um or one.lobing_um or any(one.u_offset_um) for one in facts.stylus)
+    stated = (
+        (styli, say("qualification of the styli")), (room.u_part_k or room.u_scales_k, say("temperatures")),
+        (facts.part.u_cte_per_k, say("expansion of the part")), (found.given.forms, say("form and roughness of the part")),
+        (facts.placing.u_fixture_um, say("clamping")), (operators, say("operators")),
+    )  # fmt: skip
+    return [what for given, what in stated if not given]
 
 
-def _operators(found: PartMeasurement) -> bool:
-    """Whether anything is stated of what operators do differently."""
-    facts = found.job.facts
-    return bool(facts.probing.u_operator_um) or any(
-        one.u_operator_um or one.u_operator_deg for one in facts.characteristic
+_NOTHING = 5e-4  # share of a variance that is printed as none
+# characteristics for which is told why methods differ, and whose budgets are listed: those that differ most
+EXPLAINED = 6
+
+FOLLOWED: Mapping[Method, Text] = {
+    "calibrated_part": say(
+        "Calibrated part: by public descriptions of ISO 15530-3:2011, U = k √(u_cal² + u_p² + u_b² + u_w²) with k = 2; an "
+        "error that is not corrected is added (ISO/TS 15530-3:2004). The text of the standard was not at hand. The "
+        "uncertainty of the mean of the repeats is not in that formula."
+    ),
+    "orientations": say(
+        "Several orientations: by the public summary of ISO/DTS 15530-2 (multiple orientations and repetitions, analysis of "
+        "variance, standards of length and of the probe's qualification), which was not published when this was written. Its "
+        "formulas were not at hand: the mean is corrected by the standards, and k is of the 95 % interval at the effective "
+        "degrees of freedom."
+    ),
+}
+
+SEEN: Mapping[Seen, Text] = {
+    "drawn": say("as known of it"), "varied": say("as scatter"), "systematic": say("as a systematic error"),
+    "corrected": say("corrected by a standard"), "stated": say("as stated"), "unseen": say("not"),
+}  # fmt: skip
+
+
+def methods_section(comparison: MethodComparison | None) -> Section:
+    """All of it; a section of no blocks where the job has no other method."""
+    title = say("Other methods beside it")
+    if comparison is None or not comparison.characteristics:
+        return Section(title, ())
+    told = _most_apart(comparison)
+    blocks: list[Block] = [Paragraph(_APART)]
+    for angle in (False, True):
+        own = [one for one in comparison.characteristics if _angle(comparison, one) == angle]
+        if own:
+            blocks.append(_figures(own, angle=angle))
+    blocks += [
+        Paragraph(say("Characteristic {name}: {why}", name=Verbatim(one.name), why=sentences(one.why)))
+        for one in told
+        if one.why
+    ]
+    if len(told) < len(comparison.characteristics):
+        count = len(told)
+        blocks.append(Paragraph(plural(count, one=say("Told is of the characteristic whose methods differ most."), many=say(
+            "Told is of the {count} characteristics whose methods differ most.", count=count)), "note"))  # fmt: skip
+    blocks += [_seen(comparison.methods), _conditions(comparison.methods)]
+    blocks += [_budgets(method, [one.name for one in told]) for method in comparison.methods]
+    blocks += [Paragraph(FOLLOWED[method.method], "note") for method in comparison.methods]
+    return Section(title, tuple(blocks))
+
+
+_APART = say(
+    "The same characteristics by other methods, from recordings of their own. They ask different questions: virtual "
+    "measurements draw all that the machine's certificate leaves open; the others see what varied while they measured, and "
+    "what their standards tell."
+)
+
+
+def _angle(comparison: MethodComparison, one: ComparedCharacteristic) -> bool:
+    return any(found.angle for method in comparison.methods if (found := method.of(one.name)) is not None)
+
+
+def _most_apart(comparison: MethodComparison) -> list[ComparedCharacteristic]:
+    """Those whose uncertainties differ by the largest factor, in the order of the plan."""
+
+    def factor(one: ComparedCharacteristic) -> float:
+        positive = [stated.u for stated in one.stated if stated.u > 0]
+        return log(max(positive) / min(positive)) if positive else 0.0
+
+    every = list(comparison.characteristics)
+    kept = sorted(every, key=factor, reverse=True)[:EXPLAINED]
+    return [one for one in every if one in kept]
+
+
+def _figures(own: Sequence[ComparedCharacteristic], *, angle: bool) -> Table:
+    scale = ANGLES if angle else LENGTHS
+    columns = (
+        Column(say("Characteristic"), numeric=False), Column(say("Method"), numeric=False), Column(say("Value"), scale.value),
+        Column(say("u"), scale.small), Column(say("U"), scale.small), Column(say("Eₙ")),
+    )  # fmt: skip
+    rows = []
+    for one in own:
+        normalised = {pair.other: pair.normalised for pair in one.pairs if pair.one == "virtual"}
+        for stated in one.stated:
+            value: Text = DASH
+            if stated.value is not None:
+                value = rounded(stated.value / scale.per_value, stated.U / scale.per_value)[0]
+            apart = signed(normalised[stated.method], ".2f") if stated.method in normalised else DASH
+            name = say("{method:capital}", method=METHODS[stated.method])
+            rows.append((Verbatim(one.name), name, value, significant(stated.u / scale.per_small),
+                         significant(stated.U / scale.per_small), apart))  # fmt: skip
+    note = say(
+        "Eₙ: difference of the virtual measurement's value from this one over √(U₁² + U₂²) (ISO/IEC 17043); beyond 1 the "
+        "methods contradict each other. Values that come from the same measured points have most of their error in "
+        "common, so that theirs is small."
     )
+    return Table(
+        say("Angles by each method") if angle else say("Lengths by each method"), columns, tuple(rows), (note,)
+    )
+
+
+def _seen(methods: Sequence[MethodResult]) -> Table:
+    columns = (
+        Column(say("Cause"), numeric=False), Column(say("{method:capital}", method=METHODS["virtual"]), numeric=False),
+        *(Column(say("{method:capital}", method=METHODS[one.method]), numeric=False) for one in methods),
+    )  # fmt: skip
+    rows = tuple(
+        (words, SEEN["drawn"], *(SEEN[one.seen.get(family, "unseen")] for one in methods))
+        for family, words in FAMILIES.items()
+    )
+    return Table(say("How each method takes hold of a cause"), columns, rows)
+
+
+def _conditions(methods: Sequence[MethodResult]) -> Table:
+    met = {True: say("met"), False: say("not met"), None: say("not stated")}
+    columns = (
+        Column(say("Method"), numeric=False),
+        Column(say("What it asks for"), numeric=False),
+        Column(say("This test"), numeric=False),
+    )
+    rows = tuple(
+        (say("{method:capital}", method=METHODS[one.method]), condition.text, met[condition.met])
+        for one in methods
+        for condition in one.conditions
+    )
+    return Table(say("Conditions of the tests"), columns, rows)
+
+
+def _budgets(method: MethodResult, told: Sequence[str]) -> Table:
+    """Budgets of some characteristics line by line."""
+    columns = (
+        Column(say("Characteristic"), numeric=False), Column(say("Contribution"), numeric=False),
+        Column(say("u, its part"), numeric=False), Column(say("ν")), Column(say("Share"), unit("%")),
+    )  # fmt: skip
+    rows = [row for name in told if (one := method.of(name)) is not None for row in _lines(one)]
+    caption = say("Budgets by {method}", method=METHODS[method.method])
+    return Table(caption, columns, tuple(rows), tuple(_notes(method, told)))
+
+
+def _lines(one: MethodFigure) -> list[tuple[Text, ...]]:
+    scale = ANGLES if one.angle else LENGTHS
+    rows: list[tuple[Text, ...]] = []
+    for depth, line, share in one.budget.flat():
+        if not line.u or share < _NOTHING:
+            continue
+        part = say("{value} {unit}", value=significant(one.u * share**0.5 / scale.per_small), unit=scale.small)
+        name = say("{indent}{name}", indent=Verbatim("\u2003" * depth), name=line.name)
+        rows.append((Verbatim(one.name), name, part, _freedom(line.dof), number(100 * share, ".1f")))
+    told = say("{value} {unit}", value=significant(one.u / scale.per_small), unit=scale.small)
+    whole = say("together, k = {k}", k=number(one.budget.k, ".2f"))
+    return [*rows, (Verbatim(one.name), whole, told, _freedom(one.budget.dof), number(100.0, ".1f"))]
+
+
+def _freedom(dof: float) -> Text:
+    return figure(dof, 3) if isfinite(dof) else Number("∞")
+
+
+def _notes(method: MethodResult, told: Sequence[str]) -> list[Text]:
+    """Systematic errors that were found, and what became of them."""
+    notes: list[Text] = []
+    for one in (found for name in told if (found := method.of(name)) is not None):
+        if one.systematic is None or (method.method == "orientations" and not one.systematic):
+            continue
+        scale = ANGLES if one.angle else LENGTHS
+        U, name = one.U / scale.per_small, Verbatim(one.name)
+        error = rounded(one.systematic / scale.per_small, U)[0] if U else NOTHING
+        taken_off = say("{name}: systematic error {error} {unit}, taken off.", name=name, error=error, unit=scale.small)
+        added = say("{name}: systematic error {error} {unit}, not taken off; its size is added to U.", name=name, error=error,
+                    unit=scale.small)  # fmt: skip
+        notes.append(taken_off if one.corrected else added)
+    return notes
+
+
+def methods_data(comparison: MethodComparison | None) -> dict[str, Any] | None:
+    """All of it; ``None`` where the job has no other method."""
+    if comparison is None:
+        return None
+    methods = [
+        {"method": one.method, "characteristics": [_figure(each) for each in one.figures],
+         "conditions": [{"asked": str.__str__(each.text), "met": each.met} for each in one.conditions],
+         "seen": dict(one.seen)}
+        for one in comparison.methods
+    ]  # fmt: skip
+    compared = [
+        {"name": one.name,
+         "normalised_errors": [{"one": pair.one, "other": pair.other, "E_n": pair.normalised} for pair in one.pairs],
+         "why": [str.__str__(text) for text in one.why]}
+        for one in comparison.characteristics
+    ]  # fmt: skip
+    return {"methods": methods, "compared": compared}
+
+
+def _figure(one: MethodFigure) -> dict[str, Any]:
+    def given(value: float | None) -> float | None:
+        return degrees(value) if one.angle and value is not None else value
+
+    budget = one.budget
+    return {
+        "name": one.name, "unit": "°" if one.angle else "mm", "value": given(one.value), "u": given(one.u), "U": given(one.U),
+        "k": budget.k, "dof": budget.dof if isfinite(budget.dof) else None, "systematic_error": given(one.systematic),
+        "corrected": one.corrected, "u_one_measurement": given(one.single), "scatter": given(one.scatter),
+        "budget": [
+            {"line": str.__str__(line.name), "depth": depth, "share": share,
+             "dof": line.dof if isfinite(line.dof) else None}
+            for depth, line, share in budget.flat()
+        ],
+    }  # fmt: skip

@@ -45,10 +45,14 @@ from cmm_uq.certificate.part.budget_section import (
 )
 from cmm_uq.certificate.part.figures import CharacteristicFigures, critical, figures_of
 from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, Source
-from cmm_uq.certificate.part.method import method_section, not_covered_section, program_words
-from cmm_uq.certificate.part.other_methods import methods_section
-from cmm_uq.certificate.part.part_section import errors_section, part_section
-from cmm_uq.certificate.part.results_section import conformity_section, correlation_section, results_section
+from cmm_uq.certificate.part.method import method_section, methods_section, not_covered_section, program_words
+from cmm_uq.certificate.part.results_section import (
+    conformity_section,
+    correlation_section,
+    errors_section,
+    part_section,
+    results_section,
+)
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.certificate.wording import probability
 from cmm_uq.jobs.logo import logo_of

@@ -16,27 +16,7 @@ import numpy as np
 from cmm_uq.base.messages import Text, commas, number, say, semicolons, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Outcome, Plot
-from cmm_uq.certificate.plots.style import (
-    ACCENT,
-    BAD,
-    BAND,
-    DIVERGING,
-    INK,
-    MUTED,
-    NAMES_MM,
-    OPEN,
-    RULE,
-    TINY,
-    WIDTH_MM,
-    dots,
-    drawn,
-    finite,
-    house_style,
-    lettered,
-    new_figure,
-    told_apart,
-    width_mm,
-)
+from cmm_uq.certificate.plots import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,7 +58,7 @@ class Margin:
         return (value - zero) / one
 
 
-_COLOURS = {"pass": ACCENT, "conditional pass": ACCENT, "fail": BAD, "conditional fail": BAD}
+_COLOURS = {"pass": style.ACCENT, "conditional pass": style.ACCENT, "fail": style.BAD, "conditional fail": style.BAD}
 _RULED = (0.0, 1.0)
 
 
@@ -96,14 +76,14 @@ def margin_plot(rows: Sequence[Margin], part: tuple[int, int] | None = None) -> 
     """One picture."""
     height = 17.0 + 5.2 * len(rows)
     measured = any(row.outcome is not None for row in rows)
-    with house_style():
-        figure = new_figure(height)
+    with style.house_style():
+        figure = style.new_figure(height)
         ax = figure.subplots()
         figure.subplots_adjust(left=0.34, right=0.985, bottom=12 / height, top=1 - 1.5 / height)
         for place, row in enumerate(rows):
             _band(ax, place, row)
             _interval(ax, place, row)
-        ax.set_yticks(np.arange(len(rows)), told_apart([row.name for row in rows], NAMES_MM))
+        ax.set_yticks(np.arange(len(rows)), style.told_apart([row.name for row in rows], style.NAMES_MM))
         ax.set_xticks([0.0, 0.5, 1.0], [say("lower limit"), say("middle"), say("upper limit")])
         ax.set(xlim=(-_FARTHEST, 1 + _FARTHEST), ylim=(len(rows) - 0.4, -0.6))
         ax.tick_params(left=False)
@@ -121,7 +101,7 @@ def margin_plot(rows: Sequence[Margin], part: tuple[int, int] | None = None) -> 
         )
         if part:
             caption = say("{caption} Part {number} of {count}.", caption=caption, number=part[0], count=part[1])
-        return drawn(figure, caption, _told(rows, measured=measured))
+        return style.drawn(figure, caption, _told(rows, measured=measured))
 
 
 def _told(rows: Sequence[Margin], *, measured: bool) -> Text:
@@ -138,30 +118,30 @@ def _told(rows: Sequence[Margin], *, measured: bool) -> Text:
 def _band(ax: Axes, place: int, row: Margin) -> None:
     """What is allowed, what the rule accepts, and the limits that there are."""
     ends = (0.0 if row.lower is not None else -_FARTHEST, 1.0 if row.upper is not None else 1 + _FARTHEST)
-    ax.barh(place, ends[1] - ends[0], 0.72, left=ends[0], color=BAND, lw=0, alpha=0.55, zorder=0)
+    ax.barh(place, ends[1] - ends[0], 0.72, left=ends[0], color=style.BAND, lw=0, alpha=0.55, zorder=0)
     if row.accepted is not None:
         low, high = (end if given is None else row.of(given) for given, end in zip(row.accepted, ends, strict=True))
-        ax.barh(place, max(high - low, 0.0), 0.72, left=low, color=BAND, lw=0, zorder=1)
+        ax.barh(place, max(high - low, 0.0), 0.72, left=low, color=style.BAND, lw=0, zorder=1)
     for limit, at in zip((row.lower, row.upper), _RULED, strict=True):
         if limit is not None:
-            ax.plot([at, at], [place - 0.36, place + 0.36], color=MUTED, lw=1.0, zorder=2)
-    ax.axhline(place + 0.5, color=RULE, lw=0.3, zorder=0)
+            ax.plot([at, at], [place - 0.36, place + 0.36], color=style.MUTED, lw=1.0, zorder=2)
+    ax.axhline(place + 0.5, color=style.RULE, lw=0.3, zorder=0)
 
 
 def _interval(ax: Axes, place: int, row: Margin) -> None:
     reach = -_FARTHEST, 1 + _FARTHEST
     low, high, at = (float(np.clip(row.of(value), *reach)) for value in (*row.interval, row.value))
-    colour = MUTED if row.outcome is None else _COLOURS.get(row.outcome, OPEN)
+    colour = style.MUTED if row.outcome is None else _COLOURS.get(row.outcome, style.OPEN)
     ax.plot([low, high], [place, place], color=colour, lw=1.8, solid_capstyle="butt", zorder=3)
-    if row.outcome is not None and _COLOURS.get(row.outcome) == BAD:
+    if row.outcome is not None and _COLOURS.get(row.outcome) == style.BAD:
         ax.plot([at], [place], ls="", marker="x", ms=5.5, mec=colour, mew=1.6, zorder=5)
     elif row.outcome is not None:
-        dots(ax, np.array([at]), np.array([float(place)]), 4.6, colour, hollow=colour == OPEN, zorder=5)
+        style.dots(ax, np.array([at]), np.array([float(place)]), 4.6, colour, hollow=colour == style.OPEN, zorder=5)
     if not reach[0] <= row.of(row.value) <= reach[1]:
         side = 1 if at > 0.5 else -1
         text = say("{times} times the tolerance", times=number(row.of(row.value), ".1f"))
         ax.annotate(text, (at, place), (-7 * side, 0), textcoords="offset points", ha="right" if side > 0 else "left",
-                    va="center", color=INK, fontsize=6.5, zorder=6,
+                    va="center", color=style.INK, fontsize=6.5, zorder=6,
                     bbox={"facecolor": "white", "alpha": 0.8, "lw": 0, "pad": 0.5})  # fmt: skip
 
 
@@ -184,22 +164,22 @@ def shares_plots(names: Sequence[Text], causes: Sequence[Text], shares: Floats) 
 
 def _bars(names: Sequence[Text], causes: Sequence[Text], shares: Floats) -> Plot:
     rows = np.arange(len(names))
-    with house_style():
+    with style.house_style():
         lines = _legend_lines(causes)
         top = 4.6 * len(lines) + 2.0
         height = top + _ROW_MM * len(names) + 3.0
-        figure = new_figure(height)
-        ax = figure.add_axes((_LEFT_MM / WIDTH_MM, 1.5 / height, 1 - (_LEFT_MM + _RIGHT_MM) / WIDTH_MM,
+        figure = style.new_figure(height)
+        ax = figure.add_axes((_LEFT_MM / style.WIDTH_MM, 1.5 / height, 1 - (_LEFT_MM + _RIGHT_MM) / style.WIDTH_MM,
                               _ROW_MM * len(names) / height))  # fmt: skip
         before = np.zeros(len(names))
         for g in range(len(causes)):
             shade = _SHADES[g % len(_SHADES)]
             ax.barh(rows, shares[g], 0.7, left=before, color=shade, edgecolor="white", lw=0.6)
             for row in np.flatnonzero(shares[g] >= _LEAST).tolist():
-                ax.text(before[row] + 0.5 * shares[g, row], row, number(100 * shares[g, row], ".0f"), fontsize=TINY,
-                        color="white" if shade in _DARK else INK, ha="center", va="center_baseline")  # fmt: skip
+                ax.text(before[row] + 0.5 * shares[g, row], row, number(100 * shares[g, row], ".0f"), fontsize=style.TINY,
+                        color="white" if shade in _DARK else style.INK, ha="center", va="center_baseline")  # fmt: skip
             before = before + shares[g]
-        ax.set_yticks(rows, told_apart(names, NAMES_MM))
+        ax.set_yticks(rows, style.told_apart(names, style.NAMES_MM))
         ax.set(xlim=(0, 1), ylim=(len(names) - 0.4, -0.6), xticks=[])
         ax.tick_params(left=False)
         for side in ("bottom", "left"):
@@ -207,9 +187,11 @@ def _bars(names: Sequence[Text], causes: Sequence[Text], shares: Floats) -> Plot
         for line, members in enumerate(lines):
             y = 1 - (2.6 + 4.6 * line) / height
             for g, left in members:
-                figure.text(left / WIDTH_MM, y, "■", fontsize=8, color=_SHADES[g % len(_SHADES)], va="center")
-                figure.text((left + 3.6) / WIDTH_MM, y, causes[g], fontsize=TINY, color=INK, va="center")
-        return drawn(
+                figure.text(left / style.WIDTH_MM, y, "■", fontsize=8, color=_SHADES[g % len(_SHADES)], va="center")
+                figure.text(
+                    (left + 3.6) / style.WIDTH_MM, y, causes[g], fontsize=style.TINY, color=style.INK, va="center"
+                )
+        return style.drawn(
             figure,
             say("What the variance of each characteristic is made of, %, by cause: total shares over their sum."),
             semicolons(_told_of_budget_plot(name, causes, shares[:, i]) for i, name in enumerate(names)),
@@ -226,8 +208,8 @@ def _legend_lines(causes: Sequence[Text]) -> list[list[tuple[int, float]]]:
     """Causes in lines, with where each begins, mm."""
     lines, left = [list[tuple[int, float]]()], 1.0
     for g, cause in enumerate(causes):
-        width = 9.0 + width_mm(lettered(cause), TINY)
-        if lines[-1] and left + width > WIDTH_MM:
+        width = 9.0 + style.width_mm(style.lettered(cause), style.TINY)
+        if lines[-1] and left + width > style.WIDTH_MM:
             lines.append([])
             left = 1.0
         lines[-1].append((g, left))
@@ -246,30 +228,32 @@ def correlation_plot(numbers: Sequence[Text], correlation: Floats) -> Plot:
     ``numbers``: (c,) short names of the characteristics, two at least. ``correlation``: (c, c).
     """
     count = len(numbers)
-    values = finite("correlation", correlation, (count, count))
-    side = max(min(_SIDE_MM, (WIDTH_MM - 24.0) / count), _LEAST_MM)
+    values = style.finite("correlation", correlation, (count, count))
+    side = max(min(_SIDE_MM, (style.WIDTH_MM - 24.0) / count), _LEAST_MM)
     below, left = np.tril_indices(count, -1)
     sizes = values[below, left]
-    with house_style():
+    with style.house_style():
         height = 11.0 + side * count
-        figure = new_figure(height)
-        edge = 0.5 * (WIDTH_MM - side * count)
-        ax = figure.add_axes((edge / WIDTH_MM, 9.0 / height, side * count / WIDTH_MM, side * count / height))
+        figure = style.new_figure(height)
+        edge = 0.5 * (style.WIDTH_MM - side * count)
+        ax = figure.add_axes(
+            (edge / style.WIDTH_MM, 9.0 / height, side * count / style.WIDTH_MM, side * count / height)
+        )
         steps = np.ceil(np.abs(sizes) * _CLASSES)
         for step in range(1, _CLASSES + 1):
-            for positive, colour in ((True, DIVERGING[-1]), (False, DIVERGING[0])):
+            for positive, colour in ((True, style.DIVERGING[-1]), (False, style.DIVERGING[0])):
                 some = (steps == step) & (np.abs(sizes) >= LEAST) & ((sizes > 0) == positive)
                 if some.any():
                     diameter = 0.92 * side * np.sqrt(step / _CLASSES) * 72 / 25.4
-                    dots(ax, left[some], below[some], float(diameter), colour, hollow=not positive)
+                    style.dots(ax, left[some], below[some], float(diameter), colour, hollow=not positive)
         ax.set(xlim=(-0.5, count - 0.5), ylim=(count - 0.5, -0.5))
         turned = 90 if side < 6.0 and any(len(name) > 2 for name in numbers) else 0
-        ax.set_xticks(range(count), numbers, fontsize=TINY, rotation=turned)
-        ax.set_yticks(range(count), numbers, fontsize=TINY)
-        ax.tick_params(length=0, labelcolor=INK)
+        ax.set_xticks(range(count), numbers, fontsize=style.TINY, rotation=turned)
+        ax.set_yticks(range(count), numbers, fontsize=style.TINY)
+        ax.tick_params(length=0, labelcolor=style.INK)
         for name in ("left", "bottom"):
-            ax.spines[name].set_color(RULE)
-        return drawn(
+            ax.spines[name].set_color(style.RULE)
+        return style.drawn(
             figure,
             say("Correlations between the characteristics, by their numbers: full dots positive, hollow dots negative, the "
                 "larger the stronger; those below {least:g} in size are left out.", least=LEAST),

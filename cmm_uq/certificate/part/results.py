@@ -21,7 +21,7 @@ from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.origin import NAME
 from cmm_uq.certificate.part.measurement import CertificateStatus, FurtherSetUps, PartMeasurement, UnseenError
-from cmm_uq.certificate.part.other_methods import methods_data
+from cmm_uq.certificate.part.method import methods_data
 from cmm_uq.certificate.results.keys import RESULTS
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob

@@ -1,28 +1,39 @@
-"""The results of a part: every characteristic with its uncertainty, and what the drawing's limits make of it."""
+"""The results of a part, what the drawing's limits make of them, and the part itself as it is probed, with errors and form."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from cmm_uq.analysis.parts.budget import ASSOCIATIONS, KINDS
 from cmm_uq.analysis.parts.evaluation import characteristics_of
-from cmm_uq.base.messages import DASH, Text, number, say, signed
-from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.analysis.parts.plan import Plan, Stylus
+from cmm_uq.analysis.parts.result import deviations_of
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, in_a_row, names, number, say, semicolons, signed
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.certificate.document import Block, Column, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.part.figures import CharacteristicFigures, figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement
+from cmm_uq.certificate.part.pictures import errors_picture, form_picture, part_picture
 from cmm_uq.certificate.part.plots import Margin, correlation_plot, margin_plots
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability
+from cmm_uq.maths.uncertainty.quantity import nominal
 
 FEW = 8  # characteristics up to which their correlations are a table
 
 
 def results_section(found: PartMeasurement) -> Section:
     """Every characteristic with its value, if anything was measured, and its uncertainty."""
-    every = figures_of(found)
-    parts = [
-        part for part in ([one for one in every if not one.angular], [one for one in every if one.angular]) if part
-    ]
-    tables = [_table(part, measured=found.measured is not None) for part in parts]
+    tables = [_table(part, measured=found.measured is not None) for part in _parts(figures_of(found))]
     return Section(say("Results"), (*([] if found.measured is not None else [Paragraph(_UNMEASURED)]), *tables))
+
+
+def _parts(every: Sequence[CharacteristicFigures]) -> list[list[CharacteristicFigures]]:
+    """Lengths and then angles, those that there are."""
+    parts = ([one for one in every if one.angular == angular] for angular in (False, True))
+    return [part for part in parts if part]
 
 
 _UNMEASURED = say(
@@ -39,21 +50,12 @@ def _table(every: Sequence[CharacteristicFigures], *, measured: bool) -> Table:
         Column(say("95 % interval"), scale.value if measured else scale.small, numeric=False),
         *(() if measured else (Column(say("Mean error"), scale.small),)),
     )  # fmt: skip
-    rows = tuple(_row(one, measured=measured) for one in every)
+    rows = tuple(
+        (one.number, one.beside, *(() if one.stated.value is None else (one.at(one.stated.value),)),
+         *one.with_factor(one.stated.k), one.interval, *(() if measured else (one.error(one.stated.error),)))
+        for one in every
+    )  # fmt: skip
     return Table(say("Angles") if every[0].angular else say("Lengths, forms and places"), columns, rows, _notes(every))
-
-
-def _row(one: CharacteristicFigures, *, measured: bool) -> tuple[Text, ...]:
-    value = () if one.stated.value is None else (one.at(one.stated.value),)
-    error = () if measured else (one.error(one.stated.error),)
-    return (
-        one.number,
-        one.beside,
-        *value,
-        *one.with_factor(one.stated.k),
-        one.interval,
-        *error,
-    )
 
 
 def _notes(every: Sequence[CharacteristicFigures]) -> tuple[Text, ...]:
@@ -85,10 +87,8 @@ def conformity_section(found: PartMeasurement) -> Section:
     blocks: list[Block] = [Paragraph(_rule(found, limited))]
     blocks += margin_plots([_margin(one) for one in limited if found.measured is not None or one.width > 0])
     nominal = characteristics_of(found.plan, found.plan.points)
-    parts = [
-        part for part in ([one for one in limited if not one.angular], [one for one in limited if one.angular]) if part
-    ]
-    blocks += [_decisions(part, nominal.tolist(), measured=found.measured is not None) for part in parts]
+    measured = found.measured is not None
+    blocks += [_decisions(part, nominal.tolist(), measured=measured) for part in _parts(limited)]
     return Section(say("Conformity with the drawing"), tuple(blocks))
 
 
@@ -116,14 +116,11 @@ def _decisions(every: Sequence[CharacteristicFigures], nominal: Sequence[float],
         notes.append(say("P: probability that the true value is within its limits, by the virtual measurements."))
     if any(one.judged is not None and one.judged.accepted is None for one in every):
         notes.append(say("None: the uncertainty is too large for any value to be accepted."))
-    caption = _caption(angular=every[0].angular, measured=measured)
-    return Table(caption, columns, rows, tuple(notes))
-
-
-def _caption(*, angular: bool, measured: bool) -> Text:
     if measured:
-        return say("Decisions on angles") if angular else say("Decisions")
-    return say("Angles that the rule will accept") if angular else say("What the rule will accept")
+        caption = say("Decisions on angles") if every[0].angular else say("Decisions")
+    else:
+        caption = say("Angles that the rule will accept") if every[0].angular else say("What the rule will accept")
+    return Table(caption, columns, rows, tuple(notes))
 
 
 def _decision(one: CharacteristicFigures, nominal: float, *, measured: bool) -> tuple[Text, ...]:
@@ -134,28 +131,19 @@ def _decision(one: CharacteristicFigures, nominal: float, *, measured: bool) -> 
             DASH if judged.outcome is None else OUTCOME_WORDS[judged.outcome],
             DASH if judged.probability is None else probability(judged.probability),
         )
-    shown = DASH if one.zone else one.limit(nominal)
-    return (
-        one.number,
-        one.beside,
-        shown,
-        one.limit(low),
-        one.limit(high),
-        one.accepted_of(None if judged is None else judged.accepted),
-        *decided,
-    )
+    accepted = one.accepted_of(None if judged is None else judged.accepted)
+    return (one.number, one.beside, DASH if one.zone else one.limit(nominal), one.limit(low), one.limit(high), accepted,
+            *decided)  # fmt: skip
 
 
 def _margin(one: CharacteristicFigures) -> Margin:
     judged, (low, high) = one.judged, one.limits
     low = 0.0 if one.zone else low
-    stated, accepted = one.stated, None if judged is None else judged.accepted
-    if stated.value is None:
+    accepted, outcome = (None, None) if judged is None else (judged.accepted, judged.outcome)
+    if (value := one.stated.value) is None:
         middle = 0.5 * ((low or 0.0) + (high or 0.0))
         return Margin(one.titled, middle, (middle - one.expanded, middle + one.expanded), low, high, None, accepted)
-    return Margin(
-        one.titled, stated.value, stated.interval, low, high, None if judged is None else judged.outcome, accepted
-    )
+    return Margin(one.titled, value, one.stated.interval, low, high, outcome, accepted)
 
 
 def correlation_section(found: PartMeasurement) -> Section:
@@ -185,3 +173,94 @@ def _r(value: float, row: int, column: int) -> Text:
     if column > row:
         return DASH
     return number(1) if column == row else signed(round(value, 2) + 0.0, ".2f")
+
+
+_SHORT = 8  # letters up to which features are lettered in pictures by their names, else by their numbers
+
+
+def lettered_names(plan: Plan) -> list[Text]:
+    """What features are called in pictures: their names where all are short, else their numbers."""
+    if all(len(feature.name) <= _SHORT for feature in plan.features):
+        return [Verbatim(feature.name) for feature in plan.features]
+    return [number(i + 1) for i in range(len(plan.features))]
+
+
+def part_section(found: PartMeasurement) -> Section:
+    """What is probed, with which styli, and where the part lies."""
+    plan = found.plan
+    several = len(plan.styli) > 1
+    columns = (
+        Column(say("No.")), Column(say("Feature"), numeric=False), Column(say("Kind"), numeric=False),
+        Column(say("Points")), *((Column(say("Stylus"), numeric=False),) if several else ()),
+        Column(say("Association"), numeric=False),
+    )  # fmt: skip
+    rows = tuple(
+        (number(i + 1), Verbatim(feature.name), KINDS[feature.kind], number(len(feature.points)),
+         *((Verbatim(feature.stylus),) if several else ()),
+         ASSOCIATIONS[feature.association] if len(feature.points) > 1 else DASH)
+        for i, feature in enumerate(plan.features)
+    )  # fmt: skip
+    blocks: tuple[Block, ...] = (
+        part_picture(plan, found.given.poses[0], lettered_names(plan)),
+        Table(say("Features"), columns, rows, (_FEATURES,)),
+        Facts(tuple(row for row in _lies(found) if row[1])),
+    )
+    return Section(say("The part as it is probed"), blocks)
+
+
+_UM = unit("µm")
+_FEATURES = say("Association: how a feature is made of its points, where a characteristic says nothing else.")
+
+
+def _lies(found: PartMeasurement) -> list[tuple[Text, Text]]:
+    facts, given = found.job.facts, found.job.facts.placing
+    varied = len(found.given.poses)
+    placed = say("origin at {origin} mm, turned by {angles}° about x, y, z of the machine",
+                 origin=_three(found.origin_mm), angles=_three(given.rotation_deg))  # fmt: skip
+    if varied > 1:
+        placed = say("{placed}; drawn in {count} places about it", placed=placed, count=varied)
+    datums = commas(names(facts.alignment.datums))
+    alignment = say("best fit of all points") if facts.alignment.best_fit else datums
+    repeats = facts.probing.repeats
+    return [
+        (say("Place in the machine"), placed),
+        (say("Alignment"), alignment),
+        (say("Styli"), semicolons(_stylus(one) for one in found.plan.styli)),
+        (say("Repeats of each point"), number(repeats) if repeats > 1 else NOTHING),
+    ]
+
+
+def _stylus(one: Stylus) -> Text:
+    return say("{name}: tip of {diameter} mm, offset {offset} mm", name=Verbatim(one.name), diameter=nominal(one.diameter_mm),
+               offset=_three(one.offset_mm.tolist()))  # fmt: skip
+
+
+def _three(values: Sequence[float]) -> Text:
+    return in_a_row(nominal(value) for value in values)
+
+
+def errors_section(found: PartMeasurement) -> Section:
+    """The errors of the points, and the form that was measured."""
+    blocks: list[Block] = [errors_picture(found.plan, found.displaced)]
+    deviations = None if found.job.measured is None else deviations_of(found.plan, found.job.measured)
+    if deviations is not None and np.isfinite(deviations).any():
+        blocks += [form_picture(found.plan, deviations), _forms(found.plan, deviations)]
+    elif found.measured is not None:
+        blocks.append(Paragraph(say("No feature has more points than determine it: no form was measured."), "note"))
+    return Section(say("Errors of the points"), tuple(blocks))
+
+
+def _forms(plan: Plan, deviations: Floats) -> Table:
+    """Range of the measured deviations of each feature that has some."""
+    columns = (
+        Column(say("No.")), Column(say("Feature"), numeric=False), Column(say("From"), _UM), Column(say("To"), _UM),
+        Column(say("Root mean square"), _UM),
+    )  # fmt: skip
+    rows = []
+    for i, feature in enumerate(plan.features):
+        own = deviations[plan.rows[feature.name]] / MICROMETRE
+        if np.isfinite(own).all():
+            figures = (float(own.min()), float(own.max()), float(np.sqrt(np.mean(own**2))))
+            rows.append((number(i + 1), Verbatim(feature.name), *(signed(each, ".1f") for each in figures)))
+    note = say("Noise of the machine and its errors are in these distances too; no form is stated here.")
+    return Table(say("Distances of the points from their features"), columns, tuple(rows), (note,))

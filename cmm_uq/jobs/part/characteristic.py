@@ -53,16 +53,10 @@ ASKS: Mapping[What, Asks] = {
 }  # fmt: skip
 """Of each kind of characteristic (ISO 1101, ISO 5459, ISO 14405-1)."""
 
-_ARTICLES = {
-    "angle": "an angle",
-    "angularity": "an angularity",
-    **{axis: f"a coordinate {axis}" for axis in ("x", "y", "z")},
-}
-
 
 def with_article(what: str) -> str:
     """A characteristic in a sentence: ``an angle``."""
-    return _ARTICLES.get(what, f"a {what}")
+    return f"a coordinate {what}" if what in ("x", "y", "z") else f"{'an' if what.startswith('a') else 'a'} {what}"
 
 
 LIMITS: Mapping[str, tuple[str, ...]] = {
@@ -119,18 +113,16 @@ class CharacteristicFacts(JobTable):
             example = ", ".join(['"…"'] * count)
             raise ValueError(f"names no feature: give features = [{example}], whose {self.what} it is")
         if len(self.features) != count and not (self.asks.alone and len(self.features) == 1):
-            raise ValueError(
-                f"{with_article(self.what)} is of {count} {'features' if count > 1 else 'feature'}: give so many"
-            )
+            said = f"{count} {'features' if count > 1 else 'feature'}"
+            raise ValueError(f"{with_article(self.what)} is of {said}: give so many")
         if len(set(self.features)) < len(self.features):
             raise ValueError(f"{with_article(self.what)} is of two features: {self.features[0]!r} stands there twice")
         if self.datums and not self.asks.datum_kinds:
             raise ValueError(f"{self.what} has no datums: leave them out")
         if len(self.datums) < self.asks.datums:
             raise ValueError(f"{self.what} is about a datum: give datums with the name of a feature")
-        twice = next((name for name in self.datums if self.datums.count(name) > 1 or name in self.features), None)
-        if twice is not None:
-            raise ValueError(f"{twice!r} cannot be its own datum, or a datum twice")
+        if twice := [name for name in self.datums if self.datums.count(name) > 1 or name in self.features]:
+            raise ValueError(f"{twice[0]!r} cannot be its own datum, or a datum twice")
         return self
 
     @model_validator(mode="after")

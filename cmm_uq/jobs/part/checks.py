@@ -1,21 +1,128 @@
-"""Where the part lies in the machine, and what its axes read at a point.
+"""What a part's tables say together: names that lead somewhere, datums that fix a frame, a part within the travel.
 
-What a part's tables say together: names that lead somewhere, datums that fix a frame, a part within the travel.
+Common datums are written ``A-B`` as ISO 5459 writes them. Each feature is invariant under some rigid motions (its invariance
+class, ISO 5459); datums fix the frame where no motion but standing still leaves all of them in place. To first order these
+motions are a linear space of six dimensions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import cache
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.points import AXES, Floats, beyond_travel
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts, with_article
-from cmm_uq.jobs.part.datums import BETWEEN, as_one, freedoms, members
-from cmm_uq.jobs.part.feature import ASSOCIATIONS, FEWEST, material_condition
+from cmm_uq.jobs.part.feature import ASSOCIATIONS, FEWEST, Kind, material_condition
 from cmm_uq.jobs.part.probed import Probed
-from cmm_uq.jobs.part.tables import PartFile, Places, PlacingFacts, StylusFacts
+from cmm_uq.jobs.part.tables import PartFile, Places, PlacingFacts
+
+BETWEEN = "-"
+_APART_MM = 0.01  # from one axis: what lies farther from it by its nominal lies on another
+_ACROSS = 1e-3  # sine of the angle below which two directions are one, a twentieth of a degree
+# singular value below which a motion counts as free: datums that lean by less than a twentieth of a degree are one
+_FREE = 1e-3
+_FACES: tuple[Kind, ...] = ("plane", "point")
+_ROUND: tuple[Kind, ...] = ("circle", "cylinder", "cone")
+# of a nominal orientation: what is off by more than a degree is another orientation than the drawing's
+_NEARLY = np.sin(np.radians(1.0))
+_FAR = 0.1  # share of a nominal size by which the middle of its limits may lie beside it, for fits
+Problem = tuple[str, str, str]  # what is wrong with a characteristic, its key, and what mends it
+
+
+def members(name: str, known: Collection[str]) -> tuple[str, ...]:
+    """Names of the features that a datum is on: one, or those between the hyphens of ``A-B``.
+
+    A feature that has a hyphen in its own name is found by its whole name.
+    """
+    if name in known:
+        return (name,)
+    words = [word.strip() for word in name.split(BETWEEN)]
+
+    @cache
+    def read(start: int) -> list[tuple[str, ...]]:
+        """Two ways at most to read the words from one on as names."""
+        if start == len(words):
+            return [()]
+        firsts = ((end, BETWEEN.join(words[start:end])) for end in range(start + 1, len(words) + 1))
+        return [(first, *rest) for end, first in firsts if first in known for rest in read(end)][:2]
+
+    ways = read(0)
+    if not ways:
+        unknown = next((word for word in words if word not in known), name)
+        of = f" of the common datum {name!r}" if len(words) > 1 else ""
+        raise CmmUqError(f"there is no feature {unknown!r}{of}", fix=suggestion(unknown, known))
+    if len(ways) > 1:
+        one, other = (" and ".join(map(repr, way)) for way in ways)
+        raise CmmUqError(f"the common datum {name!r} is {one}, or {other}", fix="Give features names without hyphens")
+    if twice := [each for each in ways[0] if ways[0].count(each) > 1]:
+        raise CmmUqError(f"the common datum {name!r} names {twice[0]!r} twice", fix="Name each of its features once")
+    return ways[0]
+
+
+def as_one(features: Sequence[Probed]) -> tuple[Kind, Floats, Floats | None]:
+    """What features are as one datum by their nominals: kind, a point (3,) of it, and its direction (3,).
+
+    A ``line`` where all lie on one axis: circles, cylinders and cones with theirs, spheres with their centres. A ``plane``
+    where all are parallel faces, or points of such. Else a ``point``, without direction.
+    """
+    points = np.array([one.facts.point_mm for one in features], dtype=np.float64)
+    faces = [one.facts.kind in _FACES for one in features]
+    if all(faces):
+        normals = np.array([one.normals[0] for one in features])
+        same = np.all(np.linalg.norm(np.cross(normals, normals[0]), axis=1) < _ACROSS)
+        return ("plane", points.mean(axis=0), normals[0]) if same else ("point", points.mean(axis=0), None)
+    axes = [one.direction for one in features if one.direction is not None and one.facts.kind in _ROUND]
+    apart = points - points[0]
+    farthest = apart[int(np.argmax(np.linalg.norm(apart, axis=1)))]
+    along = axes[0] if axes else farthest / (float(np.linalg.norm(farthest)) or 1.0)
+    on_it = np.linalg.norm(apart - np.outer(apart @ along, along), axis=1) < _APART_MM
+    parallel = all(np.linalg.norm(np.cross(axis, along)) < _ACROSS for axis in axes)
+    if not any(faces) and parallel and on_it.all():
+        return "line", points[0], np.asarray(along)
+    return "point", points.mean(axis=0), None
+
+
+def freedoms(datums: Sequence[tuple[Probed, ...]]) -> tuple[str, ...]:
+    """What the datums leave free, in words; nothing where they fix the frame."""
+    points = np.concatenate([np.zeros((0, 3)), *(one.points for datum in datums for one in datum)])
+    centre = points.mean(axis=0) if len(points) else np.zeros(3)
+    size = float(np.abs(points - centre).max(initial=1.0))  # so that shifts and rotations are of one size
+    fixed = [_fixed(one, centre, size, alone=len(datum) == 1) for datum in datums for one in datum]
+    rows = np.concatenate([np.zeros((0, 6)), *fixed])
+    shifts, turns = _null(np.concatenate([rows, np.eye(6)[3:]]))[:, :3], _null(rows)[:, 3:]
+    return tuple(
+        f"{words} {axis}"
+        for words, motions in (("shift along", shifts), ("rotation about", turns))
+        for axis, moved in zip(AXES, np.linalg.norm(motions, axis=0), strict=True)
+        if moved > _FREE
+    )
+
+
+def _null(rows: Floats) -> Floats:
+    """(k, 6) orthonormal motions that the rows do not see."""
+    _, values, motions = np.linalg.svd(rows, full_matrices=True)
+    return np.asarray(motions[np.append(values, np.zeros(6))[:6] <= _FREE])
+
+
+def _fixed(one: Probed, centre: Floats, size: float, *, alone: bool) -> Floats:
+    """(r, 6) of what a feature fixes: shifts of it and rotations, of a motion (shift, rotation about the centre).
+
+    A point alone fixes all three shifts; in a common datum it holds the others' plane or face, along its normal.
+    """
+    arm = (np.array(one.facts.point_mm) - centre) / size
+    place = np.hstack([np.eye(3), np.cross(np.eye(3), arm).T])  # the shift of the feature's point is t + r × arm
+    if one.facts.kind == "point" and not alone:
+        return np.asarray(one.normals[:1] @ place)
+    if one.direction is None:
+        return place
+    across = np.linalg.svd(one.direction[None])[2][1:]
+    if one.facts.kind == "circle":  # its direction is nominal
+        return np.asarray(across @ place)
+    held = one.direction if one.facts.kind == "plane" else across
+    return np.vstack([held @ place, np.hstack([np.zeros((2, 3)), across])])
 
 
 def rotation(placing: PlacingFacts) -> Floats:
@@ -27,51 +134,43 @@ def rotation(placing: PlacingFacts) -> Floats:
     return np.asarray(about_z @ about_y @ about_x)
 
 
-def readings(feature: Probed, stylus: StylusFacts, facts: PartFile) -> Floats:
+def readings(feature: Probed, facts: PartFile) -> Floats:
     """(n, 3) what the scales read while a feature is probed, mm: of the ram's reference point, which is not at the tip.
 
     Where the job does not say where the part lies, it lies at the origin.
     """
+    stylus = facts.stylus_of(feature.facts)
     centres = feature.points + 0.5 * stylus.diameter_mm * feature.normals
-    origin = facts.placing.origin_mm or [0.0, 0.0, 0.0]
-    placed = centres @ rotation(facts.placing).T + origin
+    placed = centres @ rotation(facts.placing).T + (facts.placing.origin_mm or [0.0, 0.0, 0.0])
     return np.asarray(placed - stylus.offset_mm + np.array(facts.machine_state.origin_mm))
-
-
-# of a nominal orientation: what is off by more than a degree is another orientation than the drawing's
-_NEARLY = np.sin(np.radians(1.0))
-_FAR = 0.1  # share of a nominal size by which the middle of its limits may lie beside it, for fits
 
 
 def check_names(facts: PartFile, places: Places, wrong: Gathered) -> None:
     """Gather names that stand twice or lead nowhere."""
-    for table, named in (
-        ("stylus", facts.stylus),
-        ("feature", facts.feature),
-        ("characteristic", facts.characteristic),
-    ):
-        names = [one.name for one in named]
-        for i, name in enumerate(names):
-            if name in names[:i]:
+    names = {"stylus": [one.name for one in facts.stylus], "feature": [one.name for one in facts.feature],
+             "characteristic": [one.name for one in facts.characteristic]}  # fmt: skip
+    for table, own in names.items():
+        for i, name in enumerate(own):
+            if name in own[:i]:
                 wrong.add(CmmUqError(f"the {table} {name!r} stands there twice", where=places.of(table, "name", i),
                                      fix="Give each a name of its own"))  # fmt: skip
-    styli, features = [one.name for one in facts.stylus], [one.name for one in facts.feature]
+    styli, features = names["stylus"], names["feature"]
     for i, feature in enumerate(facts.feature):
+        where = places.of("feature", "stylus", i)
         if not feature.stylus and len(styli) > 1:
             said = f"there are {len(styli)} styli, and {feature.name!r} does not say which probes it"
-            where = places.of("feature", "stylus", i)
             wrong.add(CmmUqError(said, where=where, fix=f"Give stylus = {styli[0]!r} or another"))
-        _known([feature.stylus] if feature.stylus else [], styli, "stylus", places.of("feature", "stylus", i), wrong)
+        _known([feature.stylus] if feature.stylus else [], styli, "stylus", where, wrong)
     _datums(facts.alignment.datums, features, places.of("alignment", "datums"), wrong)
     for i, one in enumerate(facts.characteristic):
         _known(one.features, features, "feature", places.of("characteristic", "features", i), wrong)
         _datums(one.datums, features, places.of("characteristic", "datums", i), wrong)
-    order = facts.probing.order
-    _known(order, features, "feature", places.of("probing", "order"), wrong)
+    order, where = facts.probing.order, places.of("probing", "order")
+    _known(order, features, "feature", where, wrong)
     left = [name for name in features if name not in order]
     if order and (left or len(order) != len(features)):
         said = f"leaves {left[0]!r} out" if left else "names a feature twice"
-        wrong.add(CmmUqError(said, where=places.of("probing", "order"), fix="Name each feature once"))
+        wrong.add(CmmUqError(said, where=where, fix="Name each feature once"))
 
 
 def _known(names: Sequence[str], known: Sequence[str], what: str, where: str, wrong: Gathered) -> None:
@@ -92,9 +191,9 @@ def _datums(names: Sequence[str], known: Sequence[str], where: str, wrong: Gathe
             fix = "Leave the characteristic out, and name it in [part] not_measured" if condition else error.fix
             wrong.add(CmmUqError(problem, where=where, fix=fix))
             continue
-        twice = next((each for each in own if each in taken), None)
-        if twice is not None:
-            wrong.add(CmmUqError(f"{twice!r} stands in two of these datums", where=where, fix="Name it in one of them"))
+        if twice := [each for each in own if each in taken]:
+            fix = "Name it in one of them"
+            wrong.add(CmmUqError(f"{twice[0]!r} stands in two of these datums", where=where, fix=fix))
         taken += own
 
 
@@ -106,9 +205,8 @@ def check_plan(facts: PartFile, features: Mapping[str, Probed], places: Places, 
 
 
 def _tips(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
-    styli = {one.name: one for one in facts.stylus}
     for i, one in enumerate(facts.feature):
-        tip = styli[one.stylus or facts.stylus[0].name].diameter_mm
+        tip = facts.stylus_of(one).diameter_mm
         if one.inner and one.diameter_mm is not None and tip >= one.diameter_mm:
             yield CmmUqError(f"a tip of {tip:g} mm does not fit into {one.name!r}, a hole of {one.diameter_mm:g} mm",
                              where=places.of("feature", "diameter_mm", i), fix="Name a smaller stylus")  # fmt: skip
@@ -123,49 +221,36 @@ def _common_faces(facts: PartFile, features: Mapping[str, Probed], places: Place
     for table, number, datums in tables:
         for name in datums:
             own = _named(name, features)
-            if len(own) < 2 or name in told or as_one(own)[0] != "plane":
-                continue
-            if sum(len(one.points) for one in own) < FEWEST["plane"]:
+            few = sum(len(one.points) for one in own) < FEWEST["plane"]
+            if name not in told and len(own) > 1 and few and as_one(own)[0] == "plane":
                 told.add(name)
-                every = BETWEEN.join(datums)
                 yield CmmUqError(f"the datum {name!r} is on {len(own)} points of one face, which are no plane",
                                  where=places.of(table, "datums", number),
-                                 fix=f"Of targets (3-2-1) make one datum of all that fix the part: {every!r}, "
+                                 fix=f"Of targets (3-2-1) make one datum of all that fix the part: {BETWEEN.join(datums)!r}, "
                                      "or probe a line or a plane there")  # fmt: skip
 
 
 def _alignment(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
-    given = facts.alignment
-    if given.datums:
-        named = [_named(name, features) for name in given.datums]
-        if free := freedoms(named):
-            yield _unfixed(free, places.of("alignment", "datums"))
-        elif not freedoms(named[:-1]):
-            said = f"the datum {given.datums[-1]!r} fixes nothing: those before it fix the part already"
-            fix = f"Leave it out, or make one datum of all, that heeds each: {BETWEEN.join(given.datums)!r}"
-            yield CmmUqError(said, where=places.of("alignment", "datums"), fix=fix)
-    elif not given.best_fit:
-        asking = [(i, one) for i, one in enumerate(facts.characteristic) if one.asks.framed and not one.datums]
-        if asking:
-            i, one = asking[0]
-            yield CmmUqError(f"the {one.what} of {one.features[0]!r} has no datums, and there is no alignment",
-                             where=places.of("characteristic", "datums", i),
-                             fix="Give datums, or [alignment] datums = [\"…\", …] or best_fit = true")  # fmt: skip
-
-
-def _unfixed(free: Sequence[str], where: str) -> CmmUqError:
-    fix = (
-        "Add a feature that fixes it, as a plane, a line across it and a point (3-2-1); of a round part whose "
-        "characteristics all have datums of their own leave the alignment out"
-    )
-    return CmmUqError(f"these datums do not fix the part: they leave free {', '.join(free)}", where=where, fix=fix)
+    datums, where = facts.alignment.datums, places.of("alignment", "datums")
+    named = [_named(name, features) for name in datums]
+    asking = [(i, one) for i, one in enumerate(facts.characteristic) if one.asks.framed and not one.datums]
+    if datums and (free := freedoms(named)):
+        yield CmmUqError(f"these datums do not fix the part: they leave free {', '.join(free)}", where=where,
+                         fix="Add a feature that fixes it, as a plane, a line across it and a point (3-2-1); of a round part "
+                             "whose characteristics all have datums of their own leave the alignment out")  # fmt: skip
+    elif datums and not freedoms(named[:-1]):
+        said = f"the datum {datums[-1]!r} fixes nothing: those before it fix the part already"
+        fix = f"Leave it out, or make one datum of all, that heeds each: {BETWEEN.join(datums)!r}"
+        yield CmmUqError(said, where=where, fix=fix)
+    elif not datums and not facts.alignment.best_fit and asking:
+        i, one = asking[0]
+        yield CmmUqError(f"the {one.what} of {one.features[0]!r} has no datums, and there is no alignment",
+                         where=places.of("characteristic", "datums", i),
+                         fix="Give datums, or [alignment] datums = [\"…\", …] or best_fit = true")  # fmt: skip
 
 
 def _named(datum: str, features: Mapping[str, Probed]) -> tuple[Probed, ...]:
     return tuple(features[name] for name in members(datum, features))
-
-
-_Check = Callable[[CharacteristicFacts, Mapping[str, Probed]], tuple[str, str, str] | None]
 
 
 def _characteristics(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
@@ -175,18 +260,18 @@ def _characteristics(facts: PartFile, features: Mapping[str, Probed], places: Pl
             yield CmmUqError(problem, where=places.of("characteristic", key, i), fix=fix)
 
 
-def unfit(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
-    """What keeps a characteristic from being evaluated: the problem, the key, and what mends it."""
-    checks: tuple[_Check, ...] = (_of_its_kinds, _association, _nominal_orientation, _limits_of_the_value, _whole_frame)
+def unfit(one: CharacteristicFacts, features: Mapping[str, Probed]) -> Problem | None:
+    """What keeps a characteristic from being evaluated."""
+    checks = (_of_its_kinds, _association, _nominal_orientation, _limits_of_the_value, _whole_frame)
     return next((found for check in checks if (found := check(one, features))), None)
 
 
-def _of_its_kinds(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
+def _of_its_kinds(one: CharacteristicFacts, features: Mapping[str, Probed]) -> Problem | None:
     """That it is of features, and about datums, that can have it."""
-    alone = len(one.features) < one.asks.features
-    said_of, own = ("of one feature is of", one.asks.alone) if alone else ("is of", one.asks.kinds)
-    for names, kinds, key, of in (
-        (one.features, own, "features", said_of), (one.datums, one.asks.datum_kinds, "datums", "is about"),
+    asks, alone = one.asks, len(one.features) < one.asks.features
+    of_features = ("of one feature is of", asks.alone) if alone else ("is of", asks.kinds)
+    for names, key, (of, kinds) in (
+        (one.features, "features", of_features), (one.datums, "datums", ("is about", asks.datum_kinds)),
     ):  # fmt: skip
         for name in names:
             parts = _named(name, features)
@@ -198,7 +283,15 @@ def _of_its_kinds(one: CharacteristicFacts, features: Mapping[str, Probed]) -> t
     return None
 
 
-def _association(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
+# what a common datum is
+_AS_ONE = {
+    "line": "an axis",
+    "plane": "a plane",
+    "point": "neither one axis nor one plane by the nominals of its features",
+}
+
+
+def _association(one: CharacteristicFacts, features: Mapping[str, Probed]) -> Problem | None:
     """That its features can be made of their points as it says."""
     for name in one.features:
         kind = features[name].facts.kind
@@ -208,15 +301,7 @@ def _association(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tu
     return None
 
 
-_AS_ONE = {
-    "line": "an axis",
-    "plane": "a plane",
-    "point": "neither one axis nor one plane by the nominals of its features",
-}
-"""What a common datum is."""
-
-
-def _nominal_orientation(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
+def _nominal_orientation(one: CharacteristicFacts, features: Mapping[str, Probed]) -> Problem | None:
     """That what is to be parallel or perpendicular to its datum is so by its nominal."""
     if one.what not in ("parallelism", "perpendicularity"):
         return None
@@ -224,7 +309,7 @@ def _nominal_orientation(one: CharacteristicFacts, features: Mapping[str, Probed
     kind, _, direction = (own[0].facts.kind, None, own[0].direction) if len(own) == 1 else as_one(own)
     if feature.direction is None or direction is None:
         return None
-    one_normal = (feature.facts.kind in _NORMAL) != (kind in _NORMAL)
+    one_normal = (feature.facts.kind == "plane") != (kind == "plane")  # the direction of a plane is across what it is
     cosine = abs(float(feature.direction @ direction))
     sine = float(np.linalg.norm(np.cross(feature.direction, direction)))
     along = (one.what == "parallelism") != one_normal
@@ -236,50 +321,40 @@ def _nominal_orientation(one: CharacteristicFacts, features: Mapping[str, Probed
             'Mend a direction, or ask for "angularity"')  # fmt: skip
 
 
-_NORMAL = ("plane",)  # kinds whose direction is across what they are; a circle is told by its axis
-
-
-def _limits_of_the_value(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
+def _limits_of_the_value(one: CharacteristicFacts, features: Mapping[str, Probed]) -> Problem | None:
     """That limits of a size are limits of the size, not deviations from it."""
     nominal = features[one.features[0]].facts.diameter_mm
-    if one.what != "size" or nominal is None:
+    limits = [limit for limit in (one.lower_mm, one.upper_mm) if limit is not None]
+    if one.what != "size" or nominal is None or not limits:
         return None
-    given = [limit for limit in (one.lower_mm, one.upper_mm) if limit is not None]
-    if not given or abs(sum(given) / len(given) - nominal) <= _FAR * nominal:
+    if abs(sum(limits) / len(limits) - nominal) <= _FAR * nominal:
         return None
-    said = " to ".join(f"{limit:g}" for limit in given)
+    said = " to ".join(f"{limit:g}" for limit in limits)
     return (f"limits of {said} mm, where {one.features[0]!r} has a nominal diameter of {nominal:g} mm",
             "lower_mm" if one.lower_mm is not None else "upper_mm",
             "Give limits of the diameter itself, as 9.9 and 10.1, not deviations from it")  # fmt: skip
 
 
-def _whole_frame(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
+def _whole_frame(one: CharacteristicFacts, features: Mapping[str, Probed]) -> Problem | None:
     """That a place with datums of its own has a whole frame: a zone that may turn about its datums is not modelled."""
-    if not one.asks.framed or not one.datums:
+    if not one.asks.framed or not one.datums or not (free := freedoms([_named(name, features) for name in one.datums])):
         return None
-    free = freedoms([_named(name, features) for name in one.datums])
     said = (
         f"the {one.what} of {one.features[0]!r} is to datums that leave free {', '.join(free)}, which is not modelled"
     )
-    return (
-        (said, "datums", "Add a datum that fixes it, as the drawing's next one, or ask for a distance")
-        if free
-        else None
-    )
+    return said, "datums", "Add a datum that fixes it, as the drawing's next one, or ask for a distance"
 
 
 def _travel(facts: PartFile, features: Mapping[str, Probed], places: Places) -> Iterator[CmmUqError]:
     """That the axes reach every point: once an axis, by its farthest point."""
     if facts.placing.origin_mm is None:
         return
-    given, styli = facts.machine_state.travel_mm, {one.name: one for one in facts.stylus}
-    named = list(features.values())
-    read = [readings(one, styli[one.facts.stylus or facts.stylus[0].name], facts) for one in named]
-    every = np.concatenate([np.zeros((0, len(AXES))), *read])
-    owner = np.repeat(np.arange(len(named)), [len(one) for one in read])
-    travel = np.array([getattr(given, axis) or (np.nan, np.nan) for axis in AXES], dtype=np.float64)
-    for i, row in beyond_travel(every, travel):
-        name, (low, high) = named[owner[row]].facts.name, travel[i]
-        yield CmmUqError(f"axis {AXES[i]} would have to go to {every[row, i]:.6g} mm for {name!r}, and its travel is "
+    read = {name: readings(one, facts) for name, one in features.items()}
+    every = np.concatenate([np.zeros((0, len(AXES))), *read.values()])
+    owner = [name for name, own in read.items() for _ in own]
+    travel = [getattr(facts.machine_state.travel_mm, axis) or (np.nan, np.nan) for axis in AXES]
+    for i, row in beyond_travel(every, np.array(travel, dtype=np.float64)):
+        low, high = travel[i]
+        yield CmmUqError(f"axis {AXES[i]} would have to go to {every[row, i]:.6g} mm for {owner[row]!r}, and its travel is "
                          f"{low:g} to {high:g} mm", where=places.of("placing", "origin_mm"),
                          fix="Place the part elsewhere, or name another stylus")  # fmt: skip

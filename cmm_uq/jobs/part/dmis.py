@@ -18,41 +18,14 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.encodings import decoded, report_lines
 from cmm_uq.jobs.importing.reports import statements
+from cmm_uq.jobs.part import drawing as drawings, feature as refused
 from cmm_uq.jobs.part.characteristic import ASKS, What
-from cmm_uq.jobs.part.datums import BETWEEN
-from cmm_uq.jobs.part.dmis_frames import DmisFrame, numbers_of, reference, words_of
-from cmm_uq.jobs.part.drawing import (
-    Drawing,
-    Facts,
-    NotUnderstood,
-    NotUnderstoodError,
-    all_there,
-    limits,
-    refuse_other_kind,
-    usual_strategy,
-)
-from cmm_uq.jobs.part.feature import (
-    FREE_STATE,
-    LEAST_MATERIAL,
-    LINE_PROFILE,
-    MAXIMUM_MATERIAL,
-    POINT_PROFILE,
-    PROJECTED,
-    SCANNED,
-    SURFACE_PROFILE,
-    TWO_POINT,
-)
+from cmm_uq.jobs.part.checks import BETWEEN
+from cmm_uq.jobs.part.drawing import Drawing, Facts, NotUnderstood, NotUnderstoodError, numbers_of, reference, words_of
 
 MILLIMETRES = {"MM": 1.0, "CM": 10.0, "M": 1000.0, "INCH": 25.4, "FEET": 304.8}
 DEGREES = {"ANGDEC": 1.0, "ANGRAD": math.degrees(1.0)}
-KINDS = {
-    "POINT": "point",
-    "LINE": "line",
-    "PLANE": "plane",
-    "CIRCLE": "circle",
-    "SPHERE": "sphere",
-    "CYLNDR": "cylinder",
-}
+KINDS = {name.upper(): name for name in ("point", "line", "plane", "circle", "sphere")} | {"CYLNDR": "cylinder"}
 # that a feature has at least: its place, its direction, its diameter
 NUMBERS = {"point": 6, "line": 9, "plane": 6, "circle": 7, "sphere": 4, "cylinder": 7}
 
@@ -73,8 +46,9 @@ _TOLERANCES: Mapping[str, What] = {
 }  # fmt: skip
 
 _REFUSED: Mapping[str, str] = {
-    "PROFL": LINE_PROFILE, "PROFS": SURFACE_PROFILE, "PROFP": POINT_PROFILE, "MMC": MAXIMUM_MATERIAL, "LMC": LEAST_MATERIAL,
-    "LP": TWO_POINT, "FREE": FREE_STATE, "PROJ": PROJECTED,
+    "PROFL": refused.LINE_PROFILE, "PROFS": refused.SURFACE_PROFILE, "PROFP": refused.POINT_PROFILE,
+    "MMC": refused.MAXIMUM_MATERIAL, "LMC": refused.LEAST_MATERIAL, "LP": refused.TWO_POINT, "FREE": refused.FREE_STATE,
+    "PROJ": refused.PROJECTED,
 }  # fmt: skip
 """Words that change what a tolerance means, refused in words of their own."""
 
@@ -87,17 +61,16 @@ def toleranced(words: list[str], feature: Facts, millimetres: float, datums: Map
     if sort not in _TOLERANCES:
         raise NotUnderstoodError(_REFUSED.get(sort) or f"is a tolerance {sort or 'of no kind'}, which is not read")
     what, kind = _TOLERANCES[sort], feature["kind"]
-    refuse_other_kind(what, kind)
+    drawings.refuse_other_kind(what, kind)
     plain = [word.upper() for word in words[1:] if not reference(word)[0]]
-    refused = next((_REFUSED[word] for word in plain if word in _REFUSED), None)
-    if refused:
-        raise NotUnderstoodError(refused)
+    if why := next((_REFUSED[word] for word in plain if word in _REFUSED), None):
+        raise NotUnderstoodError(why)
     number = numbers_of([word for word in plain if word not in _PLAIN])
     if what == "size":
         if len(number) < 2:
             raise NotUnderstoodError("has a diameter without two limits, which is not read")
         low, high = (feature["diameter_mm"] + millimetres * limit for limit in number[:2])
-        return {"what": what, "features": [feature["name"]], **limits(what, low, high)}
+        return {"what": what, "features": [feature["name"]], **drawings.limits(what, low, high)}
     if what == "position" and ("3D" in plain) != (kind in ("point", "sphere")):
         said = "3D" if "3D" in plain else "2D"
         raise NotUnderstoodError(f"is a position in {said} of a {kind}, which is not read")
@@ -125,122 +98,113 @@ def _datum(label: str, datums: Mapping[str, str]) -> str:
 
 PROGRAM = "DMIS program"
 _LABELLED = re.compile(r"^(?P<of>\w+)\s*\((?P<name>[^)]*)\)\s*=\s*(?P<major>\w+)\s*/\s*(?P<rest>.*)$")
-_PLAIN_of_drawing_dmis = re.compile(r"^(?P<major>\w+)\s*(?:/\s*(?P<rest>.*))?$")
+_UNLABELLED = re.compile(r"^(?P<major>\w+)\s*(?:/\s*(?P<rest>.*))?$")
 
 
 def drawing_of_dmis(content: bytes, where: str) -> Drawing:
     """A DMIS program."""
     text, _ = decoded(content, where, None)
-    return _Program(where).read([
-        (line, statement.partition("$$")[0].strip()) for line, statement in statements(report_lines(text, where), where)
-    ])  # fmt: skip
+    said = statements(report_lines(text, where), where)
+    return _Program(where).whole([(line, statement.partition("$$")[0].strip()) for line, statement in said])
 
 
 class _Program:
     """What was said so far."""
 
     def __init__(self, where: str) -> None:
-        self.where, self.drawing = where, Drawing(PROGRAM)
-        self.frame = DmisFrame()
+        self.where = self.place = where
+        self.line, self.drawing, self.frame = 0, Drawing(PROGRAM), drawings.DmisFrame()
         self.nominal: dict[str, Facts] = {}
         self.tolerances: dict[str, tuple[int, list[str]]] = {}
         self.datums: dict[str, str] = {}
         self.styli: dict[str, Facts] = {}
-        self.mount = np.zeros(3)
-        self.stylus = ""
-        self.measuring: tuple[str, int, list[list[float]]] | None = None
+        self.mount, self.stylus = np.zeros(3), ""
+        self.measuring: tuple[str, list[list[float]]] | None = None
         self.given: list[tuple[int, str, str]] = []
-        self.scanning = False
-        self.scanned: set[str] = set()
+        self.scanning, self.scanned = False, set[str]()
+        self.read: Mapping[str, Callable[[list[str]], None]] = {
+            "SCNMOD": self._scanning, "PAMEAS": self._scanned, "UNITS": self._units, "SNSMNT": self._mounted,
+            "SNSLCT": self._selected, "MEAS": self._begun, "PTMEAS": self._point, "ENDMES": self._ended,
+            "DATDEF": self._datum, "OUTPUT": self._output, "EVAL": self._output, "CONST": self._constructed,
+        }  # fmt: skip
 
-    def read(self, said: list[tuple[int, str]]) -> Drawing:
-        for line, statement in said:
+    def whole(self, said: list[tuple[int, str]]) -> Drawing:
+        for self.line, statement in said:
             if statement:
-                self._one(line, statement)
+                self._one(statement)
         for line, feature, tolerance in self.given:
             self._characteristic(line, feature, tolerance)
         self._left_over()
-        self.drawing.styli = [self.styli[name] for name in dict.fromkeys(one["stylus"] for one in self.drawing.features)
-                              if name in self.styli]  # fmt: skip
+        used = dict.fromkeys(one["stylus"] for one in self.drawing.features)
+        self.drawing.styli = [self.styli[name] for name in used if name in self.styli]
         self.drawing.datums = list(dict.fromkeys(self.datums.values()))
         return self.drawing
 
-    def _one(self, line: int, statement: str) -> None:
-        labelled, plain = _LABELLED.match(statement), _PLAIN_of_drawing_dmis.match(statement)
-        place = f"{self.where} line {line}"
-        try:
+    def _one(self, statement: str) -> None:
+        labelled, plain = _LABELLED.match(statement), _UNLABELLED.match(statement)
+        self.place = f"{self.where} line {self.line}"
+        with self.drawing.understanding(labelled["name"].strip() if labelled else statement[:60], self.place):
             if labelled:
-                self._labelled(labelled, line, place)
-            elif plain:
-                self._plain(plain["major"].upper(), words_of(plain["rest"] or ""), line, place)
-            else:
+                self._labelled(labelled)
+                return
+            if plain is None:
                 raise NotUnderstoodError("is no statement of DMIS that is read")
-        except NotUnderstoodError as error:
-            name = labelled["name"].strip() if labelled else statement[:60]
-            self.drawing.unknown.append(NotUnderstood(name, str(error), place))
+            major = plain["major"].upper()
+            if major in self.read:
+                self.read[major](words_of(plain["rest"] or ""))
+            elif major not in PASSED:
+                raise NotUnderstoodError(f"is a statement {major}, which is not read")
 
-    def _labelled(self, found: re.Match[str], line: int, place: str) -> None:
+    def _labelled(self, found: re.Match[str]) -> None:
         of, name, major = found["of"].upper(), found["name"].strip(), found["major"].upper()
         words = words_of(found["rest"])
         if of == "F" and major == "FEAT":
             self.nominal[name] = self._feature(name, words)
         elif of == "T" and major == "TOL":
-            self.tolerances[name] = (line, words)
+            self.tolerances[name] = (self.line, words)
         elif of == "S" and major == "SNSDEF":
             self.styli[name] = self._stylus(name, words)
         elif of == "D":
-            self._frame(major, words, place)
+            self._frame(major, words)
         elif of not in PASSED and major not in PASSED:
             raise NotUnderstoodError(f"is a statement {of}(…)={major}/, which is not read")
 
-    def _plain(self, major: str, words: list[str], line: int, place: str) -> None:
-        read: Mapping[str, Callable[[list[str], int, str], None]] = {
-            "SCNMOD": self._scanning, "PAMEAS": self._scanned, "UNITS": self._units, "SNSMNT": self._mounted,
-            "SNSLCT": self._selected, "MEAS": self._begun, "PTMEAS": self._point, "ENDMES": self._ended,
-            "DATDEF": self._datum, "OUTPUT": self._output, "EVAL": self._output, "CONST": self._constructed,
-        }  # fmt: skip
-        if major in read:
-            read[major](words, line, place)
-        elif major not in PASSED:
-            raise NotUnderstoodError(f"is a statement {major}, which is not read")
+    def _unknown(self, name: str, why: str, place: str = "") -> None:
+        self.drawing.unknown.append(NotUnderstood(name, why, place or self.place))
 
-    def _units(self, words: list[str], line: int, place: str) -> None:
+    def _units(self, words: list[str]) -> None:
         length, angle = (*words, "ANGDEC")[:2]
         if length.upper() not in MILLIMETRES or angle.upper() not in DEGREES:
-            raise CmmUqError(f"UNITS/{','.join(words)} is not read", where=place,
+            raise CmmUqError(f"UNITS/{','.join(words)} is not read", where=self.place,
                              fix=f"Write it in {', '.join(MILLIMETRES)} and {' or '.join(DEGREES)}")  # fmt: skip
         if self.nominal:
-            raise CmmUqError(
-                "the unit changes after features were defined", where=place, fix="Say UNITS once, at first"
-            )
+            said = "the unit changes after features were defined"
+            raise CmmUqError(said, where=self.place, fix="Say UNITS once, at first")
         self.frame = replace(self.frame, millimetres=MILLIMETRES[length.upper()], degrees=DEGREES[angle.upper()])
 
     def _feature(self, name: str, words: list[str]) -> Facts:
         sort = words[0].upper() if words else ""
         if sort not in KINDS:
             raise NotUnderstoodError(f"is a feature {sort or 'of no kind'}, which is not read")
-        kind, rest = KINDS[sort], words[1:]
-        found: Facts = {"name": name, "kind": kind}
-        sides = [word.upper() for word in rest if word.upper() in ("INNER", "OUTER", "BND", "UNBND")]
-        if "CART" not in (word.upper() for word in rest):
+        kind, said = KINDS[sort], [word.upper() for word in words[1:]]
+        sides = [word for word in said if word in ("INNER", "OUTER", "BND", "UNBND")]
+        if "CART" not in said:
             raise NotUnderstoodError("is not given in Cartesian coordinates, which alone are read")
-        number = numbers_of([word for word in rest if word.upper() not in (*sides, "CART")])
+        number = numbers_of([word for word in words[1:] if word.upper() not in (*sides, "CART")])
         if "BND" in sides:
             raise NotUnderstoodError("is a line with ends (BND), which is not read")
         if len(number) < NUMBERS[kind]:
             raise NotUnderstoodError(f"has {len(number)} of the {NUMBERS[kind]} numbers that a {kind} has")
-        return found | self._nominal(kind, number) | _side(kind, sides)
-
-    def _nominal(self, kind: str, number: list[float]) -> Facts:
-        found: Facts = {"point_mm": self.frame.place(number[:3])}
+        found: Facts = {"name": name, "kind": kind, "point_mm": self.frame.place(number[:3])}
         if kind != "sphere":
             found["direction"] = self.frame.vector(number[3:6])
         if kind == "line":
             found["normal"] = self.frame.vector(number[6:9])
-        if kind in ("circle", "cylinder"):
-            found["diameter_mm"] = self.frame.millimetres * number[6]
-        if kind == "sphere":
-            found["diameter_mm"] = self.frame.millimetres * number[3]
+        if kind in ("circle", "sphere", "cylinder"):
+            found["diameter_mm"] = self.frame.millimetres * number[3 if kind == "sphere" else 6]
+            if not {"INNER", "OUTER"} & set(sides):
+                raise NotUnderstoodError("does not say INNER or OUTER")
+            found["inner"] = "INNER" in sides
         return found
 
     def _stylus(self, name: str, words: list[str]) -> Facts:
@@ -252,57 +216,54 @@ class _Program:
             raise NotUnderstoodError("does not give direction, length and diameter of its tip")
         if any(number[:-5]):
             raise NotUnderstoodError("is turned by the angles of a wrist, which is not read")
-        along, length, diameter = np.array(number[-5:-2]), number[-2], number[-1]
-        offset = self.mount + self.frame.millimetres * length * along
+        *along, length, diameter = number[-5:]
+        offset = self.mount + self.frame.millimetres * length * np.array(along)
         return {"name": name, "diameter_mm": self.frame.millimetres * diameter, "offset_mm": offset.tolist()}
 
-    def _mounted(self, words: list[str], line: int, place: str) -> None:
+    def _mounted(self, words: list[str]) -> None:
         upper = [word.upper() for word in words]
         if "MNTLEN" in upper:
             number = numbers_of(words[upper.index("MNTLEN") + 1 :][:3])
             self.mount = self.frame.millimetres * np.array((*number, 0.0, 0.0, 0.0)[:3])
 
-    def _selected(self, words: list[str], line: int, place: str) -> None:
-        _, name = reference(words[0] if words else "")
+    def _selected(self, words: list[str]) -> None:
+        self.stylus = name = reference(words[0] if words else "")[1]
         if name not in self.styli:
             self.styli[name] = {"name": name, "diameter_mm": 0.0}
-            self.stylus = name
             raise NotUnderstoodError(
                 f"selects {name!r}, which this program does not define: its tip is taken as a point"
             )
-        self.stylus = name
 
-    def _scanning(self, words: list[str], line: int, place: str) -> None:
+    def _scanning(self, words: list[str]) -> None:
         self.scanning = bool(words) and words[0].upper() == "ON"
 
-    def _scanned(self, words: list[str], line: int, place: str) -> None:
+    def _scanned(self, words: list[str]) -> None:
         if self.measuring is not None:
             self.scanned.add(self.measuring[0])
 
-    def _begun(self, words: list[str], line: int, place: str) -> None:
+    def _begun(self, words: list[str]) -> None:
         _, name = reference(words[1] if len(words) > 1 else "")
         if name not in self.nominal:
             raise NotUnderstoodError(f"measures {name!r}, which is not read")
         if not self.stylus:
             self.stylus = "stylus"
             self.styli[self.stylus] = {"name": self.stylus, "diameter_mm": 0.0}
-            self.drawing.unknown.append(NotUnderstood("stylus", "is not said: its tip is taken as a point", place))
-        self.measuring = (name, line, [])
+            self._unknown("stylus", "is not said: its tip is taken as a point")
+        self.measuring = (name, [])
 
-    def _point(self, words: list[str], line: int, place: str) -> None:
+    def _point(self, words: list[str]) -> None:
         if self.measuring is None:
             return
         if not words or words[0].upper() != "CART":
             raise NotUnderstoodError("is a point that is not given in Cartesian coordinates")
-        self.measuring[2].append(self.frame.place(numbers_of(words[1:4])))
+        self.measuring[1].append(self.frame.place(numbers_of(words[1:4])))
 
-    def _ended(self, words: list[str], line: int, place: str) -> None:
+    def _ended(self, words: list[str]) -> None:
         if self.measuring is None:
             return
-        name, _, points = self.measuring
-        self.measuring = None
+        (name, points), self.measuring = self.measuring, None
         if name in self.scanned or self.scanning:
-            self.drawing.unknown.append(NotUnderstood(name, SCANNED, place))
+            self._unknown(name, refused.SCANNED)
             return
         found: Facts = {**self.nominal[name], "stylus": self.stylus}
         if found["kind"] == "point":
@@ -310,7 +271,7 @@ class _Program:
         elif points:
             found["points_mm"] = points
         else:
-            found["strategy"] = usual_strategy(found["kind"])
+            found["strategy"] = drawings.usual_strategy(found["kind"])
             if found["kind"] == "plane":
                 found |= {"length_mm": 20.0, "width_mm": 20.0}
             elif found["kind"] in ("line", "cylinder"):
@@ -320,71 +281,59 @@ class _Program:
             raise NotUnderstoodError(f"measures {name!r} a second time, which is not read")
         self.drawing.features.append(found)
 
-    def _datum(self, words: list[str], line: int, place: str) -> None:
-        features = [name for of, name in map(reference, words) if of in ("FA", "F")]
-        labels = [name for of, name in map(reference, words) if of == "DAT"]
+    def _datum(self, words: list[str]) -> None:
+        features, labels = _named(words, "FA", "F"), _named(words, "DAT")
         if len(labels) == 1 and len(features) > 1:
-            self.datums[labels[0]] = BETWEEN.join(features)
-            return
-        for feature, label in zip(features, labels, strict=False):
-            self.datums[label] = feature
+            features = [BETWEEN.join(features)]
+        self.datums |= dict(zip(labels, features, strict=False))
 
-    def _constructed(self, words: list[str], line: int, place: str) -> None:
-        _, name = reference(words[1] if len(words) > 1 else "")
-        self.drawing.unknown.append(NotUnderstood(name, "is constructed of other features, which is not read", place))
+    def _constructed(self, words: list[str]) -> None:
+        name = reference(words[1] if len(words) > 1 else "")[1]
+        self._unknown(name, "is constructed of other features, which is not read")
 
-    def _output(self, words: list[str], line: int, place: str) -> None:
-        references = [reference(word) for word in words]
-        features = [name for of, name in references if of in ("FA", "F")]
-        tolerances = [name for of, name in references if of in ("TA", "T")]
-        for tolerance in tolerances:
-            self.given += [(line, feature, tolerance) for feature in features[:1]]
+    def _output(self, words: list[str]) -> None:
+        feature = _named(words, "FA", "F")[:1]
+        self.given += [(self.line, name, tolerance) for tolerance in _named(words, "TA", "T") for name in feature]
 
     def _characteristic(self, line: int, feature: str, tolerance: str) -> None:
-        place = f"{self.where} line {line}"
-        try:
+        features = {one["name"]: one for one in self.drawing.features}
+        known = tolerance in self.tolerances and feature in features
+        place = f"{self.where} line {self.tolerances[tolerance][0] if known else line}"
+        with self.drawing.understanding(tolerance, place):
             if tolerance not in self.tolerances:
                 raise NotUnderstoodError("is a tolerance that is not defined")
-            features = {one["name"]: one for one in self.drawing.features}
             if feature not in features:
                 raise NotUnderstoodError(f"is a tolerance of {feature!r}, which is not read")
-            place = f"{self.where} line {self.tolerances[tolerance][0]}"
-            datums = {label: name for label, name in self.datums.items() if all_there([name], features)}
+            datums = {label: name for label, name in self.datums.items() if drawings.all_there([name], features)}
             found = toleranced(self.tolerances[tolerance][1], features[feature], self.frame.millimetres, datums)
             same = [one["name"] for one in self.drawing.characteristics]
             name = tolerance if tolerance not in same else f"{tolerance} {feature}"
             self.drawing.characteristics.append({"name": name, **found})
-        except NotUnderstoodError as error:
-            self.drawing.unknown.append(NotUnderstood(tolerance, str(error), place))
 
     def _left_over(self) -> None:
         """Features that are never measured, and tolerances that are never given to a feature."""
         told = {one.name for one in self.drawing.unknown} | {one["name"] for one in self.drawing.features}
         for name in self.nominal:
             if name not in told:
-                self.drawing.unknown.append(NotUnderstood(name, "is a feature that is not measured", self.where))
+                self._unknown(name, "is a feature that is not measured", self.where)
         given = {tolerance for _, _, tolerance in self.given}
         for name, (line, _) in self.tolerances.items():
             if name not in given:
-                self.drawing.unknown.append(
-                    NotUnderstood(name, "is a tolerance without a feature", f"{self.where} line {line}")
-                )
+                self._unknown(name, "is a tolerance without a feature", f"{self.where} line {line}")
 
-    def _frame(self, major: str, words: list[str], place: str) -> None:
+    def _frame(self, major: str, words: list[str]) -> None:
         """Follow a change of frame; before the first feature it is the machine's, and places the part."""
         label = reference(words[0])[1] if words else ""
         try:
             self.frame = self.frame.changed(major, words, self.nominal, self.datums.get(label, label))
         except NotUnderstoodError as error:
-            raise CmmUqError(f"a frame {error}, which is not read: what follows would stand in no frame", where=place,
-                             fix="Write the program with all its features in one frame") from None  # fmt: skip
+            said = f"a frame {error}, which is not read: what follows would stand in no frame"
+            fix = "Write the program with all its features in one frame"
+            raise CmmUqError(said, where=self.place, fix=fix) from None
         if not self.nominal:
             self.frame = replace(self.frame, axes=np.eye(3), origin=np.zeros(3))
 
 
-def _side(kind: str, sides: list[str]) -> Facts:
-    if kind not in ("circle", "sphere", "cylinder"):
-        return {}
-    if not {"INNER", "OUTER"} & set(sides):
-        raise NotUnderstoodError("does not say INNER or OUTER")
-    return {"inner": "INNER" in sides}
+def _named(words: list[str], *of: str) -> list[str]:
+    """Names to which words refer that are of these sorts."""
+    return [name for sort, name in map(reference, words) if sort in of]

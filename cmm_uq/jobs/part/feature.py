@@ -1,12 +1,7 @@
-"""``[[feature]]`` and ``[form]``: where a feature is meant to be, where it is probed, and what is not modelled.
+"""``[[feature]]`` and ``[form]``: where a feature is meant to be, where it is probed, and how its surface may deviate.
 
-What drawings ask for and programs do that is not modelled: refused by its name, in the words that are said once here.
-
-What is said follows the name of a feature or of a characteristic.
-
-``[[feature]]``: where a feature is meant to be, and where it is probed.
-
-Coordinates are those of the part, mm, at 20 °C. What each kind needs, and what none of its kind has, is said here once.
+Coordinates are those of the part, mm, at 20 °C. What drawings ask for and programs do that is not modelled is refused by its
+name, in the words that are said once here, to follow the name of a feature or of a characteristic.
 """
 
 from __future__ import annotations
@@ -45,9 +40,8 @@ class FormFacts(JobTable):
     def _numbers_of_lobes(self) -> Self:
         for key in self.harmonics_um:
             if not _COUNT.fullmatch(key) or int(key) < FEWEST_UNDULATIONS:
-                raise ValueError(
-                    f"harmonics_um has {key!r}: give numbers of lobes from {FEWEST_UNDULATIONS}, as {{ 3 = 0.5 }}"
-                )
+                least = FEWEST_UNDULATIONS
+                raise ValueError(f"harmonics_um has {key!r}: give numbers of lobes from {least}, as {{ 3 = 0.5 }}")
         return self
 
 
@@ -157,13 +151,7 @@ _ONLY: Mapping[str, Callable[[Kind, Pattern], bool]] = {
 
 Count = Annotated[int, Field(ge=1, le=LISTED.most)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
-NONE_OF_LENGTH = 1e-9  # length of a vector below which it has no direction
-
-
-def _a_direction(vector: list[float] | None) -> list[float] | None:
-    if vector is not None and math.hypot(*vector) < NONE_OF_LENGTH:
-        raise ValueError(f"{vector} has no direction: give three components that are not all 0")
-    return vector
+_NONE_OF_LENGTH = 1e-9  # length of a vector below which it has no direction
 
 
 class Strategy(JobTable):
@@ -260,7 +248,9 @@ class FeatureFacts(JobTable):
     @field_validator("direction", "along", "normal")
     @classmethod
     def _directions(cls, vector: list[float] | None) -> list[float] | None:
-        return _a_direction(vector)
+        if vector is not None and math.hypot(*vector) < _NONE_OF_LENGTH:
+            raise ValueError(f"{vector} has no direction: give three components that are not all 0")
+        return vector
 
     @model_validator(mode="after")
     def _keys_of_its_kind(self) -> Self:
@@ -290,33 +280,28 @@ class FeatureFacts(JobTable):
         return self
 
     @model_validator(mode="after")
-    def _extent_of_the_pattern(self) -> Self:
-        if self.strategy is None or self.kind in ("point", "circle", "sphere"):
-            return self._pattern_of_its_kind()
-        if self.kind == "plane":
-            self._extent_of_a_plane(self.strategy)
-        elif self.length_mm is None:
-            raise ValueError(f"a {self.kind} that is probed by a pattern needs length_mm")
-        return self._pattern_of_its_kind()
-
     def _pattern_of_its_kind(self) -> Self:
-        if self.strategy is not None and self.strategy.pattern not in PATTERNS[self.kind]:
-            raise ValueError(
-                f"a {self.kind} is not probed by the pattern {self.strategy.pattern!r}: "
-                f"give one of {', '.join(PATTERNS[self.kind])}"
-            )
-        if (found := self.strategy) is not None:
-            for key in sorted(found.model_fields_set & set(_ONLY)):
-                if not _ONLY[key](self.kind, found.pattern):
-                    raise ValueError(f"the pattern {found.pattern!r} of a {self.kind} has no {key}: leave it out")
+        if (strategy := self.strategy) is None:
+            return self
+        pattern = strategy.pattern
+        if self.kind == "plane":
+            self._check_extent_of_a_plane(pattern)
+        elif self.kind in KEYS["length_mm"] and self.length_mm is None:
+            raise ValueError(f"a {self.kind} that is probed by a pattern needs length_mm")
+        if pattern not in PATTERNS[self.kind]:
+            known = ", ".join(PATTERNS[self.kind])
+            raise ValueError(f"a {self.kind} is not probed by the pattern {pattern!r}: give one of {known}")
+        for key in sorted(strategy.model_fields_set & set(_ONLY)):
+            if not _ONLY[key](self.kind, pattern):
+                raise ValueError(f"the pattern {pattern!r} of a {self.kind} has no {key}: leave it out")
         return self
 
-    def _extent_of_a_plane(self, strategy: Strategy) -> None:
+    def _check_extent_of_a_plane(self, pattern: Pattern) -> None:
         square, disk = self.length_mm is not None and self.width_mm is not None, self.diameter_mm is not None
-        if strategy.pattern == "grid" and not square:
+        if pattern == "grid" and not square:
             raise ValueError("a plane that is probed by a grid needs length_mm and width_mm")
-        if strategy.pattern in ("circles", "spiral") and not disk:
-            raise ValueError(f"a plane that is probed by the pattern {strategy.pattern!r} needs diameter_mm")
+        if pattern in ("circles", "spiral") and not disk:
+            raise ValueError(f"a plane that is probed by the pattern {pattern!r} needs diameter_mm")
         if square == disk:
             raise ValueError("a plane has either length_mm and width_mm, or diameter_mm")
         if self.inner_diameter_mm is not None and not 0 < self.inner_diameter_mm < (self.diameter_mm or 0.0):

@@ -1,7 +1,4 @@
-"""From the folder of a part's job to a :class:`PartJob`.
-
-What a new job of a part begins with: a plate with a bore, on three datum planes; every figure is an example.
-"""
+"""From the folder of a part's job to a :class:`PartJob`, and what a new job of a part begins with."""
 
 from __future__ import annotations
 
@@ -86,15 +83,15 @@ def files_of_the_machine(facts: MachineStateFacts, source: JobFiles) -> tuple[st
     name = facts.certificate.removesuffix("/")
     if name.lower().endswith(_WHOLE):
         return (name,)
-    folder = name.rpartition("/")[0] if name.lower().endswith(".json") else name
-    certificates = (
-        () if folder != name else tuple(one for one in _CERTIFICATES if source.has(f"{folder}/{one}", written=True))
-    )
-    results = f"{folder}/{RESULTS}" if folder == name else name
+    if name.lower().endswith(".json"):
+        folder, results, certificates = name.rpartition("/")[0], name, list[str]()
+    else:
+        folder, results = name, f"{name}/{RESULTS}"
+        certificates = [each for one in _CERTIFICATES if source.has(each := f"{name}/{one}", written=True)]
     if certificates and not source.has(results, written=True):
-        return (f"{folder}/{certificates[0]}",)
-    drawn = facts.posterior or _beside(folder, _posterior_named(source, results))
-    return (results, drawn, *(f"{folder}/{one}" for one in certificates))
+        return (certificates[0],)
+    drawn = facts.posterior or f"{folder}/{_posterior_named(source, results)}".lstrip("/")
+    return (results, drawn, *certificates)
 
 
 def _posterior_named(source: JobFiles, results: str) -> str:
@@ -104,10 +101,6 @@ def _posterior_named(source: JobFiles, results: str) -> str:
     except (CmmUqError, OSError, ValueError, KeyError, TypeError, RecursionError):
         return POSTERIOR
     return named if isinstance(named, str) and "/" not in named else POSTERIOR
-
-
-def _beside(folder: str, name: str) -> str:
-    return f"{folder}/{name}" if folder else name
 
 
 def _read(source: JobFiles, *, machine: bool) -> PartJob:
@@ -128,19 +121,20 @@ def _read(source: JobFiles, *, machine: bool) -> PartJob:
     check_plan(facts, {one.facts.name: one for one in features}, places, wrong)
     wrong.refuse()
     inputs, stated_by = {"job.toml": content}, files_of_the_machine(facts.machine_state, source) if machine else ()
-    if machine:
-        fix = f"Put the machine's certificate (PDF) or its report's files there, or mend its name in {path}: [machine_state]"
-        for name in stated_by:
-            with wrong.going_on():
-                inputs[name] = source.content(name, TABLE_BYTES, fix, written=True)
-
+    fix = (
+        f"Put the machine's certificate (PDF) or its report's files there, or mend its name in {path}: [machine_state]"
+    )
+    for name in stated_by:
+        with wrong.going_on():
+            inputs[name] = source.content(name, TABLE_BYTES, fix, written=True)
+    beside = f"Put it beside job.toml, or mend its name in {path}"
     if logo := facts.laboratory.logo:
         with wrong.going_on():
-            inputs[logo] = source.content(logo, LOGO_BYTES, f"Put it beside job.toml, or mend its name in {path}")
+            inputs[logo] = source.content(logo, LOGO_BYTES, beside)
             checked_logo(inputs[logo], str(folder / logo))
 
     def recorded(name: str) -> tuple[bytes, str]:
-        inputs[name] = source.content(name, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {path}")
+        inputs[name] = source.content(name, TABLE_BYTES, beside)
         check_mark(folder, facts.job.origin, inputs[name], str(folder / name))
         return inputs[name], str(folder / name)
 
@@ -159,10 +153,8 @@ _GRID = {"pattern": "grid", "rows": 3, "columns": 4, "margin_mm": 5.0}
 def _plane(
     name: str, point: list[float], direction: list[float], along: list[float], length: float, width: float
 ) -> Any:
-    return {
-        "name": name, "kind": "plane", "point_mm": point, "direction": direction, "along": along, "length_mm": length,
-        "width_mm": width, "strategy": _GRID,
-    }  # fmt: skip
+    return {"name": name, "kind": "plane", "point_mm": point, "direction": direction, "along": along,
+            "length_mm": length, "width_mm": width, "strategy": _GRID}  # fmt: skip
 
 
 TABLES: Mapping[str, Any] = MappingProxyType({
@@ -192,4 +184,4 @@ TABLES: Mapping[str, Any] = MappingProxyType({
         {"name": "5", "what": "distance", "features": ["bore", "B"], "lower_mm": 39.95, "upper_mm": 40.05},
     ],
 })  # fmt: skip
-"""Tables of job.toml but ``[job]``."""
+"""Tables of job.toml but ``[job]``: a plate with a bore, on three datum planes; every figure is an example."""

@@ -9,37 +9,18 @@ feature, the feature that is named as the datum is taken (``A``, ``DATUM A``, ``
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from xml.etree.ElementTree import Element, SubElement
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.documents import child
+from cmm_uq.jobs.importing.documents import child, three
 from cmm_uq.jobs.importing.encodings import local, root_of
+from cmm_uq.jobs.part import drawing as drawings, feature as refused
 from cmm_uq.jobs.part.characteristic import ASKS, What
-from cmm_uq.jobs.part.drawing import (
-    Drawing,
-    Facts,
-    NotUnderstood,
-    NotUnderstoodError,
-    limits,
-    refuse_other_kind,
-    usual_strategy,
-)
-from cmm_uq.jobs.part.feature import SCANNED
-from cmm_uq.jobs.part.qif_elements import (
-    SORTS,
-    QifUnits,
-    datums_of,
-    direction,
-    inside,
-    is_inner,
-    numbers_in,
-    referred,
-    refuse_besides,
-    refuse_condition,
-    refuse_zone,
-)
+from cmm_uq.jobs.part.checks import BETWEEN
+from cmm_uq.jobs.part.drawing import Facts, NotUnderstoodError, inside, listed, number_of, text, whole_text
 
 PROGRAM = "QIF plan"
 _KINDS = ("Point", "Line", "Plane", "Circle", "Sphere", "Cylinder", "Cone")
@@ -54,16 +35,44 @@ _ASSOCIATIONS = {
     "LEASTSQUARES": "least_squares", "MINMAX": "minimum_zone", "MAXINSCRIBED": "maximum_inscribed",
     "MINCIRCUMSCRIBED": "minimum_circumscribed",
 }  # fmt: skip
-
-
-def drawing_of_qif(content: bytes, where: str) -> Drawing:
-    """A QIF plan."""
-    return _Document(root_of(content, where), where).drawing()
-
-
+# kinds of characteristics that are refused in words of their own, by the beginning of the element's name
+_SORTS: Mapping[str, str] = {
+    "PointProfile": refused.POINT_PROFILE, "LineProfile": refused.LINE_PROFILE,
+    "SurfaceProfile": refused.SURFACE_PROFILE, "SurfaceProfileNonUniform": refused.SURFACE_PROFILE,
+}  # fmt: skip
+# elements that are read, or that leave the characteristic as it is
+_READ = (
+    "ToleranceValue", "Tolerance", "DatumReferenceFrameId", "MaterialCondition", "ZoneShape", "StatisticalCharacteristic",
+    "Attributes", "DimensionType", "Name", "Description", "NonTolerance", "SeparateZone", "SizeCharacteristicDefinitionId",
+    "UUID", "QPId", "CharacteristicDefinitionId", "TargetValue", "Direction", "AnalysisMode", "AnalysisVector", "Angle",
+    "FeatureNominalIds", "FeatureNominalPairs", "CharacteristicDesignator", "CoordinateSystemId", "EntityInternalIds",
+    "EntityExternalIds", "NotedIds", "Notes", "ScopeIds", "WorkInstructions", "KeyCharacteristic", "TargetValueCalculation",
+)  # fmt: skip
+_NAMED: Mapping[str, str] = {
+    "FreeState": refused.FREE_STATE,
+    "ProjectedToleranceZone": refused.PROJECTED,
+    "ProjectedToleranceZoneValue": refused.PROJECTED,
+    "TangentPlane": 'is of a tangent plane: give its feature association = "tangent" by hand',
+    "SecondCompositeSegmentPositionDefinition": "is a composite tolerance of several segments, which is not read",
+    "UnequallyDisposedZone": "has an unequally disposed zone, which is not modelled",
+    "DirectionalZoneLimit": "has a zone of one direction, which is not read",
+    "FeatureZoneIds": "is of a restricted zone of its feature, which is not read",
+}
+_PLAIN = ("", "NONE", "REGARDLESS", "NOT_APPLICABLE")  # material conditions that leave a tolerance or a datum as it is
 _LENGTH_MM = 20.0  # of a plane or line whose length is not said: an example
 # ends of the names of elements that a plan or a model is made of; statistics, rules and resources have none
 _FEATURES = ("FeatureItem", "FeatureNominal")
+
+
+def drawing_of_qif(content: bytes, where: str) -> drawings.Drawing:
+    return _Document(root_of(content, where), where).read()
+
+
+def _direction(element: Element, name: str, place: str) -> list[float]:
+    text = child(element, name)
+    if not text:
+        raise NotUnderstoodError("does not say its direction or normal")
+    return [number_of(word) for word in three(text, place)]
 
 
 class _Document:
@@ -73,32 +82,36 @@ class _Document:
         if not any(local(element).endswith(_FEATURES) for element in root.iter()):
             raise CmmUqError("is of no feature: it has neither FeatureItem nor FeatureNominal", where=where,
                              fix="Export the plan, or the model with its product information (PMI)")  # fmt: skip
-        self.units = QifUnits(root, where)
-        self.root, self.where = root, where
+        self.units, self.root, self.where, self.drawing = (
+            drawings.QifUnits(root, where),
+            root,
+            where,
+            drawings.Drawing(PROGRAM),
+        )
         self.by_id = {element.get("id", ""): element for element in root.iter() if element.get("id")}
+        # names of features that are read, by the number of their item, and of their nominal
         self.names: dict[str, str] = {}
         self.of_nominal: dict[str, str] = {}
-        self.drawing_ = Drawing(PROGRAM)
 
-    def drawing(self) -> Drawing:
+    def read(self) -> drawings.Drawing:
         """Features first: characteristics name them."""
         planned = list(self._all("FeatureItem"))
         labels = {} if planned else self._asked()
         for item in planned or [one for one in self._all("FeatureNominal") if one.get("id", "") in labels]:
             self._named(item, "feature", self._feature, labels.get(item.get("id", ""), ""))
         for item in self._all("CharacteristicItem" if planned else "CharacteristicNominal"):
-            ids = numbers_in(inside(item, "FeatureNominalIds"))
-            if planned or len(ids) < 2 or self._features_of(item) > 1:
+            ids = listed(inside(item, "FeatureNominalIds"))
+            what = _WHATS.get(local(item).removesuffix("CharacteristicNominal"))
+            if planned or len(ids) < 2 or (what is not None and ASKS[what].features > 1):
                 self._named(item, "characteristic", self._characteristic)
                 continue
             for number in ids:  # a pattern of features: each of them
                 one = copy(item)
                 for group in [each for each in one if local(each) == "FeatureNominalIds"]:
                     one.remove(group)
-                    only = SubElement(one, "FeatureNominalIds")
-                    SubElement(only, "Id").text = number
+                    SubElement(SubElement(one, "FeatureNominalIds"), "Id").text = number
                 self._named(one, "characteristic", self._characteristic, f"{child(item, 'Name')} {number}".strip())
-        return self.drawing_
+        return self.drawing
 
     def _asked(self) -> dict[str, str]:
         """Numbers of nominal features that a datum or a characteristic is of, with the label of their datum."""
@@ -112,98 +125,94 @@ class _Document:
     def _numbers(element: Element) -> list[str]:
         """Of nominal features that an element names, alone or in pairs."""
         pairs = inside(element, "FeatureNominalPairs")
-        return [*numbers_in(inside(element, "FeatureNominalIds")),
-                *(number for pair in ([] if pairs is None else pairs) for number in numbers_in(pair))]  # fmt: skip
-
-    @staticmethod
-    def _features_of(item: Element) -> int:
-        what = _WHATS.get(local(item).removesuffix("CharacteristicNominal"))
-        return 1 if what is None else ASKS[what].features
+        return [*listed(inside(element, "FeatureNominalIds")),
+                *(number for pair in ([] if pairs is None else pairs) for number in listed(pair))]  # fmt: skip
 
     def _all(self, ending: str) -> Iterator[Element]:
         return (element for element in self.root.iter() if local(element).endswith(ending))
+
+    def _referred(self, element: Element, name: str) -> Element:
+        """The element to which another refers by a number."""
+        found = self.by_id.get(child(element, name))
+        if found is None:
+            raise NotUnderstoodError(f"refers by {name} to nothing that is there")
+        return found
 
     def _named(self, item: Element, what: str, read: Callable[[Element, str, str], Facts], name: str = "") -> None:
         """Read an item, or keep what of it is not understood."""
         number = item.get("id", "")
         name = name or child(item, "FeatureName") or child(item, "Name") or f"{what} {number}"
         place = f"{self.where}: {local(item)} id {number}"
-        taken = self.drawing_.features if what == "feature" else self.drawing_.characteristics
-        try:
+        taken = self.drawing.features if what == "feature" else self.drawing.characteristics
+        with self.drawing.understanding(name, place):
             if any(one["name"] == name for one in taken):
                 raise NotUnderstoodError(f"is the name of two {what}s")
             taken.append(read(item, name, place))
-        except NotUnderstoodError as error:
-            self.drawing_.unknown.append(NotUnderstood(name, str(error), place))
 
     def _feature(self, item: Element, name: str, place: str) -> Facts:
         sort = local(item).removesuffix("FeatureItem").removesuffix("FeatureNominal")
         if sort not in _KINDS:
             raise NotUnderstoodError(f"is a feature of kind {sort}, which is not read")
-        if any(local(element) == "FromScan" and (element.text or "").strip() != "false" for element in item.iter()):
-            raise NotUnderstoodError(SCANNED)
+        if any(local(element) == "FromScan" and text(element) != "false" for element in item.iter()):
+            raise NotUnderstoodError(refused.SCANNED)
         if any(local(element) == "Constructed" for element in item.iter()):
             raise NotUnderstoodError("is constructed of other features, which is not read")
         nominal = item if local(item).endswith("FeatureNominal") else self._referred(item, "FeatureNominalId")
         definition = self._referred(nominal, "FeatureDefinitionId")
         if inside(nominal, "PointList") is not None:
             raise NotUnderstoodError("has a list of points of its own (PointList), which is not read")
-        kind = sort.lower()
-        found: Facts = {"name": name, "kind": kind}
-        found |= {} if (association := self._association(nominal)) is None else {"association": association}
-        found = self._nominal(found, nominal, definition, place)
-        self.names[item.get("id", "")] = name
-        self.of_nominal[nominal.get("id", "")] = name
+        found: Facts = {"name": name, "kind": sort.lower()}
+        if (algorithm := inside(nominal, "SubstituteFeatureAlgorithm")) is not None:
+            if (word := whole_text(algorithm)) not in _ASSOCIATIONS:
+                raise NotUnderstoodError(f"is to be associated by {word}, which is not read")
+            found["association"] = _ASSOCIATIONS[word]
+        found |= self._nominal(sort.lower(), nominal, definition, place)
+        self._between_its_ends(found, nominal, definition)
+        self.names[item.get("id", "")] = self.of_nominal[nominal.get("id", "")] = name
         return self._probed(found)
 
-    def _association(self, nominal: Element) -> str | None:
-        given = inside(nominal, "SubstituteFeatureAlgorithm")
-        if given is None:
-            return None
-        word = "".join(given.itertext()).strip()
-        if word not in _ASSOCIATIONS:
-            raise NotUnderstoodError(f"is to be associated by {word}, which is not read")
-        return _ASSOCIATIONS[word]
-
-    def _nominal(self, found: Facts, nominal: Element, definition: Element, place: str) -> Facts:
-        kind, axis = found["kind"], inside(nominal, "Axis")
-        if kind in ("cylinder", "cone"):
-            if axis is None:
-                raise NotUnderstoodError("has no axis")
-            found |= {"point_mm": self.units.place(inside(axis, "AxisPoint"), place),
-                      "direction": direction(child(axis, "Direction"), place)}  # fmt: skip
-        else:
-            found |= {"point_mm": self.units.place(inside(nominal, "Location"), place)}
-        if kind in ("plane", "circle", "point"):
-            found["direction"] = direction(child(nominal, "Normal"), place)
+    def _nominal(self, kind: str, nominal: Element, definition: Element, place: str) -> Facts:
+        axis = inside(nominal, "Axis") if kind in ("cylinder", "cone") else nominal
+        if axis is None:
+            raise NotUnderstoodError("has no axis")
+        found: Facts = {
+            "point_mm": self.units.place(inside(axis, "Location" if axis is nominal else "AxisPoint"), place)
+        }
+        if kind != "sphere":
+            key = "Normal" if kind in ("plane", "circle", "point") else "Direction"
+            found["direction"] = _direction(axis, key, place)
         if kind == "line":
-            found |= {"direction": direction(child(nominal, "Direction"), place),
-                      "normal": direction(child(nominal, "Normal"), place)}  # fmt: skip
-        if kind in ("circle", "sphere", "cylinder", "cone"):
-            found |= {"diameter_mm": self._length(definition, "Diameter"), "inner": is_inner(definition)}
+            found["normal"] = _direction(nominal, "Normal", place)
+        if kind in refused.ROUND:
+            if (diameter := inside(definition, "Diameter")) is None:
+                raise NotUnderstoodError("does not say its Diameter")
+            found["diameter_mm"], side = self.units.mm(diameter), child(definition, "InternalExternal")
+            if side not in ("INTERNAL", "EXTERNAL"):
+                raise NotUnderstoodError("does not say whether it is a hole or a shaft")
+            found["inner"] = side == "INTERNAL"
         if kind == "cone":
             half, whole = inside(definition, "HalfAngle"), inside(definition, "FullAngle")
             angle = half if half is not None else whole
             if angle is None:
                 raise NotUnderstoodError("does not say its angle")
             found["angle_deg"] = self.units.degrees(angle) * (1 if half is None else 2)
-        if kind in ("line", "cylinder", "cone"):
-            key = "LargeEndDistance" if kind == "cone" else "Length"
-            length = inside(nominal if kind == "line" else definition, key)
-            self._between_its_ends(found, length, inside(definition, "SmallEndDistance"))
         return found
 
-    def _between_its_ends(self, found: Facts, length: Element | None, small: Element | None) -> None:
+    def _between_its_ends(self, found: Facts, nominal: Element, definition: Element) -> None:
         """Put the point of a line, cylinder or cone from its start, or from anywhere on its axis, to its middle.
 
         A cone without a small end ends at its tip. A length that is not said is an example.
         """
-        start = 0.0
-        slope = math.tan(math.radians(found["angle_deg"] / 2)) if found["kind"] == "cone" else 0.0
+        kind = found["kind"]
+        if kind not in ("line", "cylinder", "cone"):
+            return
+        length = inside(nominal if kind == "line" else definition, "LargeEndDistance" if kind == "cone" else "Length")
+        start, slope = 0.0, math.tan(math.radians(found["angle_deg"] / 2)) if kind == "cone" else 0.0
         if slope and length is not None:
+            small = inside(definition, "SmallEndDistance")
             start = self.units.mm(small) if small is not None else -0.5 * found["diameter_mm"] / slope
         if length is None:
-            self.drawing_.open_keys[found["name"]] = ["length_mm", "point_mm"]
+            self.drawing.open_keys[found["name"]] = ["length_mm", "point_mm"]
         end = self.units.mm(length) if length is not None else found.get("diameter_mm", _LENGTH_MM) / 2
         middle = 0.5 * (start + end)
         way = middle / (math.hypot(*found["direction"]) or 1.0)
@@ -214,16 +223,14 @@ class _Document:
 
     def _probed(self, found: Facts) -> Facts:
         """With what the file leaves open."""
-        kind, name = found["kind"], found["name"]
-        if kind == "point":
+        if found["kind"] == "point":
             return found
         opened = ["strategy"]
-        if kind == "plane":
+        if found["kind"] == "plane":
             found |= {"length_mm": _LENGTH_MM, "width_mm": _LENGTH_MM}
             opened += ["length_mm", "width_mm"]
-        found["strategy"] = usual_strategy(kind)
-        self.drawing_.open_keys[name] = [*opened, *self.drawing_.open_keys.get(name, ())]
-        return found
+        self.drawing.open_keys[found["name"]] = [*opened, *self.drawing.open_keys.get(found["name"], ())]
+        return found | {"strategy": drawings.usual_strategy(found["kind"])}
 
     def _characteristic(self, item: Element, name: str, place: str) -> Facts:
         sort = local(item).removesuffix("CharacteristicItem").removesuffix("CharacteristicNominal")
@@ -232,49 +239,51 @@ class _Document:
         definition = self._referred(nominal, "CharacteristicDefinitionId")
         what = self._what(sort, nominal)
         features = self._features(item, what)
-        for kind in (one["kind"] for one in self.drawing_.features if one["name"] in features):
-            refuse_other_kind(what, kind)
+        kinds = [one["kind"] for one in self.drawing.features if one["name"] in features]
+        for kind in kinds:
+            drawings.refuse_other_kind(what, kind)
         found: Facts = {"name": name, "what": what, "features": features}
-        refuse_besides(definition)
-        refuse_besides(nominal)
-        refuse_condition(definition)
-        of = next((one["kind"] for one in self.drawing_.features if one["name"] in features), "")
-        refuse_zone(definition, what, about_an_axis=of in ("circle", "cylinder", "cone", "line"))
+        _refuse_besides(definition)
+        _refuse_besides(nominal)
+        if (condition := child(definition, "MaterialCondition")) not in _PLAIN:
+            raise NotUnderstoodError(f"holds at {condition.lower()} material condition, which is not modelled")
+        usual = "DiametricalZone" if kinds[:1] and kinds[0] in ("circle", "cylinder", "cone", "line") else "PlanarZone"
+        zone = inside(definition, "ZoneShape")
+        shape = "" if zone is None or not len(zone) else local(zone[0])
+        if shape and shape not in (("DiametricalZone", "SphericalZone") if what == "position" else (usual,)):
+            raise NotUnderstoodError(f"has a tolerance zone of shape {shape}, which is not read")
         frame = self.by_id.get(child(definition, "DatumReferenceFrameId"))
-        datums = datums_of(frame, self.by_id, self.of_nominal, self.drawing_.features) if ASKS[what].datum_kinds else []
+        datums = self._datums(frame) if ASKS[what].datum_kinds and frame is not None else []
         if len(datums) < ASKS[what].datums:
             raise NotUnderstoodError("names no datum")
-        found |= {"datums": datums} if datums else {}
-        return found | self._limits(what, nominal, definition)
+        return found | ({"datums": datums} if datums else {}) | self._limits(what, nominal, definition)
 
     def _what(self, sort: str, nominal: Element) -> What:
         if sort == "LinearCoordinate":
             if child(nominal, "CoordinateSystemId"):
                 raise NotUnderstoodError("is a coordinate in a system of its own, which is not read")
-            direction = child(nominal, "Direction")
+            axis = child(nominal, "Direction")
             axes: Mapping[str, What] = {"XAXIS": "x", "YAXIS": "y", "ZAXIS": "z"}
-            if direction not in axes:
-                raise NotUnderstoodError(f"is a coordinate along {direction or 'no axis'}, which is not read")
-            return axes[direction]
+            if axis not in axes:
+                raise NotUnderstoodError(f"is a coordinate along {axis or 'no axis'}, which is not read")
+            return axes[axis]
         if sort not in _WHATS:
-            raise NotUnderstoodError(SORTS.get(sort) or f"is a characteristic of kind {sort}, which is not read")
+            raise NotUnderstoodError(_SORTS.get(sort) or f"is a characteristic of kind {sort}, which is not read")
         mode = child(nominal, "AnalysisMode")
         if sort == "DistanceBetween" and mode not in ("", "THREEDIMENSIONAL"):
             raise NotUnderstoodError(f"is a distance in the analysis {mode}, which is not read")
         return _WHATS[sort]
 
     def _features(self, item: Element, what: What) -> list[str]:
-        given = numbers_in(inside(item, "FeatureItemIds")) or self._numbers(item)
-        if len(given) != ASKS[what].features:
-            raise NotUnderstoodError(f"is a {what} of {len(given) or 'no'} features")
-        unread = [number for number in given if number not in self.names]
-        if unread:
-            raise NotUnderstoodError(f"is of the feature {self._item_name(unread[0])!r}, which is not read")
-        return [self.names[number] for number in given]
-
-    def _item_name(self, number: str) -> str:
-        item = self.by_id.get(number)
-        return number if item is None else child(item, "FeatureName") or number
+        numbers = listed(inside(item, "FeatureItemIds")) or self._numbers(item)
+        if len(numbers) != ASKS[what].features:
+            raise NotUnderstoodError(f"is a {what} of {len(numbers) or 'no'} features")
+        for number in numbers:
+            if number not in self.names:
+                of = self.by_id.get(number)
+                unread = number if of is None else child(of, "FeatureName") or number
+                raise NotUnderstoodError(f"is of the feature {unread!r}, which is not read")
+        return [self.names[number] for number in numbers]
 
     def _limits(self, what: What, nominal: Element, definition: Element) -> Facts:
         if ASKS[what].limits == "zone":
@@ -289,19 +298,50 @@ class _Document:
         low, high = inside(tolerance, "MinValue"), inside(tolerance, "MaxValue")
         if low is None or high is None:
             raise NotUnderstoodError("has a tolerance without two limits, which is not read")
-        target = inside(nominal, "TargetValue")
-        about = 0.0
+        target, about = inside(nominal, "TargetValue"), 0.0
         if child(tolerance, "DefinedAsLimit") != "true":
             if target is None:
                 raise NotUnderstoodError("has limits about a value that is not there")
             about = value(target, pmi=True)
-        return limits(what, about + value(low, pmi=True), about + value(high, pmi=True))
+        return drawings.limits(what, about + value(low, pmi=True), about + value(high, pmi=True))
 
-    def _length(self, element: Element, name: str) -> float:
-        given = inside(element, name)
-        if given is None:
-            raise NotUnderstoodError(f"does not say its {name}")
-        return self.units.mm(given)
+    def _datums(self, frame: Element) -> list[str]:
+        """Names of the features of a datum reference frame, in order of precedence; hyphens between those of a common one."""
+        listed = [each for group in frame for each in (group if local(group) == "Datums" else (group,))]
+        found = []
+        order = {word: i for i, word in enumerate(("PRIMARY", "SECONDARY", "TERTIARY"))}
+        datums = [each for each in listed if local(each) == "Datum"]
+        for datum in sorted(datums, key=lambda one: order.get(whole_text(inside(one, "Precedence")), len(order))):
+            common = inside(datum, "CompoundDatum")
+            parts = [datum] if common is None else [each for each in common if local(each) == "Datum"]
+            found.append(BETWEEN.join(map(self._datum, parts)))
+        return found
 
-    def _referred(self, element: Element, name: str) -> Element:
-        return referred(element, name, self.by_id)
+    def _datum(self, datum: Element) -> str:
+        simple = inside(datum, "SimpleDatum")
+        if simple is None:
+            raise NotUnderstoodError("has a datum of a kind that is not read")
+        if (condition := child(simple, "MaterialModifier")) not in _PLAIN:
+            raise NotUnderstoodError(f"has a datum at {condition.lower()} material condition, which is not modelled")
+        definition = self._referred(simple, "DatumDefinitionId")
+        label = child(definition, "DatumLabel")
+        if inside(definition, "DatumTargetIds") is not None:
+            raise NotUnderstoodError(f"is about the datum {label} on datum targets, which are not read")
+        named = listed(inside(definition, "FeatureNominalIds"))
+        if named and all(number in self.of_nominal for number in named):
+            return BETWEEN.join(self.of_nominal[number] for number in named)
+        pattern = re.compile(rf"(datum[ _-]?)?{re.escape(label)}", re.IGNORECASE)
+        same = [str(one["name"]) for one in self.drawing.features if pattern.fullmatch(one["name"])]
+        if named or len(same) != 1:
+            raise NotUnderstoodError(f"is about the datum {label}, which names no feature that is read")
+        return same[0]
+
+
+def _refuse_besides(element: Element) -> None:
+    """Refuse what a definition or a nominal of a characteristic says besides what is read of it."""
+    for inner in element:
+        name = local(inner)
+        if name in _READ or whole_text(inner) == "false":
+            continue
+        per_unit = "is toleranced per unit of length or area, which is not modelled" if "PerUnit" in name else ""
+        raise NotUnderstoodError(_NAMED.get(name) or per_unit or f"says {name}, which is not read")

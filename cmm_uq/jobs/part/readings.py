@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.base.files.csv_table import Cells, cells_of, numbers
+from cmm_uq.base.files.csv_table import GIVE, Cells, cells_of, numbers
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.part.probed import Probed
 from cmm_uq.jobs.part.tables import CalibratedPartFacts, OrientationsFacts, PartFile, Places
@@ -17,88 +17,119 @@ COLUMNS = ("feature", "point", "x_mm", "y_mm", "z_mm")
 FAR_MM = 5.0  # from the nominal contact point: a measured one farther away is in another frame, unit or order
 # by what the factor of points in another unit to those in mm is; a scale that is off by a hundredth is another matter
 _IN_UNITS = {1 / 25.4: "in inches", 1e-3: "in metres", 25.4: "taken for inches once too often", 1e3: "in µm"}
-_FIX = "Save it as CSV in UTF-8, with commas between the columns"
+_VALUES = ("value_mm", "value_deg")
+_LARGEST = 1_000_000  # number of a cycle, orientation or repeat
+_FAR = 0.01  # share of a standard's size beyond which a reading is of another one, or in another unit
+ReadFile = Callable[[str], tuple[bytes, str]]  # bytes of a file that the job names, and its name in messages
+
+
+@dataclass(frozen=True, eq=False)
+class _Recording:
+    """A table as it was recorded, and its name in messages."""
+
+    cells: Cells
+    where: str
+
+    @classmethod
+    def of(cls, content: bytes, where: str) -> _Recording:
+        cells = cells_of(content, where, "Save it as CSV in UTF-8, with commas between the columns")
+        short = next((i for i, row in enumerate(cells.rows) if len(row) != len(cells.header)), None)
+        if short is not None:
+            raise CmmUqError(f"has {len(cells.rows[short])} cells, and the header {len(cells.header)}",
+                             where=f"{where} line {cells.lines[short]}", fix="Complete the row")  # fmt: skip
+        return cls(cells, where)
+
+    @classmethod
+    def of_repeats(cls, content: bytes, where: str) -> _Recording:
+        """One that has rows."""
+        found = cls.of(content, where)
+        if not found.cells.rows:
+            raise CmmUqError("has no rows", where=where, fix="Record the measurements")
+        return found
+
+    def at(self, row: int) -> str:
+        return f"{self.where} line {self.cells.lines[row]}"
+
+    def texts(self, name: str) -> list[str]:
+        if name not in self.cells.header:
+            fix = f"Give it; there are {', '.join(self.cells.header)}"
+            raise CmmUqError(f"has no column {name!r}", where=self.where, fix=fix)
+        place = self.cells.header.index(name)
+        return [row[place] for row in self.cells.rows]
+
+    def numbers(self, name: str, fix: str = GIVE) -> Floats:
+        return numbers(self.texts(name), lambda row: f"{self.at(row)}, column {name}", fix)
+
+    def points(self, fix: str = GIVE) -> Floats:
+        """(n, 4) number of each point, and its coordinates."""
+        return np.column_stack([self.numbers(name, fix) for name in COLUMNS[1:]])
+
+    def keys(self, group: str) -> list[tuple[int, int]]:
+        """Numbers of cycle or orientation and of repeat of each row; one repeat where there is no such column."""
+        of = self._whole(group)
+        repeat = self._whole("repeat") if "repeat" in self.cells.header else [1] * len(of)
+        return list(zip(of, repeat, strict=True))
+
+    def _whole(self, name: str) -> list[int]:
+        found = self.numbers(name).tolist()
+        for row, value in enumerate(found):
+            if value != int(value) or not 0 <= value <= _LARGEST:
+                where = f"{self.at(row)}, column {name}"
+                raise CmmUqError(f"{value:g} is no number of a {name}", where=where, fix="Count from 1")
+        return [int(value) for value in found]
 
 
 def measured_points(content: bytes, where: str, features: Sequence[Probed]) -> Floats:
     """(n, 3) measured points in the order of the plan's, mm."""
-    cells = cells_of(content, where, _FIX)
+    table = _Recording.of(content, where)
     for name in COLUMNS:
-        if name not in cells.header:
-            raise CmmUqError(f"has no column {name!r}", where=where,
-                             fix=f"Its columns are {', '.join(COLUMNS)}, with commas between them")  # fmt: skip
-    short = next((i for i, row in enumerate(cells.rows) if len(row) != len(cells.header)), None)
-    if short is not None:
-        raise CmmUqError(f"has {len(cells.rows[short])} cells, and the header {len(cells.header)}",
-                         where=f"{where} line {cells.lines[short]}", fix="Complete the row")  # fmt: skip
-    place = [cells.header.index(name) for name in COLUMNS]
-    number = np.column_stack([_column(cells, i, where) for i in place[1:]])
-    names = [row[place[0]] for row in cells.rows]
-    return in_order(names, number[:, 0], number[:, 1:], cells, where, features)
+        if name not in table.cells.header:
+            fix = f"Its columns are {', '.join(COLUMNS)}, with commas between them"
+            raise CmmUqError(f"has no column {name!r}", where=where, fix=fix)
+    number = table.points("Give a number: every point of the plan is needed")
+    return _in_order(table, list(range(len(number))), number, where, features)
 
 
-def _column(cells: Cells, i: int, where: str) -> Floats:
-    return numbers(
-        [row[i] for row in cells.rows],
-        lambda row: f"{where} line {cells.lines[row]}, column {cells.header[i]}",
-        "Give a number: every point of the plan is needed",
-    )
-
-
-def in_order(
-    names: Sequence[str], point: Floats, xyz: Floats, cells: Cells, where: str, features: Sequence[Probed]
-) -> Floats:
-    """(n, 3) points in the order of the plan's, of rows that name feature and point."""
-    known = {one.facts.name: one for one in features}
+def _in_order(table: _Recording, some: Sequence[int], number: Floats, where: str, features: Sequence[Probed]) -> Floats:
+    """(n, 3) points in the order of the plan's, of some rows, which name feature and point; ``number``: of all rows."""
+    known, names = {one.facts.name: one for one in features}, table.texts("feature")
     rows: dict[tuple[str, int], int] = {}
     wrong = Gathered()
-    for row, (name, index) in enumerate(zip(names, point.tolist(), strict=True)):
-        at = f"{where} line {cells.lines[row]}"
+    for row in some:
+        name, index, at = names[row], float(number[row, 0]), f"{where} line {table.cells.lines[row]}"
         count = len(known[name].points) if name in known else 0
         if name not in known:
             wrong.add(CmmUqError(f"there is no feature {name!r}", where=at, fix=suggestion(name, known)))
         elif index != int(index) or not 1 <= index <= count:
             wrong.add(CmmUqError(f"{name!r} has no point {index:g}", where=at, fix=f"It has 1 to {count} by its plan"))
         elif (name, int(index)) in rows:
-            wrong.add(
-                CmmUqError(f"point {index:g} of {name!r} stands there twice", where=at, fix="Leave one of them out")
-            )
+            said = f"point {index:g} of {name!r} stands there twice"
+            wrong.add(CmmUqError(said, where=at, fix="Leave one of them out"))
         else:
             rows[name, int(index)] = row
-            away = float(np.linalg.norm(xyz[row] - known[name].points[int(index) - 1]))
+            away = float(np.linalg.norm(number[row, 1:] - known[name].points[int(index) - 1]))
             if away > FAR_MM:
                 wrong.add(CmmUqError(f"point {index:g} of {name!r} lies {away:.4g} mm from where it is planned", where=at,
                                      fix="Give it in mm in the frame of the part, in the order of the plan"))  # fmt: skip
-    if wrong.problems:
-        _refuse_another_unit(rows, xyz, known, where)
+    if wrong.problems and rows:
+        planned = np.array([known[name].points[index - 1] for name, index in rows])
+        _refuse_another_unit(planned, number[list(rows.values()), 1:], where)
     wrong.refuse()
-    for one in features:
-        for index in range(1, len(one.points) + 1):
-            if (one.facts.name, index) not in rows:
-                raise CmmUqError(f"point {index} of {one.facts.name!r} is missing", where=where,
-                                 fix=f"Give all of its {len(one.points)} points")  # fmt: skip
-    wanted = [rows[one.facts.name, index] for one in features for index in range(1, len(one.points) + 1)]
-    return np.asarray(xyz[wanted])
+    planned_rows = [(one.facts.name, index) for one in features for index in range(1, len(one.points) + 1)]
+    for name, index in planned_rows:
+        if (name, index) not in rows:
+            fix = f"Give all of its {len(known[name].points)} points"
+            raise CmmUqError(f"point {index} of {name!r} is missing", where=where, fix=fix)
+    return np.asarray(number[[rows[key] for key in planned_rows], 1:])
 
 
-def _refuse_another_unit(
-    rows: Mapping[tuple[str, int], int], xyz: Floats, known: Mapping[str, Probed], where: str
-) -> None:
-    """Say it once where all points are off by the factor of another unit, about the part's origin."""
-    if not rows:
-        return
-    planned = np.array([known[name].points[index - 1] for name, index in rows])
-    found = xyz[list(rows.values())]
+def _refuse_another_unit(planned: Floats, found: Floats, where: str) -> None:
+    """Say it once where all points (n, 3) are off by the factor of another unit, about the part's origin."""
     factor = float(np.sum(found * planned)) / (float(np.sum(planned**2)) or 1.0)
     unit = next((words for each, words in _IN_UNITS.items() if abs(factor / each - 1) < 0.01), None)
     if unit and np.linalg.norm(found / factor - planned, axis=1).max() <= FAR_MM:
         raise CmmUqError(f"the points are {factor:.4g} times those of the plan, as if they were {unit}", where=where,
                          fix="Give them in mm in the frame of the part")  # fmt: skip
-
-
-_VALUES = ("value_mm", "value_deg")
-_LARGEST = 1_000_000  # number of a cycle, orientation or repeat
-ReadFile = Callable[[str], tuple[bytes, str]]  # bytes of a file that the job names, and its name in messages
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,11 +166,11 @@ def other_readings(
     calibrated = orientations = length = None
     tips: dict[str, StandardReadings] = {}
     if (one := facts.by_calibrated_part) is not None:
-        _check_calibrated(one, facts, places, wrong)
+        _check_calibrated(one, facts, places.of("by_calibrated_part", "characteristic"), wrong)
         with wrong.going_on():
             calibrated = _repeats(*read(one.file), "cycle", facts, features, [each.name for each in one.characteristic])
     if (two := facts.by_orientations) is not None:
-        _check_tips(two, facts, places, wrong)
+        _check_tips(two, facts, places.of("by_orientations", "probe_standard"), wrong)
         with wrong.going_on():
             orientations = _repeats(*read(two.file), "orientation", facts, features, None)
             _refuse_unequal(orientations, two.file)
@@ -153,38 +184,37 @@ def other_readings(
     return OtherReadings(calibrated, orientations, length, tips)
 
 
-def _check_calibrated(one: CalibratedPartFacts, facts: PartFile, places: Places, wrong: Gathered) -> None:
+def _check_calibrated(one: CalibratedPartFacts, facts: PartFile, where: str, wrong: Gathered) -> None:
     asked = {each.name: each for each in facts.characteristic}
     names = [each.name for each in one.characteristic]
     for i, each in enumerate(one.characteristic):
-        where = places.of("by_calibrated_part", "characteristic")
         if each.name not in asked:
-            wrong.add(
-                CmmUqError(f"there is no characteristic {each.name!r}", where=where, fix=suggestion(each.name, asked))
-            )
+            problem, fix = f"there is no characteristic {each.name!r}", suggestion(each.name, asked)
         elif each.name in names[:i]:
-            wrong.add(CmmUqError(f"{each.name!r} stands there twice", where=where, fix="Give each characteristic once"))
+            problem, fix = f"{each.name!r} stands there twice", "Give each characteristic once"
         elif each.angle != (asked[each.name].asks.limits == "angles"):
             unit = "value_deg and u_arcsec" if not each.angle else "value_mm and u_um"
-            wrong.add(CmmUqError(f"{each.name!r} is stated in the wrong unit", where=where, fix=f"Give {unit}"))
-
-
-def _check_tips(one: OrientationsFacts, facts: PartFile, places: Places, wrong: Gathered) -> None:
-    styli = [each.name for each in facts.stylus]
-    seen: list[str] = []
-    for probe in one.probe_standard:
-        where = places.of("by_orientations", "probe_standard")
-        if not probe.stylus and len(styli) > 1:
-            said = f"there are {len(styli)} styli, and a probe_standard does not say which measured it"
-            wrong.add(CmmUqError(said, where=where, fix=f"Give stylus = {styli[0]!r} or another"))
-        elif probe.stylus and probe.stylus not in styli:
-            wrong.add(
-                CmmUqError(f"there is no stylus {probe.stylus!r}", where=where, fix=suggestion(probe.stylus, styli))
-            )
-        elif (name := probe.stylus or styli[0]) in seen:
-            wrong.add(CmmUqError(f"the stylus {name!r} has two standards", where=where, fix="Give it one"))
+            problem, fix = f"{each.name!r} is stated in the wrong unit", f"Give {unit}"
         else:
-            seen.append(name)
+            continue
+        wrong.add(CmmUqError(problem, where=where, fix=fix))
+
+
+def _check_tips(one: OrientationsFacts, facts: PartFile, where: str, wrong: Gathered) -> None:
+    styli, seen = [each.name for each in facts.stylus], set[str]()
+    for probe in one.probe_standard:
+        name = probe.stylus or styli[0]
+        if not probe.stylus and len(styli) > 1:
+            problem = f"there are {len(styli)} styli, and a probe_standard does not say which measured it"
+            fix = f"Give stylus = {styli[0]!r} or another"
+        elif name not in styli:
+            problem, fix = f"there is no stylus {name!r}", suggestion(name, styli)
+        elif name in seen:
+            problem, fix = f"the stylus {name!r} has two standards", "Give it one"
+        else:
+            seen.add(name)
+            continue
+        wrong.add(CmmUqError(problem, where=where, fix=fix))
 
 
 def _repeats(
@@ -194,141 +224,92 @@ def _repeats(
 
     ``needed``: characteristics whose values must be there; ``None`` takes those that are.
     """
-    cells = _cells(content, where)
-    if "feature" in cells.header:
-        return _of_points(cells, where, group, features)
-    if "characteristic" not in cells.header:
+    table = _Recording.of_repeats(content, where)
+    by_points = "feature" in table.cells.header
+    if not by_points and "characteristic" not in table.cells.header:
         raise CmmUqError("has neither a column 'characteristic' nor 'feature'", where=where,
                          fix=f"Its columns are {group}, repeat, characteristic, value_mm, or {group}, repeat, "
                              f"{', '.join(COLUMNS)}")  # fmt: skip
-    return _of_values(cells, where, group, facts, needed)
+    keys = table.keys(group)
+    measured = sorted(set(keys))
+    number = np.array([key[0] for key in measured], dtype=np.int64)
+    if not by_points:
+        return Repeats(number, _values(table, keys, group, facts, needed))
+    found, read = [], table.points()
+    for key in measured:
+        rows, its = [row for row, own in enumerate(keys) if own == key], f"{where}: {group} {key[0]}, repeat {key[1]}"
+        found.append(_in_order(table, rows, read, its, features))
+    return Repeats(number, {}, np.array(found))
 
 
-def _of_values(cells: Cells, where: str, group: str, facts: PartFile, needed: Sequence[str] | None) -> Repeats:
+def _values(
+    table: _Recording, keys: Sequence[tuple[int, int]], group: str, facts: PartFile, needed: Sequence[str] | None
+) -> dict[str, Floats]:
+    """(n,) by characteristic, mm or rad, in the order of the measurements."""
     asked = {one.name: one for one in facts.characteristic}
-    keys = _keys(cells, where, group)
-    names = _text(cells, "characteristic", where)
     found: dict[str, dict[tuple[int, int], float]] = {}
     wrong = Gathered()
-    for row, (name, key) in enumerate(zip(names, keys, strict=True)):
-        at = f"{where} line {cells.lines[row]}"
+    for row, (name, key) in enumerate(zip(table.texts("characteristic"), keys, strict=True)):
         if name not in asked:
-            wrong.add(CmmUqError(f"there is no characteristic {name!r}", where=at, fix=suggestion(name, asked)))
-            continue
-        if key in found.setdefault(name, {}):
+            wrong.add(
+                CmmUqError(f"there is no characteristic {name!r}", where=table.at(row), fix=suggestion(name, asked))
+            )
+        elif key in found.setdefault(name, {}):
             told = f"{name!r} stands there twice for {group} {key[0]}, repeat {key[1]}"
-            wrong.add(CmmUqError(told, where=at, fix="Number the repeats, or leave one of them out"))
-            continue
-        with wrong.going_on():
-            found[name][key] = _value(cells, row, where, angle=asked[name].asks.limits == "angles")
+            wrong.add(CmmUqError(told, where=table.at(row), fix="Number the repeats, or leave one of them out"))
+        else:
+            with wrong.going_on():
+                found[name][key] = _value(table, row, angle=asked[name].asks.limits == "angles")
     wrong.refuse()
     measured = sorted(set(keys))
     for name in needed if needed is not None else found:
         if lacking := [key for key in measured if key not in found.get(name, {})]:
-            raise CmmUqError(f"{name!r} has no value for {group} {lacking[0][0]}, repeat {lacking[0][1]}", where=where,
-                             fix="Give it for each measurement")  # fmt: skip
-    values = {name: np.array([found[name][key] for key in measured])
-              for name in asked if len(found.get(name, {})) == len(measured)}  # fmt: skip
-    return Repeats(np.array([key[0] for key in measured], dtype=np.int64), values)
+            said = f"{name!r} has no value for {group} {lacking[0][0]}, repeat {lacking[0][1]}"
+            raise CmmUqError(said, where=table.where, fix="Give it for each measurement")
+    return {
+        name: np.array([found[name][key] for key in measured])
+        for name in asked
+        if len(found.get(name, {})) == len(measured)
+    }
 
 
-def _value(cells: Cells, row: int, where: str, *, angle: bool) -> float:
+def _value(table: _Recording, row: int, *, angle: bool) -> float:
     """A value of a row, mm or rad."""
-    column = _VALUES[angle]
-    if column not in cells.header:
-        raise CmmUqError(f"has no column {column!r}", where=where, fix=f"Give {'angles' if angle else 'lengths'} in it")
-    at = f"{where} line {cells.lines[row]}, column {column}"
-    value = float(numbers([cells.rows[row][cells.header.index(column)]], lambda _: at)[0])
+    column, header = _VALUES[angle], table.cells.header
+    if column not in header:
+        fix = f"Give {'angles' if angle else 'lengths'} in it"
+        raise CmmUqError(f"has no column {column!r}", where=table.where, fix=fix)
+    value = float(
+        numbers([table.cells.rows[row][header.index(column)]], lambda _: f"{table.at(row)}, column {column}")[0]
+    )
     return float(np.radians(value)) if angle else value
 
 
-def _of_points(cells: Cells, where: str, group: str, features: Sequence[Probed]) -> Repeats:
-    keys = _keys(cells, where, group)
-    names = _text(cells, "feature", where)
-    number = np.column_stack([_column_of_by_readings(cells, name, where) for name in COLUMNS[1:]])
-    measured = sorted(set(keys))
-    found = []
-    for key in measured:
-        rows = [row for row, own in enumerate(keys) if own == key]
-        part = Cells(cells.header, cells.header_line, [cells.rows[r] for r in rows], [cells.lines[r] for r in rows])
-        its = f"{where}: {group} {key[0]}, repeat {key[1]}"
-        found.append(in_order([names[r] for r in rows], number[rows, 0], number[rows, 1:], part, its, features))
-    return Repeats(np.array([key[0] for key in measured], dtype=np.int64), {}, np.array(found))
-
-
 def _standard(content: bytes, where: str, column: str, calibrated: float) -> StandardReadings:
-    cells = _cells(content, where)
-    keys = _keys(cells, where, "orientation")
-    values = _column_of_by_readings(cells, column, where)
-    wrong, seen = Gathered(), set[tuple[int, int]]()
+    table = _Recording.of_repeats(content, where)
+    keys, values = table.keys("orientation"), table.numbers(column)
+    first, wrong = {key: row for row, key in reversed(list(enumerate(keys)))}, Gathered()
     for row, (key, value) in enumerate(zip(keys, values.tolist(), strict=True)):
-        at = f"{where} line {cells.lines[row]}"
-        if key in seen:
-            wrong.add(CmmUqError(f"orientation {key[0]}, repeat {key[1]} stands there twice", where=at,
-                                 fix="Number the repeats"))  # fmt: skip
-        seen.add(key)
+        if first[key] != row:
+            said = f"orientation {key[0]}, repeat {key[1]} stands there twice"
+            wrong.add(CmmUqError(said, where=table.at(row), fix="Number the repeats"))
         if abs(value - calibrated) > _FAR * calibrated:
-            wrong.add(CmmUqError(f"{value:g} mm is not the standard of {calibrated:g} mm", where=at,
-                                 fix="Give it in mm, as the machine read it"))  # fmt: skip
+            said = f"{value:g} mm is not the standard of {calibrated:g} mm"
+            wrong.add(CmmUqError(said, where=table.at(row), fix="Give it in mm, as the machine read it"))
     wrong.refuse()
     found = StandardReadings(values, np.array([key[0] for key in keys], dtype=np.int64))
     _refuse_unequal(found, where)
     return found
 
 
-_FAR = 0.01  # share of a standard's size beyond which a reading is of another one, or in another unit
-
-
 def _refuse_unequal(one: Repeats | StandardReadings, where: str) -> None:
     names, counts = np.unique(one.group, return_counts=True)
+    few, many, least = names[np.argmin(counts)], names[np.argmax(counts)], counts.min()
     if len(names) < 2:
         raise CmmUqError("was measured in one orientation alone", where=where, fix="Measure in four, two at least")
-    if counts.min() < 2:
-        raise CmmUqError(f"orientation {names[np.argmin(counts)]} was measured once", where=where,
-                         fix="Measure five times in each, twice at least")  # fmt: skip
-    if counts.min() != counts.max():
-        few, many = names[np.argmin(counts)], names[np.argmax(counts)]
-        told = f"orientation {few} was measured {counts.min()} times, orientation {many} {counts.max()} times"
+    if least < 2:
+        fix = "Measure five times in each, twice at least"
+        raise CmmUqError(f"orientation {few} was measured once", where=where, fix=fix)
+    if least != counts.max():
+        told = f"orientation {few} was measured {least} times, orientation {many} {counts.max()} times"
         raise CmmUqError(told, where=where, fix="Measure as often in each")
-
-
-def _cells(content: bytes, where: str) -> Cells:
-    cells = cells_of(content, where, _FIX)
-    if not cells.rows:
-        raise CmmUqError("has no rows", where=where, fix="Record the measurements")
-    short = next((i for i, row in enumerate(cells.rows) if len(row) != len(cells.header)), None)
-    if short is not None:
-        raise CmmUqError(f"has {len(cells.rows[short])} cells, and the header {len(cells.header)}",
-                         where=f"{where} line {cells.lines[short]}", fix="Complete the row")  # fmt: skip
-    return cells
-
-
-def _keys(cells: Cells, where: str, group: str) -> list[tuple[int, int]]:
-    """Numbers of cycle or orientation and of repeat of each row; one repeat where there is no such column."""
-    of = _whole(cells, group, where)
-    repeat = _whole(cells, "repeat", where) if "repeat" in cells.header else [1] * len(of)
-    return list(zip(of, repeat, strict=True))
-
-
-def _whole(cells: Cells, name: str, where: str) -> list[int]:
-    found = _column_of_by_readings(cells, name, where)
-    for row, value in enumerate(found.tolist()):
-        if value != int(value) or not 0 <= value <= _LARGEST:
-            raise CmmUqError(f"{value:g} is no number of a {name}",
-                             where=f"{where} line {cells.lines[row]}, column {name}", fix="Count from 1")  # fmt: skip
-    return [int(value) for value in found.tolist()]
-
-
-def _text(cells: Cells, name: str, where: str) -> list[str]:
-    place = _place(cells, name, where)
-    return [row[place] for row in cells.rows]
-
-
-def _column_of_by_readings(cells: Cells, name: str, where: str) -> Floats:
-    return numbers(_text(cells, name, where), lambda row: f"{where} line {cells.lines[row]}, column {name}")
-
-
-def _place(cells: Cells, name: str, where: str) -> int:
-    if name not in cells.header:
-        raise CmmUqError(f"has no column {name!r}", where=where, fix=f"Give it; there are {', '.join(cells.header)}")
-    return cells.header.index(name)

@@ -361,6 +361,10 @@ class PartFile(JobTable):
     by_orientations: OrientationsFacts | None = None
     """The part in several orientations with standards beside it (ISO/DTS 15530-2 as described): likewise."""
 
+    def stylus_of(self, feature: FeatureFacts) -> StylusFacts:
+        """The stylus that probes a feature: the one that it names, else the first."""
+        return next((one for one in self.stylus if one.name == feature.stylus), self.stylus[0])
+
 
 @dataclass(frozen=True)
 class Places:

@@ -11,7 +11,7 @@ from benchmarks.parts.iota import elsewhere
 from benchmarks.parts.published import Figure, arcs, circles, polar
 from benchmarks.parts.reference_pairs import every, pair
 from benchmarks.parts.zones import short
-from cmm_uq.analysis.parts.plan import FeatureKind
+from cmm_uq.jobs.part.feature import Kind
 from cmm_uq.maths.geometry.association import Association
 
 
@@ -33,9 +33,7 @@ def test_distances_of_a_real_machine_are_stated_as_its_error_map_has_them() -> N
 
 
 @pytest.mark.parametrize(("kind", "how"), list(every()))
-def test_a_reference_pair_gives_form_size_direction_and_place_to_a_picometre(
-    kind: FeatureKind, how: Association
-) -> None:
+def test_a_reference_pair_gives_form_size_direction_and_place_to_a_picometre(kind: Kind, how: Association) -> None:
     for name, off in pair(kind, how, seed=7).items():
         assert off < 1e-9, name
 

@@ -8,13 +8,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts.budget import PLACE, point_errors, variance_shares
+from cmm_uq.analysis.parts.budget import PLACE, mean_of_places, point_errors, variance_shares, ways
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings, of_points, reproducibility
 from cmm_uq.analysis.parts.machine.state import unmodelled_errors
-from cmm_uq.analysis.parts.placing import PartPose, around
-from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
+from cmm_uq.analysis.parts.plan import PartCharacteristic, PartPose, Plan, around
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions, Virtual
-from cmm_uq.analysis.parts.ways import mean_of_places, ways
 from cmm_uq.base.errors import CmmUqError
 from tests.parts_drawn import POSE, block, circle, machine, plane, spot
 

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.analysis.parts.causes.cause import PointScatter
-from cmm_uq.analysis.parts.common_datums import ProbedCommon
+from cmm_uq.analysis.parts.datums import ProbedCommon
 from cmm_uq.analysis.parts.evaluation import Evaluator
 from cmm_uq.analysis.parts.plan import CommonDatum, Nominal, PartCharacteristic, PartFeature, Plan
 from cmm_uq.base.errors import CmmUqError

@@ -8,13 +8,14 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts import in_words, plan
+from cmm_uq.analysis.parts import budget as in_words, plan
 from cmm_uq.analysis.parts.budget import PLACE, variance_shares
 from cmm_uq.analysis.parts.causes.surroundings import moving_part
 from cmm_uq.analysis.parts.machine.state import StatedNoise
 from cmm_uq.analysis.parts.setup import circumstances_of, plan_of
 from cmm_uq.analysis.parts.virtual import Virtual
 from cmm_uq.base.messages import Message, Verbatim, say
+from cmm_uq.jobs.part.feature import Kind
 from cmm_uq.jobs.part.job import TABLES
 from cmm_uq.maths.geometry.association import ASSOCIATIONS
 from tests.certificate.parts_found import machine
@@ -22,7 +23,7 @@ from tests.jobs.part.parts import plate
 
 
 def test_every_kind_has_words() -> None:
-    assert set(in_words.KINDS) == set(get_args(plan.FeatureKind))
+    assert set(in_words.KINDS) == set(get_args(Kind))
     assert set(in_words.CHARACTERISTICS) == set(plan.WHATS)
     assert set(in_words.ASSOCIATIONS) == set(ASSOCIATIONS)
 

@@ -13,8 +13,7 @@ from scipy.stats import ncx2
 from cmm_uq.analysis.parts.causes.cause import PointScatter, Rows
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.evaluation import Evaluator, characteristics_of
-from cmm_uq.analysis.parts.placing import PartPose, placed
-from cmm_uq.analysis.parts.plan import Nominal, PartAlignment, PartCharacteristic, Plan, Stylus
+from cmm_uq.analysis.parts.plan import Nominal, PartAlignment, PartCharacteristic, PartPose, Plan, Stylus, placed
 from cmm_uq.analysis.parts.result import conforming, evaluated, stated
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions, Virtual
 from cmm_uq.base.errors import CmmUqError

@@ -16,8 +16,16 @@ from scipy.special import ndtr, ndtri
 
 from cmm_uq.analysis.parts.evaluation import Movement
 from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
-from cmm_uq.analysis.parts.result import middle, possible_interval
-from cmm_uq.analysis.parts.zones import Inverse, alike, inverse, nodes_of, tails, trial_parts
+from cmm_uq.analysis.parts.result import (
+    Inverse,
+    alike,
+    inverse,
+    middle,
+    nodes_of,
+    possible_interval,
+    tails,
+    trial_parts,
+)
 from cmm_uq.base.points import Floats
 from tests.analysis.parts.causes.test_condensing import bore, face
 

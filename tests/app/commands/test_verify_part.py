@@ -19,9 +19,8 @@ from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
 from cmm_uq.app.commands.certificates.verification import Verification
 from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.app.commands.certificates.verify_part import to_rerun
-from cmm_uq.app.commands.parts.documents import contents_of, write_part, written
 from cmm_uq.app.commands.parts.machine import state_machine
-from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
+from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part, write_part, written
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.results import standing_data

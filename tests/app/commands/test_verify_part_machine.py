@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from cmm_uq.app.commands.certificates.verify import verify
-from cmm_uq.app.commands.parts.documents import contents_of
 from cmm_uq.app.commands.parts.drift import FILE
-from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
+from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from tests.app.cli.test_due import recorded, scale

@@ -8,7 +8,6 @@ from math import degrees, sqrt
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts.methods.comparison import compare_methods
 from cmm_uq.analysis.parts.methods.method import (
     ComparedCharacteristic,
     MethodComparison,
@@ -16,11 +15,11 @@ from cmm_uq.analysis.parts.methods.method import (
     MethodResult,
     MethodStatement,
 )
-from cmm_uq.analysis.parts.methods.of_job import methods_of
+from cmm_uq.analysis.parts.methods.of_job import compare_methods, methods_of
 from cmm_uq.base.messages import say
 from cmm_uq.base.units import ARCSECOND, unit
 from cmm_uq.certificate.document import Paragraph, Section, Table
-from cmm_uq.certificate.part.other_methods import methods_data, methods_section
+from cmm_uq.certificate.part.method import methods_data, methods_section
 from cmm_uq.certificate.part.page import part_document
 from cmm_uq.maths.uncertainty.budget import REPEATS, Budget, BudgetLine
 from tests.certificate.parts_found import found_of, measured_points

@@ -29,8 +29,7 @@ from cmm_uq.certificate.part.figures import _remarks
 from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement, UnseenError
 from cmm_uq.certificate.part.method import method_section
 from cmm_uq.certificate.part.page import lacking_of, machine_section, overview_of, part_document
-from cmm_uq.certificate.part.part_section import errors_section
-from cmm_uq.certificate.part.results_section import results_section
+from cmm_uq.certificate.part.results_section import errors_section, results_section
 from cmm_uq.certificate.render.html import render_html
 from cmm_uq.certificate.render.pdf import render_pdf
 from cmm_uq.certificate.wording import effect_title

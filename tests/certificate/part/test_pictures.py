@@ -8,14 +8,23 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.parts.budget import PointErrors
-from cmm_uq.analysis.parts.placing import PartPose
-from cmm_uq.analysis.parts.plan import Plan, Stylus
+from cmm_uq.analysis.parts.plan import PartPose, Plan, Stylus
 from cmm_uq.base.messages import Verbatim, number, say
 from cmm_uq.base.points import Floats
-from cmm_uq.certificate.part import views
-from cmm_uq.certificate.part.pictures import MOST, errors_picture, form_picture, part_picture
+from cmm_uq.certificate.part import pictures as views
+from cmm_uq.certificate.part.pictures import (
+    ABOVE,
+    FRONT,
+    MOST,
+    OBLIQUE,
+    SIDE,
+    VIEWS,
+    errors_picture,
+    form_picture,
+    panels,
+    part_picture,
+)
 from cmm_uq.certificate.part.plots import A_PAGE, Margin, correlation_plot, margin_plot, margin_plots, shares_plots
-from cmm_uq.certificate.part.views import ABOVE, FRONT, OBLIQUE, SIDE, VIEWS, panels
 from cmm_uq.certificate.plots.plans import _seen
 from cmm_uq.certificate.plots.style import WIDTH_MM, house_style
 from tests.certificate.saying import leaves

@@ -12,7 +12,7 @@ import pytest
 
 from cmm_uq.analysis.parts.setup import plan_of, refuse_unfit
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.part.datums import as_one, freedoms, members
+from cmm_uq.jobs.part.checks import as_one, freedoms, members
 from cmm_uq.jobs.part.probed import Probed
 from tests.jobs.part.parts import feature, plate
 

@@ -146,9 +146,9 @@ def test_axes_read_where_the_ram_stands() -> None:
         placing={"origin_mm": [300.0, 450.0, -500.0], "rotation_deg": [0.0, 0.0, 90.0]},
         machine_state={"certificate": "m", "origin_mm": [1.0, 2.0, 3.0]},
     )
-    top, stylus = job.features[0], job.facts.stylus[0]
+    top = job.features[0]
     x, y, z = top.points[0]
-    np.testing.assert_allclose(readings(top, stylus, job.facts)[0], [300 - y + 1, 450 + x + 2, -500 + z + 2 + 150 + 3])
+    np.testing.assert_allclose(readings(top, job.facts)[0], [300 - y + 1, 450 + x + 2, -500 + z + 2 + 150 + 3])
 
 
 SIMULATED = b'{"posterior": {"file": "posterior-simulated.npz"}}'

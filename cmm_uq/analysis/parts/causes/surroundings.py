@@ -1,36 +1,126 @@
-"""Temperatures, the fixture and operators among the causes.
+"""The part's own form, temperatures, the fixture and operators among the causes.
 
-The fixture among the causes: a part that moves while it is measured.
+Where a feature's ``surface`` is given, what is true of it is what its whole surface says, form and all; the points that are
+probed, a few of a surface that is not its nominal, are drawn on the same surface, and what they miss between them is an error
+like any other.
+
+A part is measured at 20 °C (ISO 1), or reduced to it by an expansion coefficient and a temperature that both are uncertain:
+what remains is the difference of two products, drawn as such. A warm scale reads too little. A gradient bends the part.
 
 Where a part lies is no error, but that it moves is one: what is probed later has moved farther. Movement is taken as even over
 the measurement, in the order in which points are probed.
 
-Temperatures among the causes: expansion of the part and of the scales, bending of the part by a gradient.
-
-A part is measured at 20 °C (ISO 1), or reduced to it by an expansion coefficient and a temperature that both are uncertain:
-what remains is the difference of two products, drawn as such. A warm scale reads too little.
-
-Operators among the causes: what repeats by different people, days or set-ups scatter by beyond everything else.
-
-Stated, not computed: from repeats of one's own. It is common to a measurement, however often each point is read, and drawn
-again in the next measurement.
+What repeats by different people, days or set-ups scatter by beyond everything else is stated, not computed: from repeats of
+one's own. It is common to a measurement, however often each point is read, and drawn again in the next measurement.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes.cause import CommonCause, PartCause, PointScatter, normal
-from cmm_uq.analysis.parts.placing import PartPose
-from cmm_uq.analysis.parts.plan import Plan
+from cmm_uq.analysis.parts.causes.cause import CommonCause, PartCause, PointScatter, Rough, field_components, normal
+from cmm_uq.analysis.parts.plan import PartFeature, PartPose, Plan
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.jobs.part.characteristic import DIRECTED
+from cmm_uq.maths.geometry.feature import frame_about
 
-FIXTURE = "fixture"
+FORM, TEMPERATURE, FIXTURE, OPERATOR = "form", "temperature", "fixture", "operator"
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceForm:
+    """What is known of a feature's form, along its normals."""
+
+    feature: str
+    # by undulations per revolution about the feature's axis, 2 and more, the standard deviation of each; its phase is any
+    harmonics_um: tuple[tuple[int, float], ...] = ()
+    # field_um, correlation_mm: standard deviation of a normal random field on the surface, and the distance over which its
+    # correlation falls to exp(−½)
+    field_um: float = 0.0
+    correlation_mm: float = 0.0
+    roughness_um: float = 0.0  # standard deviation of each point on its own
+
+    def __post_init__(self) -> None:
+        if self.field_um and not self.correlation_mm > 0:
+            said, where = "a field of form needs the distance over which it is correlated", f"form of {self.feature!r}"
+            raise CmmUqError(said, where=where, fix="Give correlation_mm")
+
+    def kernel(self, feature: PartFeature, points: Floats, some: slice = slice(None)) -> Floats:
+        """(m, n) covariance of some along the normals with all points (n, 3), mm²; without roughness."""
+        own = points[some]
+        found = np.zeros((len(own), len(points)))
+        if self.field_um:
+            apart = np.linalg.norm(own[:, None] - points, axis=2)
+            found += self.field_um**2 * np.exp(-0.5 * (apart / self.correlation_mm) ** 2)
+        if self.harmonics_um:
+            angle = _angles(feature, points)
+            for count, size in self.harmonics_um:
+                found += size**2 * np.cos(count * np.subtract.outer(angle[some], angle))
+        return np.asarray(MICROMETRE**2 * found)
+
+    def components(self, feature: PartFeature, points: Floats) -> Floats:
+        """(K, n) of the form on points (n, 3), mm; without roughness."""
+        variance = MICROMETRE**2 * (self.field_um**2 + sum(size**2 for _, size in self.harmonics_um))
+        return field_components(partial(self.kernel, feature, points), np.full(len(points), variance))
+
+
+@lru_cache(maxsize=2)
+def forms(known: tuple[SurfaceForm, ...], plan: Plan) -> tuple[list[PartCause], list[PartCause | None]]:
+    """Form of the points that are probed, and of whole surfaces: the same wherever the part lies, and so looked up.
+
+    Returns ``causes``: of the plan's points. ``whole``: as many, with the same coefficients, of the points of
+    :func:`whole_surfaces`; ``None`` for roughness.
+    """
+    causes, whole = list[PartCause](), list[PartCause | None]()
+    true = whole_surfaces(plan)
+    for one in known:
+        feature, rows, true_rows = plan.feature(one.feature), plan.rows[one.feature], true.rows[one.feature]
+        count, factor = len(feature.points), f"form of {one.feature}"
+        both = np.vstack([feature.points, feature.surface]) if len(feature.surface) else feature.points
+        if one.field_um or one.harmonics_um:
+            shapes = one.components(feature, both)
+            draw, factors = normal(np.ones(len(shapes))), (factor,) * len(shapes)
+            basis = _placed(shapes[:, :count], plan, rows)
+            causes.append(CommonCause(name=FORM, factors=factors, draw=draw, basis=basis))
+            on_surface = shapes[:, count:] if len(feature.surface) else np.zeros((len(shapes), count))
+            whole.append(CommonCause(name=FORM, factors=factors, draw=draw, basis=_placed(on_surface, true, true_rows)))
+        if one.roughness_um:
+            along, name = MICROMETRE * one.roughness_um * plan.normals[rows], f"roughness of {one.feature}"
+            causes.append(Rough(name=FORM, factors=(name,) * count, draw=normal(np.ones(count)), along=along, rows=rows,
+                                count=len(plan.points)))  # fmt: skip
+            whole.append(None)
+    return causes, whole
+
+
+def whole_surfaces(plan: Plan) -> Plan:
+    """The plan with the whole surface of each feature, where it is given, in place of the points that are probed."""
+    features = tuple(
+        replace(f, points=f.surface, normals=f.surface_normals) if len(f.surface) else f for f in plan.features
+    )
+    return replace(plan, features=features, order=np.zeros(0, dtype=np.int64), times_s=np.zeros(0))
+
+
+def _placed(shapes: Floats, plan: Plan, rows: slice) -> Floats:
+    """(K, n, 3) of all points, of shapes (K, m) along the normals of some."""
+    basis = np.zeros((len(shapes), len(plan.points), 3))
+    basis[:, rows] = shapes[:, :, None] * plan.normals[rows]
+    return basis
+
+
+def _angles(feature: PartFeature, points: Floats) -> Floats:
+    """(n,) about the feature's axis."""
+    axis = feature.nominal.direction
+    if feature.kind not in DIRECTED or axis is None:
+        where, fix = f"form of {feature.name!r}", "Give field_um instead"
+        raise CmmUqError("undulations need an axis to go round", where=where, fix=fix)
+    across = (points - feature.nominal.point) @ frame_about(axis)[:2].T
+    return np.asarray(np.arctan2(across[:, 1], across[:, 0]))
 
 
 def moving_part(plan: Plan, u_shift_um: float, u_turn_arcsec: float = 0.0) -> CommonCause:
@@ -40,9 +130,8 @@ def moving_part(plan: Plan, u_shift_um: float, u_turn_arcsec: float = 0.0) -> Co
     shifts = [MICROMETRE * done * axis for axis in np.eye(3)]
     turns = [ARCSECOND * done * np.cross(axis, about) for axis in np.eye(3)]
     sd = np.repeat([u_shift_um, u_turn_arcsec], 3)
-    return CommonCause(
-        name=FIXTURE, factors=("movement of the part",) * 6, draw=normal(sd), basis=np.array([*shifts, *turns])
-    )
+    basis, factors = np.array([*shifts, *turns]), ("movement of the part",) * 6
+    return CommonCause(name=FIXTURE, factors=factors, draw=normal(sd), basis=basis)
 
 
 def elapsed(plan: Plan) -> Floats:
@@ -54,9 +143,6 @@ def elapsed(plan: Plan) -> Floats:
     place = np.empty(n)
     place[plan.order if len(plan.order) else np.arange(n)] = np.arange(n)
     return place / max(n - 1, 1)
-
-
-TEMPERATURE = "temperature"
 
 
 @dataclass(frozen=True)
@@ -177,9 +263,6 @@ def _bent(about: Floats, directions: Floats) -> Floats:
     return np.stack([(about @ g)[:, None] * about - 0.5 * square[:, None] * g for g in directions])
 
 
-OPERATOR = "operator"
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Reproducibility(PartCause):
     """What changes characteristics and moves no point."""
@@ -202,18 +285,12 @@ def reproducibility(plan: Plan, u: Mapping[str, float]) -> Reproducibility:
     names = [one.name for one in plan.characteristics]
     for name in u:
         if name not in names:
-            raise CmmUqError(
-                f"there is no characteristic {name!r}", where="reproducibility", fix=suggestion(name, names)
-            )
+            fix = suggestion(name, names)
+            raise CmmUqError(f"there is no characteristic {name!r}", where="reproducibility", fix=fix)
     adds = np.zeros((len(u), len(names)))
     adds[np.arange(len(u)), [names.index(name) for name in u]] = 1.0
-    return Reproducibility(
-        name=OPERATOR,
-        factors=tuple(f"reproducibility of {name}" for name in u),
-        draw=normal(list(u.values())),
-        adds=adds,
-        count=len(plan.points),
-    )
+    factors, draw = tuple(f"reproducibility of {name}" for name in u), normal(list(u.values()))
+    return Reproducibility(name=OPERATOR, factors=factors, draw=draw, adds=adds, count=len(plan.points))
 
 
 def of_points(plan: Plan, u_um: float) -> PointScatter:

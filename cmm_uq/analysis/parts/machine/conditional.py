@@ -25,8 +25,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.analysis.parts.machine.periods import GivenPeriod, covariance, linear
-from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, Unmodelled
+from cmm_uq.analysis.parts.machine.state import GivenPeriod, MachineState, StatedNoise, Unmodelled, covariance, linear
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import unit
@@ -263,11 +262,7 @@ def draws_given(whole: JointModel, components: Components, sizes: Sizes, random:
 
 
 def given_recording(
-    state: MachineState,
-    model: RecordingModel,
-    sigma_mm: float | None = None,
-    draws: int = DRAWS,
-    seed: int = 0,
+    state: MachineState, model: RecordingModel, sigma_mm: float | None = None, draws: int = DRAWS, seed: int = 0
 ) -> MachineState:
     """The state of a machine with all of its errors drawn together, given the recording of its calibration.
 

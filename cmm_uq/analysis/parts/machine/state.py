@@ -1,20 +1,22 @@
 """The machine as its certificate states it, on the day of a part's measurement.
 
-The machine as its certificate states it: its errors with all that is known of them together, and what nobody knows of it.
-
 *Modelled* errors are drawn from the joint posterior of the calibration, whole rows of it, so that what the calibration could
 not tell apart stays tied together; what it left to the prior alone is drawn with that prior and named by its share of it. An
 error that the calibration did not model is drawn with the smaller of what physics allows and of what the calibration's
 recording would have shown. Those are drawn on their own: what is stated together in no certificate cannot be drawn together.
 
-The state of a machine from what its certificate carries: the data of ``results.json`` and the draws beside it.
+Taken is plain data that somebody else has read and verified: ``results.json`` and the draws beside it. Where records of the
+machine say how its errors drift, that is drawn with them; where nothing is known of it, the errors are named and taken as they
+were, with the age of the certificate.
 
-Takes plain data that somebody else has read and verified; nothing here opens a file.
 
-A machine's errors on the day of a part's measurement: what they may have changed by since the calibration.
-
-Where records of the machine say how its errors drift, that is drawn with them; where nothing is known of it, the errors are
-named and taken as they were, with the age of the certificate.
+An error with a period of which only bounds are known is any within them, evenly in its logarithm. A sum over many trial
+periods, each with its share of the variance, has the same mean and nearly the same covariance between any two points; it is
+linear, so that it can be drawn together with everything else (normal where the truth is a mixture). Few trials would pretend
+to know the period: two points far apart would err alike. What a recording says of such an error follows from its covariance
+itself, a difference of cosine integrals: from the sum, amplitudes of trial periods would answer for periods between them, and
+a recording of some hundred readings would seem to determine them all. So a draw of the sum is a draw beforehand, and what the
+recording says is added to it.
 """
 
 from __future__ import annotations
@@ -23,15 +25,118 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
+from scipy.special import sici
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.points import Floats, Machine
-from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.points import Floats, Machine, Points
+from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.physics.catalogue import effects, every
-from cmm_uq.machine.physics.effect import CONTRACT, Effect
+from cmm_uq.machine.physics.effect import CONTRACT, Effect, Parameter
+from cmm_uq.machine.physics.effects.drives import PeriodicScale
+
+_SAME = 1e-6  # of the shortest period: a distance over which nothing changes
+_LOOKED_AT = 61  # readings
+TRIED = 64  # periods: correlations of errors at two places are then off by less than a tenth in the root mean square
+
+
+class EveryPeriod(Effect):
+    """All trial periods of an effect at once; without a shape of its own."""
+
+    def __init__(self, effect: Effect) -> None:
+        self.of = effect
+        self.at = tuple(product(*(_evenly(shape.low, shape.high) for shape in effect.shape)))
+        share = 1 / np.sqrt(len(self.at))
+        self.name, self.title, self.formula = effect.name, effect.title, effect.formula
+        self.mechanism, self.points_to = effect.mechanism, effect.points_to
+        self.columns, self.tier, self.along_motion = effect.columns, effect.tier, effect.along_motion
+        self.coefficients = tuple(
+            replace(one, name=f"{one.name} {i}", prior_sd=float(one.prior_sd * share))
+            for i in range(1, len(self.at) + 1)
+            for one in effect.coefficients
+        )
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return np.concatenate([self.of.basis(points, each) for each in self.at], axis=2)
+
+
+class GivenPeriod(Effect):
+    """A periodic error with all its trial periods at once, and what a recording says of it, for each combination that it sees.
+
+    A draw f of the sum beforehand is conditioned at any reading x by f(x) + k(x, X)·B·w, w what combinations were found to be
+    less what they are by that draw and all others (conditioning by kriging: Chilès, Delfiner 2012, 7.3).
+
+    ``effect``: periodic. ``readings``: (p,) X, where the scale stood at the points of the recording, mm. ``into``: (p, r) B,
+    1/mm.
+    """
+
+    def __init__(self, effect: PeriodicScale, readings: Floats, into: Floats) -> None:
+        self.of, self.sum, self.readings, self.into = effect, EveryPeriod(effect), readings, into
+        self.name, self.title, self.formula = effect.name, effect.title, effect.formula
+        self.mechanism, self.points_to = effect.mechanism, effect.points_to
+        self.axis = self.along_motion = effect.axis
+        said = (Parameter(f"said {j}", unit("1"), 0.0) for j in range(1, into.shape[1] + 1))
+        self.coefficients = (*self.sum.coefficients, *said)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        found = np.zeros((len(points), 3, len(self.coefficients)))
+        found[:, "xyz".index(self.axis)] = self.at(points.readings[self.axis])
+        return found
+
+    def at(self, reading: Floats) -> Floats:
+        """(n, j) mm of error at readings (n,): of the trials, then of the combinations."""
+        angle = 2 * np.pi * reading[:, None] / np.ravel(self.sum.at)
+        waves = MICROMETRE * np.stack([np.sin(angle), np.cos(angle)], axis=2).reshape(len(reading), -1)
+        return np.hstack([waves, covariance(self.of, reading, self.readings) @ self.into])
+
+    def beforehand(self, random: np.random.Generator, count: int) -> Floats:
+        """Draws (N, j) of the coefficients over their standard deviations, without the recording: of one trial period each.
+
+        Mean and covariance are those of all at once; errors of a linear estimate are then distributed as those of machines
+        with one period.
+        """
+        trials, waves = len(self.sum.at), len(self.of.coefficients)
+        found = np.zeros((count, trials, waves))
+        found[np.arange(count), random.integers(trials, size=count)] = np.sqrt(trials) * random.standard_normal(
+            (count, waves)
+        )
+        return np.hstack([found.reshape(count, -1), np.zeros((count, self.into.shape[1]))])
+
+    def share(self, draws: Floats) -> float:
+        """Standard deviation of errors by draws (N, j), between the readings of the recording, over that beforehand."""
+        between = np.linspace(self.readings.min(), self.readings.max(), _LOOKED_AT)
+        left = (draws @ self.at(between).T).var(axis=0).mean()
+        return float(np.sqrt(left) / (MICROMETRE * self.of.coefficients[0].prior_sd))
+
+
+def covariance(effect: PeriodicScale, one: Floats, other: Floats) -> Floats:
+    """(n, p) mm², of an error whose period nobody knows, at readings (n,) and (p,), mm.
+
+    The mean of σ²·cos(2πd/λ) over ln λ: σ²·(Ci(2πd/λ₀) − Ci(2πd/λ₁))/ln(λ₁/λ₀).
+    """
+    (shape,), sd = effect.shape, MICROMETRE * effect.coefficients[0].prior_sd
+    apart = 2 * np.pi * np.abs(np.subtract.outer(one, other))
+    same = apart < _SAME * shape.low
+    apart[same] = 1.0
+    found = sici(apart / shape.low)[1] - sici(apart / shape.high)[1]
+    found /= np.log(shape.high / shape.low)
+    found[same] = 1.0
+    return np.asarray(sd**2 * found)
+
+
+def _evenly(low: float, high: float) -> list[float]:
+    """The middle of each of as many equal parts of the logarithm, which have the same share of the prior each."""
+    each: list[float] = np.exp(np.log(low) + np.log(high / low) * (np.arange(TRIED) + 0.5) / TRIED).tolist()
+    return each
+
+
+def linear(effect: Effect) -> Effect:
+    """The effect itself where it has no shape, else all of its trials at once."""
+    return EveryPeriod(effect) if effect.shape else effect
+
 
 POWER_QUANTILE = 1.6449  # of a normal error one in ten, in size, is larger than so many standard deviations
 # mechanisms that are no error of the machine on its own; those of the stylus are drawn from its qualification
@@ -59,25 +164,20 @@ class Unmodelled:
 
 @dataclass(frozen=True, eq=False)
 class StatedNoise:
-    """Noise of one coordinate of one point, as the calibration found it: each size a number, or one for each of M draws.
+    """Noise of one coordinate of one point, as the calibration found it: each size a number, or one for each of M draws."""
 
-    Parameters
-    ----------
-    coordinate_mm : (3,) standard deviation of each reading along x, y, z, or (M, 3).
-    placing_mm : of what a set-up adds to each of its points, and its repeats share.
-    slow_mm, slow_time_s : of a slow wander of each coordinate, and the time over which it forgets: infinite of a random walk.
-    growth_mm : of what grows with the distance from the first point that is probed, at the distance ``longest_mm``; where that
-        is zero it is not known, and all of it acts everywhere.
-    walked_s : time after which a random walk has the mean square ``slow_mm²`` from its beginning until then.
-    """
-
-    coordinate_mm: Floats = field(default_factory=lambda: np.zeros(3))
-    placing_mm: Floats | float = 0.0
+    coordinate_mm: Floats = field(default_factory=lambda: np.zeros(3))  # (3,) or (M, 3) of each reading along x, y, z
+    placing_mm: Floats | float = 0.0  # of what a set-up adds to each of its points, and its repeats share
+    # of a slow wander of each coordinate, and the time over which it forgets: infinite of a random walk
     slow_mm: Floats | float = 0.0
     slow_time_s: Floats | float = 600.0
+    # of what grows with the distance from the first point that is probed, at the distance ``longest_mm``; where that is zero
+    # it is not known, and all of it acts everywhere
     growth_mm: Floats | float = 0.0
     longest_mm: float = 0.0
-    walked_s: float = 600.0
+    walked_s: float = (
+        600.0  # time after which a random walk has the mean square ``slow_mm²`` from its beginning until then
+    )
 
     @property
     def usual_mm(self) -> Floats:
@@ -104,53 +204,42 @@ class StatedNoise:
 
 @dataclass(frozen=True, eq=False)
 class MachineState:
-    """What is known of a machine on the day that a part is measured.
+    """What is known of a machine on the day that a part is measured."""
 
-    Parameters
-    ----------
-    machine : its chain, travel and origin.
-    effects : that the calibration modelled, in the order of their coefficients.
-    draws : (M, k) of the coefficients together, in their units.
-    noise : of its readings.
-    shapes : nonlinear parameters of effects that have some, by name.
-    prior_share : by effect, part of its posterior standard deviation that is the prior's own: near 1 where the calibration
-        said nothing.
-    unmodelled : errors that it may have besides.
-    drift : (k,) root mean square of each coefficient's change since the calibration.
-    corrected : whether the machine corrects errors that were found, so that what remains is about zero.
-    corrections : (k,) coefficients that it then corrects; their means by default.
-    calibrated, valid_until : days of its certificate.
-    temperature_c : at its calibration: the errors of its scales are those of that temperature. ``None`` where they are those
-        of 20 °C, or nobody knows.
-    measured : day of the part's measurement.
-    drift_unknown : effects of which nobody knows how they have changed since the calibration.
-
-    Raises
-    ------
-    CmmUqError : draws that do not fit the effects.
-    """
-
-    machine: Machine
-    effects: tuple[Effect, ...]
-    draws: Floats
-    noise: StatedNoise = field(default_factory=StatedNoise)
-    shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    machine: Machine  # its chain, travel and origin
+    effects: tuple[Effect, ...]  # that the calibration modelled, in the order of their coefficients
+    draws: Floats  # (M, k) of the coefficients together, in their units
+    noise: StatedNoise = field(default_factory=StatedNoise)  # of its readings
+    shapes: Mapping[str, Sequence[float]] = field(
+        default_factory=dict
+    )  # nonlinear parameters of effects that have some
+    # by effect, part of its posterior standard deviation that is the prior's own: near 1 where the calibration said nothing
     prior_share: Mapping[str, float] = field(default_factory=dict)
-    unmodelled: tuple[Unmodelled, ...] = ()
-    drift: Floats = field(default_factory=lambda: np.zeros(0))
-    corrected: bool = True
-    corrections: Floats = field(default_factory=lambda: np.zeros(0))
+    unmodelled: tuple[Unmodelled, ...] = ()  # errors that it may have besides
+    drift: Floats = field(
+        default_factory=lambda: np.zeros(0)
+    )  # (k,) rms change of each coefficient since the calibration
+    corrected: bool = True  # whether the machine corrects errors that were found, so that what remains is about zero
+    corrections: Floats = field(
+        default_factory=lambda: np.zeros(0)
+    )  # (k,) that it then corrects; their means by default
+    # days of its certificate
     calibrated: date | None = None
     valid_until: date | None = None
+    # at its calibration: the errors of its scales are those of that temperature. ``None`` where they are those of 20 °C, or
+    # nobody knows
     temperature_c: float | None = None
-    measured: date | None = None
-    drift_unknown: tuple[str, ...] = ()
+    measured: date | None = None  # day of the part's measurement
+    drift_unknown: tuple[str, ...] = ()  # effects of which nobody knows how they have changed since the calibration
 
     def __post_init__(self) -> None:
         k = sum(len(effect.coefficients) for effect in self.effects)
         if self.draws.ndim != 2 or self.draws.shape[1] != k or not len(self.draws):
-            raise CmmUqError(f"draws {self.draws.shape} do not fit {k} coefficients of the machine's errors",
-                             where="the posterior", fix="Give a row a draw, a column a coefficient")  # fmt: skip
+            said, fix = (
+                f"draws {self.draws.shape} do not fit {k} coefficients",
+                "Give a row a draw, a column a coefficient",
+            )
+            raise CmmUqError(f"{said} of the machine's errors", where="the posterior", fix=fix)
         if not np.isfinite(self.draws).all():
             raise CmmUqError("a draw is no finite number", where="the posterior")
         coordinate = self.noise.coordinate_mm
@@ -255,11 +344,8 @@ def machine_stated(
     what was found. ``unmodelled``: whether errors that the calibration did not model are drawn too.
     """
     if "estimates" not in results or "identifiability" not in results:
-        raise CmmUqError(
-            "states no errors of a machine",
-            where=_WHERE,
-            fix="Give a certificate whose analysis names errors: of a ballbar, step gauge, plate, sphere, …",
-        )
+        fix = "Give a certificate whose analysis names errors: of a ballbar, step gauge, plate, sphere, …"
+        raise CmmUqError("states no errors of a machine", where=_WHERE, fix=fix)
     modelled = list(results["estimates"])
     # faults of the artefact, and of the probe that calibrated, are not those of this measurement
     found = tuple(effect for effect in effects(modelled, where=_WHERE) if of_machine(effect))
@@ -268,19 +354,13 @@ def machine_stated(
         effect = name.partition(".")[0]
         if effect in modelled and share is not None:
             shares[effect] = max(shares.get(effect, 0.0), float(share))
-    unseen = results.get("diagnosis", {}).get("unseen", [])
-    detected = {row["effect"]: row["detected"] for row in unseen}
+    detected = {row["effect"]: row["detected"] for row in results.get("diagnosis", {}).get("unseen", [])}
     day = results.get("job", {}).get("date")
     return MachineState(
-        machine,
-        found,
-        coefficients_of(found, draws),
-        noise_of_draws(draws),
-        prior_share=shares,
-        unmodelled=unmodelled_errors(modelled, detected) if unmodelled else (),
-        corrected=corrected,
+        machine, found, coefficients_of(found, draws), noise_of_draws(draws), prior_share=shares,
+        unmodelled=unmodelled_errors(modelled, detected) if unmodelled else (), corrected=corrected,
         calibrated=date.fromisoformat(day) if day else None,
-    )
+    )  # fmt: skip
 
 
 # root mean square change of a reported parameter (``scale_x.ppm``), in its unit, by so many days after the calibration;

@@ -1,19 +1,16 @@
-"""Other methods for the uncertainty of a part beside the virtual measurement.
+"""Other methods for the uncertainty of a part beside the virtual measurement, whose texts were not at hand.
 
-The uncertainty of a part by a calibrated one like it, measured again and again: the method of ISO 15530-3:2011.
-
-Its text was not at hand; followed is how it is described in public. The repeats show what varies between them; the machine's
-errors, which they keep, show as a systematic error b at the place where the calibrated part lay:
+By a calibrated part like it, measured again and again: the method of ISO 15530-3:2011, as it is described in public. The
+repeats show what varies between them; the machine's errors, which they keep, show as a systematic error b at the place where
+the calibrated part lay:
 
     U = k √(u_cal² + u_p² + u_b² + u_w²), k = 2, for results that are corrected by b; else |b| is added (ISO/TS 15530-3:2004).
 
 The budget itself is that of :func:`cmm_uq.maths.uncertainty.budgets.machine.use_by_calibrated_workpiece`.
 
-The uncertainty of a part by measuring it in several orientations, with a length standard and standards of the tips.
-
-The method of ISO/DTS 15530-2, "Use of multiple workpiece orientations and calibrated simple standards", of which only the
-public summary was at hand: several orientations and repetitions, evaluated by analysis of variance; standards of length;
-standards for the error of the probe's qualification. How these go together here follows from the model
+By measuring it in several orientations: the method of ISO/DTS 15530-2, "Use of multiple workpiece orientations and calibrated
+simple standards", by its public summary: several orientations and repetitions, evaluated by analysis of variance; standards of
+length; standards for the error of the probe's qualification. How these go together here follows from the model
 
     y_ij = y + a E + Σ b δ + g_i + e_ij
 
@@ -92,7 +89,7 @@ class MethodResult:
     method: Method
     figures: tuple[MethodFigure, ...]  # one a characteristic; those that were not tested are missing
     conditions: tuple[TestCondition, ...]  # of the test
-    # by family of causes (:data:`cmm_uq.analysis.parts.in_words.FAMILIES`), how the method takes hold of it.
+    # by family of causes (:data:`cmm_uq.analysis.parts.budget.FAMILIES`), how the method takes hold of it.
     seen: Mapping[str, Seen]
 
     def of(self, name: str) -> MethodFigure | None:
@@ -192,11 +189,10 @@ def by_calibrated_part(
     return MethodFigure(name, budget, value, bias, corrected, scatter=scatter, scatter_dof=len(readings) - 1.0)
 
 
-STATEMENT = say(
+_STATEMENT = say(
     "Uncertainty of the mean over all orientations, by a description of the method of ISO/DTS 15530-2; the text of the "
     "standard was not at hand."
 )
-
 _ORIENTATIONS, _REPEATS = say("between orientations"), say("between repeats in one orientation")
 
 
@@ -263,15 +259,9 @@ class PartWarmth:
 
 
 def by_orientations(
-    name: str,
-    readings: Floats,
-    orientation: Ints,
-    slopes: Slopes,
-    standards: CalibratedStandards,
-    warmth: PartWarmth | None = None,
-    *,
-    angle: bool = False,
-) -> MethodFigure:
+    name: str, readings: Floats, orientation: Ints, slopes: Slopes, standards: CalibratedStandards,
+    warmth: PartWarmth | None = None, *, angle: bool = False,
+) -> MethodFigure:  # fmt: skip
     """One characteristic by measurements of the part in several orientations.
 
     ``readings``: (n,) of it, mm or rad; as many in each orientation. ``orientation``: (n,) number of the orientation of
@@ -291,14 +281,11 @@ def by_orientations(
         which = say("standard of the tip of {stylus}", stylus=Verbatim(stylus))
         lines += _of_standard(standards.tips[stylus], which, slopes.tips[stylus])
     lines += _of_warmth(slopes.scale, warmth or PartWarmth())
-    budget = Budget(say("mean over all orientations"), lines, found.mean - error, own, statement=STATEMENT)
-    return MethodFigure(name, budget, found.mean - error, error, single=_single(budget, found), scatter=found.u_single,
-                  scatter_dof=found.dof_single)  # fmt: skip
-
-
-def _single(budget: Budget, found: OneWay) -> float:
-    """Standard uncertainty of one measurement in one orientation, corrected as the mean is."""
-    return float(np.sqrt(budget.variance - found.u_mean**2 + found.u_single**2))
+    value = found.mean - error
+    budget = Budget(say("mean over all orientations"), lines, value, own, statement=_STATEMENT)
+    # of one measurement in one orientation, corrected as the mean is
+    single = float(np.sqrt(budget.variance - found.u_mean**2 + found.u_single**2))
+    return MethodFigure(name, budget, value, error, single=single, scatter=found.u_single, scatter_dof=found.dof_single)
 
 
 def _sign(tip: CalibratedStandard) -> float:

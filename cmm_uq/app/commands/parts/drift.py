@@ -1,28 +1,37 @@
-"""The machine's history that its drift was read from: what of the records goes into a part's report, and comes out of it.
+"""The machine's history that a part's report takes in and brings along, and what to measure on the machine.
 
-How far the machine's errors have moved since its calibration, by its records, where there are some.
+How far its errors have moved since the calibration is known by its records, where there are some. What the calibration did not
+see is planned to be measured as by ``plan``.
 """
 
 from __future__ import annotations
 
 import datetime as dt
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.parts.machine.state import MachineState, aged
+from cmm_uq.analysis.parts.machine.state import FREE, MachineState, aged
+from cmm_uq.app.commands.plans.planning import MeasurementPlan, make_plan
+from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Text, commas, plural, say
-from cmm_uq.certificate.wording import titles
+from cmm_uq.base.files.toml_file import as_toml
+from cmm_uq.base.messages import NOTHING, Text, commas, plural, say, semicolons, sentences
+from cmm_uq.certificate.part.measurement import FurtherSetUps, UnseenError
+from cmm_uq.certificate.wording import effect_title, titles
+from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.due.drift import DriftHistory, history
 from cmm_uq.laboratory.due.drift_filter import change_since
 from cmm_uq.laboratory.due.history import MachineHistory
 from cmm_uq.laboratory.records.facts import Series
 from cmm_uq.laboratory.records.place import NONE
+from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.machine.physics.effect import Effect
 
 FILE = "machine-records/history.json"  # by its name among the inputs of a part's report
 SCHEMA = "cmm-uq/machine-history/1"
@@ -161,3 +170,135 @@ def _known(state: MachineState) -> Text:
     if not state.drift_unknown:
         return told
     return say("{told} They say nothing of {effects}.", told=told, effects=commas(titles(state.drift_unknown)))
+
+
+FOLDER = "further"  # of the job that plans them, beside the part's page
+# errors that are planned for together, set-ups that are searched, and candidates that they are chosen from
+MOST, SET_UPS, CANDIDATES = 5, 4, 60
+
+_SHOWN_BY: tuple[tuple[str, Text], ...] = (
+    ("approach_", say("a gauge whose faces are met from both sides, such as a step gauge, shows it")),
+    ("tip_", say("the artefact probed with a stylus to the side shows it")),
+    ("time_s", say("it shows where the time of each point is recorded")),
+    ("temp_", say("it shows where the temperatures of the scales are recorded")),
+    ("n", say("points probed on surfaces, with their normals, show it")),
+)
+"""By the beginning of a column that an error needs and the recording lacks."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedSetUps:
+    """What to measure, and the files of the job that plans it, by name."""
+
+    further: FurtherSetUps
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
+
+def further_of(calibrated: Job | None, unseen: Iterable[UnseenError]) -> PlannedSetUps | None:
+    """Further set-ups of the calibration's artefact for errors that it left free or did not see.
+
+    ``calibrated``: job of the calibration; ``None`` where it is not at hand.
+
+    Returns ``None`` where nothing is unseen, or the calibration is not at hand.
+    """
+    wanted = _by_share(unseen)
+    if not wanted or calibrated is None or kind_of(calibrated).observe is None:
+        return None
+    here = [one for one in wanted if _why_not(calibrated, one) is None][:MOST]
+    plan = _plan(calibrated, here)
+    found = () if plan is None else _found_by(plan, here)
+    missed = tuple(one.name for one in wanted if one.name not in found)
+    text = sentences([part for part in (_setups(plan, found), _missed(calibrated, missed)) if part])
+    names = tuple(one.name for one in wanted)
+    if plan is None or not found:
+        return PlannedSetUps(FurtherSetUps(names, 0, text, missed=missed))
+    command, file = f"cmm-uq plan {FOLDER}", f"{FOLDER}/job.toml"
+    return PlannedSetUps(
+        FurtherSetUps(names, len(plan.to_measure), text, command, file, missed), _files(calibrated, found)
+    )
+
+
+def _by_share(unseen: Iterable[UnseenError]) -> list[Effect]:
+    """Errors of the machine, that of the largest share of any characteristic first."""
+    shares: dict[str, float] = {}
+    for one in unseen:
+        if one.effect in every():
+            shares[one.effect] = max(shares.get(one.effect, 0.0), one.share)
+    return [every()[name] for name in sorted(shares, key=lambda name: -shares[name])]
+
+
+def _why_not(calibrated: Job, effect: Effect) -> Text | None:
+    """Why no set-up of the artefact, recorded as it was, shows an error; ``None`` where one may."""
+    if effect.shape:
+        return say("positions that lie closer than its period show it")
+    lacks = [name for name in effect.columns if name not in calibrated.points.columns]
+    if not lacks:
+        return None
+    return next((text for begin, text in _SHOWN_BY if lacks[0].startswith(begin)), say("another artefact may show it"))
+
+
+def _asked(calibrated: Job, names: Iterable[str]) -> list[str]:
+    return list(dict.fromkeys([*calibrated.facts.model.effects, *names]))
+
+
+def _plan(calibrated: Job, wanted: Sequence[Effect]) -> MeasurementPlan | None:
+    if not wanted:
+        return None
+    facts = calibrated.facts
+    model = facts.model.model_copy(update={"effects": _asked(calibrated, (one.name for one in wanted))})
+    plan = facts.plan.model_copy(update=_WISHES)
+    try:
+        return make_plan(
+            replace(calibrated, facts=facts.model_copy(update={"model": model, "plan": plan})), power=False
+        )
+    except CmmUqError:  # no room for further set-ups
+        return None
+
+
+_WISHES = {"criterion": "separation", "more": SET_UPS, "number": None, "candidates": CANDIDATES}
+
+
+def _found_by(plan: MeasurementPlan, wanted: Sequence[Effect]) -> tuple[str, ...]:
+    """Errors that are then no longer left free: each parameter known to half of what physics allows."""
+    if plan.better is None or plan.better.identifiability is None:
+        return ()
+    seen: dict[str, bool] = {}
+    for one in plan.better.identifiability.parameters:
+        name = one.unknown.key[0]
+        seen[name] = seen.get(name, True) and one.u_with_prior <= FREE * one.unknown.prior_sd
+    return tuple(one.name for one in wanted if seen.get(one.name, False))
+
+
+def _setups(plan: MeasurementPlan | None, found: Sequence[str]) -> Text:
+    if plan is None or not found:
+        return NOTHING
+    ends = semicolons(say("{ends} mm", ends=placing.ends) for placing in plan.to_measure)
+    return plural(
+        len(plan.to_measure),
+        one=say("One further set-up of the artefact shows {effects}: in scale readings at {ends}.",
+                effects=commas(titles(found)), ends=ends),
+        many=say("{count} further set-ups of the artefact show {effects}: in scale readings at {ends}.",
+                 count=len(plan.to_measure), effects=commas(titles(found)), ends=ends),
+    )  # fmt: skip
+
+
+def _missed(calibrated: Job, missed: Sequence[str]) -> Text:
+    if not missed:
+        return NOTHING
+    told = [
+        say("{title} ({how})", title=effect_title(name),
+            how=_why_not(calibrated, every()[name]) or say("another artefact, or more set-ups, may show it"))
+        for name in missed
+    ]  # fmt: skip
+    return say("Set-ups of the artefact as it was recorded do not show: {effects}.", effects=commas(told))
+
+
+def _files(calibrated: Job, found: Sequence[str]) -> dict[str, bytes]:
+    """The calibration's job with these errors in its model, to be planned and then measured."""
+    tables = tomllib.loads(calibrated.inputs["job.toml"].decode("utf-8-sig"))
+    tables["job"]["id"] = f"{tables['job']['id']}-{FOLDER}"[:100]
+    tables["model"] = {**tables.get("model", {}), "effects": _asked(calibrated, found)}
+    plan = {key: value for key, value in tables.get("plan", {}).items() if key != "number"}
+    tables["plan"] = {**plan, "criterion": "separation", "more": SET_UPS}
+    others = {f"{FOLDER}/{name}": content for name, content in calibrated.inputs.items() if name != "job.toml"}
+    return {f"{FOLDER}/job.toml": as_toml(tables, f"{FOLDER}/job.toml"), **others}

@@ -22,8 +22,7 @@ from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.jobs.importing.encodings import begins_with, head_text
 from cmm_uq.jobs.importing.format import HEAD
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
-from cmm_uq.jobs.part.checks import unfit
-from cmm_uq.jobs.part.datums import freedoms, members
+from cmm_uq.jobs.part.checks import freedoms, members, unfit
 from cmm_uq.jobs.part.dmis import drawing_of_dmis
 from cmm_uq.jobs.part.drawing import KEY, Drawing, NotUnderstood, probed_of, set_aside_unsound
 from cmm_uq.jobs.part.job import POSTERIOR, TABLES, part_of

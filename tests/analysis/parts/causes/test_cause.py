@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.parts.causes.cause import MANY, PointScatter, components, field_components
-from cmm_uq.analysis.parts.causes.form import SurfaceForm
-from cmm_uq.analysis.parts.causes.stylus import DEGREES, directions, styli
-from cmm_uq.analysis.parts.causes.surroundings import elapsed, moving_part
+from cmm_uq.analysis.parts.causes.machine import DEGREES, directions, styli
+from cmm_uq.analysis.parts.causes.surroundings import SurfaceForm, elapsed, moving_part
 from cmm_uq.analysis.parts.machine.state import StatedNoise, coefficients_of, noise_of_draws, unmodelled_errors
-from cmm_uq.analysis.parts.placing import PartPose
-from cmm_uq.analysis.parts.plan import PartCharacteristic, PartFeature, Plan, Stylus
+from cmm_uq.analysis.parts.plan import PartCharacteristic, PartFeature, PartPose, Plan, Stylus
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.machine.physics.catalogue import CATALOGUE, effects
 from cmm_uq.maths.inference.draws import Draws

@@ -21,16 +21,18 @@ from cmm_uq.analysis.parts.machine.conditional import (
     shown,
     stated_noise,
 )
-from cmm_uq.analysis.parts.machine.periods import TRIED, EveryPeriod, GivenPeriod, covariance
 from cmm_uq.analysis.parts.machine.state import (
+    TRIED,
+    EveryPeriod,
+    GivenPeriod,
     MachineState,
     StatedNoise,
     Unmodelled,
+    covariance,
     machine_stated,
     of_machine,
 )
-from cmm_uq.analysis.parts.placing import PartPose
-from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
+from cmm_uq.analysis.parts.plan import PartCharacteristic, PartPose, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.artefacts.ballbar import Ballbar

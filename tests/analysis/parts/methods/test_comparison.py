@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.parts.budget import VarianceShares as Shares
-from cmm_uq.analysis.parts.methods.comparison import compare_methods, family_shares, small
 from cmm_uq.analysis.parts.methods.method import MethodComparison, MethodFigure, MethodResult
+from cmm_uq.analysis.parts.methods.of_job import compare_methods, family_shares, small
 from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.base.messages import say
 from cmm_uq.base.units import ARCSECOND, unit

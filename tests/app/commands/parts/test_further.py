@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
-from cmm_uq.app.commands.parts.further import PlannedSetUps, further_of
+from cmm_uq.app.commands.parts.drift import PlannedSetUps, further_of
 from cmm_uq.app.commands.plans.planning import make_plan
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.base.messages import say

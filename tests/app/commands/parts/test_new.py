@@ -13,15 +13,7 @@ import pytest
 from cmm_uq.analysis.parts import plan
 from cmm_uq.analysis.parts.characteristics import CharacteristicEvaluation
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
-from cmm_uq.analysis.parts.setup import (
-    circumstances_of,
-    clamping_of,
-    forms_of,
-    plan_of,
-    poses_of,
-    refuse_unfit,
-    surroundings_of,
-)
+from cmm_uq.analysis.parts.setup import circumstances_of, forms_of, plan_of, poses_of, refuse_unfit, surroundings_of
 from cmm_uq.analysis.parts.virtual import AtPose
 from cmm_uq.app.commands.jobs.check import check_job
 from cmm_uq.app.commands.jobs.new import write_new
@@ -216,7 +208,8 @@ def test_circumstances_are_in_the_units_of_the_virtual_measurement() -> None:
     found = {one.feature: one for one in forms_of(job)}
     assert found["bore"].harmonics_um == ((3, 0.5),)
     assert found["A"].harmonics_um == ()  # a plane has no axis to lobe about
-    (clamped,) = clamping_of(job, plan_of(job))
+    state = MachineState(Machine(), (), np.zeros((1, 0)))
+    (clamped,) = circumstances_of(job, state, plan_of(job), 1).further
     assert np.all(clamped.size == 0.5e-3)  # type: ignore[attr-defined]
 
 
