@@ -38,7 +38,7 @@ from cmm_uq.certificate.certificate import certified
 from cmm_uq.certificate.digital_certificate.certificate import digital_certificate
 from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.pages.history import overview_of
-from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.render import render_html
 from cmm_uq.certificate.result import Outcome, Page, Result
 from cmm_uq.certificate.results.qif_file import qif
 from cmm_uq.certificate.sections import results as first_page

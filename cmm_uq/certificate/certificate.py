@@ -8,6 +8,7 @@ from dataclasses import replace
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, signed, without_keys
 from cmm_uq.base.units import unit
 from cmm_uq.certificate import clauses
+from cmm_uq.certificate.clauses import claimed, traceability
 from cmm_uq.certificate.diagnosis.page import diagnosis_sections
 from cmm_uq.certificate.document import Document, Facts, Overview, Section, Signature, with_each_text
 from cmm_uq.certificate.origin import (
@@ -21,8 +22,7 @@ from cmm_uq.certificate.origin import (
 )
 from cmm_uq.certificate.result import Outcome, Page, Result, StatedUncertainty
 from cmm_uq.certificate.results.contents import results
-from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
-from cmm_uq.certificate.results.reissue import COMPARED, NOT_COMPARED
+from cmm_uq.certificate.results.provenance import COMPARED, FILE as PROVENANCE, NOT_COMPARED
 from cmm_uq.certificate.sections.conformity import conformity_section
 from cmm_uq.certificate.sections.method import method, posterior_section, warnings
 from cmm_uq.certificate.sections.results import (
@@ -36,7 +36,6 @@ from cmm_uq.certificate.sections.results import (
     tolerance_sections,
     with_first,
 )
-from cmm_uq.certificate.sections.traceability import claimed, traceability
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.tables.identification import Identification, Laboratory

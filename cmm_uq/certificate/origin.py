@@ -1,4 +1,4 @@
-"""Where a recording comes from and which program made a document of it, as every file says it."""
+"""Where a recording comes from and which program made a document of it, as files say it; quantities and draws as data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an analysis by effects comes to: estimates, noise, diagnosis, statements of conformity."""
+"""What an analysis comes to: estimates, noise, diagnosis, statements of conformity; and what of it is to be written."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ def stated_row(outcome: str, value: Text, unit: Text, limit: float | None = None
 
 
 def title_of(key: tuple[str, str], result: Result) -> Text:
-    """A parameter in words: ``Squareness X–Y``."""
+    """A parameter in words: ``Squareness X–Y``; the effect alone where it has no other."""
     owner, name = key
     if owner == ARTEFACT:
         return next(size.title for size in result.artefact.sizes if size.name == name)
@@ -101,15 +101,13 @@ def title_of(key: tuple[str, str], result: Result) -> Text:
 
 
 def title_of_parameter(effect: Effect, name: str) -> Text:
-    """A parameter of an effect in words: the effect alone where it has no other."""
     alone = len(effect.reported) == 1
     return effect.title if alone else say("{title}, {name}", title=effect.title, name=Verbatim(name))
 
 
 def refusal(error: CmmUqError) -> Text:
     """Why something has no solution, as the error says it."""
-    parts = (Verbatim(error.where or ""), foreign(error.problem), foreign(error.fix or ""))
-    where, problem, fix = parts
+    where, problem, fix = Verbatim(error.where or ""), foreign(error.problem), foreign(error.fix or "")
     told = say("{where}: {problem}. {fix}", where=where, problem=problem, fix=fix)
     return told if told == str(error) else Verbatim(str(error))
 

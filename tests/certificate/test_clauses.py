@@ -15,7 +15,7 @@ from cmm_uq.certificate.certificate import certificate_of
 from cmm_uq.certificate.clauses import DRAFT, clauses, clauses_data, contradictions, draft, missing
 from cmm_uq.certificate.document import Document, Paragraph, Section
 from cmm_uq.certificate.origin import marked
-from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.render import render_html
 from cmm_uq.certificate.results.contents import head
 from cmm_uq.jobs.job import Job, JobFacts
 from cmm_uq.jobs.tables.identification import ReplacedCertificate as Replaced

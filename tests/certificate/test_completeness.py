@@ -17,9 +17,8 @@ from cmm_uq.app.commands.jobs.schemas import shipped
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.messages import Message, Text, Verbatim
 from cmm_uq.certificate.certificate import conditions
-from cmm_uq.certificate.clauses import formal_warnings
+from cmm_uq.certificate.clauses import claimed, formal_warnings
 from cmm_uq.certificate.document import Document
-from cmm_uq.certificate.sections.traceability import claimed
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.short_gauge import ShortGaugeFacts
 from cmm_uq.jobs.tables.artefact import Traceability

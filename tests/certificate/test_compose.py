@@ -15,8 +15,7 @@ from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.base.messages import Verbatim
 from cmm_uq.certificate.clauses import STATEMENTS, formal_warnings
 from cmm_uq.certificate.document import DecisionBlock, Document, Facts, Plot, Signature, Table
-from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.certificate.render import render_html, render_pdf
 from cmm_uq.certificate.result import Result
 from tests.artefacts.simulated import analysed
 from tests.certificate.test_completeness import changed

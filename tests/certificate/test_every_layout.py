@@ -21,8 +21,7 @@ from cmm_uq.certificate.clauses import STATEMENTS
 from cmm_uq.certificate.document import Block, Document, Facts, Plot, Section, Table
 from cmm_uq.certificate.origin import marked
 from cmm_uq.certificate.pages.budget import budget_document
-from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.certificate.render import render_html, render_pdf
 from cmm_uq.maths.uncertainty.models.model_file import read_model_file
 from tests.artefacts.simulated import diagnosed, document, planned
 from tests.certificate.samples import ballbar_certificate

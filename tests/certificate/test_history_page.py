@@ -12,7 +12,7 @@ import pytest
 from cmm_uq.certificate.document import Document
 from cmm_uq.certificate.pages.fleet import due_document
 from cmm_uq.certificate.pages.history import history_data, history_document, meets, notes, overview_of, terminal_note
-from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.render import render_html
 from cmm_uq.laboratory.due.crossing import Crossing, crossing
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, machine_due
 from cmm_uq.laboratory.due.history import MachineHistory, machine_history

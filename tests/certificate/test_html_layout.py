@@ -13,7 +13,7 @@ import pytest
 from pypdf import PdfReader
 
 from cmm_uq.certificate.document import Column, Document, Section, Table
-from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.render import render_html
 from tests.certificate.samples import HOSTILE, NUMBER, UNBREAKABLE, document_of
 
 if TYPE_CHECKING:

@@ -20,14 +20,13 @@ from cmm_uq.app.commands.reading import in_language, read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import LANGUAGES, Code, Translation as Said, translated as said_in
 from cmm_uq.base.messages import Day, Message, Number, Text, Verbatim, commas, say
+from cmm_uq.certificate import render as fitting
 from cmm_uq.certificate.document import Document, Paragraph, Plot, Section, translated
 from cmm_uq.certificate.plots import style as fonts
 from cmm_uq.certificate.plots.plans import _edge, _size, _title
 from cmm_uq.certificate.plots.residuals import budget_bars
 from cmm_uq.certificate.plots.style import NAMES_MM, SMALL, TINY, lettered_in, width_mm
-from cmm_uq.certificate.render import html as fitting
-from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.certificate.render import render_html, render_pdf
 from cmm_uq.certificate.results.contents import head
 from tests.artefacts.simulated import outcome
 from tests.certificate.saying import figures, lettering, messages

@@ -17,8 +17,7 @@ from cmm_uq.base.languages.translation import LANGUAGES, Code, translated as sai
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.certificate.clauses import STATEMENTS
 from cmm_uq.certificate.document import Document, Facts, Signature, translated
-from cmm_uq.certificate.render.html import fitted, render_html
-from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.certificate.render import fitted, render_html, render_pdf
 from cmm_uq.jobs.logo import Logo
 from tests.artefacts.simulated import document
 from tests.certificate.test_completeness import REPORTED

@@ -15,7 +15,7 @@ from pypdf import PdfReader
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.certificate.document import Column, Document, Plot, Section, Table
-from cmm_uq.certificate.render.pdf import HEIGHT_MM, WIDTH_MM, render_pdf, seal
+from cmm_uq.certificate.render import HEIGHT_MM, WIDTH_MM, render_pdf, seal
 from tests.certificate.samples import HOSTILE, NUMBER, UNBREAKABLE, document_of, plots
 from tests.certificate.sign.authority import SIGNED, Held, curve_key, issued
 

@@ -13,8 +13,7 @@ from prov.model import ProvActivity, ProvAgent, ProvDerivation, ProvDocument, Pr
 
 from cmm_uq import __version__
 from cmm_uq.certificate.document import Document
-from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.certificate.render import render_html, render_pdf
 from cmm_uq.certificate.results import provenance as installation
 from cmm_uq.certificate.results.contents import head
 from cmm_uq.certificate.results.provenance import provenance, same_but_for_the_platform

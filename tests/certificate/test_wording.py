@@ -13,11 +13,11 @@ from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.base.units import unit
+from cmm_uq.certificate.clauses import stated_uncertainty
 from cmm_uq.certificate.document import DecisionBlock, Facts, Table
 from cmm_uq.certificate.result import NoiseComponent, RecordingNoise
 from cmm_uq.certificate.sections.conformity import conformity_section
 from cmm_uq.certificate.sections.method import noise_found
-from cmm_uq.certificate.sections.traceability import stated_uncertainty
 from cmm_uq.certificate.wording import expanded, figure_row, measured, probability, title_of, with_uncertainty
 from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError
 from cmm_uq.machine.model.kind import BARS, LENGTHS

@@ -12,10 +12,10 @@ import pytest
 
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.clauses import traceability_section
 from cmm_uq.certificate.document import Facts
 from cmm_uq.certificate.origin import origin_warnings
 from cmm_uq.certificate.results.contents import head
-from cmm_uq.certificate.sections.traceability import traceability_section
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.derived_job import kept_inputs
 from tests.certificate.saying import leaves, said

@@ -14,10 +14,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from cmm_uq.certificate.clauses import clauses, clauses_data, draft
+from cmm_uq.certificate.clauses import claimed, clauses, clauses_data, draft, traceability_section
 from cmm_uq.certificate.digital_certificate.administration import Languages, formal_statements
 from cmm_uq.certificate.document import Paragraph
-from cmm_uq.certificate.sections.traceability import claimed, traceability_section
 from cmm_uq.jobs.acquired import AcquisitionRecord, Provenance
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.short_gauge import ShortGauge, ShortGaugeFacts

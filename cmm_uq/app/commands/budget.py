@@ -46,8 +46,7 @@ def write_budget(
         from cmm_uq.certificate.origin import as_json
         from cmm_uq.certificate.pages.budget import budget_document
         from cmm_uq.certificate.plots.style import lettered_in
-        from cmm_uq.certificate.render.html import render_html
-        from cmm_uq.certificate.render.pdf import render_pdf
+        from cmm_uq.certificate.render import render_html, render_pdf
         from cmm_uq.maths.uncertainty.budget_results import results_of
 
         data = as_json({**results_of(evaluation), **model.further(), "inputs_sha256": {file.name: model.sha256},

@@ -142,16 +142,15 @@ def _recipe(job: Job) -> Recipe:
     if job.facts.simulation is not None and kind_of(job).observe is None:
         raise CmmUqError(f"a job of kind {job.facts.artefact.kind!r} is compared with no simulation: its analysis is its own",
                          where=f"job.toml {KEY}", fix="Leave the simulation out")  # fmt: skip
-    usual = Recipe(_diagnose, lambda found, seed: _outcome(found))
+
+    def outcome(result: JobDiagnosis, seed: int) -> Outcome:
+        from cmm_uq.app.commands.jobs.simulate import to_fill_in
+
+        plan = result.next_plan
+        return replace(diagnosed_outcome(result), files={} if plan is None else {TO_FILL_IN: to_fill_in(plan.points)})
+
+    usual = Recipe(_diagnose, outcome)
     return recipe_of(job, lambda own: own.diagnose, lambda kind: usual, "diagnosed as a recording of an artefact")
-
-
-def _outcome(result: JobDiagnosis) -> Outcome:
-    from cmm_uq.app.commands.jobs.simulate import to_fill_in
-
-    plan = result.next_plan
-    files = {} if plan is None else {TO_FILL_IN: to_fill_in(plan.points)}
-    return replace(diagnosed_outcome(result), files=files)
 
 
 @naming_package()

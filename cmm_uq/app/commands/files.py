@@ -190,8 +190,7 @@ class Form:
             return {RESULTS: as_json(outcome.results)}
         from cmm_uq.certificate.document import translated as said
         from cmm_uq.certificate.origin import marked
-        from cmm_uq.certificate.render.html import render_html
-        from cmm_uq.certificate.render.pdf import render_pdf
+        from cmm_uq.certificate.render import render_html, render_pdf
         from cmm_uq.certificate.results.provenance import FILE, provenance
 
         job, data = outcome.found.job, as_json(outcome.results)

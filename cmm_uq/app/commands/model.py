@@ -1,4 +1,4 @@
-"""The measurement model of a job: its recording screened, joined with artefact, effects and noise; and what is refused."""
+"""The measurement model of a job, of its recording or of what a simulation leaves of that; and what is refused."""
 
 from __future__ import annotations
 

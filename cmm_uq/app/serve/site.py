@@ -34,7 +34,7 @@ from cmm_uq.app.serve.view import ChainComparing, DueDates, MachineStanding, Sit
 from cmm_uq.base.errors import CmmUqError, OutputError, printable
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.certificate.plots import style as plot_style
-from cmm_uq.certificate.render.html import template_folder
+from cmm_uq.certificate.render import template_folder
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.place import shown
 from cmm_uq.laboratory.records.store import Records

@@ -22,12 +22,12 @@ from cmm_uq.artefacts.kinds import ShiftFacts
 from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
+from cmm_uq.certificate.clauses import artefact_rows, certificate_rows, traceability_section
 from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
 from cmm_uq.certificate.origin import file_name, quantity_data
 from cmm_uq.certificate.result import StatedUncertainty
 from cmm_uq.certificate.results.contents import covariance_data, head
 from cmm_uq.certificate.sections.results import SIGN, Left, stated_table
-from cmm_uq.certificate.sections.traceability import artefact_rows, certificate_rows, traceability_section
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.verdicts import NO_VERDICTS
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, error_map_csv

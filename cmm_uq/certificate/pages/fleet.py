@@ -1,4 +1,4 @@
-"""Which machines are due for calibration."""
+"""Pages of many machines: which are due for calibration, and how those of a fleet drift, of however many those that matter."""
 
 from __future__ import annotations
 
@@ -153,14 +153,10 @@ def groups_shown(of: FleetValue) -> tuple[UsualRate, ...]:
 def usual_table(of: FleetValue) -> Table:
     spec, shown, per_year = words.digits(of), groups_shown(of), words.per_year(of)
     heads = (say("Machines"), Column(say("Number")), Column(say("Rate"), per_year), Column(say("U (95 %)"), per_year))
-    rows = tuple(
-        (
-            words.group_words(each),
-            number(each.machines),
-            words.signed_rate(each.rate, spec),
-            number(1.96 * each.u, spec),
-        )
-        for each in shown
+    rate = words.signed_rate
+    rows = (
+        (words.group_words(one), number(one.machines), rate(one.rate, spec), number(1.96 * one.u, spec))
+        for one in shown
     )
     notes: list[Text] = [say("A model at the fleet's average place; a place for the fleet's average machine.")]
     if left := len(of.fleet.usual) - len(shown):
@@ -168,7 +164,7 @@ def usual_table(of: FleetValue) -> Table:
             left, one=say("One more model or place has fewer machines; fleet.json has all."),
             many=say("{count} more models and places have fewer machines; fleet.json has all.", count=left),
         ))  # fmt: skip
-    return Table(say("Usual drift"), columns(heads), rows, tuple(notes))
+    return Table(say("Usual drift"), columns(heads), tuple(rows), tuple(notes))
 
 
 def outsiders(of: FleetValue) -> doc.Block:

@@ -314,15 +314,8 @@ def overview_of(history: MachineHistory) -> doc.Overview:
 
 
 def _certificates(history: MachineHistory) -> doc.Table | None:
-    heads = (
-        say("Date"),
-        say("Number"),
-        say("What"),
-        say("State"),
-        say("Artefact"),
-        say("Decision"),
-        say("Adjusted before"),
-    )
+    adjusted = say("Adjusted before")
+    heads = (say("Date"), say("Number"), say("What"), say("State"), say("Artefact"), say("Decision"), adjusted)
     rows = (
         (
             day(one.day), Verbatim(one.number), say("interim check") if one.interim else say("certificate"),

@@ -222,7 +222,7 @@ def as_svg(figure: Figure) -> str:
     """The figure as one ``<svg>`` element: no prolog, no date, no unused ids, coordinates to 0.01 pt.
 
     The same figure gives the same bytes on every run. The ids that stay (of clip paths and markers) are made unique
-    when several pictures share a page, see :mod:`cmm_uq.certificate.render.html`.
+    when several pictures share a page, see :mod:`cmm_uq.certificate.render`.
     """
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))

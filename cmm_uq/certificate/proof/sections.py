@@ -35,29 +35,20 @@ from cmm_uq.laboratory.proving.judgement import (
 )
 
 KIND_WORDS: Mapping[str, Text] = {
-    cases.NOTHING: say("nothing"),
-    cases.ONE: say("one effect"),
-    cases.TWO: say("two effects"),
-    cases.OUTSIDE: say("a function outside the catalogue"),
-    cases.ARTEFACT: say("a fault of the artefact"),
-}
+    cases.NOTHING: say("nothing"), cases.ONE: say("one effect"), cases.TWO: say("two effects"),
+    cases.OUTSIDE: say("a function outside the catalogue"), cases.ARTEFACT: say("a fault of the artefact"),
+}  # fmt: skip
 NOISE_WORDS: Mapping[str, Text] = {
-    cases.OWN: say("the job's own"),
-    cases.WHITE: say("white"),
-    cases.SET_UP: say("with set-up offsets"),
-    cases.AXIS: say("one axis three times noisier"),
-    cases.GROWING: say("growing with length"),
-    cases.SLOWLY: say("with slow noise in time"),
-    cases.WALKING: say("walking at random in time"),
-    cases.TAILS: say("heavy tails"),
-    cases.RESOLUTION: say("coarse display"),
-}
+    cases.OWN: say("the job's own"), cases.WHITE: say("white"), cases.SET_UP: say("with set-up offsets"),
+    cases.AXIS: say("one axis three times noisier"), cases.GROWING: say("growing with length"),
+    cases.SLOWLY: say("with slow noise in time"), cases.WALKING: say("walking at random in time"),
+    cases.TAILS: say("heavy tails"), cases.RESOLUTION: say("coarse display"),
+}  # fmt: skip
 FAULT_WORDS: Mapping[str, Text] = {
-    "length": say("a wrong certified length"),
-    "nodes": say("errors of its own points, common to all set-ups"),
+    "length": say("a wrong certified length"), "nodes": say("errors of its own points, common to all set-ups"),
     "warm": say("another temperature than stated, the same throughout"),
     "warming": say("warming from one set-up to the next"),
-}
+}  # fmt: skip
 INTERVAL_WORDS: Mapping[str, Text] = {
     judgement.STATED: say("of effects that were found"),
     judgement.NAMED: say("of what the job names, nothing hidden"),

@@ -36,26 +36,21 @@ SCHEMA = "cmm-uq/results/1"
 
 def head(job: Job, schema: str = SCHEMA, *, effects: bool = True) -> dict[str, Any]:
     """What every results.json begins with: the schema, the program, and which job with which inputs of which origin."""
-    facts = job.facts.job
-    derived = facts.derived_from
+    facts, serial = job.facts.job, job.facts.machine.serial
+    there: dict[str, Any] = {
+        "serial": serial or None, "derived_from": facts.derived_from and facts.derived_from.model_dump(),
+        "replaces": facts.replaces and facts.replaces.model_dump(mode="json", exclude_none=True),
+        "altered": list(job.altered) or None, "language": facts.language if facts.language != ENGLISH else None,
+    }  # fmt: skip
+    said = {
+        "id": facts.id, "origin": facts.origin, "date": facts.date.isoformat(), "machine": job.facts.machine.name,
+        **{key: value for key, value in there.items() if value is not None}, "inputs_sha256": sha256(job.inputs),
+    }  # fmt: skip
     return {
-        "schema": schema,
-        "software": software(job, effects=effects),
-        "job": {
-            "id": facts.id,
-            "origin": facts.origin,
-            "date": facts.date.isoformat(),
-            "machine": job.facts.machine.name,
-            **({"serial": job.facts.machine.serial} if job.facts.machine.serial else {}),
-            **({"derived_from": derived.model_dump()} if derived else {}),
-            **({"replaces": facts.replaces.model_dump(mode="json", exclude_none=True)} if facts.replaces else {}),
-            **({"altered": list(job.altered)} if job.altered else {}),
-            **({"language": facts.language} if facts.language != ENGLISH else {}),
-            "inputs_sha256": sha256(job.inputs),
-        },
+        "schema": schema, "software": software(job, effects=effects), "job": said,
         **({"acquisition": job.acquired.data} if job.acquired else {}),
         **({"import": [recognised.data for recognised in job.imported]} if job.imported else {}),
-    }
+    }  # fmt: skip
 
 
 def results(result: Result) -> dict[str, Any]:

@@ -150,7 +150,8 @@ def has_picture(statement: Statement) -> bool:
 
 def picture(statement: Statement) -> Plot:
     items = [item for item in statement.errors if not item.set_aside]
-    far, outside = len(statement.errors) - len(items), [not _accepted(item) for item in items]
+    far = len(statement.errors) - len(items)
+    outside = [item.decision.outcome not in ("pass", "conditional pass") for item in items]
     beyond = say("Not drawn: the values that the screening set aside, {count}, which lie far outside.", count=far)
     bands = [(item.limit_um, item.decision.guard_band) for item in items]
     caption = say("{standard}: every error against ±MPE, {formula}, with the guard band.",
@@ -164,10 +165,6 @@ def picture(statement: Statement) -> Plot:
         alternative=say("{count} errors over length between the limits; {outside} of them are not accepted.",
                         count=len(items), outside=sum(outside)),
     )  # fmt: skip
-
-
-def _accepted(item: Decided) -> bool:
-    return item.decision.outcome in ("pass", "conditional pass") and not item.set_aside
 
 
 _STANDING = {"counts": NOTHING, "again": say("to be measured again"), "replaced": say("measured again")}

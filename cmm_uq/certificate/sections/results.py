@@ -190,18 +190,8 @@ def tolerance_sections(result: Result) -> list[Section]:
         caption=say("Each parameter over its tolerance, with its 95 % interval."),
         alternative=say("Out of tolerance: {out}.", out=listed(out)) if out else say("No parameter is out of tolerance."),
     )  # fmt: skip
-    return [
-        section(
-            title,
-            plot,
-            table(
-                say("Parameters and tolerances"),
-                (say("Parameter"), *figures, say("Unit"), say("Verdict")),
-                rows,
-                *notes,
-            ),
-        )
-    ]
+    heads: tuple[Text | Column, ...] = (say("Parameter"), *figures, say("Unit"), say("Verdict"))
+    return [section(title, plot, Table(say("Parameters and tolerances"), columns(heads), tuple(rows), notes))]
 
 
 def summary(result: Result, warnings: Iterable[Text]) -> Summary:
@@ -289,7 +279,17 @@ def overview_of(result: Result) -> Overview | None:
         order = sorted(range(len(rows)), key=lambda i: _gravity(verdicts[i].outcome))[:_MOST]
         further = say("Further statements"), say("{count}, behind this page", count=more)
         rows = [*(rows[i] for i in sorted(order)), further]
-    return Overview(_verdict(verdicts), standing_of(verdicts.overall), (*rows, *_lacking(verdicts), *_rules(result)))
+    # the first of what statements lack, and how much more there is
+    if lacking := list(dict.fromkeys(what for one in verdicts if one.value is not None for what in one.missing)):
+        shown, more = semicolons(lacking[:2]), len(lacking) - 2
+        if more > 0:
+            shown = say("{shown}; {count} more behind this page", shown=shown, count=more)
+        rows.append((say("Missing"), shown))
+    rules = [rule_words(one.facts.rule) for one in result.statements]
+    if len(verdicts) > len(result.statements):
+        rules.append(say("tolerances: the whole 95 % interval must lie within"))
+    rows.append((say("Decision rule"), semicolons(dict.fromkeys(rules))))
+    return Overview(_verdict(verdicts), standing_of(verdicts.overall), tuple(rows))
 
 
 def _gravity(outcome: str) -> int:
@@ -314,22 +314,6 @@ def _row(one: Verdict, *, signed: bool) -> Text:
         return say("{outcome}: not determined by this recording", outcome=outcome)
     value = stated_value(one.value, one.U, signed=signed)
     return stated_row(one.outcome, value, one.unit, one.limit if one.by else None)
-
-
-def _lacking(verdicts: Sequence[Verdict]) -> list[tuple[Text, Text]]:
-    """The first of what statements lack, and how much more there is."""
-    lacking = list(dict.fromkeys(what for one in verdicts if one.value is not None for what in one.missing))
-    shown, more = semicolons(lacking[:2]), len(lacking) - 2
-    if more > 0:
-        shown = say("{shown}; {count} more behind this page", shown=shown, count=more)
-    return [(say("Missing"), shown)] if lacking else []
-
-
-def _rules(result: Result) -> list[tuple[Text, Text]]:
-    told = [rule_words(one.facts.rule) for one in result.statements]
-    if len(result.verdicts) > len(result.statements):
-        told.append(say("tolerances: the whole 95 % interval must lie within"))
-    return [(say("Decision rule"), semicolons(dict.fromkeys(told)))]
 
 
 def with_first(result: Result, sections: Sequence[Section]) -> list[Section]:

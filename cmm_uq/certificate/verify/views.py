@@ -134,7 +134,7 @@ def _compare_information(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, name: s
 
 def check_style(inquiry: Inquiry, page: HtmlPage, name: str) -> None:
     """Keep a style sheet that is not the template's: it could hide what a page says, or say something else."""
-    from cmm_uq.certificate.render.html import style_sheet
+    from cmm_uq.certificate.render import style_sheet
 
     inquiry.looked("files")
     if page.style.strip() != style_sheet(page.title, page.banner, page.language).strip():

@@ -14,8 +14,7 @@ from cmm_uq.app.serve.checks_page import FileMatch, look_up, number_in, verdict
 from cmm_uq.app.serve.exchange import RefusedRequest, UploadedFile
 from cmm_uq.app.serve.view import DueDate, MachineStanding, groups, in_order
 from cmm_uq.base.messages import say
-from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.certificate.render import render_html, render_pdf
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.facts import Entry
 from cmm_uq.laboratory.records.listing import Called, ListedCertificate, Newest

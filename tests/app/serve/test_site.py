@@ -378,7 +378,7 @@ def test_every_text_of_every_page_is_a_message_or_of_the_records(
 
 
 def test_the_template_has_no_word_of_its_own() -> None:
-    from cmm_uq.certificate.render.html import template_folder
+    from cmm_uq.certificate.render import template_folder
 
     template = (template_folder() / "serve" / "page.html").read_text(encoding="utf-8")
     bare = re.sub(r"\{#.*?#\}|\{%.*?%\}|\{\{.*?\}\}", "", template, flags=re.DOTALL)

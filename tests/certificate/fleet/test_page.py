@@ -17,8 +17,7 @@ from pypdf import PdfReader
 from cmm_uq.certificate.document import Document, Overview, Table
 from cmm_uq.certificate.pages.fleet import fleet_document
 from cmm_uq.certificate.pages.fleet_summary import fleet_csv, fleet_data, fleet_summary
-from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.certificate.render import render_html, render_pdf
 from cmm_uq.laboratory.due.fleet import FleetResult
 from tests.certificate.fleets import alone, many, two
 from tests.certificate.saying import strangers

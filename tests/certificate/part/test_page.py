@@ -30,8 +30,7 @@ from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement, 
 from cmm_uq.certificate.part.method import method_section
 from cmm_uq.certificate.part.page import lacking_of, machine_section, overview_of, part_document
 from cmm_uq.certificate.part.results_section import errors_section, results_section
-from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.certificate.render import render_html, render_pdf
 from cmm_uq.certificate.wording import effect_title
 from cmm_uq.jobs.part.job import TABLES
 from tests.certificate.parts_found import ERRORS, STANDING as CERTIFICATE, found_of, measured_points

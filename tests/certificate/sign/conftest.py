@@ -13,7 +13,7 @@ pytest.importorskip("signxml")
 from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import rsa
 
-from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.certificate.render import render_pdf
 from cmm_uq.certificate.sign import Trust
 from tests.certificate.samples import ballbar_certificate
 from tests.certificate.sign.authority import Held, curve_key, issued, root

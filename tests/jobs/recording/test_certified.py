@@ -15,7 +15,7 @@ from cmm_uq.app.commands.jobs.simulate import simulated_job
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.artefacts import kind_named
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.sections.traceability import claimed
+from cmm_uq.certificate.clauses import claimed
 from cmm_uq.jobs.dcc import Certificate, written
 from cmm_uq.jobs.dcc.certificate import StatementMetadata, rich
 from cmm_uq.jobs.job import Job

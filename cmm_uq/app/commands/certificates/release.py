@@ -21,7 +21,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, number, say, 
 from cmm_uq.base.output.manifest import sha256_of
 from cmm_uq.base.units import UNITS, printed_unit
 from cmm_uq.certificate.result import Outcome
-from cmm_uq.certificate.results.reissue import KEY, ChangedFigure, Reissue
+from cmm_uq.certificate.results.provenance import KEY, ChangedFigure, Reissue
 from cmm_uq.certificate.wording import OUTCOME_WORDS, with_uncertainty
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reports import results_named

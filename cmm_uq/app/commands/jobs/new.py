@@ -1,4 +1,9 @@
-"""The folder of a new job, or of a new budget: every other key as a comment, a schema, and what to do next."""
+"""A new job, or a new budget: a folder that can be reported at once, with a simulated recording to be replaced by one's own.
+
+The set-ups are those of the kind's usual plan in the machine's volume, the readings are drawn from the model that the job
+names, and everything that is made of them says that they are simulated. job.toml has every other key as a comment; beside it
+lie its schema, and what to do next.
+"""
 
 from __future__ import annotations
 
@@ -251,7 +256,11 @@ def write_new(
             raise CmmUqError("a new budget has no machine, artefact or job", where="--set", fix="Leave it out")
         files, origin = budget_files(), MEASURED
     elif name == PART:
-        files, origin = _part(given, drawing, answers, id), SIMULATED
+        origin = SIMULATED
+        if answers is not None:
+            files = part_of_answers(answers, id=id)
+        else:
+            files = part_of_drawing(drawing, given, id=id) if drawing else part_files(given, id=id)
     elif name == PLAN:
         files, origin = new_plan(given, id=id), MEASURED
     else:
@@ -259,12 +268,6 @@ def write_new(
     with staged(folder, Owner("new", id, origin), expected=files) as place:
         check_empty(folder, but=".unfinished-")
         return place.write(files)
-
-
-def _part(given: Tables, drawing: Path | None, answers: Answers | None, id: str) -> dict[str, bytes]:  # noqa: A002
-    if answers is not None:
-        return part_of_answers(answers, id=id)
-    return part_of_drawing(drawing, given, id=id) if drawing else part_files(given, id=id)
 
 
 def job_id(folder: Path, given: Tables, otherwise: str = "job") -> str:

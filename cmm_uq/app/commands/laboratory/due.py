@@ -185,7 +185,7 @@ def _write(
     """Write ``NAME.html``, ``NAME.json`` and what else there is, by the ends of names, all or none."""
     from cmm_uq.base.output import Owner, staged
     from cmm_uq.certificate.origin import as_json
-    from cmm_uq.certificate.render.html import render_html
+    from cmm_uq.certificate.render import render_html
 
     files = [f"{name}.{end}" for end in ("html", "json", *further)]
     with staged(folder, Owner(name, owner), force=force, expected=files) as place:

@@ -308,8 +308,7 @@ def contents_of(found: PartMeasurement, stage: Stage = silent, *, finished: Fini
     """Bytes of every file, by name."""
     from cmm_uq.certificate.origin import as_json
     from cmm_uq.certificate.part.results import part_results
-    from cmm_uq.certificate.render.html import render_html
-    from cmm_uq.certificate.render.pdf import render_pdf
+    from cmm_uq.certificate.render import render_html, render_pdf
 
     job = found.job
     if RESULTS in job.inputs:

@@ -1,4 +1,4 @@
-"""A plan in words: what its placings determine, what they leave open, how the operator sets the artefact up."""
+"""A plan in words, and as a document for the operator and for whoever answers for it."""
 
 from __future__ import annotations
 

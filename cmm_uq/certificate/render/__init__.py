@@ -1,1 +1,0 @@
-"""A document as HTML and as PDF: two views of the same texts."""
