@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -55,6 +56,9 @@ class Entry:
         return self.hash == hash_of(self.previous, self.number, self.at, self.kind, self.content)
 
 
+_NUL = re.compile(r"(?<!\\)(?:\\\\)*\\u0000")  # as JSON escapes it, and no backslash before the letters u0000
+
+
 def canonical(content: Mapping[str, Any]) -> str:
     """The one way in which a content is written: keys sorted, no blanks, finite numbers in their shortest form."""
     try:
@@ -62,7 +66,7 @@ def canonical(content: Mapping[str, Any]) -> str:
         text.encode()
     except (TypeError, ValueError) as error:
         raise CmmUqError(f"cannot be recorded: {error}", where="records") from error
-    if "\\u0000" in text:  # PostgreSQL has no such character
+    if _NUL.search(text):  # PostgreSQL has no such character
         raise CmmUqError("cannot be recorded: a text holds the character NUL", where="records")
     return text
 

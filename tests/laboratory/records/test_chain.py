@@ -185,6 +185,13 @@ def test_the_canonical_text_is_one_for_each_content(content: dict[str, float]) -
     assert canonical(json.loads(canonical(content))) == canonical(dict(reversed(content.items())))
 
 
+def test_a_backslash_before_u0000_is_no_nul() -> None:
+    assert json.loads(canonical({"a": r"\u0000"})) == {"a": r"\u0000"}
+    for nul in ("\0", "\\\0"):
+        with pytest.raises(CmmUqError, match="the character NUL"):
+            canonical({"a": nul})
+
+
 def test_entries_have_a_kind_of_the_list_and_their_moment_in_utc(tmp_path: Path) -> None:
     with open_records(tmp_path / "r.db", create=True) as records:
         with pytest.raises(CmmUqError, match="no kind of entry"):
