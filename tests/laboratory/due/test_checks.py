@@ -15,7 +15,7 @@ from cmm_uq.laboratory.records.facts import RecordedCertificate
 from tests.laboratory.due.histories import FIRST_of_made, certificate, value
 
 PART = st.floats(0, 0.999)
-U = st.floats(1e-3, 1e3)
+SIZE = st.floats(1e-3, 1e3)
 
 
 def test_the_same_artefact_cancels_by_hand() -> None:
@@ -31,7 +31,7 @@ def test_another_artefact_does_not_nor_does_an_unknown_one() -> None:
 
 
 @settings(deadline=None)
-@given(U, U, PART, PART)
+@given(SIZE, SIZE, PART, PART)
 def test_it_is_the_difference_of_two_sums_with_a_common_term(u1: float, u2: float, p1: float, p2: float) -> None:
     """x = r₁ + p₁u₁·a and y = r₂ + p₂u₂·a: the variance of y − x as a quadratic form of independent r₁, r₂, a."""
     own = u1 * math.sqrt(1 - p1**2), u2 * math.sqrt(1 - p2**2)
