@@ -21,7 +21,7 @@ _CALYPSO = ("idsymbol", "actual", "featureid")
 _CALYPSO_AXES = {"xvalue": "X", "yvalue": "Y", "zvalue": "Z"}
 
 
-class Report(Format):
+class TextReport(Format):
     """A report in lines of text, known by what its head shows."""
 
     shows: Sequence[re.Pattern[str]]
@@ -62,7 +62,7 @@ class _Place:
         return self.sort.lower(), [self.feature, *(self.xyz[axis] for axis in _AXES)], self.line
 
 
-class Calypso(Report):
+class Calypso(TextReport):
     """``…_chr.txt``, a characteristic a line; ``…_fet.txt``, a feature a line; ``…_hdr.txt``, the head.
 
     Of the characteristics those are taken whose ``idsymbol`` is the value of a coordinate (``xValue``, ``yValue``,
@@ -137,7 +137,7 @@ _FIGURES = re.compile(r"^\s*(?P<axis>[A-Z][A-Z0-9]?)\s+[-+\d.]", re.IGNORECASE)
 _NUMBER = re.compile(r"(?<!\S)[-+]?\d*[.,]?\d+(?!\S)")
 
 
-class PcDmis(Report):
+class PcDmis(TextReport):
     """The places of features, as ``LOCATION OF SPHERE SPH1`` with its lines X, Y and Z.
 
     The figures stand below the words of a heading line (``AX NOMINAL +TOL -TOL MEAS DEV OUTTOL``), flushed right; which are
@@ -229,7 +229,7 @@ _DMIS = re.compile(
 )
 
 
-class Dmis(Report):
+class Dmis(TextReport):
     """Output of DMIS programs (ANSI/CAM-I 105.0): the actual features, ``FA(SPH1)=FEAT/SPHERE,OUTER,CART,x,y,z,d``."""
 
     name = "dmis"
@@ -307,7 +307,7 @@ _IPP = re.compile(r"(?:\b\d{5}[ \t]+(?:StartSession[ \t]*\(|PtMeas[ \t]*\(|[&%#]
 _Answer = tuple[str, dict[str, str], int]  # tag, terms, line
 
 
-class Ipp(Report):
+class Ipp(TextReport):
     """I++ DME 1.4 to 1.7: the answers to ``PtMeas``, as ``00169 # X(12.5), Y(0), Z(-3), IJK(0, 0, 1)``, in mm.
 
     An answer to ``Get`` looks like one to ``PtMeas``, so a trace without the requests is read only where all its answers
