@@ -34,8 +34,7 @@ from cmm_uq.machine.model.recorded import expansion, place
 class Bryan(Radial):
     """A swept bar: n distances of n points, one a measurement.
 
-    ``facts`` what the job says of the bar; its length may be missing; ``points`` the recording; point 1 is the swept
-    ball.
+    ``facts`` what the job says of the bar; its length may be missing; ``points`` the recording; point 1 is the swept ball.
     """
 
     kind = "bryan"
@@ -62,8 +61,7 @@ class Bryan(Radial):
         The sphere is fitted as if the machine had no errors, and bends to them: unless the swept positions surround the
         fixed ball evenly, its centre takes up part of every scale and squareness error, and e1 … e6 lack that part.
 
-        ``xyz`` (n, 3) readings, mm; by default those recorded. Gives solution, and the centre (3,) of the first step,
-        mm.
+        ``xyz`` (n, 3) readings, mm; by default those recorded. Gives solution, and the centre (3,) of the first step, mm.
         """
         certified = self.sizes[0].certified
         readings = self.points.xyz if xyz is None else xyz

@@ -17,15 +17,8 @@ import numpy as np
 
 from cmm_uq.analysis.planning.set_up import SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start
-from cmm_uq.analysis.screening.shape import (
-    TOLERANCE_MM,
-    ArtefactShape,
-    Screening,
-    ball_misfit,
-    rows_by,
-    samples_of,
-    spread,
-)
+from cmm_uq.analysis.screening import shape
+from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
 from cmm_uq.artefacts.kinds import ReferenceSphereFacts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say, signed
@@ -87,8 +80,7 @@ class DigitizerArtefact(Artefact):
 
     ``facts`` what the job says of it; ``points`` the recording, with ``alpha_deg``, ``beta_deg``, ``gamma_deg``; scale
     readings as x, y, z. ``attitude`` (n, 3, 3) of each point: columns u, v, w in machine axes; ``alignments`` of each
-    measurement by itself; ``start`` the offset from these alone; ``poses`` which points were recorded in which
-    attitude.
+    measurement by itself; ``start`` the offset from these alone; ``poses`` which points were recorded in which attitude.
     """
 
     kind = "digitizer"
@@ -200,18 +192,18 @@ def shape_of(facts: ReferenceSphereFacts, points: Points) -> ArtefactShape | Non
     if scan is None:
         everything = (np.arange(len(points)),)
         return ArtefactShape(everything, offset_misfit, np.nan, 0.0, reference=attitude.reshape(-1, 9))
-    rows = rows_by(points.measurement)
+    rows = shape.rows_by(points.measurement)
     if any(len(one) < 5 for one in rows):
         return None
     seen = np.einsum("nij,nj->ni", attitude[:, :, :2], scan)
     radius = (facts.length_mm or np.nan) / 2
-    extent = 0.5 * float(np.median([spread((points.xyz + seen)[one]) for one in rows]))
+    extent = 0.5 * float(np.median([shape.spread((points.xyz + seen)[one]) for one in rows]))
     return ArtefactShape(rows, scan_misfit, radius, radius if np.isfinite(radius) else extent, reference=seen)
 
 
 def scan_misfit(xyz: Floats, seen: Floats, radius: float) -> Floats:
     """Points of one scan, relative to the mount plus what the scan plane shows (k, 3), against a sphere."""
-    return ball_misfit(xyz + seen, seen, radius)
+    return shape.ball_misfit(xyz + seen, seen, radius)
 
 
 def offset_misfit(xyz: Floats, attitude: Floats, _: float) -> Floats:
@@ -220,7 +212,7 @@ def offset_misfit(xyz: Floats, attitude: Floats, _: float) -> Floats:
     if count < 3:
         return np.zeros(count)
     design = np.concatenate([attitude.reshape(count, 3, 3), np.broadcast_to(np.eye(3), (count, 3, 3))], axis=2)
-    samples = np.array([np.arange(3)]) if count == 3 else samples_of(count, 3)
+    samples = np.array([np.arange(3)]) if count == 3 else shape.samples_of(count, 3)
     some = design[samples].reshape(len(samples), 9, _UNKNOWNS)
     s = np.linalg.svd(some, compute_uv=False)
     sound = s[:, -1] > _SOUND * s[:, 0]
@@ -229,7 +221,7 @@ def offset_misfit(xyz: Floats, attitude: Floats, _: float) -> Floats:
     found = np.linalg.pinv(some[sound]) @ xyz[samples[sound]].reshape(-1, 9, 1)
     misfits = np.linalg.norm(xyz - np.einsum("nij,sj->sni", design, found[:, :, 0]), axis=2)
     best = misfits[np.argmin(np.median(misfits, axis=1))]
-    agree = best <= max(4 * float(np.median(best)), TOLERANCE_MM)
+    agree = best <= max(4 * float(np.median(best)), shape.TOLERANCE_MM)
     fitted, *_rest = np.linalg.lstsq(design[agree].reshape(-1, _UNKNOWNS), xyz[agree].ravel(), rcond=None)
     return np.asarray(np.linalg.norm(xyz - design @ fitted, axis=1), dtype=np.float64)
 

@@ -14,14 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.planning.candidates import (
-    MIDDLE,
-    PatternFor,
-    RelocatedCandidates,
-    VolumeCandidates,
-    along_lines,
-    check_allowed,
-)
+from cmm_uq.analysis.planning import candidates
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, direction_words, planned_length
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, line_misfit, rows_by
@@ -101,14 +94,14 @@ def seven_lines(setting: Setting, lengths: Floats, shapes: Callable[[Floats], li
     diagonals = [size * signs for signs in ((1, 1, 1), (1, -1, 1), (-1, 1, 1), (-1, -1, 1))]
     found = []
     for direction in (*diagonals, *np.eye(3)):
-        check_allowed(setting, direction)
+        candidates.check_allowed(setting, direction)
         fitting = five_of(lengths, volume.chord(direction))
         if not len(fitting):
             raise volume.too_small(
                 np.outer([-0.5, 0.5], lengths[0] * attitude_along(direction)[:, 0]), direction_words(direction)
             )
         found += [
-            volume.set_up(shape, attitude_along(direction), MIDDLE, direction_words(direction))
+            volume.set_up(shape, attitude_along(direction), candidates.MIDDLE, direction_words(direction))
             for shape in shapes(fitting)
         ]
     return tuple(found)
@@ -349,7 +342,7 @@ def blocks(setting: Setting) -> tuple[SetUp, ...]:
 def _planning(
     lines: Callable[[Setting], tuple[SetUp, ...]], lengths_of: Lengths, pattern: Callable[[Floats, PlanFacts], Pattern]
 ) -> Planning:
-    def shape(setting: Setting) -> PatternFor:
+    def shape(setting: Setting) -> candidates.PatternFor:
         lengths = lengths_of(setting.artefact, setting.plan)
 
         def fitting_pattern(attitude: Floats) -> Pattern | None:
@@ -358,7 +351,9 @@ def _planning(
 
         return fitting_pattern
 
-    places = VolumeCandidates(along_lines, shape, RelocatedCandidates(along_lines))
+    places = candidates.VolumeCandidates(
+        candidates.along_lines, shape, candidates.RelocatedCandidates(candidates.along_lines)
+    )
     return Planning({"ISO 10360-2": lines}, places.candidates, places.elsewhere)
 
 

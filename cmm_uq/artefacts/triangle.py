@@ -17,14 +17,7 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.analysis.planning.candidates import (
-    ACROSS,
-    THIRDS,
-    RelocatedCandidates,
-    across_planes,
-    check_allowed,
-    thinned,
-)
+from cmm_uq.analysis.planning import candidates as places
 from cmm_uq.analysis.planning.set_up import SetUp, split
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, body_misfit, rows_by
@@ -201,8 +194,7 @@ _WRONG_UM = 5.0  # by how much a side may be off whose block or cylinder is anot
 class Triangle(Rigid):
     """A triangle as recorded: points 1, 2, 3 of every (measurement, repeat) are the axes of its cylinders.
 
-    ``facts`` what the job says of blocks and cylinders; ``points`` the recording. ``standard`` dimensions of the
-    triangle.
+    ``facts`` what the job says of blocks and cylinders; ``points`` the recording. ``standard`` dimensions of the triangle.
     """
 
     kind = "triangle"
@@ -274,7 +266,7 @@ def triangle_placings(setting: Setting) -> tuple[SetUp, ...]:
     sides = TriangleStandard.of(cast("TriangleFacts", setting.artefact)).sides
     machine = replace(setting.machine, travel_mm=setting.volume.box)
     for placing in SEVEN_PLACINGS:
-        check_allowed(setting, np.eye(3)[3 - sum(PLANES[placing.plane])], ACROSS)
+        places.check_allowed(setting, np.eye(3)[3 - sum(PLANES[placing.plane])], places.ACROSS)
     points = placed_triangle(machine, sides, repeats=setting.plan.repeats)
     return tuple(
         SetUp(placing.title, replace(some.points, machine=setting.machine))
@@ -283,7 +275,7 @@ def triangle_placings(setting: Setting) -> tuple[SetUp, ...]:
 
 
 def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
-    return thinned(_everywhere(setting), setting.plan.candidates, setting.volume)
+    return places.thinned(_everywhere(setting), setting.plan.candidates, setting.volume)
 
 
 def _title(plane: str, *, longer: bool) -> Text:
@@ -301,7 +293,7 @@ def _everywhere(setting: Setting) -> Iterator[SetUp]:
             continue
         tipped = [
             Placing(_title(plane, longer=long), plane, (x, y, z), long)
-            for x, y, z in product(THIRDS, repeat=3)
+            for x, y, z in product(places.THIRDS, repeat=3)
             for long in (False, True)
         ]
         try:
@@ -313,4 +305,6 @@ def _everywhere(setting: Setting) -> Iterator[SetUp]:
                 yield SetUp(placing.title, replace(some.points, machine=setting.machine))
 
 
-PLANNING = Planning({"triangle placings": triangle_placings}, candidates, RelocatedCandidates(across_planes))
+PLANNING = Planning(
+    {"triangle placings": triangle_placings}, candidates, places.RelocatedCandidates(places.across_planes)
+)

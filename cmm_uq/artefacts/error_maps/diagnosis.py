@@ -11,17 +11,9 @@ from cmm_uq.analysis.diagnosis.diagnosis import OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import region_of
 from cmm_uq.analysis.screening.columns import Finding
+from cmm_uq.artefacts.error_maps import comparison
 from cmm_uq.artefacts.error_maps.columns import MapColumn, columns_of, turned
-from cmm_uq.artefacts.error_maps.comparison import (
-    CandidateCause,
-    ColumnComparison,
-    column_comparison,
-    expansion,
-    function,
-    held_out,
-    noise_of,
-    residual,
-)
+from cmm_uq.artefacts.error_maps.comparison import CandidateCause, ColumnComparison
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.points import Floats
@@ -90,7 +82,7 @@ def diagnose_maps(
 ) -> MapsDiagnosis:
     comparisons, effects, differences = [], [], []
     for i, column in enumerate(columns):
-        compared = column_comparison(column, named, seed)
+        compared = comparison.column_comparison(column, named, seed)
         comparisons.append(compared)
         p_value = len(columns) * compared.p_value
         if p_value < alpha:
@@ -115,8 +107,8 @@ def expansion_shown(compared: ColumnComparison) -> OmittedEffect | None:
     if compared.effect is None:
         return None
     without = [v for v in compared.versions if v.explanation != compared.effect]
-    gain = held_out(compared, compared.versions)[1] - held_out(compared, without)[1]
-    draws = expansion(compared, compared.effect)
+    gain = comparison.held_out(compared, compared.versions)[1] - comparison.held_out(compared, without)[1]
+    draws = comparison.expansion(compared, compared.effect)
     (effect,) = effects_named((str(compared.rivals[compared.effect].effect),))
     reported = effect.to_reported(draws[:, None], np.zeros((len(draws), 0)))
     units = {parameter.name: parameter.unit for parameter in effect.reported}
@@ -124,7 +116,9 @@ def expansion_shown(compared: ColumnComparison) -> OmittedEffect | None:
     sure = all(q.interval95[0] > 0 or q.interval95[1] < 0 for q in parameters.values())
     if not sure or gain.sum() <= np.sqrt(len(gain)) * gain.std(ddof=1):
         return None
-    whole, rest, left = (float(np.sum(residual(compared, some) ** 2)) for some in ((), without, compared.versions))
+    whole, rest, left = (
+        float(np.sum(comparison.residual(compared, some) ** 2)) for some in ((), without, compared.versions)
+    )
     probability = compared.combinations.of(compared.effect)
     return OmittedEffect(
         effect.name, effect.title, probability, parameters, (rest - left) / whole, probability, effect.points_to
@@ -133,7 +127,7 @@ def expansion_shown(compared: ColumnComparison) -> OmittedEffect | None:
 
 def _difference(compared: ColumnComparison, index: int, p_value: float) -> Difference:
     column, rival = compared.column, compared.rivals[index]
-    value, u = function(compared, index)
+    value, u = comparison.function(compared, index)
     unit = column.unit[1]
     probability = compared.combinations.of(index)
     others = compared.instead(_NAMED) if probability < _WELL_KNOWN else ()
@@ -153,9 +147,11 @@ def _improvement(comparisons: Sequence[ColumnComparison], alpha: float) -> Impro
     gains = [np.zeros(0)]
     for compared in comparisons:
         versions = compared.versions if len(comparisons) * compared.p_value < alpha else ()
-        early, late = held_out(compared, ()), held_out(compared, versions)
+        early, late = comparison.held_out(compared, ()), comparison.held_out(compared, versions)
         for place, values in zip(
-            rms, (residual(compared, ()), residual(compared, versions), early[0], late[0]), strict=True
+            rms,
+            (comparison.residual(compared, ()), comparison.residual(compared, versions), early[0], late[0]),
+            strict=True,
         ):
             place.append(values)
         gains.append(late[1] - early[1])
@@ -174,7 +170,7 @@ def _noise(comparisons: Sequence[ColumnComparison], alpha: float, *, rotations: 
         return None
     unit, factor = chosen[0].column.unit
     found = [
-        noise_of(compared, compared.versions if len(comparisons) * compared.p_value < alpha else ())
+        comparison.noise_of(compared, compared.versions if len(comparisons) * compared.p_value < alpha else ())
         for compared in chosen
     ]
     variances, freedoms = np.array(found).T

@@ -11,20 +11,9 @@ from cmm_uq.artefacts.error_maps.comparison import ColumnComparison
 from cmm_uq.artefacts.error_maps.diagnosis import Difference, MapsDiagnosed, MapsDiagnosis
 from cmm_uq.base import messages
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, plural, say, semicolons, sentences, signed
+from cmm_uq.certificate import document as parts
 from cmm_uq.certificate.diagnosis.overview import STANDING, gained, held_out, share_of, summary_of, sure
-from cmm_uq.certificate.document import (
-    Block,
-    Column,
-    Document,
-    Facts,
-    Overview,
-    Paragraph,
-    Section,
-    Table,
-    figure_columns,
-    text_columns,
-    working_page,
-)
+from cmm_uq.certificate.document import Block, Column, Document, Facts, Overview, Paragraph, Section, Table
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.residuals import curve_with_band
 from cmm_uq.certificate.plots.style import lettered_in
@@ -255,7 +244,7 @@ def maps_document(found: MapsDiagnosed, seed: int) -> Document:
     )
     named = messages.commas(titles(facts.model.effects)) or say("none")
     program = say("cmm-uq {version}", version=Verbatim(__version__))
-    return working_page(
+    return parts.working_page(
         facts, say("Diagnosis of error maps"), messages.day(facts.job.date), overview=overview_of(found),
         particulars=(Facts(tested), Facts(((say("Error maps"), maps), (say("Effects that the job names"), named)))),
         warnings=(say("{why:capital}.", why=f.why) for f in found.findings),
@@ -315,8 +304,8 @@ def _compared_of_page(found: MapsDiagnosed) -> Table:
         chance = probability(one.combinations.probability[one.best])
         rows.append((one.column.title, *counts, number(d.p_of(one), ".2g"), best, chance))
     heads = (
-        *text_columns(say("Error")), *figure_columns(say("Maps"), say("Positions"), say("p")),
-        *text_columns(say("Most probable explanation")), Column(say("Probability")),
+        *parts.text_columns(say("Error")), *parts.figure_columns(say("Maps"), say("Positions"), say("p")),
+        *parts.text_columns(say("Most probable explanation")), Column(say("Probability")),
     )  # fmt: skip
     note = say(
         "p is corrected for having looked at all of them. Each error is a free function of position "

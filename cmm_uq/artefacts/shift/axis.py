@@ -13,16 +13,9 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.artefacts.kinds import KnownLength, ShiftFacts
+from cmm_uq.artefacts.shift import result as shared
 from cmm_uq.artefacts.shift.integration import IntegratedCurve, KnownSpan, Method, integrated
-from cmm_uq.artefacts.shift.result import (
-    Curve,
-    Reported,
-    ShiftFound,
-    correction_table,
-    listed_draws,
-    peak_to_valley,
-    shift_facts,
-)
+from cmm_uq.artefacts.shift.result import Curve, Reported, ShiftFound
 from cmm_uq.artefacts.shift.series import RepeatedDrift, ShiftedSeries, Undetermined, shifted_series, undetermined
 from cmm_uq.artefacts.shift.smooth import FINEST, Coefficients, SmoothFunction, SmoothModel, sampled
 from cmm_uq.base.errors import CmmUqError
@@ -218,7 +211,7 @@ class ShiftResult(ShiftFound):
 
     @cached_property
     def table(self) -> ErrorMap:
-        return correction_table(self.axis, self.fine, self.job.points.machine)
+        return shared.correction_table(self.axis, self.fine, self.job.points.machine)
 
     @cached_property
     def scale(self) -> Quantity | None:
@@ -231,7 +224,7 @@ class ShiftResult(ShiftFound):
     @cached_property
     def linearity(self) -> Quantity:
         """Linearity error: peak to valley of the curve about the line through its ends at the first series, µm."""
-        found = peak_to_valley(self.estimate.about_the_ends)
+        found = shared.peak_to_valley(self.estimate.about_the_ends)
         return self.stating.stated(f"linearity_{self.axis}.peak_to_valley_um", found)
 
     @cached_property
@@ -248,8 +241,8 @@ class ShiftResult(ShiftFound):
         shifts = estimate.shifts.T if estimate.series.u_shift > 0 else ()
         return {
             **{f"shifts[{i}].mm": (draws, "mm") for i, draws in enumerate(shifts) if i > 0},
-            **listed_draws(f"curves.linearity_{self.axis}.error_um", estimate.curve.draws / MICROMETRE, "µm"),
-            **(listed_draws("artefact.distance_mm", estimate.artefact, "mm") if estimate.scale_known else {}),
+            **shared.listed_draws(f"curves.linearity_{self.axis}.error_um", estimate.curve.draws / MICROMETRE, "µm"),
+            **(shared.listed_draws("artefact.distance_mm", estimate.artefact, "mm") if estimate.scale_known else {}),
         }
 
     @cached_property
@@ -283,7 +276,7 @@ def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) 
 
 def checked_series(job: Job) -> tuple[ShiftedSeries, KnownSpan | None]:
     check_facts(job)
-    facts = shift_facts(job)
+    facts = shared.shift_facts(job)
     series = recorded_series(facts, job.points, job.recording_path)
     return series, None if facts.known is None else _known(facts.known, series)
 

@@ -6,16 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from cmm_uq.artefacts.shift import result as shared
 from cmm_uq.artefacts.shift.axis import ShiftResult
-from cmm_uq.artefacts.shift.result import (
-    artefact_section,
-    curve_data,
-    figures_section,
-    method_section,
-    shared_results,
-    shift_facts,
-    table_file,
-)
 from cmm_uq.base.messages import Number, Text, Verbatim, in_a_row, number, plural, say, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
@@ -35,13 +27,13 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
     if result.scale is not None:
         estimates[SCALE[result.axis].name] = {"ppm": quantity_data(result.scale)}
     joint, (mean, u, U) = result.beside_integrations, result.distances or (None, None, None)
-    return shared_results(result, estimates, len(estimate.series.reading), {
-        "curves": {linearity: curve_data(curve, result.stated_along(curve))},
+    return shared.shared_results(result, estimates, len(estimate.series.reading), {
+        "curves": {linearity: shared.curve_data(curve, result.stated_along(curve))},
         "integrations": {
             method: {"position_mm": one.position.tolist(), "error_um": _um(one.error), "u_um": _um(one.u)}
             for method, one in result.integrated.items()
         },
-        "beside_integrations": None if joint is None else curve_data(joint, joint.expanded),
+        "beside_integrations": None if joint is None else shared.curve_data(joint, joint.expanded),
         "artefact": {
             "point": estimate.series.numbers.tolist(), "distance_mm": None if mean is None else mean.tolist(),
             "u_um": None if u is None else _um(u), "U_mm": None if U is None else U.tolist(),
@@ -97,7 +89,7 @@ def _curve(result: ShiftResult) -> Section:
     columns = (Column(say("Reading"), unit("mm")), *_in_um(say("Error"), say("U"), say("Band")))
     beyond = say(
         "{table_file} holds the curve as an error map; beyond the readings it repeats the last value, uncalibrated.",
-        table_file=Verbatim(table_file(result.job)),
+        table_file=Verbatim(shared.table_file(result.job)),
     )
     band_words = say("U: 95 % at that position; band: half width of the band for the whole curve, k = {k:.2f}.", k=k)
     table = Table(say("Error by position"), columns, rows, (SIGN, band_words, beyond))
@@ -211,7 +203,7 @@ def _figures(result: ShiftResult) -> Section:
     meaning = say(
         "Linearity error: of the estimated curve about the straight line through the ends of the first series."
     )
-    return figures_section(say("Axis figures"), quantities(result), meaning)
+    return shared.figures_section(say("Axis figures"), quantities(result), meaning)
 
 
 def _open(result: ShiftResult) -> Section:
@@ -257,7 +249,7 @@ def _open(result: ShiftResult) -> Section:
 
 
 def _artefact(result: ShiftResult) -> Section:
-    facts = shift_facts(result.job)
+    facts = shared.shift_facts(result.job)
     shifts, U = in_a_row(nominal(s) for s in facts.shifts_mm), significant(2 * facts.u_shift_um)
     rows = ((say("Shifts"), say("{shifts} mm, U = {U} µm (k = 2)", shifts=shifts, U=U)),)
     blocks: list[Block] = []
@@ -269,7 +261,7 @@ def _artefact(result: ShiftResult) -> Section:
         columns = (Column(say("Point")), *figure_columns(say("Distance from the first"), say("U"), unit=unit("mm")))
         note = say("U is for a coverage probability of 95 %, from the posterior distribution.")
         blocks.append(Table(say("The artefact's own dimensions"), columns, cells[:MOST_ROWS], (note,)))
-    return artefact_section(result.job, say("Uncalibrated artefact, shifted"), say("points"), rows, *blocks)
+    return shared.artefact_section(result.job, say("Uncalibrated artefact, shifted"), say("points"), rows, *blocks)
 
 
 def _method(result: ShiftResult) -> Section:
@@ -279,4 +271,4 @@ def _method(result: ShiftResult) -> Section:
         "correlation length and growth towards the ends are sampled, all else is drawn from its "
         "exact conditional distribution."
     )
-    return method_section(result, text, len(result.estimate.series.reading), *_beside_integrations(result))
+    return shared.method_section(result, text, len(result.estimate.series.reading), *_beside_integrations(result))

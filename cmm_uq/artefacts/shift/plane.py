@@ -13,19 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from cmm_uq.artefacts.kinds import KnownLength
+from cmm_uq.artefacts.shift import result as shared
 from cmm_uq.artefacts.shift.axis import check_facts, check_known, known_points
 from cmm_uq.artefacts.shift.integration import KnownSpan
 from cmm_uq.artefacts.shift.placed_plate import PlacedPlate, placed_plate
 from cmm_uq.artefacts.shift.plane_model import FreeInPlane, PlaneModel, free_in_plane, plane_model
-from cmm_uq.artefacts.shift.result import (
-    Curve,
-    Reported,
-    ShiftFound,
-    error_map_of,
-    listed_draws,
-    peak_to_valley,
-    shift_facts,
-)
+from cmm_uq.artefacts.shift.result import Curve, Reported, ShiftFound
 from cmm_uq.artefacts.shift.smooth import Coefficients, sampled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Machine
@@ -224,7 +217,7 @@ class PlaneShiftResult(ShiftFound):
         for (name, parameter), (draws, own) in self._draws.items():
             found.setdefault(name, {})[parameter] = Quantity.of_draws(draws, own)
         for name, sized in self._sized.items():
-            found.setdefault(name, {})[PEAK_TO_VALLEY] = peak_to_valley(sized)
+            found.setdefault(name, {})[PEAK_TO_VALLEY] = shared.peak_to_valley(sized)
         return {name: self.stating.all(name, quantities) for name, quantities in found.items()}
 
     @cached_property
@@ -238,9 +231,9 @@ class PlaneShiftResult(ShiftFound):
     def listed(self) -> Reported:
         found: dict[str, tuple[Floats, str]] = {}
         for c in self.printed:
-            found |= listed_draws(f"curves.{c.name}.error_{c.suffix}", c.curve.draws / c.size, c.unit)
+            found |= shared.listed_draws(f"curves.{c.name}.error_{c.suffix}", c.curve.draws / c.size, c.unit)
         for k, name in enumerate(("first_mm", "second_mm")):
-            found |= listed_draws(f"artefact.{name}", self.estimate.balls[:, :, k], "mm")
+            found |= shared.listed_draws(f"artefact.{name}", self.estimate.balls[:, :, k], "mm")
         return found
 
     @cached_property
@@ -307,7 +300,7 @@ def plane_correction_table(estimate: PlaneEstimate, machine: Machine) -> ErrorMa
     if SQUARENESS[estimate.plate.plane].name not in estimate.free.names:
         y, errors = found[axes[1]]
         errors[:, axes[0]] -= estimate.squareness.mean() * (y - y[0])
-    return error_map_of(found, machine)
+    return shared.error_map_of(found, machine)
 
 
 def analyse_plane(job: Job, *, seed: int = 0, progress: Progress | None = None) -> PlaneShiftResult:
@@ -325,7 +318,7 @@ def analyse_plane(job: Job, *, seed: int = 0, progress: Progress | None = None) 
 
 def checked_plate(job: Job) -> tuple[PlacedPlate, KnownSpan | None]:
     check_facts(job)
-    facts = shift_facts(job)
+    facts = shared.shift_facts(job)
     plate = placed_plate(job.points, str(facts.plane), job.recording_path)
     return plate, None if facts.known is None else _known(facts.known, plate)
 
