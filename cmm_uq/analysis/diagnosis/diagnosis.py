@@ -8,25 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import special
 
+from cmm_uq.analysis.diagnosis import joint as jointly
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, withhold
 from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement, thin_out
-from cmm_uq.analysis.diagnosis.joint import (
-    JointPosterior,
-    Mode,
-    WithheldEffect,
-    effects_without_size,
-    group_of,
-    joint_posterior,
-    period_modes,
-    period_settled,
-    withhold_unpredicted,
-    withhold_unresolved,
-)
+from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, WithheldEffect, joint_posterior, period_modes
 from cmm_uq.analysis.diagnosis.location import Place, locate
 from cmm_uq.analysis.diagnosis.model_average import ModelAverage, average_models
 from cmm_uq.analysis.diagnosis.noise import has_heavy_tails, probability_by_name
 from cmm_uq.base.messages import Text
-from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.kind import Observed
@@ -109,16 +98,18 @@ def diagnose(
     found, joint, withheld = _asserted(search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known)
     gain = improvement(model, found.model)
     if found.effects and gain.elpd_gain <= gain.elpd_gain_se:
-        withheld = (*withheld, *withhold_unpredicted(found, gain.unseen))
+        withheld = (*withheld, *jointly.withhold_unpredicted(found, gain.unseen))
         found = _of_all(withhold(found, found.chosen), model)
         gain, joint = improvement(model, model), joint_posterior(found, seed, progress, known)
     noise, first = _noise(found, joint, stated), found.first
     after = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
-    rivals = tuple(
-        (first.explanations[i].name, float(first.probability[i])) for i in np.argsort(-first.probability)[:12]
-    )
+    most = np.argsort(-first.probability)[:12]
+    rivals = tuple((first.explanations[i].name, float(first.probability[i])) for i in most)
+    verdict = "consistent" if first.p_value >= alpha else "unexplained"
+    if first.p_value < alpha and found.effects:
+        verdict = "partial" if found.rough or found.unexplained > _UNKNOWN else "explained"
     return Diagnosis(
-        _verdict(found, alpha), first.p_value, alpha, locate(first, alpha, found.chosen), _left_out(found, joint, model),
+        verdict, first.p_value, alpha, locate(first, alpha, found.chosen), _left_out(found, joint, model),
         _indistinguishable(found), rivals, noise, gain, model, after, joint.components, joint.posterior,
         int(some.used.sum()), found, withheld, average_models(found, joint, model, seed),
     )  # fmt: skip
@@ -128,14 +119,13 @@ def _asserted(
     result: SearchResult, model: RecordingModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
 ) -> tuple[SearchResult, JointPosterior, tuple[WithheldEffect, ...]]:
     """What of a search may be asserted; where an effect's size is open its next probable is tried, else the least goes."""
-    result, gone = withhold_unresolved(result)
+    result, gone = jointly.withhold_unresolved(result)
     places: dict[int, WithheldEffect] = {}  # of each effect that was tried in the place of others, the first of these
     tried: frozenset[int] = frozenset()
     while True:
         result = _of_all(result, model)
         joint = joint_posterior(result, seed, progress, known)
-        more = effects_without_size(result, joint)
-        if not more:
+        if not (more := jointly.effects_without_size(result, joint)):
             return result, joint, gone
         tried |= frozenset(more)
         alone = []
@@ -156,12 +146,6 @@ def _of_all(result: SearchResult, model: RecordingModel) -> SearchResult:
     return replace(result, model=replace(result.model, artefact=model.artefact, used=model.used))
 
 
-def _verdict(result: SearchResult, alpha: float) -> str:
-    if result.first.p_value >= alpha or not result.effects:
-        return "consistent" if result.first.p_value >= alpha else "unexplained"
-    return "partial" if result.rough or result.unexplained > _UNKNOWN else "explained"
-
-
 def _left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel) -> tuple[OmittedEffect, ...]:
     index = {str.__str__(result.first.explanations[i].name): i for i in result.chosen}
     posterior = joint.posterior
@@ -171,7 +155,7 @@ def _left_out(result: SearchResult, joint: JointPosterior, before: RecordingMode
     listed = []
     for effect in (e for e in result.model.effects if e.name in result.effects):
         modes = period_modes(result, index[effect.name])
-        known = not modes or period_settled(result, index[effect.name], modes)
+        known = not modes or jointly.period_settled(result, index[effect.name], modes)
         probability, together, group = _probability(result, index[effect.name], known=known)
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
         shapes = joint.shapes.get(effect.name, np.zeros((len(draws), 0)))
@@ -181,17 +165,20 @@ def _left_out(result: SearchResult, joint: JointPosterior, before: RecordingMode
         reported = effect.to_reported(draws, shapes)
         units = {parameter.name: parameter.unit for parameter in effect.reported}
         share = (_squares(linear, [column[effect.name, c.name] for c in effect.coefficients]) - first + total) / first
+        if "phase_rad" in reported:  # unwrapped about its middle
+            turned = np.exp(1j * reported["phase_rad"])
+            middle = float(np.angle(np.mean(turned)))
+            reported["phase_rad"] = np.asarray(middle + np.angle(np.exp(1j * (reported["phase_rad"] - middle))))
         parameters = {
-            name: Quantity.of_draws(_unwrapped(values) if name == "phase_rad" else values, units[name])
+            name: Quantity.of_draws(values, units[name])
             for name, values in reported.items()
-            if known or name not in frozenset({"phase_rad", *(shape.name for shape in effect.shape)})
+            if known or name not in {"phase_rad", *(shape.name for shape in effect.shape)}
         }
         explained = max(share, 0.0) if total > 0 else 0.0
-        item = OmittedEffect(
+        listed.append(OmittedEffect(
             effect.name, effect.title, probability, parameters, explained, together, effect.points_to, group,
             modes[1:] if known else modes, known,
-        )  # fmt: skip
-        listed.append(item)
+        ))  # fmt: skip
     return tuple(sorted(listed, key=lambda item: -item.probability))
 
 
@@ -200,15 +187,11 @@ def _probability(result: SearchResult, index: int, *, known: bool) -> tuple[floa
     combinations = result.combinations
     if combinations is None:
         return 0.0, 0.0, ()
-    group = group_of(combinations, result.chosen, index) | (frozenset() if known else combinations.imitating(index))
+    group = jointly.group_of(combinations, result.chosen, index)
+    group |= frozenset() if known else combinations.imitating(index)
     ordered = sorted((i for i in group if combinations.of(i) > 0), key=lambda i: -combinations.of(i))
     names = tuple(combinations.explanations[i].name for i in ordered)
     return combinations.of(index), combinations.of_any(group | {index}), names
-
-
-def _unwrapped(phase: Floats) -> Floats:
-    middle = float(np.angle(np.mean(np.exp(1j * phase))))
-    return np.asarray(middle + np.angle(np.exp(1j * (phase - middle))), dtype=np.float64)
 
 
 def _squares(linear: LinearModel, without: Sequence[int]) -> float:
@@ -237,10 +220,6 @@ def _noise(result: SearchResult, joint: JointPosterior, stated: float | None) ->
     squares = last.squares[likeliest] * last.kinds[likeliest].scatter ** 2
     # two-sided χ² test of the stated noise at 1 %
     p = 0.5 if stated is None else float(special.chdtrc(last.degrees_of_freedom, squares / stated**2))
-    return NoiseDiagnosis(
-        Quantity.of_draws(sizes.coordinate / MICROMETRE, unit("µm")),
-        Quantity.of_draws(sizes.placing / MICROMETRE, unit("µm")),
-        float(np.mean(sizes.slow > 0)) > _NOISE_KIND,
-        probability_by_name(last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or has_heavy_tails(residuals),
-        min(p, 1 - p) < 0.005,
-    )
+    heavy = probability_by_name(last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or has_heavy_tails(residuals)
+    of_point, offset = (Quantity.of_draws(size / MICROMETRE, unit("µm")) for size in (sizes.coordinate, sizes.placing))
+    return NoiseDiagnosis(of_point, offset, float(np.mean(sizes.slow > 0)) > _NOISE_KIND, heavy, min(p, 1 - p) < 0.005)

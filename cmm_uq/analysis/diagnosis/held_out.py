@@ -95,7 +95,12 @@ class Improvement:
 
 def improvement(before: RecordingModel, after: RecordingModel) -> Improvement:
     """Compare two models of one recording by cross-validation over its set-ups, or the points of few set-ups."""
-    groups, unseen = _groups(before)
+    # what is left out together, by its place: set-ups, or of few set-ups, which might leave too much open, their points
+    artefact, used = before.artefact, before.used
+    group, unseen = artefact.measurement[used], say("set-ups")
+    if len(np.unique(group)) < FOLDS:
+        group, unseen = np.column_stack([group, artefact.points.point[artefact.rows[:, 0]][used]]), say("points")
+    groups = numbered_by_place(before, group)
     left = [model.estimate().least_squares.residuals for model in (before, after)]
     rms = [float(np.sqrt(np.mean(each**2)) / MICROMETRE) if len(each) else 0.0 for each in left]
     first = _held_out(before, groups)
@@ -131,16 +136,6 @@ def _held_out(model: RecordingModel, groups: NDArray[np.int64]) -> tuple[float, 
         density = float(-0.5 * (rest @ rest + np.sum(seen**2 / (1 + s**2)) + np.sum(np.log1p(s**2))))
         densities.append(density - counts[-1] * np.log(sigma * np.sqrt(2 * np.pi)))
     return float(np.sqrt(sum(errors) / max(sum(counts), 1)) / MICROMETRE), np.array(densities)
-
-
-def _groups(model: RecordingModel) -> tuple[NDArray[np.int64], Text]:
-    """What is left out together, by its place: set-ups, or of few set-ups, which might leave too much open, their points."""
-    artefact, used = model.artefact, model.used
-    placing = artefact.measurement[used]
-    if len(np.unique(placing)) >= FOLDS:
-        return (numbered_by_place(model, placing), say("set-ups"))
-    key = np.column_stack([placing, artefact.points.point[artefact.rows[:, 0]][used]])
-    return (numbered_by_place(model, key), say("points"))
 
 
 def _predicted(placing: Freedoms, every: Floats, out: NDArray[np.bool_]) -> tuple[Floats, Floats, int]:

@@ -60,21 +60,14 @@ def period_modes(result: SearchResult, index: int) -> tuple[Mode, ...]:
     likely = likely[np.argsort(frequency[likely])]
     span = _span(result, effect.shape[0].period_along)
     apart = np.split(likely, np.flatnonzero(np.diff(frequency[likely]) > _APART / span) + 1)
-    found_modes = []
+    found = []
     for part in (peak for trials in apart for peak in _peaks(trials, evidence)):
         step = 0.5 * STEP / span
-        ends = from_even_scale(
-            effect, np.array([frequency[part].max() + step, max(frequency[part].min() - step, 1e-9)])
-        )
+        even = np.array([frequency[part].max() + step, max(frequency[part].min() - step, 1e-9)])
+        ends = from_even_scale(effect, even)
         period = _within(from_even_scale(effect, frequency[part]), weight[part], effect.shape[0].unit, ends)
-        found_modes.append(Mode(period, float(weight[part].sum()), (float(ends[0]), float(ends[1]))))
-    return tuple(sorted((m for m in found_modes if m.probability > _TOLD), key=lambda m: -m.probability))
-
-
-def holds_whole_period(result: SearchResult, index: int, mode: Mode) -> bool:
-    """Whether the readings hold a whole period of an effect: less is a bow, or any other curve."""
-    axis = effect_of(result.first.explanations[index]).shape[0].period_along
-    return axis is None or mode.period.interval95[1] <= _span(result, axis)
+        found.append(Mode(period, float(weight[part].sum()), (float(ends[0]), float(ends[1]))))
+    return tuple(sorted((mode for mode in found if mode.probability > _TOLD), key=lambda mode: -mode.probability))
 
 
 def _peaks(trials: Ints, evidence: Floats) -> Iterator[Ints]:
@@ -135,9 +128,8 @@ def joint_posterior(
     drawn = sample_shaped(replace(linear, sigma=None), shaped, seed, progress)
     sizes = posterior.sizes.at(np.resize(np.arange(len(posterior.draws)), len(drawn.draws)))
     shapes = {e.name: drawn.shapes[:, j : j + 1] for j, e in enumerate(new)}
-    return JointPosterior(
-        NoisyPosterior(**{f.name: getattr(drawn, f.name) for f in fields(drawn)}, sizes=sizes), components, shapes
-    )
+    both = NoisyPosterior(**{f.name: getattr(drawn, f.name) for f in fields(drawn)}, sizes=sizes)
+    return JointPosterior(both, components, shapes)
 
 
 def _shaped(result: SearchResult, model: RecordingModel, effect: Effect, values: Floats) -> Shaped:
@@ -198,8 +190,9 @@ def period_settled(result: SearchResult, index: int, modes: tuple[Mode, ...]) ->
 
 
 def _too_little(result: SearchResult, index: int, modes: tuple[Mode, ...]) -> Text | None:
-    combinations = result.combinations
-    if combinations is None or not holds_whole_period(result, index, modes[0]):
+    combinations, axis = result.combinations, effect_of(result.first.explanations[index]).shape[0].period_along
+    # less than a whole period is a bow, or any other curve
+    if combinations is None or (axis is not None and modes[0].period.interval95[1] > _span(result, axis)):
         return NOT_WHOLE
     return None if period_settled(result, index, modes) or combinations.of(index) >= ASSERTED else UNRESOLVED
 
@@ -279,15 +272,13 @@ def _chance(result: SearchResult, joint: JointPosterior) -> dict[str, float]:
     """Of each effect found, the probability that noise alone gives it as much of the misfit (F test of what it takes last)."""
     if not result.chosen:
         return {}
-    linear = result.model.estimate().linear.uncorrelated(joint.components.white(joint.posterior.sizes.typical))
-    linear = replace(linear, sigma=None)
-    whole = solve(linear)
+    white = joint.components.white(joint.posterior.sizes.typical)
+    linear = replace(result.model.estimate().linear.uncorrelated(white), sigma=None)
+    whole, chance = solve(linear), {}
     left, dof = float(whole.residuals @ whole.residuals), max(whole.degrees_of_freedom, 1)
-    chance = {}
     for name in result.effects:
-        own = [i for i, unknown in enumerate(linear.unknowns) if unknown.key[0] == name]
-        rest = solve(linear.only([i for i in range(len(linear.unknowns)) if i not in own])).residuals
-        more = float(rest @ rest) - left
-        ratio = max(more, 0.0) / len(own) / max(left / dof, 1e-300)
-        chance[name] = float(special.fdtrc(len(own), dof, ratio))
+        others = [i for i, unknown in enumerate(linear.unknowns) if unknown.key[0] != name]
+        count, rest = len(linear.unknowns) - len(others), solve(linear.only(others)).residuals
+        ratio = max(float(rest @ rest) - left, 0.0) / count / max(left / dof, 1e-300)
+        chance[name] = float(special.fdtrc(count, dof, ratio))
     return chance

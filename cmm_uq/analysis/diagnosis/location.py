@@ -61,35 +61,31 @@ def locate(compared: ModelComparison, alpha: float, effects: Collection[int] = (
     chosen: list[tuple[Version, float, tuple[Text, ...]]] = []
     while functions and len(chosen) < _MOST:
         gains = _beside(compared, [version for version, *_ in chosen], functions)
-        gains = {i: gain for i, gain in gains.items() if _p_value(compared, gain[0]) < alpha}
+        gains = {i: found for i, found in gains.items() if found[2] < alpha}
         if not gains:
             break
-        most = max(gain for gain, _ in gains.values())
-        likely = [i for i, (gain, _) in gains.items() if gain > most - _AS_WELL]
+        most = max(gain for gain, *_ in gains.values())
+        likely = [i for i, (gain, *_) in gains.items() if gain > most - _AS_WELL]
         first = max(likely, key=lambda i: (any(every[i].could_be(every[e]) for e in effects), gains[i][0]))
-        gain, version = gains[first]
+        _, version, p_value = gains[first]
         besides = _beside(compared, [*(v for v, *_ in chosen), version], set(gains) - {first})
-        functions = {i for i, (left, _) in besides.items() if _p_value(compared, left) < alpha}
+        functions = {i for i, (*_, p) in besides.items() if p < alpha}
         also = sorted((i for i in likely if i != first and i not in functions), key=lambda i: -gains[i][0])
-        chosen.append((version, _p_value(compared, gain), tuple(dict.fromkeys(every[i].name for i in also))))
+        chosen.append((version, p_value, tuple(dict.fromkeys(every[i].name for i in also))))
     return tuple(_places(compared, chosen))
 
 
 def _beside(
     compared: ModelComparison, conditions: Sequence[Version], functions: Collection[int]
-) -> dict[int, tuple[float, Version]]:
-    comparison = compared.comparison
+) -> dict[int, tuple[float, Version, float]]:
+    """Of each function its log odds beside others, its best version, and how often noise shows as much."""
+    comparison, found = compared.comparison, {}
     alone = float(comparison.log_evidence_of(conditions)[0]) if conditions else 0.0
-    found = comparison.beside(conditions, functions)
-    return {
-        i: (evidence - alone if conditions else float(compared.log_odds[i]), version)
-        for i, (evidence, version) in found.items()
-        if i in functions
-    }
-
-
-def _p_value(compared: ModelComparison, log_odds: float) -> float:
-    return tail_probability(compared.null_maximum, log_odds)
+    for i, (evidence, version) in comparison.beside(conditions, functions).items():
+        if i in functions:
+            gain = evidence - alone if conditions else float(compared.log_odds[i])
+            found[i] = gain, version, tail_probability(compared.null_maximum, gain)
+    return found
 
 
 def _places(compared: ModelComparison, chosen: Sequence[tuple[Version, float, tuple[Text, ...]]]) -> Iterable[Place]:
@@ -175,12 +171,9 @@ def _jump(compared: ModelComparison, index: int, x: Floats, order: Ints) -> tupl
 def region_of(covariate: Floats, curve: Floats, sure: NDArray[np.bool_] | None = None) -> tuple[float, float]:
     """Range of the sorted covariate about the curve's largest value where it exceeds half of it and is ``sure``."""
     size = np.abs(curve) if sure is None else np.where(sure, np.abs(curve), 0.0)
-    high = (np.abs(curve) >= 0.5 * size.max()) & (size > 0)
-    first = last = int(np.argmax(size))
-    while first > 0 and high[first - 1]:
-        first -= 1
-    while last < len(high) - 1 and high[last + 1]:
-        last += 1
+    low = np.flatnonzero(~((np.abs(curve) >= 0.5 * size.max()) & (size > 0)))
+    most = int(np.argmax(size))
+    first, last = low[low < most].max(initial=-1) + 1, low[low > most].min(initial=len(size)) - 1
     return float(covariate[first]), float(covariate[last])
 
 
@@ -210,28 +203,23 @@ def residual_field(before: RecordingModel, after: RecordingModel) -> ResidualFie
     """The residuals of two models of one recording as vectors; ``None`` where an observation is of more than two points."""
     artefact, used = before.artefact, before.used
     rows, noise, readings = artefact.rows[used], artefact.noise_scale[used], artefact.points.machine_xyz
-    left = np.column_stack(
-        [model.residuals(model.estimate().least_squares.value)[used] / MICROMETRE for model in (before, after)]
-    )
+    each = [model.residuals(model.estimate().least_squares.value)[used] / MICROMETRE for model in (before, after)]
+    left = np.column_stack(each)
     if rows.shape[1] == 1:
         every = np.broadcast_to(np.eye(3), (len(artefact.points), 3, 3))
         directions = artefact.project(artefact.points.xyz, every)[used]  # (m, 3) in which each sees its point move
-        point, vectors, scale, dimensions = rows[:, 0], [], [], []
-        order = np.argsort(point, kind="stable")
-        for own in np.split(order, np.flatnonzero(np.diff(point[order])) + 1):
-            vectors.append(np.linalg.pinv(directions[own], rcond=_SEEN) @ left[own])
-            scale.append(float(noise[own].mean()))
-            dimensions.append(int(np.linalg.matrix_rank(directions[own], tol=_SEEN)))
-        field, seen = np.array(vectors), np.array(dimensions, dtype=np.int64)
-        return ResidualField(readings[np.unique(point)], field[:, :, 0], field[:, :, 1], np.array(scale), seen, False)
+        point, order = rows[:, 0], np.argsort(rows[:, 0], kind="stable")
+        sets = np.split(order, np.flatnonzero(np.diff(point[order])) + 1)
+        field = np.array([np.linalg.pinv(directions[own], rcond=_SEEN) @ left[own] for own in sets])
+        scale = np.array([float(noise[own].mean()) for own in sets])
+        seen = np.array([np.linalg.matrix_rank(directions[own], tol=_SEEN) for own in sets], dtype=np.int64)
+        return ResidualField(readings[np.unique(point)], field[:, :, 0], field[:, :, 1], scale, seen, False)
     if rows.shape[1] == 2:
         ends, count = readings[rows], 2 * len(rows)
         along = ends[:, 1] - ends[:, 0]
-        along = along / np.linalg.norm(along, axis=1, keepdims=True)
-        half = 0.5 * left[:, :, None] * along[:, None, :]
+        half = 0.5 * left[:, :, None] * (along / np.linalg.norm(along, axis=1, keepdims=True))[:, None, :]
         both = np.stack([-half, half], axis=1)  # (m, end, model, 3)
         first, second = (both[:, :, i].reshape(count, 3) for i in (0, 1))
-        return ResidualField(
-            ends.reshape(count, 3), first, second, np.repeat(0.5 * noise, 2), np.ones(count, dtype=np.int64), True
-        )
+        scale, one = np.repeat(0.5 * noise, 2), np.ones(count, dtype=np.int64)
+        return ResidualField(ends.reshape(count, 3), first, second, scale, one, True)
     return None

@@ -66,14 +66,13 @@ def average_models(result: SearchResult, joint: JointPosterior, before: Recordin
     combinations = result.combinations
     if combinations is None:
         return ModelAverage()
-    whole = result.first.model.artefact is before.artefact
-    total: dict[Key, float] = {}
+    whole, total = result.first.model.artefact is before.artefact, dict[Key, float]()
     for key, p in needed_combinations(combinations).items():
         # functions are known where the candidates were compared: of a large recording, on some of the observations
         own = key if whole else combinations.effects_of(key)
         total[own] = total.get(own, 0.0) + p
     order = sorted((key for key in total if total[key] > REMAINS), key=lambda key: -total[key])[:_MOST]
-    if not order or total[order[0]] >= SETTLED or len(order) < 2:
+    if len(order) < 2 or total[order[0]] >= SETTLED:
         return ModelAverage()
     typical = joint.posterior.sizes.typical
     noise = joint.components.white(typical), float(typical.coordinate[0])
@@ -93,8 +92,7 @@ def needed_combinations(combinations: Combinations) -> dict[Key, float]:
     total = dict(combinations.probability)
     for key in sorted(total, key=lambda key: -len(key)):
         fewer = [key - {i} for i in key if key - {i} in evidence]
-        enough = [one for one in fewer if evidence[key] - evidence[one] < _WORTH]
-        if enough:
+        if enough := [one for one in fewer if evidence[key] - evidence[one] < _WORTH]:
             total[max(enough, key=lambda one: evidence[one])] += total.pop(key)
     return total
 
@@ -145,14 +143,12 @@ def _drawn(linear: LinearModel, sigma: float, stated: float | None, seed: int) -
         left = reduced.observed - reduced.design @ mean
         fitted = float(np.einsum("ij,jk,ik->", reduced.design, covariance, reduced.design)) / sigma**2
         degrees = max(reduced.count - fitted, 1.0) + known
-        sigma = float(np.sqrt((left @ left + known * (stated or 0.0) ** 2) / degrees))
-        sigma = max(sigma, 1e-6)
+        sigma = max(float(np.sqrt((left @ left + known * (stated or 0.0) ** 2) / degrees)), 1e-6)
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(17,)))
     scale = np.sqrt(np.diag(covariance))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    half = vectors * np.sqrt(np.maximum(values, 0.0))
     # The symmetric root: axes of equal length turn with the last digits, their sum does not.
-    root = scale[:, None] * (half @ vectors.T)
+    root = scale[:, None] * ((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
     normal = random.standard_normal((_DRAWS, len(mean)))
     wider = np.sqrt(degrees / random.chisquare(degrees, _DRAWS))
     return np.asarray(mean + wider[:, None] * (normal @ root.T))

@@ -19,20 +19,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.proving import cases, design as set_ups, judgement
 from cmm_uq.laboratory.proving.cases import canonical_json, micrometres, sha256_of
 from cmm_uq.laboratory.proving.design import Design, FaultReach, Reach, fault_reaches, reaches
-from cmm_uq.laboratory.proving.judgement import (
-    FEWEST,
-    LARGEST,
-    MISSED,
-    OFTEN,
-    OPEN,
-    REFUSED,
-    VERDICTS,
-    AcceptanceFigure,
-    DetectionCurve,
-    ProofJudgement,
-    Rate,
-    Tenth,
-)
+from cmm_uq.laboratory.proving.judgement import OPEN, AcceptanceFigure, DetectionCurve, ProofJudgement, Rate, Tenth
 
 KIND_WORDS: Mapping[str, Text] = {
     cases.NOTHING: say("nothing"), cases.ONE: say("one effect"), cases.TWO: say("two effects"),
@@ -58,10 +45,10 @@ INTERVAL_WORDS: Mapping[str, Text] = {
 }
 ANSWER_WORDS: Mapping[str, Text] = {**VERDICT_WORDS, judgement.REFUSED: say("no answer")}
 STANDING_WORDS: Mapping[str, Text] = {
-    judgement.MET: say("shown"), OPEN: say("too few cases to decide"), MISSED: say("missed"),
+    judgement.MET: say("shown"), OPEN: say("too few cases to decide"), judgement.MISSED: say("missed"),
 }  # fmt: skip
 HEADLINES: Mapping[str, tuple[str, Standing]] = {
-    judgement.MET: ("SHOWN", "good"), OPEN: ("OPEN", "open"), MISSED: ("MISSED", "bad"),
+    judgement.MET: ("SHOWN", "good"), OPEN: ("OPEN", "open"), judgement.MISSED: ("MISSED", "bad"),
 }  # fmt: skip
 RATE_HEADS = (Column(say("Counted")), Column(say("Rate"), unit("%")), Column(say("95 % interval"), unit("%")))
 
@@ -147,7 +134,7 @@ class DiagnosisProof:
     @property
     def conforming(self) -> bool:
         """Whether the cases show of no figure that it is missed."""
-        return all(one.standing != MISSED for one in self.accepted)
+        return all(one.standing != judgement.MISSED for one in self.accepted)
 
 
 def conclusion_section(conclusion: Text, figures: Sequence[AcceptanceFigure]) -> Section:
@@ -180,10 +167,10 @@ def answers_section(proof: DiagnosisProof) -> Section:
     judged, rows = proof.judgement, []
     for kind, what in KIND_WORDS.items():
         said = judged.verdicts(kind)
-        answers = (number(said.get(verdict, 0)) for verdict in (*VERDICTS, REFUSED))
+        answers = (number(said.get(verdict, 0)) for verdict in (*judgement.VERDICTS, judgement.REFUSED))
         right = number(sum(one.right for one in judged.of_kind(kind)))
         rows.append((what, number(sum(said.values())), *answers, right))
-    answered = [Column(ANSWER_WORDS[verdict]) for verdict in (*VERDICTS, REFUSED)]
+    answered = [Column(ANSWER_WORDS[verdict]) for verdict in (*judgement.VERDICTS, judgement.REFUSED)]
     verdicts = table(say("Verdicts"), (say("Hidden"), Column(say("Cases")), *answered, Column(say("Right"))), rows, say(
         "Right: consistent of nothing; explained of effects that are all found and no other named; of a function, "
         "that no known effect accounts for it; of a fault of the artefact, that something is there and no effect of "
@@ -214,7 +201,7 @@ def answers_section(proof: DiagnosisProof) -> Section:
 def strength_section(proof: DiagnosisProof, often: Text) -> Section:
     title, curve, in_bins = say("How strong a cause must be"), proof.judgement.by_strength, proof.judgement.in_bins
     if curve is None:
-        few = say("Fewer than {fewest} effects were hidden: too few to say.", fewest=FEWEST)
+        few = say("Fewer than {fewest} effects were hidden: too few to say.", fewest=judgement.FEWEST)
         return section(title, Paragraph(few))
     rows = ((say("{low:g} to {high:g}", low=low, high=high), *cells(rate)) for low, high, rate in in_bins)
     by_strength = table(say("Found by strength"), (say("Strength √λ"), *RATE_HEADS), rows)
@@ -222,7 +209,7 @@ def strength_section(proof: DiagnosisProof, often: Text) -> Section:
 
 
 def strength_words(value: float) -> Text:
-    return number(value, ".1f") if value <= LARGEST else say("beyond {largest:g}", largest=LARGEST)
+    return number(value, ".1f") if value <= judgement.LARGEST else say("beyond {largest:g}", largest=judgement.LARGEST)
 
 
 def probabilities_section(proof: DiagnosisProof) -> Section:
@@ -304,7 +291,7 @@ def _smallest(proof: DiagnosisProof, reach: Reach) -> tuple[Text, Text]:
     found = proof.judgement.by_strength
     if found is None or reach.amplitude(found.often) is None:
         return DASH, DASH
-    low, high = (reach.amplitude(min(end, LARGEST)) for end in found.interval)
+    low, high = (reach.amplitude(min(end, judgement.LARGEST)) for end in found.interval)
     ends = [DASH if end is None else number(end, ".2g") for end in (low, high)]
     return number(found.often / reach.per_unit, ".2g"), say("{low} to {high}", low=ends[0], high=ends[1])
 
@@ -352,7 +339,7 @@ def strength_plot(in_bins: tuple[tuple[float, float, Rate], ...], curve: Detecti
         across = np.append(curve.strengths, curve.strengths[::-1])
         ax.fill(across, 100 * np.append(curve.low, curve.high[::-1]), color=BAND, lw=0, zorder=0)
         ax.plot(curve.strengths, 100 * curve.curve, color=ACCENT, lw=1.3)
-        ax.axhline(100 * OFTEN, color=MUTED, lw=0.6, ls=(0, (4, 3)), zorder=1)
+        ax.axhline(100 * judgement.OFTEN, color=MUTED, lw=0.6, ls=(0, (4, 3)), zorder=1)
         bars(ax, middle, low, high, 1.0, INK)
         dots(ax, middle, share, 4.0, INK)
         ax.set(xlim=(curve.strengths[0] - 0.5, curve.strengths[-1] + 0.5), ylim=(-3, 103))

@@ -33,10 +33,9 @@ def draw_nothing(comparison: CandidateComparison, random: np.random.Generator, d
     drawn = np.empty((len(comparison.left), draws))
     for g in np.unique(kind):
         columns = np.flatnonzero(kind == g)
-        heavy = uniform[columns] < probability_of_tails(comparison, comparison.kinds[g])
-        drawn[:, columns] = left_of_noise(
-            comparison, comparison.kinds[g], random, comparison.sigma[size[columns]], heavy
-        )
+        own, sigma = comparison.kinds[g], comparison.sigma[size[columns]]
+        heavy = uniform[columns] < probability_of_tails(comparison, own)
+        drawn[:, columns] = left_of_noise(comparison, own, random, sigma, heavy)
     return drawn
 
 
@@ -53,24 +52,21 @@ def probability_of_tails(comparison: CandidateComparison, kind: NoiseKind) -> fl
 
 
 def left_of_noise(
-    comparison: CandidateComparison,
-    kind: NoiseKind,
-    random: np.random.Generator,
-    sigma: Floats,
+    comparison: CandidateComparison, kind: NoiseKind, random: np.random.Generator, sigma: Floats,
     heavy: NDArray[np.bool_] | None = None,
-) -> Floats:
+) -> Floats:  # fmt: skip
     """What the baseline leaves (m, draws), mm, of noise of one kind and sizes (draws,), in heavy tails where these are."""
-    fine = kind.unrounded if comparison.display else None
+    fine, display = kind.unrounded if comparison.display else None, comparison.display
     # of a stream of its own: the others stay as they are
     wider = None if heavy is None else tail_widths(random.spawn(1)[0], heavy, len(comparison.left))
     standing = order_and_side(comparison.left, comparison.reached)
     drawn = draw_noise(fine or kind, random, len(sigma), comparison.noise_scale, standing, wider)
     if comparison.certified.size:
         drawn += comparison.certified @ random.standard_normal((comparison.certified.shape[1], len(sigma)))
-    if not (comparison.display and fine):
+    if not (display and fine):
         return sigma * comparison.rest(drawn)
     drawn, scale = sigma * drawn, comparison.noise_scale[:, None]
-    return comparison.rest(drawn + comparison.display.rounded(scale * drawn) / scale)
+    return comparison.rest(drawn + display.rounded(scale * drawn) / scale)
 
 
 def draw_noise(
@@ -228,11 +224,10 @@ class _Evidence:
     @classmethod
     def of(cls, comparison: CandidateComparison, data: Floats, lead: list[Version] | None = None) -> _Evidence:
         nothing, something = comparison.log_evidence(data)
-        single = [
-            i
-            for i, e in enumerate(comparison.explanations)
-            if e.kind == EFFECT and e.weight == 1 and not e.shaped and i in comparison.visible
+        effects = [
+            i for i, e in enumerate(comparison.explanations) if e.kind == EFFECT and e.weight == 1 and not e.shaped
         ]
+        single = [i for i in effects if i in comparison.visible]
         alone, both = np.zeros_like(nothing), np.full_like(something, -np.inf)
         if len(single) > 1:
             lead = best_versions(comparison, data, single) if lead is None else lead
@@ -247,10 +242,8 @@ class _Evidence:
 
     def add(self, j: int, other: _Evidence) -> None:
         """To that of one of the data, that under other noise."""
-        for own, more in (
-            (self.nothing, other.nothing), (self.something, other.something),
-            (self.alone, other.alone), (self.both, other.both),
-        ):  # fmt: skip
+        for name in ("nothing", "something", "alone", "both"):
+            own, more = getattr(self, name), getattr(other, name)
             own[..., j] = np.logaddexp(own[..., j], more[..., 0])
 
     def log_odds(self) -> Floats:
@@ -262,8 +255,7 @@ class _Evidence:
         pair = np.log(EFFECTS[2] / EFFECTS[0]) - np.log(comb(len(self.single), 2)) + np.log(NOTHING)
         for version, columns in _together(self.lead).items():
             first = version.explanation
-            others = [i for i in self.single if i != first]
-            beside = np.ascontiguousarray(self.both[:, columns])[others]
+            beside = np.ascontiguousarray(self.both[:, columns])[[i for i in self.single if i != first]]
             gain = special.logsumexp(beside, axis=0) - self.alone[columns]
             log_odds[columns] = np.logaddexp(log_odds[columns], pair + (gain + odds[first, columns]))
         return np.asarray(log_odds, dtype=np.float64)

@@ -8,20 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
+from cmm_uq.analysis.diagnosis.comparison import explanations as candidate
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key, explore
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
-from cmm_uq.analysis.diagnosis.comparison.explanations import (
-    EFFECT,
-    UNKNOWN,
-    Explanation,
-    Member,
-    effects_together,
-    known_effects,
-    refine,
-    unknown_functions,
-    with_shorter_periods,
-)
+from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fit, log_prior
 from cmm_uq.analysis.diagnosis.noise import noise_kinds, sigma_grid
 from cmm_uq.base.points import Floats
@@ -107,16 +98,11 @@ def _search(model: RecordingModel, stated: float | None, alpha: float, seed: int
         return SearchResult(first, first.comparison, None, frozenset(), (), model, 0.0, stated=stated)
     combinations = explore(first.comparison)
     probable = (combinations.by_key[key].versions for key, p in combinations.probability.items() if p > _PROBABLE)
-    shaped = {
-        v.explanation
-        for versions in probable
-        for v in versions
-        if first.explanations[v.explanation].members[v.member].shape
-    }
+    members = [explanation.members for explanation in first.explanations]
+    shaped = {v.explanation for versions in probable for v in versions if members[v.explanation][v.member].shape}
     if shaped:
-        explanations = [
-            _refined(first, combinations, i) if i in shaped else e for i, e in enumerate(first.explanations)
-        ]
+        every = enumerate(first.explanations)
+        explanations = [_refined(first, combinations, i) if i in shaped else e for i, e in every]
         first = replace(first, comparison=replace(first.comparison, explanations=explanations))
         combinations = explore(first.comparison, combinations, frozenset(shaped))
     combinations = replace(combinations, imitated=_imitated(first.comparison, combinations))
@@ -170,13 +156,13 @@ def _refined(first: ModelComparison, combinations: Combinations, index: int) -> 
     gains = _gains(first, explanation, others)
     shows = bool(gains.max() > _SHOWN)
     if shows:
-        explanation = with_shorter_periods(first.model, first.values, explanation)
+        explanation = candidate.with_shorter_periods(first.model, first.values, explanation)
         gains = _gains(first, explanation, others)
     below = gains.max() - gains
     shaped = np.array([bool(member.shape) for member in explanation.members])
     between = _BETWEEN * max(float(gains.max()), 0.0) + 1.0
     fits = [int(i) for i in np.argsort(below) if shaped[i] and below[i] < between][: None if shows else _FEW]
-    refined = refine(first.model, first.values, explanation, fits)
+    refined = candidate.refine(first.model, first.values, explanation, fits)
     # what does not fit at all keeps its weight, and costs nothing: columns of zeros are invisible
     lost = set(np.flatnonzero(shaped & (below > max(_IMPROBABLE, between))).tolist())
     weight = sum(explanation.members[i].weight for i in lost)
@@ -201,11 +187,9 @@ def effects_to_assert(combinations: Combinations) -> Key:
     chosen = combinations.most_probable
     if not chosen:
         return _one_by_one(combinations)
-    doubtful = frozenset(
-        i
-        for i in chosen
-        if combinations.of(i) < ASSERTED and probability_with_rivals(combinations, chosen, i) < ASSERTED
-    )
+    doubtful = {
+        i for i in chosen if max(combinations.of(i), probability_with_rivals(combinations, chosen, i)) < ASSERTED
+    }
     # and effects improbable only because a nonparametric term, which could be the same, describes them as well
     instead = {j for i in chosen for j, odds in combinations.instead(chosen, i).items() if odds > NOT_TOLD_APART}
     besides = frozenset(
@@ -256,10 +240,10 @@ def model_comparison(
     model: RecordingModel, stated: float | None, seed: int, alpha: float | None = None
 ) -> ModelComparison:
     values = model.estimate().about
-    singles = known_effects(model, values, tuple(effect.name for effect in model.effects))
+    singles = candidate.known_effects(model, values, tuple(effect.name for effect in model.effects))
     known_as = {term for single in singles if single.effect is not None for term in single.effect.stands_for}
-    functions = [function for function in unknown_functions(model, values) if function.term not in known_as]
-    candidates = singles + effects_together(singles) + functions
+    functions = [function for function in candidate.unknown_functions(model, values) if function.term not in known_as]
+    candidates = singles + candidate.effects_together(singles) + functions
     comparison = comparison_of(model, stated, candidates)
     nothing, something = comparison.log_evidence()
     log_odds = something[:, 0] - nothing[0]
