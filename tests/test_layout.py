@@ -25,8 +25,8 @@ SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
 MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.reference\.")
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
-    "": 200, "base": 3_050, "maths": 12_600, "jobs": 14_300, "machine": 6_700, "analysis": 18_900, "laboratory": 16_300,
-    "certificate": 18_150, "artefacts": 10_700, "app": 16_800,
+    "": 140, "base": 2_750, "maths": 10_500, "jobs": 12_250, "machine": 5_800, "analysis": 15_800, "laboratory": 13_200,
+    "certificate": 16_000, "artefacts": 8_750, "app": 14_500,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 282, 1608
@@ -129,9 +129,10 @@ def test_a_public_class_has_a_name_of_its_own() -> None:
 
 
 def test_no_folder_has_more_entries_than_are_taken_in_at_a_glance() -> None:
-    folders = [PACKAGE, *(path for path in PACKAGE.rglob("*") if path.is_dir() and path.name != "__pycache__")]
-    entries = {folder: {path.name for path in folder.iterdir()} - {"__init__.py", "__pycache__"} for folder in folders}
-    assert not {folder.relative_to(ROOT): len(names) for folder, names in entries.items() if len(names) > 20}
+    kept = {path for path in PACKAGE.rglob("*") if path.is_file() and "__pycache__" not in path.parts}
+    entries = {entry for path in kept for entry in (path, *path.parents) if PACKAGE in entry.parents}
+    counts = Counter(entry.parent for entry in entries if entry.name != "__init__.py")
+    assert not {folder.relative_to(ROOT): count for folder, count in counts.items() if count > 20}
 
 
 def lines_of(path: Path) -> int:

@@ -1,21 +1,14 @@
-"""I++ DME (VDMA 8722): its lines, and a client for session, positions and errors; nothing here moves the machine.
+"""I++ DME (VDMA 8722): its lines.
 
 Lines are by the syntax of specification 1.4.3, section 6.1.4: terms such as ``X(12.5)``, and responses with tags and a sign:
-``&`` accepts a command, ``#`` brings data, ``!`` an error, ``%`` ends the transaction. Transactions follow each other, each to
-the end of its answer.
+``&`` accepts a command, ``#`` brings data, ``!`` an error, ``%`` ends the transaction.
 """
 
 from __future__ import annotations
 
 import re
-from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, cast
-
-from cmm_uq.laboratory.live.instruments.parsing import Framer
-from cmm_uq.laboratory.live.instruments.profile import MessageFrame
-from cmm_uq.laboratory.live.instruments.source import Clock, Port
 
 ACK, DATA, ERROR, DONE = "&", "#", "!", "%"
 Sign = Literal["&", "#", "!", "%"]
@@ -176,144 +169,3 @@ class HeardLine:
     response: ServerLine | None  # what it is; ``None`` where it is none of the protocol
     utc_ns: int
     monotonic_ns: int
-
-
-ANSWER_WITHIN_S = 2.0  # time for the acknowledgement, and for data
-NOT_THERE = frozenset({501, 502, 505, 506, 507, 509, 510})
-"""Errors by which a server says that it does not know a command, an argument or a property (section 8.2)."""
-
-
-class Client:
-    """A client of one server; ``unasked``: lines that answer no command: events, reports of daemons, errors by themselves."""
-
-    def __init__(self, port: Port, clock: Clock, *, within_s: float = ANSWER_WITHIN_S) -> None:
-        self._port, self._clock, self.within_s = port, clock, within_s
-        self._framer = Framer(MessageFrame(terminator="<CR><LF>", longest=LONGEST))
-        self._commands = self._events = 0
-        self._came: deque[HeardLine] = deque()
-        self.unasked: deque[HeardLine] = deque()
-
-    def call(self, command: str, *, event: bool = False) -> list[HeardLine]:
-        """Send a command and wait for the end of its transaction, each line in time; its lines of data."""
-        if event:
-            self._events = self._events % 9999 + 1
-            tag = f"E{self._events:04d}"
-        else:
-            self._commands = self._commands % 99999 + 1
-            tag = f"{self._commands:05d}"
-        self._port.write(f"{tag} {command}\r\n".encode("ascii"))
-        first = self._answer(tag, command)
-        if first.response is None or first.response.sign != ACK:
-            raise NoAnswerError(f"{command} was answered {first.raw!r} before it was acknowledged with {ACK}")
-        data, faults = [], []
-        while (response := (heard := self._answer(tag, command)).response) and response.sign != DONE:
-            if response.sign == ACK:
-                raise NoAnswerError(f"{command} was acknowledged twice")
-            if response.sign == DATA:
-                data.append(heard)
-                continue
-            try:
-                faults.append(fault_of(response.rest))
-            except BadLineError as error:
-                raise NoAnswerError(f"an error that is none of the protocol: {error}") from None
-        if stopping := next((fault for fault in faults if fault.stops), None):
-            raise FaultError(stopping)
-        return data
-
-    def listen(self) -> bool:
-        """Take what comes within a moment; whether anything is in :attr:`unasked`."""
-        self._read()
-        self.unasked += self._came
-        self._came.clear()
-        return bool(self.unasked)
-
-    def _answer(self, tag: str, command: str) -> HeardLine:
-        until = self._clock.monotonic_ns() + round(self.within_s * 1e9)
-        while True:
-            while self._came:
-                heard = self._came.popleft()
-                if heard.response is not None and heard.response.tag == tag:
-                    return heard
-                self.unasked.append(heard)
-            if self._clock.monotonic_ns() >= until:
-                raise NoAnswerError(f"{command} was not answered within {self.within_s:g} s")
-            self._read()
-
-    def _read(self) -> None:
-        received = self._port.read()
-        utc, monotonic = self._clock.utc_ns(), self._clock.monotonic_ns()
-        for framed in self._framer.feed(received):
-            try:
-                response = response_of(framed.body) if framed.whole else None
-            except BadLineError:
-                response = None
-            self._came.append(HeardLine(framed.raw, response, utc, monotonic))
-
-    def start_session(self, *, take_over: bool = False) -> None:
-        """Begin; with ``take_over`` after ending one that is active, such as one's own that was cut off."""
-        if take_over:
-            self.end_session()
-        self.call("StartSession()")
-
-    def end_session(self) -> None:
-        """End; daemons end with it."""
-        self.call("EndSession()")
-
-    def version(self) -> str | None:
-        """Version of the specification that the server implements; ``None`` before 1.4, which does not know the question."""
-        return self._known("GetDMEVersion()", "DMEVersion")
-
-    def machine_class(self) -> str | None:
-        """``CartCMM`` or another."""
-        return self._known("GetMachineClass()", "GetMachineClass")
-
-    def in_error(self) -> bool:
-        """Whether the server waits for its errors to be cleared."""
-        (answer,) = self.call("GetErrStatusE()", event=True)
-        return _first(answer, "ErrStatus") == 1.0
-
-    def clear_all_errors(self) -> None:
-        """Let the server go on after an error."""
-        self.call("ClearAllErrors()")
-
-    def get(self, *names: str) -> HeardLine:
-        """Ask for what the names say now, ``X``, ``Y``, ``Z`` where none is given."""
-        (answer,) = self.call(f"Get({_empty(names or 'XYZ')})")
-        return answer
-
-    def on_pt_meas_report(self, *names: str) -> None:
-        """Say what is reported of each measured point."""
-        self.call(f"OnPtMeasReport({_empty(names)})")
-
-    def on_move_report(self, time_s: float, distance_mm: float, *names: str) -> None:
-        """Have positions reported while the machine moves."""
-        spaced = f"Time({number_text(max(time_s, 0.1))}), Dis({number_text(distance_mm)})"
-        self.call(f"OnMoveReportE({spaced}, {_empty(names)})", event=True)
-
-    def enable_user(self) -> None:
-        """Let the user move the machine and pick points by the joystick."""
-        self.call("EnableUser()")
-
-    def _known(self, command: str, name: str) -> str | None:
-        """Answer to what older servers may not know; ``None`` where this one does not, and goes on."""
-        try:
-            (answer,) = self.call(command)
-        except FaultError as error:
-            if error.fault.number not in NOT_THERE:
-                raise
-            self.clear_all_errors()
-            return None
-        return str(_first(answer, name))
-
-
-def _empty(names: Sequence[str]) -> str:
-    return ", ".join(f"{name}()" for name in names)
-
-
-def _first(heard: HeardLine, name: str) -> Argument:
-    """The first that a term of an answer holds."""
-    rest = heard.response.rest if heard.response else ""
-    try:
-        return terms_of(rest)[name][0]
-    except (BadLineError, LookupError):
-        raise NoAnswerError(f"{rest!r} where {name}(…) belongs") from None

@@ -10,6 +10,7 @@ from dataclasses import replace
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.laboratory.live.instruments import ipp, source
+from cmm_uq.laboratory.live.instruments.ipp_client import ANSWER_WITHIN_S, Client
 from cmm_uq.laboratory.live.instruments.profile import Connection, Positions, ProfileFile, shown
 from cmm_uq.laboratory.live.instruments.source import SECOND, Event, PortLostError
 
@@ -49,7 +50,7 @@ class IppMachine:
         self._number, self._gap_at, self._closed = 0, -1, False
         self._port = opened()
         self._connected = True
-        self.client, began = ipp.Client(self._port, clock), clock.monotonic_ns()
+        self.client, began = Client(self._port, clock), clock.monotonic_ns()
         try:
             self._begin(take_over=False)
         except ipp.FaultError as error:
@@ -61,7 +62,7 @@ class IppMachine:
             fix = "Check that the port is that of the I++ DME server, usually 1294"
             raise CmmUqError(f"no I++ DME server answers: {error}", where=self.name, fix=fix) from None
         took_s = (clock.monotonic_ns() - began) / SECOND
-        self._again_within_s = min(max(AGAIN_WITHIN_S, took_s), ipp.ANSWER_WITHIN_S)
+        self._again_within_s = min(max(AGAIN_WITHIN_S, took_s), ANSWER_WITHIN_S)
 
     def identity(self) -> source.Identity:
         return self._identity
@@ -193,13 +194,13 @@ class IppMachine:
         except CmmUqError:
             self._clock.sleep(RETRY_S)
             return
-        self.client = ipp.Client(self._port, self._clock, within_s=self._again_within_s)
+        self.client = Client(self._port, self._clock, within_s=self._again_within_s)
         try:
             self._begin(take_over=True)
         except (ipp.NoAnswerError, ipp.FaultError, PortLostError):
             self._port.close()
             self._clock.sleep(RETRY_S)
             return
-        self._connected, self.client.within_s = True, ipp.ANSWER_WITHIN_S
+        self._connected, self.client.within_s = True, ANSWER_WITHIN_S
         now, gap, self._gap_at = self._clock.monotonic_ns(), self._gap_at, -1
         yield source.Returned(self.name, self._clock.utc_ns(), now, (now - gap) / SECOND)

@@ -18,7 +18,6 @@ from cmm_uq.laboratory.live.instruments.ipp import (
     DONE,
     ERROR,
     BadLineError,
-    Client,
     FaultError,
     HeardLine,
     NoAnswerError,
@@ -29,6 +28,7 @@ from cmm_uq.laboratory.live.instruments.ipp import (
     response_of,
     terms_of,
 )
+from cmm_uq.laboratory.live.instruments.ipp_client import Client
 from cmm_uq.laboratory.live.instruments.ipp_machine import IppMachine
 from cmm_uq.laboratory.live.instruments.source import SYSTEM, Gap, PortLostError, Reading, Returned, TcpPort
 from tests.laboratory.live.instruments.listening import listening
@@ -117,19 +117,15 @@ def test_a_number_as_it_is_sent_is_one_of_the_syntax_and_exact_to_a_picometre(va
 
 
 @contextmanager
-def session(machine: UnreliableIppServer, *, begin: bool = True) -> Iterator[Client]:
+def session(machine: UnreliableIppServer, *, drive: bool = True, begin: bool = True) -> Iterator[Client]:
     port = TcpPort("127.0.0.1", machine.port, machine.url)
-    client = Client(port, SYSTEM)
+    client = Client(port, SYSTEM, confirm=(lambda command: True) if drive else None)
     try:
         if begin:
             client.start_session()
         yield client
     finally:
         port.close()
-
-
-def said(client: Client, command: str) -> list[str]:
-    return [heard.response.rest for heard in client.call(command) if heard.response is not None]
 
 
 @pytest.fixture
@@ -142,10 +138,10 @@ def machine() -> Iterator[UnreliableIppServer]:
 def test_a_session_from_beginning_to_end(machine: UnreliableIppServer) -> None:
     with session(machine) as client:
         assert (client.version(), client.machine_class(), client.in_error()) == ("1.4.3", "CartCMM", False)
-        assert said(client, "EnumTools()") == ['"RefTool"', '"NoTool"', '"Probe1"', '"Probe2"']
-        client.call('ChangeTool("Probe1")')
-        assert said(client, "GetProp(Tool.Name())") == ['Tool.Name("Probe1")']
-        assert said(client, "GetProp(Part.Temperature())") == ["Part.Temperature(20.13)"]
+        assert client.tools() == ["RefTool", "NoTool", "Probe1", "Probe2"]
+        client.change_tool("Probe1")
+        assert client.tool() == "Probe1"
+        assert client.part_temperature() == 20.13
         client.end_session()
         with pytest.raises(FaultError, match="Protocol error"):
             client.get()
@@ -156,17 +152,35 @@ def test_a_point_is_measured_where_the_surface_is(machine: UnreliableIppServer) 
     machine.radial = 0.05
     with session(machine) as client:
         client.on_pt_meas_report("X", "Y", "Z", "IJK")
-        (measured,) = said(client, "PtMeas(X(10), Y(20), Z(30), IJK(3, 0, 4))")
-        found = terms_of(measured)
+        heard = client.pt_meas((10, 20, 30), (3, 0, 4))
+        assert heard.response is not None
+        found = terms_of(heard.response.rest)
         assert [found[axis][0] for axis in "XYZ"] == pytest.approx([10.03, 20.0, 30.04], abs=1e-4)
         assert found["IJK"] == pytest.approx((0.6, 0.0, 0.8))
+
+
+@pytest.mark.parametrize("move", [
+    lambda client: client.pt_meas((0, 0, 0)),
+    lambda client: client.go_to((0, 0, 0)),
+    lambda client: client.change_tool("Probe1"),
+])  # fmt: skip
+def test_nothing_moves_unless_it_was_allowed_and_confirmed(move, machine: UnreliableIppServer) -> None:
+    with session(machine, drive=False) as client:
+        with pytest.raises(CmmUqError, match="moves the machine, which was not allowed"):
+            move(client)
+        asked: list[str] = []
+        client._confirm = lambda command: bool(asked.append(command))
+        with pytest.raises(CmmUqError, match="was not confirmed"):
+            move(client)
+    assert len(asked) == 1
+    assert not [line for line in machine.lines if "PtMeas(" in line or "GoTo" in line or "ChangeTool" in line]
 
 
 def test_an_error_stops_the_server_until_it_is_cleared(machine: UnreliableIppServer) -> None:
     """Section 6.2.5, with 2500 and 0514 of 8.2."""
     with session(machine) as client:
         with pytest.raises(FaultError) as error:
-            client.call("GoTo(X(5000))")
+            client.go_to((5000, 0, 0))
         assert error.value.fault.number == 2500
         assert client.in_error()
         with pytest.raises(FaultError) as error:
@@ -178,12 +192,12 @@ def test_an_error_stops_the_server_until_it_is_cleared(machine: UnreliableIppSer
 
 def test_reports_of_a_daemon_and_events_are_kept_beside_the_answers(machine: UnreliableIppServer) -> None:
     with session(machine) as client:
-        client.on_move_report(0.1, 1.0, "X")
-        client.call("GoTo(X(7))")
-        assert [heard.raw for heard in client.unasked] == [b"E0001 # X(7.0000)\r\n"]
-        client.call("StopDaemon(E0001)")
+        tag = client.on_move_report(0.1, 1.0, "X")
+        client.go_to((7, 0, 0))
+        assert [heard.raw for heard in client.unasked] == [f"{tag} # X(7.0000)\r\n".encode()]
+        client.stop_daemon(tag)
         with pytest.raises(FaultError, match="Daemon does not exist"):
-            client.call("StopDaemon(E0001)")
+            client.stop_daemon(tag)
 
 
 def test_an_older_server_is_asked_no_more_than_it_knows() -> None:
@@ -191,9 +205,8 @@ def test_an_older_server_is_asked_no_more_than_it_knows() -> None:
     try:
         with session(machine) as client:
             assert client.version() is None
-            with pytest.raises(FaultError, match="Bad property"):
-                client.call("GetProp(Part.Temperature())")
-            client.clear_all_errors()
+            assert client.part_temperature() is None
+            assert client.scale_temperatures() == {}
             client.get()
     finally:
         machine.close()
@@ -223,9 +236,8 @@ def test_a_server_that_breaks_the_protocol_is_refused_in_words(wrong, told: str,
     with session(machine) as client:
         for key, value in wrong.items():
             setattr(machine.mischief, key, value)
-        client.within_s = 0.2
         with pytest.raises(NoAnswerError, match=told):
-            client.call("Get(X())")
+            client.call("Get(X())", within_s=0.2)
 
 
 def test_half_a_line_of_data_is_no_position(machine: UnreliableIppServer) -> None:
@@ -241,6 +253,11 @@ def test_a_connection_that_is_cut_is_lost(machine: UnreliableIppServer) -> None:
         with pytest.raises(PortLostError):
             client.get()
         machine.start()
+
+
+def test_a_name_that_would_break_the_line_is_refused(machine: UnreliableIppServer) -> None:
+    with session(machine) as client, pytest.raises(CmmUqError, match="can be no name of a tool"):
+        client.change_tool('a") %')
 
 
 def declared(machine: UnreliableIppServer, profile: str = "ipp") -> DeclaredSource:
