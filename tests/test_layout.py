@@ -29,7 +29,7 @@ CEILING = {
     "certificate": 16_000, "artefacts": 8_750, "app": 14_500,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
-OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 282, 1608
+OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 249, 1509
 """Imports of the package within functions, and exemptions from the formatter: only falling."""
 LOADED_LATE = {
     "arviz", "asn1crypto", "contourpy", "cryptography", "ctypes", "defusedxml", "emcee", "fcntl",
