@@ -35,7 +35,10 @@ OF_U = 0.1
 """Part of its u by which a sampled figure may move."""
 ASK = """
 import ctypes, pathlib
+import scipy.linalg
 import numpy.linalg, scipy.linalg.cython_blas
+matrix = numpy.add.outer(numpy.arange(300.0), numpy.ones(300)) + 300 * numpy.eye(300)
+numpy.linalg.svd(matrix @ matrix), scipy.linalg.cho_factor(matrix @ matrix.T), scipy.linalg.qr(matrix)
 lines = pathlib.Path("/proc/self/maps").read_text().splitlines()
 for path in sorted({line.split()[-1] for line in lines if "openblas" in line}):
     library = ctypes.CDLL(path)
@@ -46,7 +49,7 @@ for path in sorted({line.split()[-1] for line in lines if "openblas" in line}):
                 ask.restype = ctypes.c_char_p
                 print(ask().decode())
 """
-"""Names the kernel of every OpenBLAS that numpy and scipy load."""
+"""Names the kernel of every OpenBLAS that numpy and scipy load; a processor that lacks its instructions ends this first."""
 
 
 def honoured(kernel: str) -> bool:

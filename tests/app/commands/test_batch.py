@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.app.commands.laboratory import batch as batch_run, batch as module, batch_jobs
+from cmm_uq.app.commands.laboratory import batch as batch_run, batch_jobs
 from cmm_uq.app.commands.laboratory.batch import Batch, BatchOptions, write_batch
 from cmm_uq.app.commands.laboratory.batch_jobs import begin, conforming
 from cmm_uq.app.commands.reading import read_job
@@ -31,7 +31,7 @@ CANNED = "tests.laboratory.schedule.canned"
 @pytest.fixture
 def canned(monkeypatch: pytest.MonkeyPatch) -> None:
     """What a report says is made up: these tests are about what is around it."""
-    monkeypatch.setattr(module, "PROGRAM", CANNED)
+    monkeypatch.setattr(batch_jobs, "PROGRAM", CANNED)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -228,8 +228,8 @@ def test_a_signal_leaves_whole_reports_and_says_how_to_go_on(tmp_path: Path, num
     script = f"""if 1:
         import sys
         from cmm_uq.app import cli
-        from cmm_uq.app.commands.laboratory import batch
-        batch.PROGRAM = {CANNED!r}
+        from cmm_uq.app.commands.laboratory import batch_jobs
+        batch_jobs.PROGRAM = {CANNED!r}
         sys.argv = ["cmm-uq", "batch", {str(jobs)!r}, "--out", {str(out)!r}, "--workers", "2"]
         cli.main()"""
     process = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.PIPE, text=True)
