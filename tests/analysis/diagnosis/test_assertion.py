@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis import diagnosis
+from cmm_uq.analysis.diagnosis import diagnosis, joint
 from cmm_uq.analysis.diagnosis.comparison import search
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
@@ -135,7 +135,7 @@ def test_where_no_size_of_a_group_is_known_the_most_probable_is_withheld(monkeyp
         "joint_posterior": lambda *_: None,
         "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
     }.items():
-        monkeypatch.setattr(diagnosis, name, stub)
+        monkeypatch.setattr(diagnosis if hasattr(diagnosis, name) else joint, name, stub)
     found, _, withheld = diagnosis._asserted(start, cast("Any", None), 0, None, None)
     assert seen == [{0}, {1}, set()]
     assert (found.chosen, [each.effect for each in withheld]) == (frozenset(), ["0"])
@@ -160,7 +160,7 @@ def test_of_effects_whose_sizes_are_open_together_the_least_probable_goes_first(
         "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
         "substitute": lambda *_: None,
     }.items():
-        monkeypatch.setattr(diagnosis, name, stub)
+        monkeypatch.setattr(diagnosis if hasattr(diagnosis, name) else joint, name, stub)
     found, _, withheld = diagnosis._asserted(start, cast("Any", None), 0, None, None)
     assert (found.chosen, [each.effect for each in withheld]) == (frozenset({0, 1}), ["2"])
 
