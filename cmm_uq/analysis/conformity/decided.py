@@ -16,7 +16,7 @@ from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.analysis.conformity.standard import NOT_STATED, Test
 from cmm_uq.analysis.conformity.statement import Decided, Remeasurement, Statement, least_favourable, with_standing
 from cmm_uq.analysis.conformity.uncertainty import Causes, causes_of_lengths, length_budget, temperatures, u_of_repeats
-from cmm_uq.base.messages import Argument, Text, at_key, plural, say, semicolons
+from cmm_uq.base.messages import Text, at_key, plural, say, semicolons
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE, unit
 from cmm_uq.jobs.tables.circumstances import LINE_KEYS, TestUncertainty
@@ -171,16 +171,13 @@ def _again_in_words(items: Sequence[Decided], again: Remeasurement | None) -> It
             say("measurement {measurement}, {length} mm", measurement=m, length=nominal(length)) for m, length in places
         )
         if again and places:
-            words: dict[str, Argument] = {
-                "repeats": again.repeats,
-                "readings": again.readings,
-                "which": semicolons(each),
-            }
+            repeats, readings, which = again.repeats, again.readings, semicolons(each)
             further = say(
                 "One of {repeats} values lies outside: measure {readings} times more, as further repeats of the same "
-                "measurement, all of which must lie inside: {which}.", **words)  # fmt: skip
+                "measurement, all of which must lie inside: {which}.", repeats=repeats, readings=readings, which=which,
+            )  # fmt: skip
             done = say("One of {repeats} values lay outside and was measured {readings} times more, all inside: {which}.",
-                       **words)  # fmt: skip
+                       repeats=repeats, readings=readings, which=which)  # fmt: skip
             yield further if standing == "again" else done
 
 

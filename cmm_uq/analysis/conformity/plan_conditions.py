@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity import plans
 from cmm_uq.analysis.conformity.plans import BarPlan, Condition, LengthPlan, Plan, SpherePlan, position_of
-from cmm_uq.base.messages import NOTHING, Argument, Text, Verbatim, at_key, commas, number, plural, say, semicolons
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, commas, number, plural, say, semicolons
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.quantity import nominal
@@ -285,12 +285,12 @@ def _in_words(same: dict[int, tuple[float | None, int]]) -> Iterator[Text]:
     """One sentence for all that are the same of one other; copies come first."""
     for apart, other in sorted(set(same.values()), key=lambda pair: (pair[1], pair[0] is not None)):
         numbers = sorted(own for own, pair in same.items() if pair == (apart, other))
-        words: dict[str, Argument] = {"which": _listed(numbers), "apart": apart or 0.0, "other": other}
-        one = say("measurement {which} is within {apart:g} mm of {other}", **words)
-        many = say("measurements {which} are within {apart:g} mm of {other}", **words)
+        which, off = _listed(numbers), apart or 0.0
+        one = say("measurement {which} is within {apart:g} mm of {other}", which=which, apart=off, other=other)
+        many = say("measurements {which} are within {apart:g} mm of {other}", which=which, apart=off, other=other)
         if apart is None:
-            one = say("measurement {which} is a copy of {other}", which=words["which"], other=other)
-            many = say("measurements {which} are copies of {other}", which=words["which"], other=other)
+            one = say("measurement {which} is a copy of {other}", which=which, other=other)
+            many = say("measurements {which} are copies of {other}", which=which, other=other)
         yield plural(len(numbers), one=one, many=many)
 
 
