@@ -278,7 +278,7 @@ def test_a_certificate_holds_until_its_last_day(last: dt.date) -> None:
 def test_a_certificate_of_another_version_that_was_to_be_computed_again_is_told_with_both_versions(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for module in ("certificates.verify_again", "parts.machine"):
+    for module in ("certificates.verification", "parts.machine"):
         monkeypatch.setattr(f"cmm_uq.app.commands.{module}.__version__", "99.0.0")
     job = plate_of(by_certificate())
     (first, *_) = state_machine(job, rerun=True).warnings
