@@ -13,9 +13,9 @@ from cmm_uq.app.commands.laboratory.acquire import begin_acquisition
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim
-from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer
 from cmm_uq.laboratory.live.instruments.source import Gap, Moment, Returned
 from cmm_uq.laboratory.live.story import read_story
+from tests.laboratory.live.instruments.mischief import UnreliableIppServer
 from tests.laboratory.live.session import FakeClock, job_folder, probed, said, session, temperature, type_in
 
 BAR = ("100 100 -300", "600.003 100 -300")
@@ -378,7 +378,7 @@ def test_the_picture_has_every_point_and_a_cross_where_to_go(tmp_path: Path, clo
 
 
 def test_a_machine_goes_on_after_an_error_once_the_operator_says_so(tmp_path: Path) -> None:
-    machine = SimulatedIppServer()
+    machine = UnreliableIppServer()
     more = f'[[acquire.source]]\nname = "cmm"\nprofile = "ipp-position"\nport = "{machine.url}"\n'
     taking = begin_acquisition(job_folder(tmp_path / "job", more))
     (source,) = taking.sources
