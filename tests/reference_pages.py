@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 from typer.models import ArgumentInfo, CommandInfo
 
@@ -414,9 +414,8 @@ def _beginning(name: str) -> Beginning:
 def _parameters(command: CommandInfo) -> Iterable[tuple[str, str, str]]:
     """Name, meaning and default of each argument and option."""
     assert command.callback is not None
-    hints = get_type_hints(command.callback)
-    for name, parameter in inspect.signature(command.callback).parameters.items():
-        info, switch = parameter.default, hints[name]
+    for name, parameter in inspect.signature(command.callback, eval_str=True).parameters.items():
+        info, switch = parameter.default, parameter.annotation
         declared = [one for one in info.param_decls or () if one.startswith("-")]
         names = declared or [f"--{name.replace('_', '-')}", *([f"--no-{name}"] if info.default is True else [])]
         shown = f"`{name.upper()}`" if isinstance(info, ArgumentInfo) else ", ".join(f"`{one}`" for one in names)
