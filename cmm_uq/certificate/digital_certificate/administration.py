@@ -21,7 +21,6 @@ from cmm_uq.certificate.results.provenance import Reissue
 from cmm_uq.certificate.sections.results import SIGN, UNCERTAINTY
 from cmm_uq.jobs.chain import holds_on, right
 from cmm_uq.jobs.dcc import certificate as dcc
-from cmm_uq.jobs.dcc.quantities import Expanded, Hybrid, Real, RealList
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.tables.artefact import CertificateFile, Traceability
@@ -124,7 +123,7 @@ def items(job: Job, texts: Languages) -> dcc.Items:
         if travel := getattr(machine.travel_mm, axis):
             name = texts.words(say("Measuring range of {axis}", axis=Verbatim(axis.upper())))
             values = tuple(Decimal(repr(float(end))) for end in travel)
-            ends = RealList(labels=("lowest", "highest"), values=values, units=(UNITS["mm"].dsi,))
+            ends = dcc.RealList(labels=("lowest", "highest"), values=values, units=(UNITS["mm"].dsi,))
             ref_type = ("cmm_measuringRange",)
             travels.append(dcc.PrimitiveQuantity(id=f"travel_{axis}", name=name, value=ends, ref_type=ref_type))
     item = dcc.Item(
@@ -328,7 +327,9 @@ def _certified(
     owner: str, length: float | None, u_um: float | None, cte: float, texts: Languages
 ) -> tuple[dcc.PrimitiveQuantity, ...]:
     u = Decimal(repr(float(u_um or 0.0))).scaleb(-3)
-    stated = Expanded(uncertainty=u, factor=Decimal(1), probability=P_STANDARD, distribution="normal") if u else None
+    stated = (
+        dcc.Expanded(uncertainty=u, factor=Decimal(1), probability=P_STANDARD, distribution="normal") if u else None
+    )
     known = (
         ("length", say("Certified length"), length, "mm", stated),
         ("cte", say("Coefficient of thermal expansion"), cte or None, "1/K", None),
@@ -336,7 +337,7 @@ def _certified(
     return tuple(
         dcc.PrimitiveQuantity(
             id=f"{owner}_{key}", name=texts.words(name), ref_type=("basic_referenceValue",),
-            value=Real(value=Decimal(repr(float(value))), unit=UNITS[unit].dsi, uncertainty=uncertainty),
+            value=dcc.Real(value=Decimal(repr(float(value))), unit=UNITS[unit].dsi, uncertainty=uncertainty),
         )
         for key, name, value, unit, uncertainty in known if value is not None
     )  # fmt: skip
@@ -363,8 +364,8 @@ def conditions(job: Job, texts: Languages) -> tuple[dcc.InfluenceCondition, ...]
 
 def _temperature(id_: str, name: Text, celsius: float, ref_type: str, texts: Languages) -> dcc.DccQuantity:
     shown = Decimal(repr(float(celsius)))
-    kelvin = Real(value=shown + _KELVIN, unit=UNITS["K"].dsi)
-    both = Hybrid(values=(kelvin, Real(value=shown, unit=UNITS["°C"].dsi)))
+    kelvin = dcc.Real(value=shown + _KELVIN, unit=UNITS["K"].dsi)
+    both = dcc.Hybrid(values=(kelvin, dcc.Real(value=shown, unit=UNITS["°C"].dsi)))
     return dcc.DccQuantity(id=id_, name=texts.words(name), value=both, ref_type=(ref_type,))
 
 

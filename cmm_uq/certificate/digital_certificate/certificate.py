@@ -24,7 +24,7 @@ from cmm_uq.certificate.digital_certificate import administration, figures as pl
 from cmm_uq.certificate.digital_certificate.administration import Languages, english, mark_of, one_line
 from cmm_uq.certificate.origin import as_json, file_name
 from cmm_uq.certificate.wording import stated_row, stated_value
-from cmm_uq.jobs.dcc import certificate as dcc, quantities as si
+from cmm_uq.jobs.dcc import certificate as dcc
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.verdicts import TOLERANCE_RULE, Verdict, Verdicts
 
@@ -63,7 +63,7 @@ def _of_tolerance(verdict: Verdict, texts: Languages, *, certifies: bool) -> dcc
         declaration=texts.rich(Verbatim(verdict.outcome), *_why(verdict.outcome)),
         conformity=IN_THE_SCHEMA[verdict.outcome] if certifies else None,
         data=dcc.Data(parts=tuple(
-            dcc.DccQuantity(name=texts.words(name), value=si.Real(value=bound, unit=unit), ref_type=("cmm_toleranceLimit",))
+            dcc.DccQuantity(name=texts.words(name), value=dcc.Real(value=bound, unit=unit), ref_type=("cmm_toleranceLimit",))
             for name, bound in bounds
         )),
         ref_type=_ref_type(verdict.outcome, certifies=certifies),
@@ -103,18 +103,23 @@ def statement(
     )
 
 
-def _figures(path: tuple[str, ...], entry: Mapping[str, Any], figures: plain.DigitalFigures) -> Iterator[plain.Part]:
+def _figures(path: tuple[str, ...], entry: Mapping[str, Any], figures: plain.DigitalFigures) -> Iterator[dcc.Element]:
     """The value with its uncertainty, its limit, the acceptance limit of the rule, and probabilities."""
 
     def quantity(
-        keys: str, name: Text, value: Decimal, ref_type: str, unit: str = _MICROMETRE, stated: si.Expanded | None = None
+        keys: str,
+        name: Text,
+        value: Decimal,
+        ref_type: str,
+        unit: str = _MICROMETRE,
+        stated: dcc.Expanded | None = None,
     ) -> dcc.DccQuantity:
-        real, id_ = si.Real(value=value, unit=unit, uncertainty=stated), figures.id_of((*path, *keys.split(".")))
+        real, id_ = dcc.Real(value=value, unit=unit, uncertainty=stated), figures.id_of((*path, *keys.split(".")))
         return dcc.DccQuantity(id=id_, name=figures.texts.words(name), value=real, ref_type=(ref_type,))
 
     u, limit, guard = plain.decimal(entry["u_um"]), plain.decimal(entry["limit_um"]), entry["guard_band_um"]
     stated = (
-        si.Expanded(uncertainty=2 * u, factor=Decimal(2), probability=_P_TWICE, distribution="normal")
+        dcc.Expanded(uncertainty=2 * u, factor=Decimal(2), probability=_P_TWICE, distribution="normal")
         if u > 0
         else None
     )
@@ -158,9 +163,9 @@ def evidence(
 
 def _values(
     path: tuple[str, ...], errors: Sequence[Mapping[str, Any]], figures: plain.DigitalFigures, *, certifies: bool
-) -> plain.Part:
+) -> dcc.QuantityList:
     below, texts = (*path, "errors"), figures.texts
-    uncertainty = si.ExpandedList(
+    uncertainty = dcc.ExpandedList(
         uncertainties=plain.decimals([error["U_um"] for error in errors]), factors=(Decimal(2),), probabilities=(_P_TWICE,),
         distributions=("normal",),
     )  # fmt: skip
@@ -168,7 +173,7 @@ def _values(
     values = plain.decimals([error["error_um"] for error in errors])
     column = dcc.DccQuantity(
         id=figures.id_of((*below, "error_um")), name=texts.words(say("Value")), ref_type=("basic_measurementError",),
-        value=si.RealList(values=values, units=(_MICROMETRE,), uncertainty=uncertainty if known else None),
+        value=dcc.RealList(values=values, units=(_MICROMETRE,), uncertainty=uncertainty if known else None),
     )  # fmt: skip
     others = [{key: error[key] for key in error if key not in ("error_um", "u_um", "U_um")} for error in errors]
     rest = [
@@ -288,18 +293,18 @@ def _together(results: Mapping[str, Any], figures: plain.DigitalFigures) -> dcc.
         return None
     units = [plain.dsi_of(data["units"][i]) for i in chosen]
     columns = tuple(
-        si.CovarianceColumn(covariances=tuple(
-            si.CovarianceElement(value=plain.decimal(matrix[row][column]), unit=plain.product(a, b))
+        dcc.CovarianceColumn(covariances=tuple(
+            dcc.CovarianceElement(value=plain.decimal(matrix[row][column]), unit=plain.product(a, b))
             for row, a in zip(chosen, units, strict=True)
         ))
         for column, b in zip(chosen, units, strict=True)
     )  # fmt: skip
     factor = plain.decimal(float(f"{sqrt(special.chdtri(len(chosen), 0.05)):.6f}"))
     values, U, k = (plain.decimals([quantity[key] for quantity in found]) for key in ("value", "U", "k"))
-    stated = si.RealList(
+    stated = dcc.RealList(
         labels=tuple(names[i] for i in chosen), values=values, units=tuple(units),
-        uncertainty=si.ExpandedList(uncertainties=U, factors=k, probabilities=(plain.P95,)),
-        region=si.EllipsoidalRegion(columns=columns, factor=factor, probability=plain.P95, distribution="normal"),
+        uncertainty=dcc.ExpandedList(uncertainties=U, factors=k, probabilities=(plain.P95,)),
+        region=dcc.EllipsoidalRegion(columns=columns, factor=factor, probability=plain.P95, distribution="normal"),
     )  # fmt: skip
     title = figures.texts.words(say("Estimates together, with their covariance"))
     ref_type = ("cmm_covariance",)

@@ -21,17 +21,16 @@ from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.units import PRINTED, UNITS, Unit
 from cmm_uq.certificate.digital_certificate.administration import P_STANDARD, Languages, english
 from cmm_uq.certificate.wording import effect_of, effect_title, parameter_title
-from cmm_uq.jobs.dcc.certificate import Characters, DccQuantity, QuantityList, StatementMetadata
-from cmm_uq.jobs.dcc.quantities import Expanded, ExpandedList, Interval, IntervalList, Real, RealList
+from cmm_uq.jobs.dcc import certificate as dcc
+from cmm_uq.jobs.dcc.certificate import Element
 
 ONE = UNITS["1"]
 _ENDINGS: Mapping[str, Unit] = MappingProxyType({**PRINTED, "deg": UNITS["°"], "mm2": UNITS["mm²"]})
 _PLAIN = ("k", "probability", "p_value", "share", "dof", "draws", "repeat", "measurement", "point", "points")
 """Keys of what has no unit, also where the key above them has one."""
 
+# a unit of the table with its prefix, and the power of both
 _FACTOR = re.compile(r"((?:\\(?:nano|micro|milli|centi|kilo))?\\[a-z]+)(?:\\tothe\{(-?\d+)\})?")
-"""A unit with its prefix, and the power of both; those of the table."""
-
 _SHORT = 4  # numbers of a list that stand in columns of their own: a point, a direction
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_.\-]")
 _BUDGET = {"value", "u", "U", "k", "dof", "unit", "budget"}
@@ -150,25 +149,25 @@ def plain_cell(value: Any) -> bool:
     return not isinstance(value, Mapping) or (is_quantity(value) and value["value"] is not None)
 
 
-def expanded_of(data: Mapping[str, Any]) -> Expanded | None:
+def expanded_of(data: Mapping[str, Any]) -> dcc.Expanded | None:
     """U with k and 95 %; where only u is known, that with k = 1; None where there is none that D-SI takes."""
     u, U, k = data["u"], data.get("U"), data.get("k")
     if not u:
         return None
     if U is None:
-        return Expanded(uncertainty=decimal(u), factor=Decimal(1), probability=P_STANDARD, distribution="normal")
+        return dcc.Expanded(uncertainty=decimal(u), factor=Decimal(1), probability=P_STANDARD, distribution="normal")
     if k is None or k < 1:
         return None
     distribution = POSTERIOR if "interval95" in data else None
-    return Expanded(uncertainty=decimal(U), factor=decimal(k), probability=P95, distribution=distribution)
+    return dcc.Expanded(uncertainty=decimal(U), factor=decimal(k), probability=P95, distribution=distribution)
 
 
-def interval_of(data: Mapping[str, Any]) -> Interval | None:
+def interval_of(data: Mapping[str, Any]) -> dcc.Interval | None:
     """The 95 % coverage interval."""
     if not data.get("interval95") or data["u"] is None:
         return None
     u, low, high = decimals((data["u"], *data["interval95"]))
-    return Interval(standard=u, low=low, high=high, probability=P95, distribution=POSTERIOR)
+    return dcc.Interval(standard=u, low=low, high=high, probability=P95, distribution=POSTERIOR)
 
 
 def symmetric(data: Mapping[str, Any]) -> bool:
@@ -180,28 +179,27 @@ def symmetric(data: Mapping[str, Any]) -> bool:
     return bool(round((high - value) / step) == round((value - low) / step))
 
 
-def spread_of(values: Sequence[Mapping[str, Any]]) -> ExpandedList | IntervalList | None:
+def spread_of(values: Sequence[Mapping[str, Any]]) -> dcc.ExpandedList | dcc.IntervalList | None:
     """Uncertainties of a column: U with k of each, or the interval of each; None where neither is known of all."""
-    none = Expanded(uncertainty=Decimal(0), factor=Decimal(1), probability=P95)  # of what is known without one
+    none = dcc.Expanded(uncertainty=Decimal(0), factor=Decimal(1), probability=P95)  # of what is known without one
     stated = [expanded_of(value) or (none if not value["u"] else None) for value in values]
     known = [(each.uncertainty, each.factor, each.probability) for each in stated if each is not None]
     if len(known) < len(stated):
         return intervals_of(values)
     uncertainties, factors, chances = zip(*known, strict=True)
-    return ExpandedList(uncertainties=uncertainties, factors=factors, probabilities=chances)
+    return dcc.ExpandedList(uncertainties=uncertainties, factors=factors, probabilities=chances)
 
 
-def intervals_of(values: Sequence[Mapping[str, Any]]) -> IntervalList | None:
+def intervals_of(values: Sequence[Mapping[str, Any]]) -> dcc.IntervalList | None:
     """The interval of each; None where it is not known of all. What has no uncertainty is an interval of no width."""
     known = [(each.standard, each.low, each.high) for each in map(interval_of, values) if each is not None]
     if len(known) < len(values):
         return None
     standards, lows, highs = zip(*known, strict=True)
-    return IntervalList(standards=standards, lows=lows, highs=highs, probabilities=(P95,))
+    return dcc.IntervalList(standards=standards, lows=lows, highs=highs, probabilities=(P95,))
 
 
 Path = tuple[str, ...]
-Part = DccQuantity | QuantityList
 NOT_DETERMINED = say("not determined by this recording")
 _ESTIMATED = ("estimates", "artefact")  # keys of what is estimated with the priors that physics allows
 _NO_RESULT = ("noise", "least_squares")
@@ -214,15 +212,15 @@ class DigitalFigures:
 
     texts: Languages
     free: Collection[str] = ()  # paths of estimates that the recording does not determine: what is known is no result
-    stated: Mapping[str, StatementMetadata] = field(default_factory=dict)  # of estimates, ``scale_x.ppm``, by name
+    stated: Mapping[str, dcc.StatementMetadata] = field(default_factory=dict)  # of estimates, ``scale_x.ppm``, by name
     _ids: set[str] = field(default_factory=set)
 
-    def parts(self, path: Path, value: Any, above: Unit | None = None) -> Iterator[Part]:
+    def parts(self, path: Path, value: Any, above: Unit | None = None) -> Iterator[Element]:
         if value is None or value in ({}, []):
             return
         unit = unit_of(path[-1], above) if not path[-1].isdecimal() else above or ONE
         if is_number(value):
-            yield self._quantity(path, Real(value=decimal(value), unit=unit.dsi))
+            yield self._quantity(path, dcc.Real(value=decimal(value), unit=unit.dsi))
         elif isinstance(value, str | bool):
             yield self._quantity(path, english((str(value),)))
         elif isinstance(value, list):
@@ -250,31 +248,31 @@ class DigitalFigures:
         own = effect_title(path[-1]) if effect_of(path[-1]) is not None else Verbatim(without_unit(path[-1]))
         return TITLES.get(path[-1], own)
 
-    def _quantity(self, path: Path, value: Any, *, name: Text | None = None) -> DccQuantity:
+    def _quantity(self, path: Path, value: Any, *, name: Text | None = None) -> dcc.DccQuantity:
         label = self.texts.words(name or self.title(path))
         statement = self.stated.get(".".join(path[1:])) if path[0] == "estimates" else None
-        return DccQuantity(id=self.id_of(path), name=label, value=value, ref_type=_ref_type(path, value),
+        return dcc.DccQuantity(id=self.id_of(path), name=label, value=value, ref_type=_ref_type(path, value),
                         metadata=() if statement is None else (statement,))  # fmt: skip
 
-    def _interval(self, path: Path, value: Any) -> DccQuantity:
+    def _interval(self, path: Path, value: Any) -> dcc.DccQuantity:
         name = say("{what}, 95 % coverage interval", what=self.title(path))
         return self._quantity((*path, "interval95"), value, name=name)
 
-    def _with_uncertainty(self, path: Path, data: Mapping[str, Any], unit: Unit) -> Iterator[Part]:
+    def _with_uncertainty(self, path: Path, data: Mapping[str, Any], unit: Unit) -> Iterator[Element]:
         """A value with u, U, k and interval, and what else is said of it."""
         if data["value"] is None or (path[0] in _ESTIMATED and ".".join(path[-2:]) in self.free):
             yield self._quantity(path, self.texts.rich(NOT_DETERMINED))
             return
         value, interval = decimal(data["value"]), interval_of(data) if data["u"] else None
         stated = expanded_of(data) or interval
-        yield self._quantity(path, Real(value=value, unit=unit.dsi, uncertainty=stated))
+        yield self._quantity(path, dcc.Real(value=value, unit=unit.dsi, uncertainty=stated))
         if interval is not None and interval is not stated and not symmetric(data):
-            yield self._interval(path, Real(value=value, unit=unit.dsi, uncertainty=interval))
+            yield self._interval(path, dcc.Real(value=value, unit=unit.dsi, uncertainty=interval))
         for key, further in data.items():
             if key not in ("value", "u", "U", "k", "interval95"):
                 yield from self.parts((*path, key), further, unit)
 
-    def _keys(self, path: Path, data: Mapping[str, Any], unit: Unit | None) -> Iterator[Part]:
+    def _keys(self, path: Path, data: Mapping[str, Any], unit: Unit | None) -> Iterator[Element]:
         """Each key by itself, but for a curve of errors with u and interval of each, which are one list."""
         taken: set[str] = set()
         for key, value in data.items():
@@ -283,16 +281,18 @@ class DigitalFigures:
             interval: Any = data.get(f"interval95_{ending}")
             if key != ending and is_curve(value, u, interval):
                 low, high = map(decimals, interval)
-                stated = IntervalList(standards=decimals(u), lows=low, highs=high, probabilities=(P95,))
+                stated = dcc.IntervalList(standards=decimals(u), lows=low, highs=high, probabilities=(P95,))
                 dsi = unit_of(key, unit).dsi
-                yield self._quantity((*path, key), RealList(values=decimals(value), units=(dsi,), uncertainty=stated))
+                yield self._quantity(
+                    (*path, key), dcc.RealList(values=decimals(value), units=(dsi,), uncertainty=stated)
+                )
                 taken |= {f"u_{ending}", f"interval95_{ending}"}
             elif key not in taken:
                 yield from self.parts((*path, key), value, unit)
 
-    def _list(self, path: Path, values: Sequence[Any], unit: Unit) -> Iterator[Part]:
+    def _list(self, path: Path, values: Sequence[Any], unit: Unit) -> Iterator[Element]:
         if are_numbers(values):
-            yield self._quantity(path, RealList(values=decimals(values), units=(unit.dsi,)))
+            yield self._quantity(path, dcc.RealList(values=decimals(values), units=(unit.dsi,)))
         elif all(isinstance(value, str | bool) for value in values):
             yield self._quantity(path, _texts(values))
         elif all(isinstance(value, Mapping) for value in values):
@@ -301,12 +301,12 @@ class DigitalFigures:
             inner = (part for i, value in enumerate(values) for part in self.parts((*path, str(i)), value, unit))
             yield from self._parts_of(path, inner)
 
-    def _parts_of(self, path: Path, inner: Iterable[Part], name: Text | None = None) -> Iterator[Part]:
+    def _parts_of(self, path: Path, inner: Iterable[Element], name: Text | None = None) -> Iterator[Element]:
         """The parts below a key as one list, if there are any."""
         if parts := tuple(inner):
-            yield QuantityList(name=self.texts.words(name or self.title(path)), parts=parts, id=self.id_of(path))
+            yield dcc.QuantityList(name=self.texts.words(name or self.title(path)), parts=parts, id=self.id_of(path))
 
-    def _table(self, path: Path, rows: Sequence[Mapping[str, Any]]) -> Iterator[Part]:
+    def _table(self, path: Path, rows: Sequence[Mapping[str, Any]]) -> Iterator[Element]:
         """A table by its columns; row by row where a cell holds more than a figure, a text or a point."""
         if not all(plain_cell(value) for row in rows for value in row.values()):
             yield from (part for i, row in enumerate(rows) for part in self.parts((*path, str(i)), dict(row)))
@@ -314,25 +314,25 @@ class DigitalFigures:
             for key in dict.fromkeys(key for row in rows for key in row):
                 yield from self._column((*path, key), [row.get(key) for row in rows])
 
-    def _column(self, path: Path, cells: Sequence[Any]) -> Iterator[Part]:
+    def _column(self, path: Path, cells: Sequence[Any]) -> Iterator[Element]:
         """A column; cells without a figure are left out, and labels then say which rows, from 1, the others are."""
         if not (rows := [row for row, cell in enumerate(cells) if cell is not None]):
             return
         labels, values, unit = _labels(rows, cells), [cells[row] for row in rows], unit_of(path[-1], None)
         if all(map(is_number, values)):
-            yield self._quantity(path, RealList(labels=labels, values=decimals(values), units=(unit.dsi,)))
+            yield self._quantity(path, dcc.RealList(labels=labels, values=decimals(values), units=(unit.dsi,)))
         elif all(map(is_quantity, values)):
             yield from self._column_of_quantities(path, dict(zip(rows, values, strict=True)), labels, unit)
         elif all(isinstance(value, list) for value in values) and len({len(value) for value in values}) == 1:
             for i in range(len(values[0])):
-                part = RealList(labels=labels, values=decimals([value[i] for value in values]), units=(unit.dsi,))
+                part = dcc.RealList(labels=labels, values=decimals([value[i] for value in values]), units=(unit.dsi,))
                 yield self._quantity((*path, str(i)), part, name=say("{what} {i}", what=self.title(path), i=i + 1))
         else:
             yield self._quantity(path, _texts([str(value) for value in values]))
 
     def _column_of_quantities(
         self, path: Path, rows: Mapping[int, Mapping[str, Any]], labels: tuple[str, ...], unit: Unit
-    ) -> Iterator[Part]:
+    ) -> Iterator[Element]:
         """With the uncertainty of each, or one by one where D-SI has no list for what is known of them."""
         quantities = list(rows.values())
         uncertainty, intervals = spread_of(quantities), intervals_of(quantities)
@@ -341,27 +341,27 @@ class DigitalFigures:
                 yield from self._with_uncertainty((*path, str(row)), quantity, unit)
             return
         values = decimals([each["value"] for each in quantities])
-        column = RealList(labels=labels, values=values, units=(unit.dsi,), uncertainty=uncertainty)
+        column = dcc.RealList(labels=labels, values=values, units=(unit.dsi,), uncertainty=uncertainty)
         yield self._quantity(path, column)
         if intervals is not None and not all(map(symmetric, quantities)):
             yield self._interval(path, column.with_changes(uncertainty=intervals))
 
-    def _matrix(self, path: Path, rows: Sequence[Sequence[float]], units: Sequence[str]) -> Iterator[Part]:
+    def _matrix(self, path: Path, rows: Sequence[Sequence[float]], units: Sequence[str]) -> Iterator[Element]:
         """A covariance matrix, row by row, each element in the product of its units."""
         for i, (row, unit) in enumerate(zip(rows, units, strict=True)):
             elements = tuple(product(unit, other) for other in units)
-            yield self._quantity((*path, str(i)), RealList(values=decimals(row), units=elements))
+            yield self._quantity((*path, str(i)), dcc.RealList(values=decimals(row), units=elements))
 
-    def _budget(self, path: Path, data: Mapping[str, Any]) -> Iterator[Part]:
+    def _budget(self, path: Path, data: Mapping[str, Any]) -> Iterator[Element]:
         unit = dsi_of(data["unit"])
         if data["value"] is not None:
-            value = Real(value=decimal(data["value"]), unit=unit, uncertainty=expanded_of(data))
+            value = dcc.Real(value=decimal(data["value"]), unit=unit, uncertainty=expanded_of(data))
             yield self._quantity((*path, "value"), value)
-        yield from (self._quantity((*path, key), Real(value=decimal(data[key]), unit=unit)) for key in ("u", "U"))
+        yield from (self._quantity((*path, key), dcc.Real(value=decimal(data[key]), unit=unit)) for key in ("u", "U"))
         yield from (part for key in ("k", "dof") for part in self.parts((*path, key), data[key]))
         yield from self._parts_of((*path, "budget"), self._lines(path, data["budget"], unit), say("Uncertainty budget"))
 
-    def _lines(self, path: Path, lines: Sequence[Mapping[str, Any]], unit: str) -> Iterator[Part]:
+    def _lines(self, path: Path, lines: Sequence[Mapping[str, Any]], unit: str) -> Iterator[Element]:
         """Of a budget, column by column."""
         for key in ("input", "distribution", "source"):
             yield self._quantity((*path, "budget", key), _texts([line[key] for line in lines]))
@@ -374,7 +374,7 @@ class DigitalFigures:
             rows = [i for i, line in enumerate(lines) if line[key] is not None]
             if rows:
                 values, chosen = decimals([lines[i][key] for i in rows]), tuple(units[i] for i in rows)
-                column = RealList(labels=_labels(rows, lines), values=values, units=chosen)
+                column = dcc.RealList(labels=_labels(rows, lines), values=values, units=chosen)
                 yield self._quantity((*path, "budget", key), column)
 
 
@@ -385,13 +385,13 @@ def _labels(rows: Sequence[int], whole: Sequence[object]) -> tuple[str, ...]:
 
 def _texts(values: Sequence[Any]) -> Any:
     texts = [str(value).lower() if isinstance(value, bool) else str(value) for value in values]
-    return Characters(tuple(texts)) if all(text and text.split() == [text] for text in texts) else english(texts)
+    return dcc.Characters(tuple(texts)) if all(text and text.split() == [text] for text in texts) else english(texts)
 
 
 def _ref_type(path: Path, value: Any) -> tuple[str, ...]:
     if path[-1] == "interval95":
         return ("cmm_coverageInterval",)
-    if not isinstance(value, Real | RealList) or path[0] in _NO_RESULT:
+    if not isinstance(value, dcc.Real | dcc.RealList) or path[0] in _NO_RESULT:
         return ()
     if path[0] in ("certified", "tolerances") or path[-1].startswith("reference"):
         return ("basic_referenceValue",) if path[0] != "tolerances" else ("cmm_toleranceLimit",)

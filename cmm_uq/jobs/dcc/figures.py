@@ -12,7 +12,7 @@ from decimal import Decimal
 from typing import Any
 
 from cmm_uq.base.units import UNITS
-from cmm_uq.jobs.dcc import certificate as dcc, quantities as si
+from cmm_uq.jobs.dcc import certificate as dcc
 from cmm_uq.jobs.dcc.certificate import DccQuantity, Measurement, QuantityList, StatementMetadata
 
 Covariance = tuple[tuple[tuple[Decimal, ...], ...], str]  # of the values, row by row, and its unit
@@ -101,18 +101,18 @@ def statements(measurement: Measurement) -> Iterator[StatementMetadata]:
 def _numbers(value: Any) -> Iterator[dict[str, Any]]:
     """Values, units and uncertainties of whatever a quantity consists of; of a hybrid by its first unit."""
     match value:
-        case si.Hybrid():
+        case dcc.Hybrid():
             yield from _numbers(value.values[0])
-        case si.Real() | si.Constant() | si.RealInList():
+        case dcc.Real() | dcc.Constant() | dcc.RealInList():
             labels = (value.label,) if value.label else ()
             stated = (_stated(value.uncertainty),)
             yield {"values": (value.value,), "units": (value.unit or "",), "uncertainties": stated, "labels": labels}
-        case si.RealList():
+        case dcc.RealList():
             count = len(value.values)
             each = _stated_of_list(value.uncertainty, count)
             yield {"values": value.values, "units": _each(value.units, count, ""), "labels": value.labels,
                    "uncertainties": each, "covariance": _covariance(value.region)}  # fmt: skip
-        case si.Reals(values=reals):
+        case dcc.Reals(values=reals):
             common = _stated(value.uncertainty and value.uncertainty.stated)
             yield {
                 "values": tuple(real.value for real in reals),
@@ -121,12 +121,12 @@ def _numbers(value: Any) -> Iterator[dict[str, Any]]:
                 "labels": tuple(real.label or "" for real in reals) if any(real.label for real in reals) else (),
                 "covariance": _covariance(value.region),
             }
-        case si.Lists():
+        case dcc.Lists():
             for inner in value.lists:
                 yield from _numbers(inner)
         case dcc.Characters():
             yield {"words": value.words}
-        case si.Complex() | si.Complexes():
+        case dcc.Complex() | dcc.Complexes():
             yield {"words": ("a complex quantity",)}
         case _:
             yield {"words": (_words(value),)}
@@ -134,13 +134,13 @@ def _numbers(value: Any) -> Iterator[dict[str, Any]]:
 
 def _stated(stated: object) -> ValueUncertainty:
     match stated:
-        case si.Univariate():
+        case dcc.Univariate():
             return _stated(stated.stated)
-        case si.Expanded() | si.ExpandedMU():
+        case dcc.Expanded() | dcc.ExpandedMU():
             return ValueUncertainty(stated.uncertainty, stated.factor, stated.probability)
-        case si.Interval():
+        case dcc.Interval():
             return ValueUncertainty(None, None, stated.probability, stated.standard, stated.low, stated.high)
-        case si.StandardMU():
+        case dcc.StandardMU():
             return ValueUncertainty(standard=stated.standard)
         case Decimal():
             return ValueUncertainty(standard=stated)
@@ -151,13 +151,13 @@ def _stated_of_list(stated: object, count: int) -> tuple[ValueUncertainty, ...]:
     """One a value, where the certificate may have one for all."""
     columns: Sequence[Sequence[Any]]
     match stated:
-        case si.UnivariateList():
+        case dcc.UnivariateList():
             return _stated_of_list(stated.stated, count)
-        case si.ExpandedList() | si.ExpandedListMU():
+        case dcc.ExpandedList() | dcc.ExpandedListMU():
             columns = (stated.uncertainties, stated.factors, stated.probabilities)
-        case si.StandardListMU():
+        case dcc.StandardListMU():
             columns = ((None,), (None,), (None,), stated.standards)
-        case si.IntervalList():
+        case dcc.IntervalList():
             columns = ((None,), (None,), stated.probabilities, stated.standards, stated.lows, stated.highs)
         case _:
             return (NONE,) * count
@@ -172,7 +172,7 @@ def _each(column: Sequence[Any], count: int, otherwise: Any) -> tuple[Any, ...]:
     return (column[0],) * count if len(column) == 1 else (otherwise,) * count
 
 
-def _covariance(region: si.EllipsoidalRegion | None) -> Covariance | None:
+def _covariance(region: dcc.EllipsoidalRegion | None) -> Covariance | None:
     if region is None:
         return None
     units = {element.unit for column in region.columns for element in column.covariances}

@@ -12,24 +12,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import islice
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, cast
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.jobs.dcc.certificate import VERSION, Certificate, Comment, CoreData, Markup
-from cmm_uq.jobs.dcc.fields import Attribute, Child, Content, Element, Field, ForeignElements, Simple, by_tag, fields_of
-from cmm_uq.jobs.dcc.quantities import EllipsoidalRegion, Interval, RealList, RectangularRegion
+from cmm_uq.jobs.dcc.certificate import CLASSES, VERSION, Certificate, Element, Field, Simple
 from cmm_uq.jobs.dcc.tree import NAMESPACES, Node, parsed, serialised
 
 Problem = tuple[str, str]  # what is wrong, and how to mend it
 ROOT = "dcc:digitalCalibrationCertificate"
 _IGNORED = ("xsi:schemaLocation", "xsi:noNamespaceSchemaLocation", "xsi:type")
-
-
-def problems_of(part: Element) -> Iterator[Problem]:
-    """What is wrong with a part by itself."""
-    if check := _CHECKS.get(type(part)):
-        yield from check(part)
 
 
 def ids_and_references(root: Node) -> Iterator[tuple[Node, Problem]]:
@@ -45,7 +36,7 @@ def ids_and_references(root: Node) -> Iterator[tuple[Node, Problem]]:
                 yield node, (f"refId {reference!r} is the id of nothing", "Name an id of this certificate")
 
 
-def _list(values: RealList) -> Iterator[Problem]:
+def _list(values: Element) -> Iterator[Problem]:
     count = len(values.values)
     lists: dict[str, Any] = {"units": values.units, "labels": values.labels, "times": values.times}
     lists |= getattr(getattr(values.uncertainty, "stated", values.uncertainty), "__dict__", {})
@@ -56,7 +47,7 @@ def _list(values: RealList) -> Iterator[Problem]:
         yield f"{count} values have a covariance matrix of {len(values.region.columns)}", "A row and a column for each"
 
 
-def _region(region: EllipsoidalRegion) -> Iterator[Problem]:
+def _region(region: Element) -> Iterator[Problem]:
     columns = [[one.value for one in column.covariances] for column in region.columns]
     if any(len(column) != len(columns) for column in columns):
         yield "the covariance matrix is not square", "A row and a column for each value"
@@ -64,21 +55,22 @@ def _region(region: EllipsoidalRegion) -> Iterator[Problem]:
         yield "the covariance matrix is not symmetric", "The covariance of two is the same both ways"
 
 
-def _interval(interval: Interval) -> Iterator[Problem]:
+def _interval(interval: Element) -> Iterator[Problem]:
     if interval.low > interval.high:
         yield f"the interval {interval.low} to {interval.high} is empty", "The lower end first"
 
 
-def _core(core: CoreData) -> Iterator[Problem]:
+def _core(core: Element) -> Iterator[Problem]:
     if core.begin > core.end:
         yield f"the measurement began on {core.begin} and ended on {core.end}", "The first day first"
     if missing := sorted(set(core.mandatory_languages) - set(core.languages)):
         yield f"the mandatory language {missing[0]!r} is not used", "Name it among the used ones"
 
 
-_CHECKS: Mapping[type[Element], Callable[[Any], Iterator[Problem]]] = MappingProxyType({
-    RealList: _list, EllipsoidalRegion: _region, RectangularRegion: _region, Interval: _interval, CoreData: _core,
-})  # fmt: skip
+_CHECKS: Mapping[str, Callable[[Element], Iterator[Problem]]] = {
+    "RealList": _list, "EllipsoidalRegion": _region, "RectangularRegion": _region, "Interval": _interval, "CoreData": _core,
+}  # fmt: skip
+"""What is wrong with a part by itself."""
 
 
 def read(data: bytes, where: str) -> Certificate:
@@ -88,7 +80,7 @@ def read(data: bytes, where: str) -> Certificate:
     for node, (problem, fix) in ids_and_references(root):
         reader.wrong(node, problem, fix)
     reader.gathered.refuse()
-    return cast("Certificate", certificate)
+    return certificate
 
 
 def unread(data: bytes, where: str) -> tuple[str, ...]:
@@ -102,9 +94,8 @@ def unread(data: bytes, where: str) -> tuple[str, ...]:
 def _root(data: bytes, where: str) -> Node:
     root = parsed(data, where)
     if root.tag != ROOT:
-        raise CmmUqError(
-            f"is no DCC: its root is {root.tag}", where=f"{where}, line {root.line}", fix=f"A DCC is a {ROOT}"
-        )
+        problem = f"is no DCC: its root is {root.tag}"
+        raise CmmUqError(problem, where=f"{where}, line {root.line}", fix=f"A DCC is a {ROOT}")
     return root
 
 
@@ -122,49 +113,47 @@ class _Reader:
 
     def read(self, node: Node, cls: type[Element]) -> Any:
         """An element as a class; None where something of it is wrong."""
-        fields, before = fields_of(cls), self.problems
-        children = self._sorted(node, cls)
-        self._attributes(node, fields)
-        values = {field.name: self._value(node, field, children[i]) for i, field in enumerate(fields)}
+        before, children = self.problems, self._sorted(node, cls)
+        self._attributes(node, cls)
+        values = {name: self._value(node, field, children[name]) for name, field in cls.FIELDS.items()}
         if self.problems > before:
             return None
         part = cls(**{name: value for name, value in values.items() if value is not None})
-        for problem, fix in problems_of(part):
+        for problem, fix in _CHECKS[cls.__name__](part) if cls.__name__ in _CHECKS else ():
             self.wrong(node, problem, fix)
         return part
 
-    def _sorted(self, node: Node, cls: type[Element]) -> list[list[Node]]:
+    def _sorted(self, node: Node, cls: type[Element]) -> dict[str, list[Node]]:
         """Children by the field that they belong to, in the order of the schema."""
-        fields, places = fields_of(cls), by_tag(cls)
-        rest = next((i for i, field in enumerate(fields) if isinstance(field.place, ForeignElements)), None)
-        children: list[list[Node]] = [[] for _ in fields]
-        last = -1
+        places = {tag: name for name, field in cls.FIELDS.items() for tag in field.outer}
+        foreign = next((name for name, field in cls.FIELDS.items() if field.kind == "foreign"), None)
+        children: dict[str, list[Node]] = {name: [] for name in cls.FIELDS}
+        order, last = list(cls.FIELDS), -1
         for child in node.children:
-            index = places.get(child.tag)
-            if index is None and (cls in (Markup, Comment) or child.tag == "ds:Signature"):
-                index = rest
-            if index is None:
+            name = places.get(child.tag)
+            if name is None and (not places or child.tag == "ds:Signature"):
+                name = foreign
+            if name is None:
                 self._unknown(child, list(places))
                 continue
-            if index < last and not cls.UNORDERED:
+            if order.index(name) < last and not cls.UNORDERED:
                 self.wrong(child, f"{child.tag} stands behind what has to follow it", "The order is that of the schema")
-            last = max(last, index)
-            children[index].append(child)
+            last = max(last, order.index(name))
+            children[name].append(child)
         if node.children and node.text.strip():
             self.wrong(node, f"{node.tag} has text between its elements", "Elements only")
         return children
 
     def _value(self, node: Node, field: Field, children: Sequence[Node]) -> Any:
         """Of one field; None for the default."""
-        place = field.place
-        if isinstance(place, Attribute):
-            text = node.attributes.get(place.tag)
-            return None if text is None else self._simple(node, place.simple, text, f"@{place.tag}")
-        if isinstance(place, Content):
-            return self._simple(node, place.simple, node.text)
-        if isinstance(place, ForeignElements):
+        if field.kind == "attribute":
+            text = node.attributes.get(field.tag)
+            return None if text is None else self._simple(node, field, text, f"@{field.tag}")
+        if field.kind == "content":
+            return self._simple(node, field, node.text)
+        if field.kind == "foreign":
             return tuple(children)
-        elements = list(self._inner(field, place, children))
+        elements = list(self._inner(field, children))
         if field.required and not elements and not any(child.tag in field.outer for child in node.children):
             self.wrong(node, f"{node.tag} has no {' or '.join(field.outer)}", "The schema asks for it")
         if field.repeated:
@@ -172,9 +161,9 @@ class _Reader:
         self._once(elements)
         return self._element(elements[0], field) if elements else None
 
-    def _inner(self, field: Field, place: Child, children: Sequence[Node]) -> Iterator[Node]:
+    def _inner(self, field: Field, children: Sequence[Node]) -> Iterator[Node]:
         """The elements of a field, out of the element that they stand in together."""
-        if not place.within:
+        if not field.within:
             yield from children
             return
         self._once(children)
@@ -192,21 +181,22 @@ class _Reader:
             self.wrong(children[1], f"{children[1].tag} is there {len(children)} times", "Once, or not at all")
 
     def _element(self, child: Node, field: Field) -> Any:
-        if (cls := field.tags[child.tag]) is not None:
-            return self.read(child, cls)
+        if field.simple is None:
+            return self.read(child, CLASSES[field.tags[child.tag]])
         for inner in child.children:
             self._unknown(inner, [])
-        return None if field.simple is None else self._simple(child, field.simple, child.text)
+        return self._simple(child, field, child.text)
 
-    def _simple(self, node: Node, simple: Simple, text: str, which: str = "") -> Any:
+    def _simple(self, node: Node, field: Field, text: str, which: str = "") -> Any:
+        simple = cast("Simple", field.simple)
         try:
             return simple.read(text)
         except (ValueError, KeyError, OverflowError):
             self.wrong(node, f"{which or node.tag} {text[:60]!r} is not {simple.what}", "As the schema has it")
             return None
 
-    def _attributes(self, node: Node, fields: Sequence[Field]) -> None:
-        known = [field.place.tag for field in fields if isinstance(field.place, Attribute)]
+    def _attributes(self, node: Node, cls: type[Element]) -> None:
+        known = [field.tag for field in cls.FIELDS.values() if field.kind == "attribute"]
         for name in [name for name in node.attributes if name not in (*known, *_IGNORED)]:
             if self.strict:
                 fix = suggestion(name, known) if known else "Take it out"
@@ -233,31 +223,32 @@ def written(certificate: Certificate) -> bytes:
 
 
 def _fill(node: Node, element: Element) -> None:
-    for problem, fix in problems_of(element):
+    name = type(element).__name__
+    for problem, fix in _CHECKS[name](element) if name in _CHECKS else ():
         raise CmmUqError(problem, where=node.xpath, fix=fix)
-    for field in fields_of(type(element)):
-        value, place = getattr(element, field.name), field.place
+    for field in element.FIELDS.values():
+        value = getattr(element, field.name)
         if value is None or (value == () and not field.required):
             continue
-        if isinstance(place, Attribute):
-            node.attributes[place.tag] = _text(node, place.simple, value)
-        elif isinstance(place, Content):
-            node.text = _text(node, place.simple, value)
-        elif isinstance(place, Child):
-            _place(node, field, place, value if field.repeated else (value,))
+        if field.kind == "attribute":
+            node.attributes[field.tag] = _text(node, field, value)
+        elif field.kind == "content":
+            node.text = _text(node, field, value)
+        elif field.kind == "element":
+            _place(node, field, value if field.repeated else (value,))
         else:
             node.children += value
 
 
-def _place(node: Node, field: Field, place: Child, values: tuple[Any, ...]) -> None:
+def _place(node: Node, field: Field, values: tuple[Any, ...]) -> None:
     if not values:
         raise CmmUqError(f"{node.tag} has no {field.name}", where=node.xpath, fix="The schema asks for one")
-    outer = _added(node, field.outer[0]) if place.within else node
+    outer = _added(node, field.outer[0]) if field.within else node
     for value in values:
         if field.simple is not None:
-            inner = _added(outer, next(iter(field.tags)))
-            inner.text = _text(inner, field.simple, value)
-        elif tag := next((tag for tag, cls in field.tags.items() if cls is type(value)), None):
+            inner = _added(outer, field.tag)
+            inner.text = _text(inner, field, value)
+        elif tag := next((tag for tag, name in field.tags.items() if name == type(value).__name__), None):
             _fill(_added(outer, tag), value)
         else:
             problem, fix = f"{type(value).__name__} is no {field.name}", f"Known: {', '.join(field.tags)}"
@@ -270,7 +261,8 @@ def _added(parent: Node, tag: str) -> Node:
     return node
 
 
-def _text(node: Node, simple: Simple, value: Any) -> str:
+def _text(node: Node, field: Field, value: Any) -> str:
+    simple = cast("Simple", field.simple)
     text = simple.write(value)
     try:
         valid = simple.read(text) == value

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from cmm_uq.base.files.table import JobTable, Length, Position, Uncertainty
-from cmm_uq.jobs.part.feature import Association, Kind, refuse_not_modelled
+from cmm_uq.base.files.table import Length, Position, Uncertainty, key, required
+from cmm_uq.jobs.part.feature import Association, Kind, Modelled, Name
 
 What = Literal[
     "size", "straightness", "flatness", "roundness", "cylindricity", "sphericity", "distance", "angle", "parallelism",
@@ -22,7 +22,6 @@ TURNED: tuple[Kind, ...] = ("line", "plane", "cylinder", "cone")
 DIRECTED: tuple[Kind, ...] = ("line", "plane", "circle", "cylinder", "cone")
 EVERY: tuple[Kind, ...] = ("point", "line", "plane", "circle", "sphere", "cylinder", "cone")
 PLACED: tuple[Kind, ...] = ("point", "circle", "sphere", "cylinder", "cone")
-Feature = Annotated[str, Field(min_length=1, max_length=100)]
 
 
 @dataclass(frozen=True)
@@ -67,32 +66,25 @@ LIMITS: Mapping[str, tuple[str, ...]] = {
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 
 
-class CharacteristicFacts(JobTable):
+class CharacteristicFacts(Modelled):
     """One ``[[characteristic]]``."""
 
-    name: Annotated[str, Field(min_length=1, max_length=100)]
-    """Name or number on the drawing."""
-    what: What
-    """What is asked for."""
-    features: Annotated[list[Feature], Field(max_length=2)] = []
+    name: Name = required("Name or number on the drawing.")
+    what: What = required("What is asked for.")
+    features: Annotated[list[Name], Field(max_length=2)] = []
     """Names of the features that it is of: two of a distance and an angle, one of all else and of the angle of a cone."""
-    datums: Annotated[list[Feature], Field(max_length=6)] = []
+    datums: Annotated[list[Name], Field(max_length=6)] = []
     """Names of the features that are its datums, in order, `"A-B"` of a common datum on both; where it needs some and has
     none, those of `[alignment]`."""
     tolerance_mm: Length | None = None
     """Width of the tolerance zone, of form, orientation, location and runout; of a position its diameter."""
-    lower_mm: Position | None = None
-    """Lower limit of a size, distance or coordinate."""
-    upper_mm: Position | None = None
-    """Upper limit of a size, distance or coordinate."""
-    lower_deg: Degrees | None = None
-    """Lower limit of an angle."""
-    upper_deg: Degrees | None = None
-    """Upper limit of an angle."""
+    lower_mm: Position | None = key(None, "Lower limit of a size, distance or coordinate.")
+    upper_mm: Position | None = key(None, "Upper limit of a size, distance or coordinate.")
+    lower_deg: Degrees | None = key(None, "Lower limit of an angle.")
+    upper_deg: Degrees | None = key(None, "Upper limit of an angle.")
     u_operator_um: Uncertainty = 0.0
     """Standard uncertainty by who measures and how, of repeats of one's own; of a length."""
-    u_operator_deg: Annotated[float, Field(ge=0, le=10)] = 0.0
-    """The same of an angle, °."""
+    u_operator_deg: Annotated[float, Field(ge=0, le=10)] = key(0.0, "The same of an angle, °.")
     association: Association | None = None
     """How its features are made of their points, where not as they say themselves."""
 
@@ -101,42 +93,31 @@ class CharacteristicFacts(JobTable):
         """What it is of."""
         return ASKS[self.what]
 
-    @model_validator(mode="before")
-    @classmethod
-    def _modelled(cls, table: Any) -> Any:
-        return refuse_not_modelled(table)
-
-    @model_validator(mode="after")
-    def _of_features(self) -> Self:
+    def problems(self) -> Iterator[str]:
         count = self.asks.features
         if not self.features:
             example = ", ".join(['"…"'] * count)
-            raise ValueError(f"names no feature: give features = [{example}], whose {self.what} it is")
+            yield f"names no feature: give features = [{example}], whose {self.what} it is"
         if len(self.features) != count and not (self.asks.alone and len(self.features) == 1):
             said = f"{count} {'features' if count > 1 else 'feature'}"
-            raise ValueError(f"{with_article(self.what)} is of {said}: give so many")
+            yield f"{with_article(self.what)} is of {said}: give so many"
         if len(set(self.features)) < len(self.features):
-            raise ValueError(f"{with_article(self.what)} is of two features: {self.features[0]!r} stands there twice")
+            yield f"{with_article(self.what)} is of two features: {self.features[0]!r} stands there twice"
         if self.datums and not self.asks.datum_kinds:
-            raise ValueError(f"{self.what} has no datums: leave them out")
+            yield f"{self.what} has no datums: leave them out"
         if len(self.datums) < self.asks.datums:
-            raise ValueError(f"{self.what} is about a datum: give datums with the name of a feature")
+            yield f"{self.what} is about a datum: give datums with the name of a feature"
         if twice := [name for name in self.datums if self.datums.count(name) > 1 or name in self.features]:
-            raise ValueError(f"{twice[0]!r} cannot be its own datum, or a datum twice")
-        return self
+            yield f"{twice[0]!r} cannot be its own datum, or a datum twice"
+        yield from self._unfit_limits()
 
-    @model_validator(mode="after")
-    def _limits_of_its_kind(self) -> Self:
-        own = LIMITS[self.asks.limits]
-        for key in (key for keys in LIMITS.values() for key in keys):
-            if getattr(self, key) is not None and key not in own:
-                raise ValueError(f"{with_article(self.what)} has no {key}: its limits are {' and '.join(own)}")
-        other = "u_operator_um" if self.asks.limits == "angles" else "u_operator_deg"
-        if getattr(self, other):
-            raise ValueError(f"{with_article(self.what)} has no {other}: give the other one")
+    def _unfit_limits(self) -> Iterator[str]:
+        what, own, angle = with_article(self.what), LIMITS[self.asks.limits], self.asks.limits == "angles"
+        for name in (name for names in LIMITS.values() for name in names):
+            if getattr(self, name) is not None and name not in own:
+                yield f"{what} has no {name}: its limits are {' and '.join(own)}"
+        if self.u_operator_um if angle else self.u_operator_deg:
+            yield f"{what} has no u_operator_{'um' if angle else 'deg'}: give the other one"
         for low, high in ((self.lower_mm, self.upper_mm), (self.lower_deg, self.upper_deg)):
             if low is not None and high is not None and not low < high:
-                raise ValueError(
-                    f"its lower limit {low:g} is not below its upper limit {high:g}: exchange or mend them"
-                )
-        return self
+                yield f"its lower limit {low:g} is not below its upper limit {high:g}: exchange or mend them"

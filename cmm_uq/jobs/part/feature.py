@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Literal, Self, get_args
+from collections.abc import Callable, Iterator, Mapping
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
 
 from cmm_uq.base.files.limits import INPUTS, LISTED
-from cmm_uq.base.files.table import JobTable, Length, Triple, Uncertainty
+from cmm_uq.base.files.table import JobTable, Length, Triple, Uncertainty, key, required
 
 _COUNT = re.compile(r"[1-9][0-9]{0,3}")
 FEWEST_UNDULATIONS = 2  # one undulation per revolution is a shift, none a change of size
@@ -36,13 +36,11 @@ class FormFacts(JobTable):
     roughness_um: Uncertainty = 0.0
     """Standard deviation of a contact point by roughness, from point to point on its own."""
 
-    @model_validator(mode="after")
-    def _numbers_of_lobes(self) -> Self:
-        for key in self.harmonics_um:
-            if not _COUNT.fullmatch(key) or int(key) < FEWEST_UNDULATIONS:
+    def problems(self) -> Iterator[str]:
+        for name in self.harmonics_um:
+            if not _COUNT.fullmatch(name) or int(name) < FEWEST_UNDULATIONS:
                 least = FEWEST_UNDULATIONS
-                raise ValueError(f"harmonics_um has {key!r}: give numbers of lobes from {least}, as {{ 3 = 0.5 }}")
-        return self
+                yield f"harmonics_um has {name!r}: give numbers of lobes from {least}, as {{ 3 = 0.5 }}"
 
 
 SCANNED = (
@@ -58,6 +56,7 @@ TWO_POINT = "is a two-point size (LP), which is not modelled: sizes are those of
 PROJECTED = "has a projected tolerance zone, which is not modelled"
 SYMMETRY = "is a symmetry: the median plane of two faces is not modelled"
 FREE_STATE = "is toleranced in the free state, and how a part bends is not modelled"
+Name = Annotated[str, Field(min_length=1, max_length=100)]
 _INSTEAD = "leave it out, and name it in [part] not_measured"
 
 _WORDS: Mapping[str, str] = {
@@ -88,18 +87,22 @@ def material_condition(datum: str) -> str:
     return _WORDS.get(condition, "") if condition in ("m", "l", "mmc", "lmc") else ""
 
 
-def refuse_not_modelled(table: Any) -> Any:
-    """The table as it is; for a validator that runs before any other."""
-    for key in _KEYS.keys() & (table.keys() if isinstance(table, Mapping) else set()):
-        value = table[key]
-        told = _KEYS[key] if value is not False else None
-        if key == "what" and isinstance(value, str) and value.strip().casefold() == "concentricity":
-            raise ValueError('ask for "coaxiality", of a circle as of an axis')
-        if isinstance(value, str):
-            told = _WORDS.get(value.strip().casefold().replace(" ", "_").replace("-", "_").strip("()"), told)
-        if told:
-            raise ValueError(f"{key} = {value!r} {told}: {_INSTEAD}")
-    return table
+class Modelled(JobTable):
+    """A table that says nothing which is not modelled."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _modelled(cls, table: Any) -> Any:
+        for name in _KEYS.keys() & (table.keys() if isinstance(table, Mapping) else set()):
+            value = table[name]
+            told = _KEYS[name] if value is not False else None
+            if name == "what" and isinstance(value, str) and value.strip().casefold() == "concentricity":
+                raise ValueError('ask for "coaxiality", of a circle as of an axis')
+            if isinstance(value, str):
+                told = _WORDS.get(value.strip().casefold().replace(" ", "_").replace("-", "_").strip("()"), told)
+            if told:
+                raise ValueError(f"{name} = {value!r} {told}: {_INSTEAD}")
+        return table
 
 
 Kind = Literal["point", "line", "plane", "circle", "sphere", "cylinder", "cone"]
@@ -154,96 +157,63 @@ Angle = Annotated[float, Field(ge=-360, le=360)]
 _NONE_OF_LENGTH = 1e-9  # length of a vector below which it has no direction
 
 
-class Strategy(JobTable):
+class Strategy(Modelled):
     """``strategy``: a pattern of points on the nominal surface."""
 
     pattern: Pattern
     """`points` spread evenly, a `grid`, `sections` across the axis, `lines` along it, `circles` about a plane's point, or
     a `spiral`."""
-    points: Count | None = None
-    """Points in all; of `sections`, `lines` and `circles` those of each."""
-    sections: Count | None = None
-    """Sections across the axis, or circles of latitude on a sphere."""
-    lines: Count | None = None
-    """Lines along the axis."""
-    circles: Count | None = None
-    """Concentric circles on a plane."""
-    rows: Count | None = None
-    """Rows of a grid, across the plane's length."""
-    columns: Count | None = None
-    """Columns of a grid, along the plane's length."""
-    turns: Annotated[float, Field(gt=0, le=1000)] | None = None
-    """Turns of a spiral."""
-    start_deg: Angle = 0.0
-    """Angle of the first point from `along`, counted about the direction by the right hand."""
+    points: Count | None = key(None, "Points in all; of `sections`, `lines` and `circles` those of each.")
+    sections: Count | None = key(None, "Sections across the axis, or circles of latitude on a sphere.")
+    lines: Count | None = key(None, "Lines along the axis.")
+    circles: Count | None = key(None, "Concentric circles on a plane.")
+    rows: Count | None = key(None, "Rows of a grid, across the plane's length.")
+    columns: Count | None = key(None, "Columns of a grid, along the plane's length.")
+    turns: Annotated[float, Field(gt=0, le=1000)] | None = key(None, "Turns of a spiral.")
+    start_deg: Angle = key(0.0, "Angle of the first point from `along`, counted about the direction by the right hand.")
     sweep_deg: Annotated[float, Field(gt=0, le=360)] = 360.0
     """Angle that is probed, for part of a circle, cylinder or cone."""
-    cap_deg: Annotated[float, Field(gt=0, lt=180)] = 90.0
-    """Of a sphere, how far from its direction it is probed."""
-    margin_mm: Annotated[float, Field(ge=0, le=1e6)] = 0.0
-    """What stays free at each end and edge."""
+    cap_deg: Annotated[float, Field(gt=0, lt=180)] = key(90.0, "Of a sphere, how far from its direction it is probed.")
+    margin_mm: Annotated[float, Field(ge=0, le=1e6)] = key(0.0, "What stays free at each end and edge.")
 
-    @model_validator(mode="before")
-    @classmethod
-    def _modelled(cls, table: Any) -> Any:
-        return refuse_not_modelled(table)
-
-    @model_validator(mode="after")
-    def _what_the_pattern_needs(self) -> Self:
+    def problems(self) -> Iterator[str]:
         needed = _NEEDED[self.pattern]
-        for key in needed:
-            if getattr(self, key) is None:
-                raise ValueError(f"the pattern {self.pattern!r} needs {key}: give {' and '.join(needed)}")
-        counts = {key for keys in _NEEDED.values() for key in keys}
-        for key in sorted(counts & self.model_fields_set - set(needed)):
-            raise ValueError(f"the pattern {self.pattern!r} has no {key}: leave it out")
-        return self
+        for name in needed:
+            if getattr(self, name) is None:
+                yield f"the pattern {self.pattern!r} needs {name}: give {' and '.join(needed)}"
+        counts = {name for keys in _NEEDED.values() for name in keys}
+        for name in sorted(counts & self.model_fields_set - set(needed)):
+            yield f"the pattern {self.pattern!r} has no {name}: leave it out"
 
 
-class FeatureFacts(JobTable):
+class FeatureFacts(Modelled):
     """One ``[[feature]]``."""
 
-    name: Annotated[str, Field(min_length=1, max_length=100)]
-    """Name by which datums and characteristics name it."""
-    kind: Kind
-    """What it is."""
-    point_mm: Triple
-    """A point on it: its centre, the middle of its axis or line, or a point of its plane."""
+    name: Name = required("Name by which datums and characteristics name it.")
+    kind: Kind = required("What it is.")
+    point_mm: Triple = required("A point on it: its centre, the middle of its axis or line, or a point of its plane.")
     direction: Triple | None = None
     """Along a line or an axis, or normal: of a plane and a point out of the material. Of a sphere from its centre to the
     middle of what is probed, by default z. Of any length."""
-    diameter_mm: Length | None = None
-    """Nominal diameter; of a cone at `point_mm`; of a round plane its outer one."""
-    inner_diameter_mm: Length | None = None
-    """Inner diameter of a plane that is a ring."""
+    diameter_mm: Length | None = key(None, "Nominal diameter; of a cone at `point_mm`; of a round plane its outer one.")
+    inner_diameter_mm: Length | None = key(None, "Inner diameter of a plane that is a ring.")
     angle_deg: Annotated[float, Field(gt=0, lt=180)] | None = None
     """Whole angle of a cone, which widens along its direction."""
-    inner: bool | None = None
-    """Whether it is a hole: material lies around it."""
+    inner: bool | None = key(None, "Whether it is a hole: material lies around it.")
     length_mm: Length | None = None
     """How long it is along its direction, half on either side of `point_mm`; of a plane along `along`."""
-    width_mm: Length | None = None
-    """How wide a plane is across `along`."""
+    width_mm: Length | None = key(None, "How wide a plane is across `along`.")
     along: Triple | None = None
     """Across the direction: where angles begin and along what a plane's length lies; by default the axis of the part that is
     the most across, the first of several."""
-    normal: Triple | None = None
-    """Of a line, out of the material of the surface that it lies on."""
-    stylus: str = ""
-    """Name of the stylus that probes it; may be left out where there is one."""
+    normal: Triple | None = key(None, "Of a line, out of the material of the surface that it lies on.")
+    stylus: str = key("", "Name of the stylus that probes it; may be left out where there is one.")
     association: Association = "least_squares"
     """How it is made of its points, where a characteristic says nothing else."""
-    strategy: Strategy | None = None
-    """Where it is probed: a pattern of points."""
+    strategy: Strategy | None = key(None, "Where it is probed: a pattern of points.")
     points_mm: Annotated[list[Triple], Field(max_length=LISTED.most)] | None = None
     """In place of a pattern, its contact points on the nominal surface; normals follow from it."""
-    form: FormFacts | None = None
-    """Its own form and roughness, in place of `[form]`."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _modelled(cls, table: Any) -> Any:
-        return refuse_not_modelled(table)
+    form: FormFacts | None = key(None, "Its own form and roughness, in place of `[form]`.")
 
     @field_validator("direction", "along", "normal")
     @classmethod
@@ -252,57 +222,51 @@ class FeatureFacts(JobTable):
             raise ValueError(f"{vector} has no direction: give three components that are not all 0")
         return vector
 
-    @model_validator(mode="after")
-    def _keys_of_its_kind(self) -> Self:
-        for key, kinds in KEYS.items():
-            if key in self.model_fields_set and self.kind not in kinds:
-                raise ValueError(f"a {self.kind} has no {key}: leave it out")
-        if self.kind in DIRECTED and self.direction is None:
-            raise ValueError(f"a {self.kind} needs a direction: give direction = [x, y, z]")
-        if self.kind in ROUND and (self.diameter_mm is None or self.inner is None):
-            raise ValueError(f"a {self.kind} needs diameter_mm, and inner: true of a hole, false of a shaft")
-        if self.kind == "cone" and self.angle_deg is None:
-            raise ValueError("a cone needs angle_deg: give its whole angle")
-        if self.kind == "line" and self.normal is None:
-            raise ValueError("a line needs normal: out of the material of the surface that it lies on")
-        if self.association not in ASSOCIATIONS[self.kind]:
-            known = ", ".join(ASSOCIATIONS[self.kind])
-            raise ValueError(f"a {self.kind} has no association {self.association!r}: give one of {known}")
-        return self
+    def problems(self) -> Iterator[str]:
+        kind = self.kind
+        for name, kinds in KEYS.items():
+            if name in self.model_fields_set and kind not in kinds:
+                yield f"a {kind} has no {name}: leave it out"
+        if kind in DIRECTED and self.direction is None:
+            yield f"a {kind} needs a direction: give direction = [x, y, z]"
+        if kind in ROUND and (self.diameter_mm is None or self.inner is None):
+            yield f"a {kind} needs diameter_mm, and inner: true of a hole, false of a shaft"
+        if kind == "cone" and self.angle_deg is None:
+            yield "a cone needs angle_deg: give its whole angle"
+        if kind == "line" and self.normal is None:
+            yield "a line needs normal: out of the material of the surface that it lies on"
+        if self.association not in ASSOCIATIONS[kind]:
+            known = ", ".join(ASSOCIATIONS[kind])
+            yield f"a {kind} has no association {self.association!r}: give one of {known}"
+        yield from self._source_of_points()
 
-    @model_validator(mode="after")
-    def _one_source_of_points(self) -> Self:
-        if self.kind == "point":
-            if self.strategy is not None or self.points_mm is not None:
-                raise ValueError("a point is probed at point_mm: leave strategy and points_mm out")
-        elif (self.strategy is None) == (self.points_mm is None):
-            raise ValueError('give either strategy = { pattern = "…", … } or points_mm = [[x, y, z], …]')
-        return self
+    def _source_of_points(self) -> Iterator[str]:
+        kind = self.kind
+        if kind == "point" and (self.strategy is not None or self.points_mm is not None):
+            yield "a point is probed at point_mm: leave strategy and points_mm out"
+        if kind != "point" and (self.strategy is None) == (self.points_mm is None):
+            yield 'give either strategy = { pattern = "…", … } or points_mm = [[x, y, z], …]'
+        if self.strategy is not None:
+            yield from self._unfit(self.strategy)
 
-    @model_validator(mode="after")
-    def _pattern_of_its_kind(self) -> Self:
-        if (strategy := self.strategy) is None:
-            return self
-        pattern = strategy.pattern
-        if self.kind == "plane":
-            self._check_extent_of_a_plane(pattern)
-        elif self.kind in KEYS["length_mm"] and self.length_mm is None:
-            raise ValueError(f"a {self.kind} that is probed by a pattern needs length_mm")
-        if pattern not in PATTERNS[self.kind]:
-            known = ", ".join(PATTERNS[self.kind])
-            raise ValueError(f"a {self.kind} is not probed by the pattern {pattern!r}: give one of {known}")
-        for key in sorted(strategy.model_fields_set & set(_ONLY)):
-            if not _ONLY[key](self.kind, pattern):
-                raise ValueError(f"the pattern {pattern!r} of a {self.kind} has no {key}: leave it out")
-        return self
-
-    def _check_extent_of_a_plane(self, pattern: Pattern) -> None:
-        square, disk = self.length_mm is not None and self.width_mm is not None, self.diameter_mm is not None
-        if pattern == "grid" and not square:
-            raise ValueError("a plane that is probed by a grid needs length_mm and width_mm")
-        if pattern in ("circles", "spiral") and not disk:
-            raise ValueError(f"a plane that is probed by the pattern {pattern!r} needs diameter_mm")
-        if square == disk:
-            raise ValueError("a plane has either length_mm and width_mm, or diameter_mm")
-        if self.inner_diameter_mm is not None and not 0 < self.inner_diameter_mm < (self.diameter_mm or 0.0):
-            raise ValueError("inner_diameter_mm must be smaller than diameter_mm")
+    def _unfit(self, strategy: Strategy) -> Iterator[str]:
+        """What keeps a pattern from being probed on it."""
+        kind, pattern, disk = self.kind, strategy.pattern, self.diameter_mm is not None
+        square = self.length_mm is not None and self.width_mm is not None
+        if kind == "plane":
+            if pattern == "grid" and not square:
+                yield "a plane that is probed by a grid needs length_mm and width_mm"
+            if pattern in ("circles", "spiral") and not disk:
+                yield f"a plane that is probed by the pattern {pattern!r} needs diameter_mm"
+            if square == disk:
+                yield "a plane has either length_mm and width_mm, or diameter_mm"
+            if self.inner_diameter_mm is not None and not 0 < self.inner_diameter_mm < (self.diameter_mm or 0.0):
+                yield "inner_diameter_mm must be smaller than diameter_mm"
+        elif kind in KEYS["length_mm"] and self.length_mm is None:
+            yield f"a {kind} that is probed by a pattern needs length_mm"
+        if pattern not in PATTERNS[kind]:
+            known = ", ".join(PATTERNS[kind])
+            yield f"a {kind} is not probed by the pattern {pattern!r}: give one of {known}"
+        for name in sorted(strategy.model_fields_set & set(_ONLY)):
+            if not _ONLY[name](kind, pattern):
+                yield f"the pattern {pattern!r} of a {kind} has no {name}: leave it out"

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from cmm_uq.base.files.limits import INPUTS, LISTED
-from cmm_uq.base.files.table import JobTable, Length, Limit, Temperature, Triple, Uncertainty
+from cmm_uq.base.files.table import JobTable, Length, Limit, Position, Temperature, Triple, Uncertainty, key, required
 from cmm_uq.base.files.toml_file import line_of
 from cmm_uq.base.units import REFERENCE_TEMPERATURE
-from cmm_uq.jobs.part.characteristic import CharacteristicFacts
-from cmm_uq.jobs.part.feature import Count, FeatureFacts, FormFacts
+from cmm_uq.jobs.part.characteristic import CharacteristicFacts, Degrees
+from cmm_uq.jobs.part.feature import Count, FeatureFacts, FormFacts, Name
 from cmm_uq.jobs.tables.conformity import Prior, Rule, needs_prior
 from cmm_uq.jobs.tables.identification import Identification, Laboratory
 from cmm_uq.jobs.tables.machine import Travel, check_carriages
@@ -24,10 +25,9 @@ Expansion = Annotated[float, Field(ge=-1e-4, le=1e-3)]  # A coefficient of expan
 SmallExpansion = Annotated[float, Field(ge=0, le=1e-4)]
 Kelvins = Annotated[float, Field(ge=0, le=100)]
 Uncertainties = Annotated[list[Uncertainty], Field(min_length=3, max_length=3)]
-Angles = Annotated[list[Annotated[float, Field(ge=-360, le=360)]], Field(min_length=3, max_length=3)]
+Angles = Annotated[list[Degrees], Field(min_length=3, max_length=3)]
 SmallAngles = Annotated[list[Annotated[float, Field(ge=0, le=10)]], Field(min_length=3, max_length=3)]
 Lengths = Annotated[list[Annotated[float, Field(ge=0, le=1e6)]], Field(min_length=3, max_length=3)]
-Name = Annotated[str, Field(min_length=1, max_length=100)]
 
 
 class PartJobFacts(Identification):
@@ -40,20 +40,13 @@ class PartJobFacts(Identification):
 class PartFacts(JobTable):
     """``[part]``: what is measured."""
 
-    name: Name
-    """Name of the part."""
-    drawing: str = ""
-    """Number of the drawing, with its revision."""
-    serial: str = ""
-    """Serial number of the part."""
-    owner: str = ""
-    """Owner of the part."""
-    material: str = ""
-    """Material."""
-    cte_per_k: Expansion = 0.0
-    """Coefficient of thermal expansion of the part, 1/K."""
-    u_cte_per_k: SmallExpansion = 0.0
-    """Standard uncertainty of that coefficient, 1/K."""
+    name: Name = required("Name of the part.")
+    drawing: str = key("", "Number of the drawing, with its revision.")
+    serial: str = key("", "Serial number of the part.")
+    owner: str = key("", "Owner of the part.")
+    material: str = key("", "Material.")
+    cte_per_k: Expansion = key(0.0, "Coefficient of thermal expansion of the part, 1/K.")
+    u_cte_per_k: SmallExpansion = key(0.0, "Standard uncertainty of that coefficient, 1/K.")
     not_measured: Annotated[list[Name], Field(max_length=LISTED.most)] = []
     """What the drawing asks for besides and this job leaves out; the certificate says so."""
 
@@ -76,34 +69,25 @@ class MachineStateFacts(JobTable):
     left out."""
     origin_mm: Triple = [0.0, 0.0, 0.0]
     """Scale reading of the origin of the coordinates that `[placing]` speaks of."""
-    corrected: bool = True
-    """Whether the machine corrects the errors that its calibration found."""
+    corrected: bool = key(True, "Whether the machine corrects the errors that its calibration found.")
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if (self.certificate is None) == (self.job is None):
-            raise ValueError("give either certificate or job: what states the machine's errors")
+            yield "give either certificate or job: what states the machine's errors"
         if self.job is not None and self.posterior:
-            raise ValueError("a job is analysed anew and needs no posterior: leave it out")
-        return self
-
-    @model_validator(mode="after")
-    def _three_carriages(self) -> Self:
+            yield "a job is analysed anew and needs no posterior: leave it out"
         check_carriages(self.chain)
-        return self
 
 
 class StylusFacts(JobTable):
     """One ``[[stylus]]``: a tip, and what its qualification left uncertain."""
 
-    name: Name
-    """Name by which features name it."""
+    name: Name = required("Name by which features name it.")
     diameter_mm: Annotated[float, Field(ge=0, le=1000)]
     """Diameter of the tip; 0 where a sensor does not touch."""
     offset_mm: Triple = [0.0, 0.0, 0.0]
     """Centre of the tip from the ram's reference point, along the axes of the machine."""
-    u_diameter_um: Uncertainty = 0.0
-    """Standard uncertainty of the tip's effective diameter, as qualified."""
+    u_diameter_um: Uncertainty = key(0.0, "Standard uncertainty of the tip's effective diameter, as qualified.")
     u_offset_um: Uncertainties = [0.0, 0.0, 0.0]
     """Standard uncertainties of the tip's offset against the tip to which the others are referred; 0 of that tip."""
     qualified_at_mm: Triple | None = None
@@ -118,14 +102,11 @@ class AlignmentFacts(JobTable):
 
     datums: Annotated[list[Name], Field(max_length=6)] = []
     """Names of features in order: each fixes what those before it left free (3-2-1). `"A-B"` is a common datum on both."""
-    best_fit: bool = False
-    """By least squares of all points from the nominal surfaces instead."""
+    best_fit: bool = key(False, "By least squares of all points from the nominal surfaces instead.")
 
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if self.best_fit and self.datums:
-            raise ValueError("give either datums or best_fit = true")
-        return self
+            yield "give either datums or best_fit = true"
 
 
 class PlacingFacts(JobTable):
@@ -139,8 +120,7 @@ class PlacingFacts(JobTable):
     """Standard deviations of where it is put, where its place is not the same each time."""
     u_rotation_deg: SmallAngles = [0.0, 0.0, 0.0]
     """Standard deviations of how it is turned, about the axes of the machine."""
-    u_fixture_um: Uncertainty = 0.0
-    """Standard uncertainty of each point by what clamping does to the part."""
+    u_fixture_um: Uncertainty = key(0.0, "Standard uncertainty of each point by what clamping does to the part.")
 
 
 class ProbingFacts(JobTable):
@@ -150,8 +130,7 @@ class ProbingFacts(JobTable):
     """Names of all features in the order in which they are probed; as they stand where it is left out."""
     seconds_per_point: Annotated[float, Field(ge=0, le=1e5)] = 0.0
     """Time from a point to the next, for noise that wanders; 0 where it is not known."""
-    repeats: Count = 1
-    """How often each point is probed; its mean counts."""
+    repeats: Count = key(1, "How often each point is probed; its mean counts.")
     u_operator_um: Uncertainty = 0.0
     """Standard uncertainty of each coordinate of each point by who measures and how, common to its repeats."""
 
@@ -159,20 +138,15 @@ class ProbingFacts(JobTable):
 class EnvironmentFacts(JobTable):
     """``[environment]``: temperatures while the part is measured, and what is known of them."""
 
-    part_c: Temperature = 20.0
-    """Temperature of the part."""
+    part_c: Temperature = key(20.0, "Temperature of the part.")
     scales_c: Annotated[list[Temperature], Field(min_length=3, max_length=3)] = [20.0, 20.0, 20.0]
     """Temperatures of the scales of x, y, z."""
     compensated: bool = True
     """Whether the machine computes lengths at 20 °C from these temperatures and the coefficients of expansion."""
-    u_part_k: Kelvins = 0.0
-    """Standard uncertainty of the part's temperature."""
-    u_scales_k: Kelvins = 0.0
-    """Standard uncertainty of each scale's temperature, on its own."""
-    scales_cte_per_k: Expansion = 0.0
-    """Coefficient of expansion of the scales, 1/K."""
-    u_scales_cte_per_k: SmallExpansion = 0.0
-    """Standard uncertainty of that coefficient, 1/K."""
+    u_part_k: Kelvins = key(0.0, "Standard uncertainty of the part's temperature.")
+    u_scales_k: Kelvins = key(0.0, "Standard uncertainty of each scale's temperature, on its own.")
+    scales_cte_per_k: Expansion = key(0.0, "Coefficient of expansion of the scales, 1/K.")
+    u_scales_cte_per_k: SmallExpansion = key(0.0, "Standard uncertainty of that coefficient, 1/K.")
     u_gradient_k_per_m: Annotated[list[Kelvins], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]
     """Standard uncertainties of the gradient of the part's temperature along the axes of the machine, K/m."""
     u_drift_k: Kelvins = 0.0
@@ -182,19 +156,16 @@ class EnvironmentFacts(JobTable):
 class DecisionFacts(JobTable):
     """``[decision]``: by which rule conformity with the drawing is decided."""
 
-    rule: Rule = "ISO 14253-1"
-    """Decision rule, by name or by its figure."""
+    rule: Rule = key("ISO 14253-1", "Decision rule, by name or by its figure.")
     prior: Prior | None = None
     """What is known of such parts beforehand, for rules that go by it (JCGM 106:2012, 7.2)."""
 
-    @model_validator(mode="after")
-    def _prior_where_needed(self) -> Self:
+    def problems(self) -> Iterator[str]:
         if needs_prior(self.rule) and self.prior is None:
-            raise ValueError(
+            yield (
                 "this rule goes by what is known of such parts beforehand: "
                 "give prior = { sd_um = … } or { share_of_limit = … }"
             )
-        return self
 
 
 class MeasuredFacts(JobTable):
@@ -211,29 +182,21 @@ Seconds = Annotated[float, Field(gt=0, le=1e6)]
 class CalibratedFacts(JobTable):
     """One ``[[by_calibrated_part.characteristic]]``."""
 
-    name: Name
-    """Name of the characteristic, as in `[[characteristic]]`."""
-    value_mm: Annotated[float, Field(ge=-1e7, le=1e7)] | None = None
-    """Its value on the calibrated part, of lengths and zones."""
-    u_um: Limit | None = None
-    """Standard uncertainty of that value."""
-    value_deg: Annotated[float, Field(ge=-360, le=360)] | None = None
-    """Its value on the calibrated part, of angles."""
-    u_arcsec: Seconds | None = None
-    """Standard uncertainty of that angle."""
+    name: Name = required("Name of the characteristic, as in `[[characteristic]]`.")
+    value_mm: Position | None = key(None, "Its value on the calibrated part, of lengths and zones.")
+    u_um: Limit | None = key(None, "Standard uncertainty of that value.")
+    value_deg: Degrees | None = key(None, "Its value on the calibrated part, of angles.")
+    u_arcsec: Seconds | None = key(None, "Standard uncertainty of that angle.")
     u_part_um: Uncertainty = 0.0
     """Standard uncertainty by what differs between parts: form, roughness, elasticity."""
-    u_part_arcsec: Annotated[float, Field(ge=0, le=1e6)] = 0.0
-    """The same, of an angle."""
+    u_part_arcsec: Annotated[float, Field(ge=0, le=1e6)] = key(0.0, "The same, of an angle.")
 
-    @model_validator(mode="after")
-    def _one_unit(self) -> Self:
+    def problems(self) -> Iterator[str]:
         length, angle = (self.value_mm, self.u_um), (self.value_deg, self.u_arcsec)
         if None in length and None in angle:
-            raise ValueError("give value_mm and u_um, or value_deg and u_arcsec of an angle, of its certificate")
+            yield "give value_mm and u_um, or value_deg and u_arcsec of an angle, of its certificate"
         if any(one is not None for one in length) and any(one is not None for one in angle):
-            raise ValueError("give either value_mm and u_um, or value_deg and u_arcsec")
-        return self
+            yield "give either value_mm and u_um, or value_deg and u_arcsec"
 
     @property
     def angle(self) -> bool:
@@ -249,14 +212,11 @@ class CalibratedPartFacts(JobTable):
     `feature`, `point`, `x_mm`, `y_mm`, `z_mm`; with `repeat` where a set-up was measured several times."""
     characteristic: Annotated[list[CalibratedFacts], Field(min_length=1, max_length=INPUTS.most)]
     """What the certificate of the calibrated part states."""
-    certificate: str = ""
-    """Number of that certificate, and whose it is."""
+    certificate: str = key("", "Number of that certificate, and whose it is.")
     corrected: bool = True
     """Whether results of the part are corrected by the systematic error that the calibrated part shows."""
-    temperature_c: Temperature = REFERENCE_TEMPERATURE
-    """Mean temperature of the calibrated part."""
-    u_cte_per_k: SmallExpansion = 0.0
-    """Standard uncertainty of its coefficient of expansion, 1/K."""
+    temperature_c: Temperature = key(REFERENCE_TEMPERATURE, "Mean temperature of the calibrated part.")
+    u_cte_per_k: SmallExpansion = key(0.0, "Standard uncertainty of its coefficient of expansion, 1/K.")
     same_procedure: bool | None = None
     """Whether it was measured as the part is: the same points, styli, speeds, clamping."""
     similar: bool | None = None
@@ -266,45 +226,32 @@ class CalibratedPartFacts(JobTable):
     """Whether the repeats lie far enough apart to show what varies in use: times of day, temperatures, operators."""
     substitution: bool | None = None
     """Whether the part is measured in place of the calibrated part: where it lay, turned as it was, soon after it."""
-    place_varied: bool = False
-    """Whether it lay in another place in each set-up, as parts do."""
-    qualified_anew: bool = False
-    """Whether the styli were qualified anew for each set-up."""
+    place_varied: bool = key(False, "Whether it lay in another place in each set-up, as parts do.")
+    qualified_anew: bool = key(False, "Whether the styli were qualified anew for each set-up.")
 
 
 class LengthStandardFacts(JobTable):
     """``[by_orientations.length_standard]``."""
 
-    length_mm: Length
-    """Calibrated length."""
-    u_um: Limit
-    """Standard uncertainty of the calibrated length."""
+    length_mm: Length = required("Calibrated length.")
+    u_um: Limit = required("Standard uncertainty of the calibrated length.")
     file: Name
     """CSV with the columns `orientation`, `repeat`, `length_mm`: the standard as it was measured, best along directions of the
     part's lengths."""
-    certificate: str = ""
-    """Number of its certificate, and whose it is."""
-    temperature_c: Temperature = REFERENCE_TEMPERATURE
-    """Its mean temperature."""
-    u_cte_per_k: SmallExpansion = 0.0
-    """Standard uncertainty of its coefficient of expansion, 1/K."""
+    certificate: str = key("", "Number of its certificate, and whose it is.")
+    temperature_c: Temperature = key(REFERENCE_TEMPERATURE, "Its mean temperature.")
+    u_cte_per_k: SmallExpansion = key(0.0, "Standard uncertainty of its coefficient of expansion, 1/K.")
 
 
 class ProbeStandardFacts(JobTable):
     """One ``[[by_orientations.probe_standard]]``."""
 
-    stylus: str = ""
-    """Name of the stylus that measured it; may be left out where there is one."""
-    diameter_mm: Length
-    """Calibrated diameter."""
-    u_um: Limit
-    """Standard uncertainty of the calibrated diameter."""
-    inner: bool = False
-    """Whether it is a ring; else a sphere or a plug."""
-    file: Name
-    """CSV with the columns `orientation`, `repeat`, `diameter_mm`."""
-    certificate: str = ""
-    """Number of its certificate, and whose it is."""
+    stylus: str = key("", "Name of the stylus that measured it; may be left out where there is one.")
+    diameter_mm: Length = required("Calibrated diameter.")
+    u_um: Limit = required("Standard uncertainty of the calibrated diameter.")
+    inner: bool = key(False, "Whether it is a ring; else a sphere or a plug.")
+    file: Name = required("CSV with the columns `orientation`, `repeat`, `diameter_mm`.")
+    certificate: str = key("", "Number of its certificate, and whose it is.")
 
 
 class OrientationsFacts(JobTable):
@@ -319,41 +266,30 @@ class OrientationsFacts(JobTable):
     """A calibrated ring, sphere or plug for each stylus: the size of the tip is taken from it."""
     points_varied: bool = False
     """Whether contact points were others in each orientation, so that the part's form is seen."""
-    place_varied: bool = True
-    """Whether the part lay in other places too."""
-    qualified_anew: bool = False
-    """Whether the styli were qualified anew for each orientation."""
+    place_varied: bool = key(True, "Whether the part lay in other places too.")
+    qualified_anew: bool = key(False, "Whether the styli were qualified anew for each orientation.")
 
 
 class PartFile(JobTable):
     """All of a part's job.toml."""
 
-    job: PartJobFacts
-    """Identification, and free text for the certificate."""
-    laboratory: Laboratory = Laboratory()
-    """Who answers for the certificate."""
-    part: PartFacts
-    """What is measured."""
-    machine_state: MachineStateFacts
-    """The machine as its certificate states it."""
+    job: PartJobFacts = required("Identification, and free text for the certificate.")
+    laboratory: Laboratory = key(Laboratory(), "Who answers for the certificate.")
+    part: PartFacts = required("What is measured.")
+    machine_state: MachineStateFacts = required("The machine as its certificate states it.")
     stylus: Annotated[list[StylusFacts], Field(min_length=1, max_length=INPUTS.most)]
     """Styli that probe it, and what their qualification left uncertain."""
     feature: Annotated[list[FeatureFacts], Field(min_length=1, max_length=INPUTS.most)]
     """Features: where they are meant to be, and where they are probed."""
-    alignment: AlignmentFacts = AlignmentFacts()
-    """How coordinates of the part follow from measured points."""
-    placing: PlacingFacts = PlacingFacts()
-    """Where the part lies in the machine."""
-    probing: ProbingFacts = ProbingFacts()
-    """In which order, how fast and how often the points are probed."""
+    alignment: AlignmentFacts = key(AlignmentFacts(), "How coordinates of the part follow from measured points.")
+    placing: PlacingFacts = key(PlacingFacts(), "Where the part lies in the machine.")
+    probing: ProbingFacts = key(ProbingFacts(), "In which order, how fast and how often the points are probed.")
     environment: EnvironmentFacts = EnvironmentFacts()
     """Temperatures while the part is measured, and what is known of them."""
-    form: FormFacts = FormFacts()
-    """The part's own form and roughness, between the points that are probed."""
+    form: FormFacts = key(FormFacts(), "The part's own form and roughness, between the points that are probed.")
     characteristic: Annotated[list[CharacteristicFacts], Field(min_length=1, max_length=INPUTS.most)]
     """What the drawing asks for."""
-    decision: DecisionFacts = DecisionFacts()
-    """By which rule conformity with the drawing is decided."""
+    decision: DecisionFacts = key(DecisionFacts(), "By which rule conformity with the drawing is decided.")
     recording: MeasuredFacts | None = None
     """The points as they were measured; without them there are uncertainties alone."""
     by_calibrated_part: CalibratedPartFacts | None = None

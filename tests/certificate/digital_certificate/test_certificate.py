@@ -20,8 +20,15 @@ from cmm_uq.certificate.digital_certificate.certificate import IN_THE_SCHEMA, di
 from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.wording import OUTCOME_WORDS
 from cmm_uq.jobs.dcc import Certificate, read, written
-from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity, StatementMetadata as Statement
-from cmm_uq.jobs.dcc.quantities import Expanded, Hybrid, Interval, Real, RealList
+from cmm_uq.jobs.dcc.certificate import (
+    DccQuantity as Quantity,
+    Expanded,
+    Hybrid,
+    Interval,
+    Real,
+    RealList,
+    StatementMetadata as Statement,
+)
 from cmm_uq.jobs.job import Job
 from tests.artefacts.simulated import results
 from tests.certificate.test_completeness import CHAIN

@@ -13,7 +13,7 @@ from lxml import etree
 from cmm_uq.certificate.digital_certificate.certificate import digital_certificate
 from cmm_uq.certificate.origin import as_json
 from cmm_uq.jobs.dcc import Certificate, read, written
-from cmm_uq.jobs.dcc.quantities import Expanded, Real
+from cmm_uq.jobs.dcc.certificate import Expanded, Real
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.short_gauge import ShortGaugeFacts
 from cmm_uq.jobs.tables.artefact import CertificateFile

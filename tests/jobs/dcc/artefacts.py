@@ -6,7 +6,7 @@ import datetime as dt
 from collections.abc import Sequence
 from decimal import Decimal
 
-from cmm_uq.jobs.dcc import Certificate, certificate as dcc, quantities as si, written
+from cmm_uq.jobs.dcc import Certificate, certificate as dcc, written
 from tests.conftest import ROOT
 from tests.jobs.dcc.certificates import certificate
 
@@ -18,9 +18,9 @@ def value(
     name: str, number: str, U: str | None = None, unit: str = MM, ref_type: str = "basic_measuredValue"
 ) -> dcc.DccQuantity:
     """One value with its expanded uncertainty in the same unit."""
-    stated = None if U is None else si.Expanded(uncertainty=Decimal(U), factor=K, probability=P)
+    stated = None if U is None else dcc.Expanded(uncertainty=Decimal(U), factor=K, probability=P)
     return dcc.DccQuantity(
-        name=dcc.words(name), ref_type=(ref_type,), value=si.Real(value=Decimal(number), unit=unit, uncertainty=stated)
+        name=dcc.words(name), ref_type=(ref_type,), value=dcc.Real(value=Decimal(number), unit=unit, uncertainty=stated)
     )
 
 
@@ -28,18 +28,20 @@ def listed(
     name: str, numbers: str, Us: str | None = None, unit: str = MM, covariance: Sequence[Sequence[str]] = ()
 ) -> dcc.DccQuantity:
     """A list of values, with one uncertainty for all or one a value."""
-    stated = None if Us is None else si.ExpandedList(
+    stated = None if Us is None else dcc.ExpandedList(
         uncertainties=_decimals(Us), factors=(K,), probabilities=(P,)
     )  # fmt: skip
     region = None
     if covariance:
         unit_ = unit + r"\tothe{2}"
         columns = tuple(
-            si.CovarianceColumn(covariances=tuple(si.CovarianceElement(value=Decimal(one), unit=unit_) for one in row))
+            dcc.CovarianceColumn(
+                covariances=tuple(dcc.CovarianceElement(value=Decimal(one), unit=unit_) for one in row)
+            )
             for row in covariance
         )
-        region = si.EllipsoidalRegion(columns=columns, factor=K, probability=P)
-    found = si.RealList(values=_decimals(numbers), units=(unit,), uncertainty=stated, region=region)
+        region = dcc.EllipsoidalRegion(columns=columns, factor=K, probability=P)
+    found = dcc.RealList(values=_decimals(numbers), units=(unit,), uncertainty=stated, region=region)
     return dcc.DccQuantity(name=dcc.words(name), value=found)
 
 

@@ -6,7 +6,7 @@ import datetime as dt
 from decimal import Decimal
 
 from cmm_uq.jobs.dcc import Certificate, certificate as dcc
-from cmm_uq.jobs.dcc.quantities import Expanded, Real
+from cmm_uq.jobs.dcc.certificate import Expanded, Real
 
 LENGTH = Real(
     label="L",

@@ -8,7 +8,7 @@ from pathlib import Path
 import lxml.etree
 import pytest
 
-from cmm_uq.jobs.dcc import Certificate, quantities as si, read, written
+from cmm_uq.jobs.dcc import Certificate, certificate as dcc, read, written
 from cmm_uq.jobs.dcc.certificate import DccQuantity, QuantityList, StatementMetadata, rich, words
 from cmm_uq.jobs.dcc.figures import QuantityFigures, data, figures, shown, statements, unit_shown
 from cmm_uq.jobs.dcc.xml_file import checked_by_schema
@@ -17,7 +17,7 @@ from tests.jobs.dcc.artefacts import BALL_BAR, MM, PLATE, SPHERE, STEP_GAUGE, TR
 
 SCHEMAS = ROOT.parent / "shared" / "schemas"
 D = Decimal
-HALF = si.Expanded(uncertainty=D("0.010"), factor=D(2), probability=D("0.95"))
+HALF = dcc.Expanded(uncertainty=D("0.010"), factor=D(2), probability=D("0.95"))
 
 
 def of(given: object) -> tuple[QuantityFigures, ...]:
@@ -27,22 +27,22 @@ def of(given: object) -> tuple[QuantityFigures, ...]:
 
 
 ONE_VALUE = {
-    "a value": si.Real(value=D("1.50"), unit=MM, uncertainty=HALF),
-    "a value with an interval": si.Real(value=D("1.50"), unit=MM, uncertainty=si.Interval(
+    "a value": dcc.Real(value=D("1.50"), unit=MM, uncertainty=HALF),
+    "a value with an interval": dcc.Real(value=D("1.50"), unit=MM, uncertainty=dcc.Interval(
         standard=D("0.005"), low=D("1.49"), high=D("1.51"), probability=D("0.95"))),
-    "a value of D-SI 2.2": si.Real(value=D("1.50"), unit=MM, uncertainty=si.Univariate(
-        stated=si.StandardMU(standard=D("0.005")))),
-    "a constant": si.Constant(value=D("1.50"), unit=MM, uncertainty=D("0.005")),
-    "a list with one for all": si.RealList(values=(D("1.50"),), units=(MM,), uncertainty=si.IntervalList(
+    "a value of D-SI 2.2": dcc.Real(value=D("1.50"), unit=MM, uncertainty=dcc.Univariate(
+        stated=dcc.StandardMU(standard=D("0.005")))),
+    "a constant": dcc.Constant(value=D("1.50"), unit=MM, uncertainty=D("0.005")),
+    "a list with one for all": dcc.RealList(values=(D("1.50"),), units=(MM,), uncertainty=dcc.IntervalList(
         standards=(D("0.005"),), lows=(D("1.49"),), highs=(D("1.51"),), probabilities=(D("0.95"),))),
-    "a list of D-SI 2.2": si.RealList(values=(D("1.50"),), units=(MM,), uncertainty=si.UnivariateList(
-        stated=si.StandardListMU(standards=(D("0.005"),)))),
-    "the same expanded": si.RealList(values=(D("1.50"),), units=(MM,), uncertainty=si.UnivariateList(
-        stated=si.ExpandedListMU(uncertainties=(D("0.010"),), factors=(D(2),), probabilities=(D("0.95"),)))),
-    "the first of two units": si.Hybrid(values=(
-        si.Real(value=D("1.50"), unit=MM, uncertainty=HALF), si.Real(value=D("0.0015"), unit=r"\metre"))),
-    "a list one by one, with the list's unit and uncertainty": si.Lists(lists=(si.Reals(
-        unit=MM, uncertainty=si.ListUncertainty(stated=HALF), values=(si.RealInList(value=D("1.50")),)),)),
+    "a list of D-SI 2.2": dcc.RealList(values=(D("1.50"),), units=(MM,), uncertainty=dcc.UnivariateList(
+        stated=dcc.StandardListMU(standards=(D("0.005"),)))),
+    "the same expanded": dcc.RealList(values=(D("1.50"),), units=(MM,), uncertainty=dcc.UnivariateList(
+        stated=dcc.ExpandedListMU(uncertainties=(D("0.010"),), factors=(D(2),), probabilities=(D("0.95"),)))),
+    "the first of two units": dcc.Hybrid(values=(
+        dcc.Real(value=D("1.50"), unit=MM, uncertainty=HALF), dcc.Real(value=D("0.0015"), unit=r"\metre"))),
+    "a list one by one, with the list's unit and uncertainty": dcc.Lists(lists=(dcc.Reals(
+        unit=MM, uncertainty=dcc.ListUncertainty(stated=HALF), values=(dcc.RealInList(value=D("1.50")),)),)),
 }  # fmt: skip
 
 
@@ -55,7 +55,7 @@ def test_a_value_is_the_same_in_whichever_form_it_is_given(given: object) -> Non
 
 
 def test_a_value_without_uncertainty_has_none() -> None:
-    (found,) = of(si.Real(value=D(1), unit=MM))
+    (found,) = of(dcc.Real(value=D(1), unit=MM))
     assert found.uncertainties[0].u is None
 
 
@@ -67,7 +67,7 @@ def test_one_uncertainty_and_one_unit_are_of_every_value_of_a_list() -> None:
 
 def test_statements_of_lists_and_quantities_are_found_with_those_of_the_measurement() -> None:
     said = StatementMetadata(conformity="pass", norms=("ISO 10360-2:2009",), declaration=rich("within the limit"))
-    inner = DccQuantity(name=words("Q"), value=si.Real(value=D(1), unit=MM), metadata=(said,))
+    inner = DccQuantity(name=words("Q"), value=dcc.Real(value=D(1), unit=MM), metadata=(said,))
     made = issued(QuantityList(parts=(inner,), metadata=(said,)))  # type: ignore[arg-type]
     (measurement,) = made.measurements
     assert [one.conformity for one in statements(measurement)] == ["pass", "pass"]

@@ -12,9 +12,7 @@ from lxml import etree
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.dcc import checked_by_schema, written
-from cmm_uq.jobs.dcc.certificate import Certificate
-from cmm_uq.jobs.dcc.fields import Attribute, Element, Field, ForeignElements, fields_of
-from cmm_uq.jobs.dcc.quantities import Complex
+from cmm_uq.jobs.dcc.certificate import CLASSES, Certificate, Complex, Element, Field
 from cmm_uq.jobs.dcc.tree import NAMESPACES
 from cmm_uq.jobs.dcc.xml_file import _schema
 from tests.jobs.dcc.certificates import certificate
@@ -66,16 +64,16 @@ def compared(element: Any, cls: type[Element], seen: set[type[Element]]) -> int:
     if cls in seen:
         return 0
     seen.add(cls)
-    found, fields = 0, fields_of(cls)
+    found, fields = 0, cls.FIELDS.values()
     given = {short(child.name): child for child in elements(element.type) if child.name}
     given = {tag: child for tag, child in given.items() if not tag.startswith("ds:")}
     mine = [tag for field in fields for tag in field.outer if tag not in LATER]
     # a complex value is by its parts or by magnitude and phase, with a unit at the end of either
     assert mine == list(given) or (cls is Complex and sorted(mine) == sorted(given)), cls
-    attributes = {field.place.tag for field in fields if isinstance(field.place, Attribute)}
+    attributes = {field.tag for field in fields if field.kind == "attribute"}
     assert attributes >= {name for name in getattr(element.type, "attributes", ()) if name}, cls
     for field in fields:
-        if isinstance(field.place, Attribute | ForeignElements):
+        if field.kind in ("attribute", "foreign"):
             continue
         for outer in field.outer:
             if outer not in LATER:
@@ -94,7 +92,7 @@ def below(child: Any, field: Field, outer: str, seen: set[type[Element]]) -> int
     if len(field.tags) == 1:
         assert field.repeated == repeated(inner), (field.name, outer)
         assert field.required == needed(child), (field.name, outer)
-    return compared(inner, cls, seen) if cls is not None else 0
+    return compared(inner, CLASSES[cls], seen) if cls else 0
 
 
 def test_every_element_of_the_schema_is_a_field_in_the_same_order_as_often_and_as_needed(schema: Any) -> None:

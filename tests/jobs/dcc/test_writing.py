@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.dcc import quantities as si, read, written
-from cmm_uq.jobs.dcc.quantities import Expanded, Interval, Real
+from cmm_uq.jobs.dcc import certificate as dcc, read, written
+from cmm_uq.jobs.dcc.certificate import Expanded, Interval, Real
 from tests.jobs.dcc.certificates import LENGTH, certificate
 
 NUMBERS = st.decimals(allow_nan=False, allow_infinity=False, min_value=-(10**12), max_value=10**12)
@@ -46,29 +46,29 @@ def test_any_quantity_is_read_as_it_was_written(
 TWO = (Decimal(1), Decimal(2))
 
 
-def elements(*values: str) -> si.CovarianceColumn:
-    return si.CovarianceColumn(
-        covariances=tuple(si.CovarianceElement(value=Decimal(value), unit=r"\metre") for value in values)
+def elements(*values: str) -> dcc.CovarianceColumn:
+    return dcc.CovarianceColumn(
+        covariances=tuple(dcc.CovarianceElement(value=Decimal(value), unit=r"\metre") for value in values)
     )
 
 
-def region(*columns: si.CovarianceColumn) -> si.EllipsoidalRegion:
-    return si.EllipsoidalRegion(columns=columns, factor=Decimal("2.45"), probability=Decimal("0.95"))
+def region(*columns: dcc.CovarianceColumn) -> dcc.EllipsoidalRegion:
+    return dcc.EllipsoidalRegion(columns=columns, factor=Decimal("2.45"), probability=Decimal("0.95"))
 
 
-def lists(**given: Any) -> si.RealList:
-    return si.RealList(**{"values": TWO, "units": (r"\metre",), **given})
+def lists(**given: Any) -> dcc.RealList:
+    return dcc.RealList(**{"values": TWO, "units": (r"\metre",), **given})
 
 
-EXPANDED = si.ExpandedList(uncertainties=TWO * 2, factors=(Decimal(2),), probabilities=(Decimal("0.95"),))
+EXPANDED = dcc.ExpandedList(uncertainties=TWO * 2, factors=(Decimal(2),), probabilities=(Decimal("0.95"),))
 
 
 @pytest.mark.parametrize(("value", "told"), [
     (LENGTH.with_changes(value=Decimal("NaN")), "'NaN' is not a number"),
     (LENGTH.with_changes(value=Decimal("Infinity")), "'Infinity' is not a number"),
-    (si.Real(value=TWO[0], unit="m", uncertainty=si.Expanded(uncertainty=TWO[0], factor=Decimal("0.7"), probability=TWO[0])),
+    (dcc.Real(value=TWO[0], unit="m", uncertainty=dcc.Expanded(uncertainty=TWO[0], factor=Decimal("0.7"), probability=TWO[0])),
      "'0.7' is not a coverage factor"),
-    (si.Real(value=TWO[0], unit="m", uncertainty=si.Interval(standard=TWO[0], low=TWO[1], high=TWO[0], probability=TWO[0])),
+    (dcc.Real(value=TWO[0], unit="m", uncertainty=dcc.Interval(standard=TWO[0], low=TWO[1], high=TWO[0], probability=TWO[0])),
      "the interval 2 to 1 is empty"),
     (lists(units=(r"\metre",) * 3), "2 values have 3 units"), (lists(labels=("a", "b", "c")), "2 values have 3 labels"),
     (lists(labels=("a b", "c")), "'a b c' is not a list of words"),
@@ -95,5 +95,5 @@ def test_a_part_is_frozen_and_takes_its_own_fields_only() -> None:
     with pytest.raises(TypeError, match=r"takes no .*'colour'"):
         LENGTH.with_changes(colour="red")
     with pytest.raises(TypeError, match=r"needs .*'unit'"):
-        si.Real(value=Decimal(1))  # type: ignore[call-arg]
+        dcc.Real(value=Decimal(1))  # type: ignore[call-arg]
     assert {LENGTH, LENGTH.with_changes(label="L")} == {LENGTH}
