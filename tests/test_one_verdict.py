@@ -367,6 +367,7 @@ def test_the_commands_on_a_machine_that_is_out_of_tolerance(tmp_path: Path) -> N
     )
     (job / "job.toml").write_text(toml, encoding="utf-8")
     jobs, records = tmp_path / "jobs", tmp_path / "records.db"
+    (jobs / "schedule.toml").write_text("[run]\nquiet_s = 0\n", encoding="utf-8")
     done = run("report", "--scheduled", jobs, "--out", tmp_path / "reports", "--records", records)
     told = [json.loads(line) for line in done.stdout.splitlines()]
     assert done.returncode == 1
