@@ -37,17 +37,23 @@ def components(possible: tuple[str, ...] = (AXES, PLACING, GROWTH, SLOW)) -> Com
     return Components(sparse.csr_array(blocks), shares, slow, frequency, possible)
 
 
-def covariance(noise: Components, sizes: Sizes) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """By the definition of each component, observation by observation."""
+def covariances(noise: Components, sizes: Sizes) -> np.ndarray[tuple[int, int, int], np.dtype[np.float64]]:
+    """(w, M, M) by the definition of each component, observation by observation."""
     parts, length, time = noise.shares[:, :3], np.repeat(np.linspace(0, 1, 6), 2), np.linspace(0, 1, M)
     slow, fast = slow_variances(sizes.slow, sizes.rate, noise.frequency)
-    found = np.diag(parts @ sizes.reading[0] ** 2 + (length * sizes.growth[0]) ** 2 + fast[0])
-    found += sizes.placing[0] ** 2 * np.kron(np.eye(6), np.ones((2, 2)))
-    for k, variance in zip(noise.frequency, slow[0], strict=True):
+    own = sizes.reading**2 @ parts.T + (length * sizes.growth[:, None]) ** 2 + fast[:, None]
+    found = own[:, None] * np.eye(M) + sizes.placing[:, None, None] ** 2 * np.kron(np.eye(6), np.ones((2, 2)))
+    for k, variance in zip(noise.frequency, slow.T, strict=True):
         wave = (np.sqrt(2) if k else 1.0) * np.cos(np.pi * k * time)
-        wave = wave if sizes.rate[0] or not k else wave - wave[0]  # a walk begins at zero
-        found += variance * np.outer(wave, wave)
+        walk = wave - wave[0] if k else wave  # it begins at zero
+        outer = np.where((sizes.rate > 0)[:, None, None], np.outer(wave, wave), np.outer(walk, walk))
+        found += variance[:, None, None] * outer
     return np.asarray(found)
+
+
+def covariance(noise: Components, sizes: Sizes) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """(M, M) of the first sizes."""
+    return np.asarray(covariances(noise, sizes)[0])
 
 
 SIZES = Sizes(np.array([[1.0, 2.0, 0.5]]), np.array([1.5]), np.array([0.7]), np.array([1.2]), np.array([4.0]))
