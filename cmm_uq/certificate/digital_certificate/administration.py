@@ -35,13 +35,31 @@ _NOBODY = say("nobody: nothing is certified")
 
 @dataclass(frozen=True)
 class Languages:
-    """What says texts in a language (ISO 639-1), and in English beside it."""
+    """Makes elements with texts in a language (ISO 639-1), and in English beside it."""
 
     code: Code
 
     @property
     def codes(self) -> tuple[Code, ...]:
         return (self.code,) if self.code == ENGLISH else (self.code, ENGLISH)
+
+    def __call__(self, kind: str, **fields: Any) -> Any:
+        """An element: words of a text, paragraphs of one or several, a single refType; what is empty is left out."""
+        cls = dcc.CLASSES[kind]
+        return cls(**{name: self._of_field(cls.FIELDS[name], value) for name, value in fields.items()})
+
+    def _of_field(self, field: dcc.Field, value: Any) -> Any:
+        kinds = tuple(field.tags.values())
+        if isinstance(value, str):
+            if kinds == ("Words",):
+                return self.words(value)
+            if field.name == "ref_type":
+                return (value,)
+            if not field.repeated and field.kind == "element" and kinds == ("",):
+                return one_line(value) or (value if field.required else None)
+        if kinds == ("Rich",) and value is not None and not isinstance(value, dcc.Rich) and not field.repeated:
+            return self.rich(*([value] if isinstance(value, str) else value)) if value else None
+        return value
 
     def _contents(self, text: str) -> tuple[dcc.LanguageText, ...]:
         """In each language; without one where nobody may translate it."""
@@ -89,57 +107,49 @@ def mark_of(job: Job) -> Mark | None:
 def core_data(job: Job, texts: Languages) -> dcc.CoreData:
     facts, mark = job.facts.job, mark_of(job)
     number = one_line(facts.number or facts.id)
-    known = [
+    known = (
         ("calibrationLaboratory", facts.id, say("Job"), "cmm_job"),
         ("customer", facts.order, say("Order"), "basic_orderNumber"),
-    ]
-    return dcc.CoreData(
-        country=job.facts.laboratory.country or UNKNOWN_COUNTRY,
-        languages=texts.codes,
-        mandatory_languages=texts.codes[:1],
-        identifier=number if mark is None else f"{mark.word}-{number}",
+    )
+    replaces = facts.replaces
+    return texts(
+        "CoreData", country=job.facts.laboratory.country or UNKNOWN_COUNTRY, languages=texts.codes,
+        mandatory_languages=texts.codes[:1], identifier=number if mark is None else f"{mark.word}-{number}",
         identifications=tuple(
-            dcc.IdentificationNumber(issuer=issuer, value=one_line(value), name=texts.words(name), ref_type=(ref_type,))
+            texts("IdentificationNumber", issuer=issuer, value=value, name=name, ref_type=ref_type)
             for issuer, value, name, ref_type in known if value
         ),
-        received=facts.received,
-        begin=facts.date,
-        end=facts.date,
-        location=dcc.PerformanceLocation(place="other"),
+        received=facts.received, begin=facts.date, end=facts.date, location=dcc.PerformanceLocation(place="other"),
         issued=facts.issued if certifies(job) else None,
-        replaced=None if facts.replaces is None
-        else dcc.ReplacedReport(change="substituted", identifier=one_line(facts.replaces.number)),
+        replaced=replaces and texts("ReplacedReport", change="substituted", identifier=replaces.number),
     )  # fmt: skip
 
 
-def serial_number(serial: str, texts: Languages) -> dcc.IdentificationNumber:
-    name = texts.words(say("Serial number"))
-    return dcc.IdentificationNumber(issuer="manufacturer", value=serial, name=name, ref_type=("basic_serialNumber",))
+def _serial(serial: str, texts: Languages) -> tuple[dcc.IdentificationNumber, ...]:
+    """A serial number; nothing where it is not stated."""
+    named = {"name": say("Serial number"), "ref_type": "basic_serialNumber"}
+    return (texts("IdentificationNumber", issuer="manufacturer", value=serial, **named),) if serial.strip() else ()
 
 
 def items(job: Job, texts: Languages) -> dcc.Items:
     machine, mark, travels = job.facts.machine, mark_of(job), []
     for axis in "xyz":
         if travel := getattr(machine.travel_mm, axis):
-            name = texts.words(say("Measuring range of {axis}", axis=Verbatim(axis.upper())))
             values = tuple(Decimal(repr(float(end))) for end in travel)
             ends = dcc.RealList(labels=("lowest", "highest"), values=values, units=(UNITS["mm"].dsi,))
-            ref_type = ("cmm_measuringRange",)
-            travels.append(dcc.PrimitiveQuantity(id=f"travel_{axis}", name=name, value=ends, ref_type=ref_type))
-    item = dcc.Item(
-        id="machine",
-        name=texts.words(Verbatim(machine.name)),
-        description=None if mark is None else texts.rich(mark.banner),
-        manufacturer=somebody(Verbatim(machine.manufacturer), texts) if machine.manufacturer else None,
-        model=one_line(machine.model) or None,
-        identifications=(serial_number(one_line(machine.serial) or str.__str__(NOT_STATED), texts),),
-        quantities=tuple(travels),
-    )
+            name = say("Measuring range of {axis}", axis=Verbatim(axis.upper()))
+            named = {"id": f"travel_{axis}", "name": name, "ref_type": "cmm_measuringRange"}
+            travels.append(texts("PrimitiveQuantity", value=ends, **named))
+    item = texts(
+        "Item", id="machine", name=Verbatim(machine.name), description=mark and mark.banner,
+        manufacturer=somebody(machine.manufacturer, texts), model=machine.model, quantities=tuple(travels),
+        identifications=_serial(machine.serial if machine.serial.strip() else str.__str__(NOT_STATED), texts),
+    )  # fmt: skip
     return dcc.Items(owner=_contact(machine.owner, "", texts) if machine.owner else None, items=(item,))
 
 
-def somebody(name: Text, texts: Languages) -> dcc.Somebody:
-    return dcc.Somebody(name=texts.words(name))
+def somebody(name: str | None, texts: Languages) -> dcc.Somebody | None:
+    return texts("Somebody", name=name if isinstance(name, Text) else Verbatim(name)) if name else None
 
 
 def laboratory(job: Job, texts: Languages) -> dcc.CalibrationLaboratory:
@@ -147,21 +157,19 @@ def laboratory(job: Job, texts: Languages) -> dcc.CalibrationLaboratory:
     facts = job.facts.laboratory
     if not certifies(job):
         return dcc.CalibrationLaboratory(contact=_contact(_NOBODY, "", texts))
-    code = one_line(facts.accreditation) or None
-    return dcc.CalibrationLaboratory(code=code, contact=_contact(facts.name, facts.address, texts))
+    contact = _contact(facts.name, facts.address, texts)
+    return texts("CalibrationLaboratory", code=facts.accreditation, contact=contact)
 
 
 def persons(job: Job, texts: Languages) -> tuple[dcc.Person, ...]:
     """Who authorises the certificate, and who measured."""
-    facts, operator, found = job.facts.laboratory, job.facts.job.operator, []
+    facts, operator = job.facts.laboratory, job.facts.job.operator
     if not certifies(job):
         return (dcc.Person(person=somebody(_NOBODY, texts)),)
-    if facts.signatory:
-        signatory, role = somebody(Verbatim(facts.signatory), texts), one_line(facts.signatory_role) or None
-        found.append(dcc.Person(person=signatory, role=role, main_signer=True))
-    if operator:
-        found.append(dcc.Person(person=somebody(Verbatim(operator), texts), role="operator", main_signer=False))
-    return tuple(found) or (dcc.Person(person=somebody(NOT_STATED, texts)),)
+    known = ((facts.signatory, facts.signatory_role, True), (operator, "operator", False))
+    return tuple(
+        texts("Person", person=somebody(name, texts), role=role, main_signer=signs) for name, role, signs in known if name
+    ) or (dcc.Person(person=somebody(NOT_STATED, texts)),)  # fmt: skip
 
 
 def customer(job: Job, texts: Languages) -> dcc.Contact:
@@ -172,26 +180,24 @@ def formal_statements(job: Job, results: Mapping[str, Any], texts: Languages) ->
     """What it is not, what the results relate to, how they are traceable, what it replaces, when the next is agreed."""
     facts, mark, found = job.facts.job, mark_of(job), list[dcc.StatementMetadata]()
 
-    def state(name: Text, *paragraphs: Text, **more: Any) -> None:
-        found.append(dcc.StatementMetadata(name=texts.words(name), declaration=texts.rich(*paragraphs), **more))
+    def state(name: Text | None, *paragraphs: Text, **more: Any) -> None:
+        found.append(texts("StatementMetadata", name=name, declaration=paragraphs, **more))
 
     if mark is not None:
-        state(mark.banner, mark.banner, valid=False, ref_type=("cmm_notACertificate",))
+        state(mark.banner, mark.banner, valid=False, ref_type="cmm_notACertificate")
     if certifies(job):
-        chain = claimed(job)
-        found += [dcc.StatementMetadata(declaration=texts.rich(text), ref_type=("cmm_general",)) for text in STATEMENTS]
-        state(say("Traceability"), chain.statement, traceable=chain.claim == "traceable",
-              ref_type=("basic_metrologicallyTraceableToSI",))  # fmt: skip
+        for text in STATEMENTS:
+            state(None, text, ref_type="cmm_general")
+        chain, ref_type = claimed(job), "basic_metrologicallyTraceableToSI"
+        state(say("Traceability"), chain.statement, traceable=chain.claim == "traceable", ref_type=ref_type)
     if (replaces := facts.replaces) is not None:
         paragraphs: list[Text] = [replaced_certificate(replaces), Verbatim(replaces.reason), Verbatim(replaces.changed)]
         if (comparison := Reissue.of_results(results)) is not None:
             paragraphs += [comparison.sentence, *(difference.sentence for difference in comparison.differences)]
-        state(say("Replaces certificate"), *paragraphs, ref_type=("basic_revision",))
+        state(say("Replaces certificate"), *paragraphs, ref_type="basic_revision")
     if facts.recalibration_agreed:
-        name = texts.words(say("Next calibration, as agreed with the customer"))
-        found.append(
-            dcc.StatementMetadata(name=name, date=facts.recalibration_agreed, ref_type=("basic_recalibration",))
-        )
+        name = say("Next calibration, as agreed with the customer")
+        state(name, date=facts.recalibration_agreed, ref_type="basic_recalibration")
     further = [
         (say("Place"), facts.place), (say("Deviations from the method"), facts.deviations),
         (say("Results of external providers"), facts.external), (say("Data from the customer"), facts.from_customer),
@@ -205,22 +211,19 @@ def formal_statements(job: Job, results: Mapping[str, Any], texts: Languages) ->
 
 def ref_types(texts: Languages) -> tuple[dcc.RefTypeDefinition, ...]:
     path = say("What stands under a key of results.json has its path as id and its first key as refType.")
-    return (
-        dcc.RefTypeDefinition(
-            name=texts.words(say("Good practice of the DCC: names that all fields of calibration share")),
-            namespace="basic", link="https://digilab.ptb.de/dkd/refType/vocab/index.php",
-        ),
-        dcc.RefTypeDefinition(
-            name=texts.words(say("Names of this program for coordinate measuring machines")),
-            description=texts.rich(path), namespace="cmm", link="docs/dcc.md",
-        ),
+    known = (
+        (say("Good practice of the DCC: names that all fields of calibration share"), None, "basic",
+         "https://digilab.ptb.de/dkd/refType/vocab/index.php"),
+        (say("Names of this program for coordinate measuring machines"), path, "cmm", "docs/dcc.md"),
     )  # fmt: skip
+    names = ("name", "description", "namespace", "link")
+    return tuple(texts("RefTypeDefinition", **dict(zip(names, row, strict=True))) for row in known)
 
 
 def _contact(name: str, address: str, texts: Languages) -> dcc.Contact:
     lines: list[Text] = [Verbatim(line.strip()) for line in address.splitlines() if line.strip()]
     known = name if isinstance(name, Text) else Verbatim(name) if name else NOT_STATED
-    return dcc.Contact(name=texts.words(known), location=dcc.Location(further=(texts.rich(*(lines or [NOT_STATED])),)))
+    return texts("Contact", name=known, location=dcc.Location(further=(texts.rich(*(lines or [NOT_STATED])),)))
 
 
 NO_HASH = "none"  # procedure and value of the hash of a certificate that is not at hand as a file
@@ -231,16 +234,12 @@ def methods(job: Job, results: Mapping[str, Any], texts: Languages) -> tuple[dcc
     """As the job states it, and how values and uncertainties follow."""
     standards = tuple(dict.fromkeys(one_line(entry["standard"]) for entry in results.get("conformity", ())))
     stated = job.facts.job.procedure
+    name, of_uncertainty = say("Calibration of a coordinate measuring machine"), "basic_methodMeasurementUncertainty"
     return (
-        dcc.Method(
-            name=texts.words(say("Calibration of a coordinate measuring machine")),
-            description=texts.rich(Verbatim(stated) if stated else NOT_STATED),
-            norms=standards, ref_type=("basic_calibrationMethod",),
-        ),
-        dcc.Method(
-            name=texts.words(say("Measurement uncertainty")), description=texts.rich(UNCERTAINTY, SIGN),
-            references=("JCGM 100:2008", "JCGM 101:2008"), ref_type=("basic_methodMeasurementUncertainty",),
-        ),
+        texts("Method", name=name, description=Verbatim(stated) if stated else NOT_STATED, norms=standards,
+              ref_type="basic_calibrationMethod"),
+        texts("Method", name=say("Measurement uncertainty"), description=(UNCERTAINTY, SIGN), ref_type=of_uncertainty,
+              references=("JCGM 100:2008", "JCGM 101:2008")),
     )  # fmt: skip
 
 
@@ -249,9 +248,9 @@ def software(results: Mapping[str, Any], texts: Languages) -> tuple[dcc.Software
     used = results["software"]
     named = {used["name"]: used["version"], **used.get("plugins", {})}
     return tuple(
-        dcc.Software(name=texts.words(Verbatim(name)), release=one_line(version), type="application" if not i else "library")
+        texts("Software", name=Verbatim(name), release=version, type="application" if not i else "library")
         for i, (name, version) in enumerate(named.items())
-    )  # fmt: skip
+    )
 
 
 def equipment(job: Job, results: Mapping[str, Any], texts: Languages) -> dcc.Equipments:
@@ -260,10 +259,8 @@ def equipment(job: Job, results: Mapping[str, Any], texts: Languages) -> dcc.Equ
     def reference(
         name: str, serial: str, chain: Traceability | None, *certified: dcc.PrimitiveQuantity
     ) -> dcc.Equipment:
-        return dcc.Equipment(
-            name=texts.words(Verbatim(name)), certificate=_certificate(job, chain, texts),
-            identifications=_serial(serial, texts), quantities=certified, ref_type=("basic_normalUsed",),
-        )  # fmt: skip
+        return texts("Equipment", name=Verbatim(name), certificate=_certificate(job, chain, texts), quantities=certified,
+                     identifications=_serial(serial, texts), ref_type="basic_normalUsed")  # fmt: skip
 
     facts, gauge = job.facts.artefact, job.facts.short_gauge
     u_um = float(facts.u_of(facts.length_mm or 0.0))
@@ -280,19 +277,12 @@ def equipment(job: Job, results: Mapping[str, Any], texts: Languages) -> dcc.Equ
         for each in job.facts.thermometer
     ]
     found += [
-        dcc.Equipment(
-            name=texts.words(Verbatim(each.name)), model=one_line(each.model or "") or None,
-            manufacturer=somebody(Verbatim(each.maker), texts) if each.maker else None,
-            certificate=_referral(one_line(each.certificate), texts) if each.certificate else None,
-            identifications=_serial(each.serial or "", texts), ref_type=("cmm_instrument",),
-        )
+        texts("Equipment", name=Verbatim(each.name), model=each.model, manufacturer=somebody(each.maker, texts),
+              certificate=_referral(each.certificate, texts) if each.certificate else None,
+              identifications=_serial(each.serial or "", texts), ref_type="cmm_instrument")
         for each in ([] if job.acquired is None else job.acquired.said.instruments)
     ]  # fmt: skip
     return dcc.Equipments(equipment=tuple(found))
-
-
-def _serial(serial: str, texts: Languages) -> tuple[dcc.IdentificationNumber, ...]:
-    return (serial_number(one_line(serial), texts),) if serial.strip() else ()
 
 
 def _certificate(job: Job, chain: Traceability | None, texts: Languages) -> dcc.Hash | None:
@@ -307,38 +297,27 @@ def _certificate(job: Job, chain: Traceability | None, texts: Languages) -> dcc.
     described += [say("{right:capital}", right=right(chain))] if right(chain) else []
     digest = sha256(job.inputs)[file] if file is not None and file in job.inputs else None
     valid = None if chain.until is None else holds_on(chain, job.facts.job.date)
-    return _referral(number, texts, digest, texts.rich(*described) if described else None, valid)
+    return _referral(number, texts, digest, description=described, in_validity_range=valid)
 
 
-def _referral(
-    number: str,
-    texts: Languages,
-    digest: str | None = None,
-    described: dcc.Rich | None = None,
-    valid: bool | None = None,
-) -> dcc.Hash:
-    return dcc.Hash(
-        referral=texts.words(say("Calibration certificate")), referral_id=number, procedure="SHA-256" if digest else NO_HASH,
-        value=digest or NO_HASH, description=described, in_validity_range=valid,
-    )  # fmt: skip
+def _referral(number: str, texts: Languages, digest: str | None = None, **more: Any) -> dcc.Hash:
+    return texts("Hash", referral=say("Calibration certificate"), referral_id=number, value=digest or NO_HASH,
+                 procedure="SHA-256" if digest else NO_HASH, **more)  # fmt: skip
 
 
 def _certified(
     owner: str, length: float | None, u_um: float | None, cte: float, texts: Languages
 ) -> tuple[dcc.PrimitiveQuantity, ...]:
     u = Decimal(repr(float(u_um or 0.0))).scaleb(-3)
-    stated = (
-        dcc.Expanded(uncertainty=u, factor=Decimal(1), probability=P_STANDARD, distribution="normal") if u else None
-    )
+    spread = {"factor": Decimal(1), "probability": P_STANDARD, "distribution": "normal"}
+    stated = dcc.Expanded(uncertainty=u, **spread) if u else None
     known = (
         ("length", say("Certified length"), length, "mm", stated),
         ("cte", say("Coefficient of thermal expansion"), cte or None, "1/K", None),
     )
     return tuple(
-        dcc.PrimitiveQuantity(
-            id=f"{owner}_{key}", name=texts.words(name), ref_type=("basic_referenceValue",),
-            value=dcc.Real(value=Decimal(repr(float(value))), unit=UNITS[unit].dsi, uncertainty=uncertainty),
-        )
+        texts("PrimitiveQuantity", id=f"{owner}_{key}", name=name, ref_type="basic_referenceValue",
+              value=dcc.Real(value=Decimal(repr(float(value))), unit=UNITS[unit].dsi, uncertainty=uncertainty))
         for key, name, value, unit, uncertainty in known if value is not None
     )  # fmt: skip
 
@@ -347,9 +326,8 @@ def conditions(job: Job, texts: Languages) -> tuple[dcc.InfluenceCondition, ...]
     """As the job states them, and the least and largest recorded temperatures, in K and in °C."""
     found = []
     if job.facts.job.conditions:
-        data = dcc.Data(parts=(texts.rich(Verbatim(job.facts.job.conditions)),))
-        name = texts.words(say("Conditions"))
-        found.append(dcc.InfluenceCondition(name=name, data=data, ref_type=("cmm_conditions",)))
+        parts = (texts.rich(Verbatim(job.facts.job.conditions)),)
+        found.append((say("Conditions"), parts, "cmm_conditions"))
     for column, what in TEMPERATURES.items():
         if column in job.points.columns:
             values = job.points.columns[column]
@@ -357,16 +335,18 @@ def conditions(job: Job, texts: Languages) -> tuple[dcc.InfluenceCondition, ...]
                 _temperature(f"{column}.min", say("Lowest temperature"), values.min(), "basic_temperatureMin", texts),
                 _temperature(f"{column}.max", say("Highest temperature"), values.max(), "basic_temperatureMax", texts),
             )
-            name = texts.words(say("Temperature: {what}", what=what))
-            found.append(dcc.InfluenceCondition(name=name, data=dcc.Data(parts=ends), ref_type=("basic_temperature",)))
-    return tuple(found)
+            found.append((say("Temperature: {what}", what=what), ends, "basic_temperature"))
+    return tuple(
+        texts("InfluenceCondition", name=name, data=dcc.Data(parts=parts), ref_type=ref_type)
+        for name, parts, ref_type in found
+    )
 
 
 def _temperature(id_: str, name: Text, celsius: float, ref_type: str, texts: Languages) -> dcc.DccQuantity:
     shown = Decimal(repr(float(celsius)))
     kelvin = dcc.Real(value=shown + _KELVIN, unit=UNITS["K"].dsi)
     both = dcc.Hybrid(values=(kelvin, dcc.Real(value=shown, unit=UNITS["°C"].dsi)))
-    return dcc.DccQuantity(id=id_, name=texts.words(name), value=both, ref_type=(ref_type,))
+    return texts("DccQuantity", id=id_, name=name, value=both, ref_type=ref_type)
 
 
 def metadata(results: Mapping[str, Any], texts: Languages) -> tuple[dcc.StatementMetadata, ...]:
@@ -374,12 +354,12 @@ def metadata(results: Mapping[str, Any], texts: Languages) -> tuple[dcc.Statemen
     again = [f"{name} SHA-256 {digest}" for name, digest in results["job"]["inputs_sha256"].items()]
     if (seed := results.get("sampling", {}).get("seed")) is not None:
         again.append(f"seed {seed}")
-    inputs = dcc.StatementMetadata(
-        name=texts.words(say("Inputs, from which every figure follows again")), ref_type=("cmm_inputs",),
-        declaration=texts.rich(*map(Verbatim, again)),
-    )  # fmt: skip
-    odd = [flag["why"] for flag in results.get("screening", ())]
-    if not odd:
-        return (inputs,)
-    name = texts.words(say("What is odd in the recording"))
-    return inputs, dcc.StatementMetadata(name=name, declaration=english(odd), ref_type=("cmm_screening",))
+    name, odd = (
+        say("Inputs, from which every figure follows again"),
+        [each["why"] for each in results.get("screening", ())],
+    )
+    stated = [texts("StatementMetadata", name=name, declaration=[*map(Verbatim, again)], ref_type="cmm_inputs")]
+    if odd:
+        name = say("What is odd in the recording")
+        stated.append(texts("StatementMetadata", name=name, declaration=english(odd), ref_type="cmm_screening"))
+    return tuple(stated)

@@ -56,14 +56,13 @@ def of_tolerances(verdicts: Verdicts, texts: Languages, *, certifies: bool) -> M
 def _of_tolerance(verdict: Verdict, texts: Languages, *, certifies: bool) -> dcc.StatementMetadata:
     limit, unit = plain.decimal(verdict.limit or 0.0), plain.dsi_of(verdict.unit)
     bounds = ((say("Smallest permissible value"), -limit), (say("Largest permissible value"), limit))
-    return dcc.StatementMetadata(
-        name=texts.words(say("Conformity with its tolerance")),
+    return texts(
+        "StatementMetadata", name=say("Conformity with its tolerance"), references=(TOLERANCE_RULE,),
         description=english([f"Missing: {what}" for what in verdict.missing]) if verdict.missing else None,
-        references=(TOLERANCE_RULE,),
-        declaration=texts.rich(Verbatim(verdict.outcome), *_why(verdict.outcome)),
+        declaration=(Verbatim(verdict.outcome), *_why(verdict.outcome)),
         conformity=IN_THE_SCHEMA[verdict.outcome] if certifies else None,
         data=dcc.Data(parts=tuple(
-            dcc.DccQuantity(name=texts.words(name), value=dcc.Real(value=bound, unit=unit), ref_type=("cmm_toleranceLimit",))
+            texts("DccQuantity", name=name, value=dcc.Real(value=bound, unit=unit), ref_type="cmm_toleranceLimit")
             for name, bound in bounds
         )),
         ref_type=_ref_type(verdict.outcome, certifies=certifies),
@@ -90,17 +89,12 @@ def statement(
     value = stated_value(entry["value_um"], 2 * entry["u_um"], signed=entry.get("signed", True))
     quantity = say("{decision}: {quantity}", decision=Verbatim(decision), quantity=Verbatim(entry["quantity"]))
     row = stated_row(decision, value, UNITS["µm"], entry["limit_um"])
-    return dcc.StatementMetadata(
-        id=figures.id_of(path),
-        name=texts.words(named),
-        description=english(remarks) if remarks else None,
-        norms=(one_line(entry["standard"]),),
-        references=(one_line(entry["rule"]),),
-        declaration=texts.rich(quantity, row, *_why(decision)),
-        conformity=IN_THE_SCHEMA[decision] if certifies else None,
-        data=dcc.Data(parts=tuple(_figures(path, entry, figures))),
-        ref_type=_ref_type(decision, certifies=certifies),
-    )
+    return texts(
+        "StatementMetadata", id=figures.id_of(path), name=named, description=english(remarks) if remarks else None,
+        norms=(one_line(entry["standard"]),), references=(one_line(entry["rule"]),),
+        declaration=(quantity, row, *_why(decision)), conformity=IN_THE_SCHEMA[decision] if certifies else None,
+        data=dcc.Data(parts=tuple(_figures(path, entry, figures))), ref_type=_ref_type(decision, certifies=certifies),
+    )  # fmt: skip
 
 
 def _figures(path: tuple[str, ...], entry: Mapping[str, Any], figures: plain.DigitalFigures) -> Iterator[dcc.Element]:
@@ -115,7 +109,7 @@ def _figures(path: tuple[str, ...], entry: Mapping[str, Any], figures: plain.Dig
         stated: dcc.Expanded | None = None,
     ) -> dcc.DccQuantity:
         real, id_ = dcc.Real(value=value, unit=unit, uncertainty=stated), figures.id_of((*path, *keys.split(".")))
-        return dcc.DccQuantity(id=id_, name=figures.texts.words(name), value=real, ref_type=(ref_type,))
+        return figures.texts("DccQuantity", id=id_, name=name, value=real, ref_type=ref_type)
 
     u, limit, guard = plain.decimal(entry["u_um"]), plain.decimal(entry["limit_um"]), entry["guard_band_um"]
     stated = (
@@ -156,8 +150,9 @@ def evidence(
         parts = [_values(path, entry["errors"], figures, certifies=certifies)] if entry["errors"] else []
         parts += figures.parts((*path, "test_uncertainty"), entry["test_uncertainty"])
         if parts:
-            name = figures.texts.words(say("All values decided by {standard}", standard=Verbatim(entry["standard"])))
-            found.append(dcc.DccResult(name=name, data=dcc.Data(parts=tuple(parts)), ref_type=("cmm_conformity",)))
+            name = say("All values decided by {standard}", standard=Verbatim(entry["standard"]))
+            data = dcc.Data(parts=tuple(parts))
+            found.append(figures.texts("DccResult", name=name, data=data, ref_type="cmm_conformity"))
     return tuple(found)
 
 
@@ -171,8 +166,8 @@ def _values(
     )  # fmt: skip
     known = all(error["u_um"] > 0 for error in errors)
     values = plain.decimals([error["error_um"] for error in errors])
-    column = dcc.DccQuantity(
-        id=figures.id_of((*below, "error_um")), name=texts.words(say("Value")), ref_type=("basic_measurementError",),
+    column = texts(
+        "DccQuantity", id=figures.id_of((*below, "error_um")), name=say("Value"), ref_type="basic_measurementError",
         value=dcc.RealList(values=values, units=(_MICROMETRE,), uncertainty=uncertainty if known else None),
     )  # fmt: skip
     others = [{key: error[key] for key in error if key not in ("error_um", "u_um", "U_um")} for error in errors]
@@ -181,8 +176,8 @@ def _values(
     ]
     words = tuple(IN_THE_SCHEMA[error["outcome"]] for error in errors)
     outcomes = (dcc.StatementMetadata(conformity_list=words, ref_type=("basic_conformity",)),) if certifies else ()
-    name = texts.words(say("Values in the order of the recording"))
-    return dcc.QuantityList(name=name, parts=(column, *rest), metadata=outcomes, ref_type=("cmm_table",))
+    name = say("Values in the order of the recording")
+    return texts("QuantityList", name=name, parts=(column, *rest), metadata=outcomes, ref_type="cmm_table")
 
 
 _TITLES: Mapping[str, Text] = MappingProxyType({
@@ -217,42 +212,33 @@ def digital_certificate(
     stated = [statement(i, entry, figures, certifies=real) for i, entry in enumerate(decided)]
     # results.json itself: what D-SI has no place for stands there
     content = as_json(results) if file is None else file
-    everything = dcc.DccResult(
-        name=texts.words(say("Every figure, for other programs")), ref_type=("cmm_resultsFile",),
-        data=dcc.Data(parts=(dcc.Attached(file_name="results.json", mime_type="application/json", data=content),)),
-    )  # fmt: skip
-    mark, title = mark_of(job), Verbatim(job.facts.machine.name)
+    file_of_results = dcc.Attached(file_name="results.json", mime_type="application/json", data=content)
+    everything = texts("DccResult", name=say("Every figure, for other programs"), ref_type="cmm_resultsFile",
+                       data=dcc.Data(parts=(file_of_results,)))  # fmt: skip
+    mark, machine = mark_of(job), Verbatim(job.facts.machine.name)
+    title = say("Calibration of {machine}", machine=machine)
+    if mark is not None:
+        title = say("{banner}: {machine}", banner=mark.banner, machine=machine)
     return dcc.Certificate(
         administrative=dcc.Administrative(
-            software=administration.software(results, texts),
-            ref_types=administration.ref_types(texts),
-            core=administration.core_data(job, texts),
-            items=administration.items(job, texts),
-            laboratory=administration.laboratory(job, texts),
-            persons=administration.persons(job, texts),
+            software=administration.software(results, texts), ref_types=administration.ref_types(texts),
+            core=administration.core_data(job, texts), items=administration.items(job, texts),
+            laboratory=administration.laboratory(job, texts), persons=administration.persons(job, texts),
             customer=administration.customer(job, texts),
             statements=(*administration.formal_statements(job, results, texts), *stated),
         ),
         measurements=(
-            dcc.Measurement(
-                name=texts.words(
-                    say("Calibration of {machine}", machine=title) if mark is None
-                    else say("{banner}: {machine}", banner=mark.banner, machine=title)
-                ),
-                methods=administration.methods(job, results, texts),
-                software=administration.software(results, texts),
-                equipment=administration.equipment(job, results, texts),
-                conditions=administration.conditions(job, texts),
+            texts(
+                "Measurement", name=title, methods=administration.methods(job, results, texts),
+                software=administration.software(results, texts), equipment=administration.equipment(job, results, texts),
+                conditions=administration.conditions(job, texts), metadata=administration.metadata(results, texts),
                 results=(*_results(results, figures), *evidence(decided, figures, certifies=real), everything),
-                metadata=administration.metadata(results, texts),
                 ref_id=("machine",),
                 ref_type=("cmm_calibration",) if real else (f"cmm_{job.origin}", "cmm_notACertificate"),
             ),
         ),
-        document=None if html is None else dcc.Attached(
-            file_name=file_name("certificate.html", job.origin), mime_type="text/html", data=html,
-            name=texts.words(say("The same certificate for reading")),
-        ),
+        document=html and texts("Attached", file_name=file_name("certificate.html", job.origin), mime_type="text/html",
+                                data=html, name=say("The same certificate for reading")),
     )  # fmt: skip
 
 
@@ -267,10 +253,9 @@ def _results(results: Mapping[str, Any], figures: plain.DigitalFigures) -> list[
         else:
             parts = tuple(figures.parts((key,), data))
         if parts:
-            title = figures.texts.words(_TITLES.get(key, Verbatim(plain.without_unit(key).capitalize())))
-            found.append(
-                dcc.DccResult(name=title, data=dcc.Data(parts=parts), ref_type=(plain.plain_name(f"cmm_{key}"),))
-            )
+            title = _TITLES.get(key, Verbatim(plain.without_unit(key).capitalize()))
+            data, ref_type = dcc.Data(parts=parts), plain.plain_name(f"cmm_{key}")
+            found.append(figures.texts("DccResult", name=title, data=data, ref_type=ref_type))
     together = _together(results, figures)
     return found if together is None else [*found, together]
 
@@ -306,7 +291,9 @@ def _together(results: Mapping[str, Any], figures: plain.DigitalFigures) -> dcc.
         uncertainty=dcc.ExpandedList(uncertainties=U, factors=k, probabilities=(plain.P95,)),
         region=dcc.EllipsoidalRegion(columns=columns, factor=factor, probability=plain.P95, distribution="normal"),
     )  # fmt: skip
-    title = figures.texts.words(say("Estimates together, with their covariance"))
-    ref_type = ("cmm_covariance",)
-    quantity = dcc.DccQuantity(id=figures.id_of(("covariance",)), name=title, value=stated, ref_type=ref_type)
-    return dcc.DccResult(name=title, data=dcc.Data(parts=(quantity,)), ref_type=ref_type)
+    texts, named = (
+        figures.texts,
+        {"name": say("Estimates together, with their covariance"), "ref_type": "cmm_covariance"},
+    )
+    quantity = texts("DccQuantity", id=figures.id_of(("covariance",)), value=stated, **named)
+    return texts("DccResult", data=dcc.Data(parts=(quantity,)), **named)

@@ -13,7 +13,7 @@ from typing import Any
 
 from cmm_uq.base.units import UNITS
 from cmm_uq.jobs.dcc import certificate as dcc
-from cmm_uq.jobs.dcc.certificate import DccQuantity, Measurement, QuantityList, StatementMetadata
+from cmm_uq.jobs.dcc.certificate import DccQuantity, Element, Measurement, QuantityList, StatementMetadata
 
 Covariance = tuple[tuple[tuple[Decimal, ...], ...], str]  # of the values, row by row, and its unit
 
@@ -35,6 +35,12 @@ class ValueUncertainty:
         if self.standard is not None or self.expanded is None or not self.factor:
             return self.standard
         return self.expanded / self.factor
+
+    @property
+    def printed(self) -> tuple[str, str, str, str]:
+        """U, k, u and interval, empty where it is not given."""
+        interval = "" if self.low is None else f"{self.low} to {self.high}"
+        return _text(self.expanded), _text(self.factor), _text(self.standard), interval
 
 
 NONE = ValueUncertainty()
@@ -100,69 +106,55 @@ def statements(measurement: Measurement) -> Iterator[StatementMetadata]:
 
 def _numbers(value: Any) -> Iterator[dict[str, Any]]:
     """Values, units and uncertainties of whatever a quantity consists of; of a hybrid by its first unit."""
-    match value:
-        case dcc.Hybrid():
+    match type(value).__name__:
+        case "Hybrid":
             yield from _numbers(value.values[0])
-        case dcc.Real() | dcc.Constant() | dcc.RealInList():
-            labels = (value.label,) if value.label else ()
-            stated = (_stated(value.uncertainty),)
-            yield {"values": (value.value,), "units": (value.unit or "",), "uncertainties": stated, "labels": labels}
-        case dcc.RealList():
-            count = len(value.values)
-            each = _stated_of_list(value.uncertainty, count)
-            yield {"values": value.values, "units": _each(value.units, count, ""), "labels": value.labels,
-                   "uncertainties": each, "covariance": _covariance(value.region)}  # fmt: skip
-        case dcc.Reals(values=reals):
-            common = _stated(value.uncertainty and value.uncertainty.stated)
-            yield {
-                "values": tuple(real.value for real in reals),
-                "uncertainties": tuple(common if r.uncertainty is None else _stated(r.uncertainty) for r in reals),
-                "units": tuple(real.unit or value.unit or "" for real in reals),
-                "labels": tuple(real.label or "" for real in reals) if any(real.label for real in reals) else (),
-                "covariance": _covariance(value.region),
-            }
-        case dcc.Lists():
+        case "Lists":
             for inner in value.lists:
                 yield from _numbers(inner)
-        case dcc.Characters():
-            yield {"words": value.words}
-        case dcc.Complex() | dcc.Complexes():
+        case "Real" | "Constant" | "RealInList":
+            yield _by_themselves((value,))
+        case "Reals":
+            yield _by_themselves(value.values, value.unit, _stated(value.uncertainty), value.region)
+        case "RealList":
+            count, covariance = len(value.values), _covariance(value.region)
+            yield {"values": value.values, "units": _each(value.units, count, ""), "labels": value.labels,
+                   "uncertainties": _stated_of_list(value.uncertainty, count), "covariance": covariance}  # fmt: skip
+        case "Complex" | "Complexes":
             yield {"words": ("a complex quantity",)}
         case _:
-            yield {"words": (_words(value),)}
+            yield {"words": value.words if isinstance(value, dcc.Characters) else (_words(value),)}
 
 
-def _stated(stated: object) -> ValueUncertainty:
-    match stated:
-        case dcc.Univariate():
-            return _stated(stated.stated)
-        case dcc.Expanded() | dcc.ExpandedMU():
-            return ValueUncertainty(stated.uncertainty, stated.factor, stated.probability)
-        case dcc.Interval():
-            return ValueUncertainty(None, None, stated.probability, stated.standard, stated.low, stated.high)
-        case dcc.StandardMU():
-            return ValueUncertainty(standard=stated.standard)
-        case Decimal():
-            return ValueUncertainty(standard=stated)
-    return NONE
+def _by_themselves(
+    reals: Sequence[Element], unit: str | None = None, common: ValueUncertainty = NONE, region: Element | None = None
+) -> dict[str, Any]:
+    """Of values one by one, with what all of them have in common."""
+    return {
+        "values": tuple(real.value for real in reals), "units": tuple(real.unit or unit or "" for real in reals),
+        "uncertainties": tuple(common if real.uncertainty is None else _stated(real.uncertainty) for real in reals),
+        "labels": tuple(real.label or "" for real in reals) if any(real.label for real in reals) else (),
+        "covariance": _covariance(region),
+    }  # fmt: skip
 
 
-def _stated_of_list(stated: object, count: int) -> tuple[ValueUncertainty, ...]:
+_STATED = ("uncertainty", "factor", "probability", "standard", "low", "high")
+_STATED_OF_LIST = ("uncertainties", "factors", "probabilities", "standards", "lows", "highs")
+"""Fields of all forms of uncertainty, in the order of :class:`ValueUncertainty`."""
+
+
+def _stated(stated: Any) -> ValueUncertainty:
+    stated = getattr(stated, "stated", stated)
+    if isinstance(stated, Decimal):
+        return ValueUncertainty(standard=stated)
+    return ValueUncertainty(*(getattr(stated, name, None) for name in _STATED))
+
+
+def _stated_of_list(stated: Any, count: int) -> tuple[ValueUncertainty, ...]:
     """One a value, where the certificate may have one for all."""
-    columns: Sequence[Sequence[Any]]
-    match stated:
-        case dcc.UnivariateList():
-            return _stated_of_list(stated.stated, count)
-        case dcc.ExpandedList() | dcc.ExpandedListMU():
-            columns = (stated.uncertainties, stated.factors, stated.probabilities)
-        case dcc.StandardListMU():
-            columns = ((None,), (None,), (None,), stated.standards)
-        case dcc.IntervalList():
-            columns = ((None,), (None,), stated.probabilities, stated.standards, stated.lows, stated.highs)
-        case _:
-            return (NONE,) * count
-    rows = zip(*(_each(column, count, None) for column in columns), strict=True)
-    return tuple(ValueUncertainty(*row) for row in rows)
+    stated = getattr(stated, "stated", stated)
+    columns = (_each(getattr(stated, name, ()), count, None) for name in _STATED_OF_LIST)
+    return tuple(ValueUncertainty(*row) for row in zip(*columns, strict=True))
 
 
 def _each(column: Sequence[Any], count: int, otherwise: Any) -> tuple[Any, ...]:
@@ -172,7 +164,7 @@ def _each(column: Sequence[Any], count: int, otherwise: Any) -> tuple[Any, ...]:
     return (column[0],) * count if len(column) == 1 else (otherwise,) * count
 
 
-def _covariance(region: dcc.EllipsoidalRegion | None) -> Covariance | None:
+def _covariance(region: Element | None) -> Covariance | None:
     if region is None:
         return None
     units = {element.unit for column in region.columns for element in column.covariances}
@@ -271,7 +263,9 @@ def _particulars(certificate: dcc.Certificate) -> Rows:
         ("Replaces", "" if core.replaced is None else f"{core.replaced.identifier} ({core.replaced.change})"),
         ("Previous report", _hashed(core.previous)), ("Laboratory", _contact(administrative.laboratory.contact)),
         ("Laboratory code", administrative.laboratory.code or ""), ("Customer", _contact(administrative.customer)),
-        *(("Item", _item(item)) for item in administrative.items.items), ("Received", _text(core.received)),
+        *(("Item", _joined(item.name, item.manufacturer and item.manufacturer.name, item.model, *_identified(item)))
+          for item in administrative.items.items),
+        ("Received", _text(core.received)),
         ("Calibrated", performed), ("Issued", _text(core.issued)), ("Place", core.location.place),
         ("Languages", ", ".join(core.languages)),
         *(("Responsible", _joined(person.person.name, person.role, by=" ")) for person in administrative.persons),
@@ -285,7 +279,10 @@ def _measured(measurement: Measurement) -> tuple[str, Rows, tuple[Grid, ...]]:
     equipment = () if measurement.equipment is None else measurement.equipment.equipment
     rows = _rows(
         *(("Method", _joined(method.name, *method.norms, *method.references)) for method in measurement.methods),
-        *(("Equipment", _equipment(piece)) for piece in equipment),
+        *(
+            ("Equipment", _joined(piece.name, piece.model, *_identified(piece), _certified(piece)))
+            for piece in equipment
+        ),
         *(("Condition", f"{each.name}: {_sentence(of_data(each.data, ()))}") for each in measurement.conditions),
         *_conformity(measurement),
     )
@@ -307,8 +304,7 @@ def _below_each_other(title: str, quantities: Sequence[QuantityFigures]) -> Grid
     rows = [("Quantity", "Value", "Unit", "U", "k", "u", "Interval")]
     for quantity in quantities:
         for value, unit, stated in zip(quantity.values, quantity.units, quantity.uncertainties, strict=True):
-            U, k, u = _text(stated.expanded), _text(stated.factor), _text(stated.standard)
-            rows.append((quantity.shown, str(value), unit_shown(unit), U, k, u, _interval(stated)))
+            rows.append((quantity.shown, str(value), unit_shown(unit), *stated.printed))
         if not quantity.values:
             rows.append((quantity.shown, " ".join(quantity.words), "", "", "", "", ""))
     used = [i for i in range(len(rows[0])) if any(row[i] for row in rows[1:])]
@@ -325,17 +321,11 @@ def _columns(quantity: QuantityFigures) -> list[tuple[str, list[str]]]:
         values = [f"{v} {unit_shown(own)}".rstrip() for v, own in zip(values, quantity.units, strict=True)]
     elif quantity.units[0] and unit_shown(quantity.units[0]):
         unit = f" / {unit_shown(quantity.units[0])}"
-    stated = quantity.uncertainties
-    further = [
-        (f"U{unit}", [_text(one.expanded) for one in stated]), ("k", [_text(one.factor) for one in stated]),
-        (f"u{unit}", [_text(one.standard) for one in stated]), (f"interval{unit}", [_interval(one) for one in stated]),
-    ]  # fmt: skip
+    stated = zip(*(one.printed for one in quantity.uncertainties), strict=True)
+    headings = (f"U{unit}", "k", f"u{unit}", f"interval{unit}")
+    further = [(heading, list(cells)) for heading, cells in zip(headings, stated, strict=True) if any(cells)]
     labels = [(f"{quantity.shown}: label", list(quantity.labels))] if quantity.labels else []
-    return [*labels, (f"{quantity.shown}{unit}", values), *(column for column in further if any(column[1]))]
-
-
-def _interval(stated: ValueUncertainty) -> str:
-    return "" if stated.low is None else f"{stated.low} to {stated.high}"
+    return [*labels, (f"{quantity.shown}{unit}", values), *further]
 
 
 def _conformity(measurement: Measurement) -> Rows:
@@ -366,18 +356,12 @@ def _value(quantity: QuantityFigures, i: int) -> str:
     return f"{quantity.values[i]} {unit}".rstrip() + U
 
 
-def _item(item: dcc.Item) -> str:
-    maker = item.manufacturer and item.manufacturer.name
-    return _joined(item.name, maker, item.model, *_identified(item.identifications))
+def _certified(piece: Element) -> str:
+    return piece.certificate and f"certificate {_hashed(piece.certificate)}"
 
 
-def _equipment(piece: dcc.Equipment) -> str:
-    certificate = piece.certificate and f"certificate {_hashed(piece.certificate)}"
-    return _joined(piece.name, piece.model, *_identified(piece.identifications), certificate)
-
-
-def _identified(identifications: Iterable[dcc.IdentificationNumber]) -> list[str]:
-    return [f"{_text(number.name) or number.issuer} {number.value}" for number in identifications]
+def _identified(of: Element) -> list[str]:
+    return [f"{_text(number.name) or number.issuer} {number.value}" for number in of.identifications]
 
 
 def _hashed(chain: dcc.Hash | None) -> str:
