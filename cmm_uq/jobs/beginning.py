@@ -51,11 +51,10 @@ class Beginning:
     command: str = "report"
 
 
+# ``[machine]`` of a new job of any kind
 MACHINE: Mapping[str, Any] = MappingProxyType({
     "name": "Bridge machine", "travel_mm": {"x": [0.0, 700.0], "y": [0.0, 1000.0], "z": [-600.0, 0.0]},
 })  # fmt: skip
-"""``[machine]`` of a new job of any kind."""
-
 AT_20_C: Mapping[str, float] = MappingProxyType({"temp_artefact_c": 20.0})  # in a first recording
 
 

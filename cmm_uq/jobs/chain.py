@@ -22,9 +22,8 @@ from cmm_uq.jobs.reports import AS_FOUND
 from cmm_uq.jobs.tables.artefact import ACCREDITED, CONSENSUS, IN_HOUSE, MATERIAL, NATIONAL, OTHER, Traceability
 from cmm_uq.jobs.tables.origin import MEASURED
 
+# what a statement of traceability says; the last where nothing that is certified enters
 Claim = Literal["traceable", "by evidence", "not shown", "none needed"]
-"""What a statement of traceability says; the last where nothing that is certified enters."""
-
 Lack = tuple[Text, str]  # what a claim lacks, in words without keys, and the key of job.toml that would mend it
 NOT_MEASURED = say("Nobody measured this recording, and no result of it is traceable.")
 OWN_MACHINE = say(

@@ -58,9 +58,8 @@ COLUMNS: Mapping[str, str] = MappingProxyType({
     "n_points": "Number of points of the fit that gave the point.",
 })  # fmt: skip
 _OF_SOME_MACHINES = re.compile(r"temp_(bridge|ram)_.*|depth_mm|turned_deg")
+# columns that a recording may have, and that are refused in another unit than that of their name
 OPTIONAL = tuple(name for name in COLUMNS if name not in REQUIRED and not _OF_SOME_MACHINES.fullmatch(name))
-"""Columns that a recording may have, and that are refused in another unit than that of their name."""
-
 LARGEST_NUMBER = 1e9  # of a measurement, point or repeat
 LARGEST_OF = {"_mm": LONGEST_MM, "_um": 1e9, "_c": 1e5, "_pct": 1e6, "_deg": 1e6}
 """By the ending of a column's name: far beyond any recording in its unit, so that a mistaken unit is still told as one."""
@@ -75,6 +74,7 @@ def largest(column: str) -> float:
 
 _AXES = {a: Verbatim(a.upper()) for a in AXES}
 
+# by name of the column
 WORDS: Mapping[str, Text] = MappingProxyType({
     **{f"{a}_mm": axis for a, axis in _AXES.items()},
     **{f"approach_{a}": say("direction of travel along {axis}", axis=axis) for a, axis in _AXES.items()},
@@ -95,8 +95,6 @@ WORDS: Mapping[str, Text] = MappingProxyType({
     "depth_mm": say("scan depth"),
     "radius_mm": say("fitted radius"), "fit_rms_um": say("residuals of the fit"), "n_points": say("number of points fitted"),
 })  # fmt: skip
-"""By name of the column."""
-
 _UNITS: Mapping[str, Text] = MappingProxyType({
     "_mm_s": Verbatim("mm/s"), "_mm": unit("mm"), "_um": unit("µm"), "_c": unit("°C"), "_s": unit("s"),
     "_hpa": Verbatim("hPa"), "_pct": unit("%"), "_deg": unit("°"),

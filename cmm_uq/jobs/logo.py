@@ -19,15 +19,13 @@ if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
 _SVG = "{http://www.w3.org/2000/svg}"
+# elements that draw, and what they draw with; letters are none: fonts differ from machine to machine
 _DRAWING = frozenset({
     "svg", "g", "defs", "title", "desc", "metadata", "style", "path", "rect", "circle", "ellipse", "line", "polyline",
     "polygon", "image", "linearGradient", "radialGradient", "stop", "clipPath", "mask",
 })  # fmt: skip
-"""Elements that draw, and what they draw with; letters are none: fonts differ from machine to machine."""
-
+# of namespaces of drawing programs: their notes draw nothing
 _EDITORS = ("inkscape", "sodipodi", "rdf-syntax", "purl.org/dc", "creativecommons.org", "ns.adobe.com")
-"""Of namespaces of drawing programs: their notes draw nothing."""
-
 _OUTWARD = re.compile(
     r"@import|@font-face|javascript:|expression\s*\(|url\s*\(\s*['\"]?\s*(?!['\"]?\s*#)|\\", re.IGNORECASE
 )

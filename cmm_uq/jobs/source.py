@@ -14,22 +14,19 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import FILE_NAME, Limit
 
+# names that commands write, or attach to a certificate, beside the recording of a job
 _WRITTEN = re.compile(
     r"job\.toml|results\.json|manifest\.json|truth\.toml|compensation\.json|(certificate|diagnosis|plan).*\.(html|pdf)"
     r"|posterior.*\.npz|budget\..*|\.unfinished-.*",
     re.IGNORECASE,
 )
-"""Names that commands write, or attach to a certificate, beside the recording of a job."""
-
 DERIVED = ("truth.toml", "compensation.json")  # names that belong beside a derived recording
 RESULTS = "results.json"  # name of what another job's report wrote; a job may keep it in a folder of its own
 
+# names of what another job's report wrote and this one may go by
 _REPORTED = re.compile(r"results\.json|posterior.*\.npz|certificate.*\.pdf", re.IGNORECASE)
-"""Names of what another job's report wrote and this one may go by."""
-
+# windows takes these for devices, with any ending
 _DEVICE = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])(\..*)?", re.IGNORECASE)
-"""Windows takes these for devices, with any ending."""
-
 _COPY = "Copy the file into the folder and name it there: a job must be complete by itself"
 _FORBIDDEN = frozenset('<>:"|?*')  # on Windows
 

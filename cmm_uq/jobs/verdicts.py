@@ -13,9 +13,8 @@ from typing import Any, Literal
 from cmm_uq.base.messages import NOTHING, Text, Verbatim
 from cmm_uq.base.units import UNITS, printed_unit
 
+# outcomes of statements, the gravest first: findings in their order; incomplete is what would pass, were it whole
 GRAVEST = ("fail", "conditional fail", "remeasure", "undecided", "incomplete", "conditional pass", "pass")
-"""Outcomes of statements, the gravest first: findings in their order; incomplete is what would pass, were it whole."""
-
 NONE = "none"  # in place of an outcome where nothing is stated
 BEYOND = frozenset({"fail", "conditional fail"})  # outcomes that find a machine beyond a limit
 

@@ -21,12 +21,10 @@ from cmm_uq.base.files.content import text_of
 from cmm_uq.base.files.limits import CELL, CELLS, COLUMN_NAME, COLUMNS, LINE, LINES, ROWS, Limit
 from cmm_uq.base.points import Floats
 
+# sizes of a number in a table, other than 0: squares and sums of 10⁵ of them stay far within a double's range
 SMALLEST, LARGEST = 1e-30, 1e15
-"""Sizes of a number in a table, other than 0: squares and sums of 10⁵ of them stay far within a double's range."""
-
+# of what is written with these alone, ``float`` takes exactly the numbers of this module
 _CHARACTERS = b"0123456789+-.eE"
-"""Of what is written with these alone, ``float`` takes exactly the numbers of this module."""
-
 GIVE = "Give a number"
 GIVE_OR_REMOVE = "Give a number, or remove the column"  # of a column that need not be there
 MEASURE = "Measure the point again, or leave out its measurement"  # of a coordinate

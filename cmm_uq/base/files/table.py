@@ -52,9 +52,8 @@ def required(sentence: str) -> Any:
     return Field(description=sentence)
 
 
+# largest coordinate or length, mm: ten metres written in micrometres, so that a mistaken unit is still told as one
 LONGEST_MM = 1e7
-"""Largest coordinate or length, mm: ten metres written in micrometres, so that a mistaken unit is still told as one."""
-
 SMALLEST_UM = 1e-6  # least standard uncertainty or limit other than 0, µm: a picometre, a hundredth of an atom
 LARGEST_UM = 1e6  # largest standard uncertainty, limit or error, µm: a metre
 
@@ -85,19 +84,16 @@ def _plain_column(name: str) -> str:
 Position = Annotated[float, Field(ge=-LONGEST_MM, le=LONGEST_MM)]  # A coordinate, or a shift, mm
 Length = Annotated[float, Field(gt=0, le=LONGEST_MM), at_least(1e-6)]  # A length, mm
 
+# A limit, or a standard uncertainty that cannot be 0, µm
 Limit = Annotated[float, Field(gt=0, le=LARGEST_UM), at_least(SMALLEST_UM)]
-"""A limit, or a standard uncertainty that cannot be 0, µm."""
-
+# A standard uncertainty, µm, or 0 where it does not count
 Uncertainty = Annotated[float, Field(ge=0, le=LARGEST_UM), AfterValidator(_zero_or_more_than_nothing)]
-"""A standard uncertainty, µm, or 0 where it does not count."""
-
 Temperature = Annotated[float, Field(ge=-273.15, le=1000)]  # °C
 Duration = Annotated[float, Field(ge=0, le=1e6)]  # minutes or seconds
 Number = Annotated[int, Field(ge=-1_000_000_000, le=1_000_000_000)]  # of a measurement or point
 
+# A number in a unit that only its name knows: as large as in a recording
 AnyFloat = Annotated[float, Field(ge=-1e15, le=1e15)]
-"""A number in a unit that only its name knows: as large as in a recording."""
-
 Column = Annotated[str, AfterValidator(_plain_column)]  # name of a recorded column
 Range = Annotated[list[Position], Field(min_length=2, max_length=2)]
 Triple = Annotated[list[Position], Field(min_length=3, max_length=3)]

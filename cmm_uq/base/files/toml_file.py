@@ -27,14 +27,13 @@ _STRING = (
     r'|"(?:[^"\\\n]++|\\.)*+"?+'
     r"|'[^'\n]*+'?+"
 )
+# every alternative takes all that it can and never gives back, so that the time is linear in the text
 _TOKEN = re.compile(
     rf"(?P<dotted>(?:(?:[\w-]++|{_STRING})[ \t]*+\.[ \t]*+){{{DEPTH.most}}}+)"
     rf"|(?P<string>{_STRING})|(?P<comment>\#[^\n]*+)"
     rf"|(?P<long>[\w-]{{{NUMERAL.most + 1},}}+)|[\w-]++|(?P<open>[\[{{])|(?P<close>[\]}}])",
     re.DOTALL,
 )
-"""Every alternative takes all that it can and never gives back, so that the time is linear in the text."""
-
 _MARKS = frozenset("\u200c\u200d\u200e\u200f\u061c\u00ad\ufeff")
 """Invisible characters that ordinary text of some languages needs; all others steer terminals and change what is read."""
 
@@ -112,9 +111,8 @@ def _check_characters(text: str, place: str) -> None:
 
 Facts = TypeVar("Facts", bound=BaseModel)
 
+# of the names that stand in a location for one of several tables that a key may have, none of which the user wrote
 _CHOICE = re.compile("GuardBand|FalseAccept|UncertaintyRatio|PosteriorProbability|UnconditionalRisk|literal")
-"""Of the names that stand in a location for one of several tables that a key may have, none of which the user wrote."""
-
 _ONE_MEANT = re.compile(r"Did you mean '([^']*)'\?")
 _SHOWN = 60  # characters of a key or a value in a message
 

@@ -18,9 +18,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Protocol
 
+# how long to wait for files that are just being put in place: the process ends within two seconds of a signal
 PATIENCE_S = 1.2
-"""How long to wait for files that are just being put in place: the process ends within two seconds of a signal."""
-
 _LONGER_S = 5 * PATIENCE_S  # longer than the process has left
 
 

@@ -28,12 +28,11 @@ from cmm_uq.jobs.dcc import certificate as dcc
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.verdicts import TOLERANCE_RULE, Verdict, Verdicts
 
+# by the word of results.json
 IN_THE_SCHEMA: Mapping[str, str] = MappingProxyType({
     "pass": "pass", "fail": "fail", "conditional pass": "conditionalPass", "conditional fail": "conditionalFail",
     "undecided": "noPass", "incomplete": "noPass", "remeasure": "noPass",
 })  # fmt: skip
-"""By the word of results.json."""
-
 _WHY: Mapping[str, Text] = MappingProxyType({
     "undecided": say("Neither conformity nor nonconformity is proved by the rule, so noPass: conformity is not stated."),
     "incomplete": say(
@@ -190,12 +189,11 @@ _TITLES: Mapping[str, Text] = MappingProxyType({
 })  # fmt: skip
 """Of parts of results.json that every kind has, in the order of the certificate; those of a kind have their key as title."""
 
+# keys that are no results of the machine, or stand elsewhere in the certificate; the attached results.json has them
 _NOT_STATED_THERE = (
     "schema", "software", "job", "import", "acquisition", "sampling", "identifiability", "diagnosis", "screening", "posterior",
     "accuracy", "conformity", "verdicts", "covariance", "iso17025", "traceability", "replaced",
 )  # fmt: skip
-"""Keys that are no results of the machine, or stand elsewhere in the certificate; the attached results.json has them."""
-
 _MOST = 40  # estimates whose covariance is written out; of more, the attached results.json has it.
 
 

@@ -26,9 +26,8 @@ from cmm_uq.jobs.dcc.certificate import Element
 
 ONE = UNITS["1"]
 _ENDINGS: Mapping[str, Unit] = MappingProxyType({**PRINTED, "deg": UNITS["°"], "mm2": UNITS["mm²"]})
+# keys of what has no unit, also where the key above them has one
 _PLAIN = ("k", "probability", "p_value", "share", "dof", "draws", "repeat", "measurement", "point", "points")
-"""Keys of what has no unit, also where the key above them has one."""
-
 # a unit of the table with its prefix, and the power of both
 _FACTOR = re.compile(r"((?:\\(?:nano|micro|milli|centi|kilo))?\\[a-z]+)(?:\\tothe\{(-?\d+)\})?")
 _SHORT = 4  # numbers of a list that stand in columns of their own: a point, a direction

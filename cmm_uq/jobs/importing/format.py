@@ -165,6 +165,7 @@ class Format(ABC):
         """
 
 
+# by their first bytes
 _UNREAD: tuple[tuple[bytes | tuple[bytes, ...], str, str], ...] = (
     (b"\xd0\xcf\x11\xe0", "is a workbook of the old kind (.xls), or one with a password",
      "Save it as .xlsx without a password"),
@@ -176,8 +177,6 @@ _UNREAD: tuple[tuple[bytes | tuple[bytes, ...], str, str], ...] = (
     ((b"\x89PNG", b"\xff\xd8\xff"), "is a picture", "Export the table itself, as CSV or .xlsx"),
     (b"SQLite format 3", "is a database", "Export the table as CSV or .xlsx"),
 )  # fmt: skip
-"""By their first bytes."""
-
 # Asked in this order, after those of other packages; a text that is none of them is a text table.
 BUILT_IN = (
     *("tabular.Excel", "tabular.OpenDocument", "documents.Qif", "documents.Dcc"),

@@ -57,14 +57,13 @@ _PHRASES: Mapping[str, str] = {
 }  # fmt: skip
 _COLUMNS = {phrase: column for column, phrases in _PHRASES.items() for phrase in phrases.split("|")}
 
+# words beside the letter of an axis that leave it a coordinate
 _COORDINATE = _set(
     "coordinate coordinates coord koordinate koord coordonnee coordinata coordenada value wert valeur valore valor axis achse "
     "axe asse eje actual measured ist istwert gemessen messwert mesure mesuree misurato misurata medido medida position pos "
     "center centre mitte mittelpunkt centro point punkt punto ball kugel sphere boule bille sfera esfera p pt act ax "
     "kugelmitte"
 )
-"""Words beside the letter of an axis that leave it a coordinate."""
-
 _NOMINAL = _set(
     "nominal nom soll sollwert theo theoretical theorique nominale teorico teorica target cad nennwert cible obiettivo"
 )
@@ -80,9 +79,8 @@ _TIP = _set("tip taster stylus tastkopf palpeur tastatore palpador offset")
 _SMALL = _set("no nr n number nummer numero num")
 _LONGEST = 120  # characters of a heading; longer text is none
 
+# coverage factor in a heading, as ``U (µm), k = 2``
 COVERAGE = re.compile(r"[\[(,;]?\s*\bk\s*=\s*(\d+(?:[.,]\d+)?)\s*[\])]?", re.IGNORECASE)
-"""Coverage factor in a heading, as ``U (µm), k = 2``."""
-
 # what certificates print above a column, beside its unit or its coverage factor
 _SYMBOLS: Mapping[str, str] = {"U": "reference_U_um", "U95": "reference_U_um", "u": "reference_u_um"}
 _FIGURES = frozenset("0123456789+-−.,")

@@ -95,9 +95,8 @@ def apart(cell: str) -> tuple[str, WrittenUnit] | None:
 
 Source = str | Annotated[int, Field(ge=1, le=COLUMNS.most)]  # A column of the file: its heading, or its number from 1
 
+# one, or several where a row holds several points, in their order
 Sources = Source | Annotated[list[Source], Field(min_length=1, max_length=COLUMNS.most)]
-"""One, or several where a row holds several points, in their order."""
-
 DELIMITERS: Mapping[str, str] = {",": ",", ";": ";", "tab": "\t", "blank": " ", "|": "|"}
 
 

@@ -19,28 +19,24 @@ from cmm_uq.jobs.importing.keys import WrittenUnit, apart, unit_named
 
 _E = r"(?:[eE][+-]?\d+)?"
 _BLANKS = " \u00a0\u202f\u2009'’"
+# A comma that can only be a decimal one
 _COMMA_DECIMAL = re.compile(
     rf"^[+-]?(?:\d{{1,3}}(?:[.{_BLANKS}]\d{{3}})+,\d+|0\d*,\d+|\d{{4,}},\d+|\d*,(?:\d{{1,2}}|\d{{4,}})|,\d+"
     rf"|\d+,\d+(?=[eE])){_E}$", re.MULTILINE,
 )  # fmt: skip
-"""A comma that can only be a decimal one."""
-
+# commas that can only be between groups of three digits
 _COMMA_GROUPS = re.compile(rf"^[+-]?[1-9]\d{{0,2}}(?:(?:,\d{{3}})+\.\d*|(?:,\d{{3}}){{2,}}){_E}$", re.MULTILINE)
-"""Commas that can only be between groups of three digits."""
-
+# A point that can only be a decimal one
 _POINT_DECIMAL = re.compile(
     rf"^[+-]?(?:0\d*\.\d+|\d{{4,}}\.\d*|\d*\.(?:\d{{1,2}}|\d{{4,}})?|\.\d+|\d+\.\d+(?=[eE])){_E}$", re.MULTILINE
 )
-"""A point that can only be a decimal one."""
-
 _TWO_COMMAS = re.compile(r",\d*,")
 _POINT_GROUPS = re.compile(r"^[+-]?[1-9]\d{0,2}(?:\.\d{3}){2,}$", re.MULTILINE)
+# A number with groups of three digits
 _GROUPED = {
     sign: re.compile(rf"[+-]?\d{{1,3}}(?:(?:[{_BLANKS}]\d{{3}})+|(?:{group}\d{{3}})+)(?:{mark}\d*)?{_E}")
     for sign, mark, group in ((".", r"\.", ","), (",", ",", r"\."))
 }
-"""A number with groups of three digits."""
-
 At = Callable[[int, int], str]  # place of a cell, by indices of column and row
 
 

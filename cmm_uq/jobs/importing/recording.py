@@ -26,9 +26,8 @@ from cmm_uq.jobs.importing.format import Fact, Recognition, Sheet, format_of
 from cmm_uq.jobs.importing.header import POINTS, REFERENCES, Header, header_of, no_header
 from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys, length_named
 
+# lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled
 SHORTEST_NORMAL, LONGEST_NORMAL = 1e-3, 1e3
-"""Lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled."""
-
 _QUANTITIES = {re.sub(r"_(mm|um|c|s|hpa|pct|deg|mm_s)$", "", name): name for name in (*REQUIRED, *OPTIONAL)}
 _OTHER_UNITS = re.compile(
     r"_(m|cm|um|µm|mm|nm|in|inch|mil|k|f|c|min|ms|h|s|pa|kpa|hpa|mbar|mmhg|rad|deg|arcsec|pct|percent)$"

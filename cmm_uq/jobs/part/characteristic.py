@@ -58,11 +58,10 @@ def with_article(what: str) -> str:
     return f"a coordinate {what}" if what in ("x", "y", "z") else f"{'an' if what.startswith('a') else 'a'} {what}"
 
 
+# keys of a characteristic's limits, by how the drawing limits it
 LIMITS: Mapping[str, tuple[str, ...]] = {
     "zone": ("tolerance_mm",), "lengths": ("lower_mm", "upper_mm"), "angles": ("lower_deg", "upper_deg"),
 }  # fmt: skip
-"""Keys of a characteristic's limits, by how the drawing limits it."""
-
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 
 

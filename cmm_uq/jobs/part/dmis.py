@@ -29,6 +29,7 @@ KINDS = {name.upper(): name for name in ("point", "line", "plane", "circle", "sp
 # that a feature has at least: its place, its direction, its diameter
 NUMBERS = {"point": 6, "line": 9, "plane": 6, "circle": 7, "sphere": 4, "cylinder": 7}
 
+# first words of statements that say nothing of what is measured, or that are read elsewhere
 PASSED = (
     "DMISMN", "DMISMD", "DISPLY", "FILNAM", "PRCOMP", "SNSET", "SNSMNT", "OPEN", "CLOSE", "GOTO", "MODE", "TEXT", "SAVE",
     "ENDFIL", "FEDRAT", "ACLRAT", "DECPL", "FINPOS", "RAPID", "FROM", "GOHOME", "CRSLCT", "TECOMP", "WKPLAN", "DEVICE",
@@ -36,8 +37,6 @@ PASSED = (
     "GOTARG", "ENDGO", "CLMPID", "CLMPSN", "FIXTID", "FIXTSN", "OPERID", "PARTID", "PARTRV", "PARTSN", "PLANID", "PREVOP",
     "PROCID", "LOTID", "DMEID", "DMESWI", "DMESWV", "MFGDEV",
 )  # fmt: skip
-"""First words of statements that say nothing of what is measured, or that are read elsewhere."""
-
 
 _TOLERANCES: Mapping[str, What] = {
     "FLAT": "flatness", "STRGHT": "straightness", "CIRLTY": "roundness", "CYLCTY": "cylindricity", "DIAM": "size",
@@ -45,13 +44,12 @@ _TOLERANCES: Mapping[str, What] = {
     "CRNOUT": "circular_runout", "TRNOUT": "total_runout",
 }  # fmt: skip
 
+# words that change what a tolerance means, refused in words of their own
 _REFUSED: Mapping[str, str] = {
     "PROFL": refused.LINE_PROFILE, "PROFS": refused.SURFACE_PROFILE, "PROFP": refused.POINT_PROFILE,
     "MMC": refused.MAXIMUM_MATERIAL, "LMC": refused.LEAST_MATERIAL, "LP": refused.TWO_POINT, "FREE": refused.FREE_STATE,
     "PROJ": refused.PROJECTED,
 }  # fmt: skip
-"""Words that change what a tolerance means, refused in words of their own."""
-
 _PLAIN = ("RFS", "2D", "3D")  # words that leave a tolerance as it is, or say what its feature says already
 
 

@@ -59,6 +59,7 @@ FREE_STATE = "is toleranced in the free state, and how a part bends is not model
 Name = Annotated[str, Field(min_length=1, max_length=100)]
 _INSTEAD = "leave it out, and name it in [part] not_measured"
 
+# as somebody may write them in job.toml
 _WORDS: Mapping[str, str] = {
     "mmc": MAXIMUM_MATERIAL, "mmr": MAXIMUM_MATERIAL, "maximum_material": MAXIMUM_MATERIAL, "m": MAXIMUM_MATERIAL,
     "lmc": LEAST_MATERIAL, "lmr": LEAST_MATERIAL, "least_material": LEAST_MATERIAL, "l": LEAST_MATERIAL,
@@ -69,8 +70,6 @@ _WORDS: Mapping[str, str] = {
     "symmetry": SYMMETRY,
     "scan": SCANNED, "scanning": SCANNED, "scanned": SCANNED, "continuous": SCANNED,
 }  # fmt: skip
-"""As somebody may write them in job.toml."""
-
 _KEYS: Mapping[str, str | None] = {
     "what": None, "pattern": None, "association": None, "modifier": None, "material_condition": None, "condition": None,
     "free_state": FREE_STATE, "mmc": MAXIMUM_MATERIAL, "lmc": LEAST_MATERIAL, "projected_zone_mm": PROJECTED,
@@ -111,38 +110,36 @@ Pattern = Literal["points", "grid", "sections", "lines", "circles", "spiral"]
 # points that determine a feature
 FEWEST: Mapping[Kind, int] = {"point": 1, "line": 2, "plane": 3, "circle": 3, "sphere": 4, "cylinder": 5, "cone": 6}
 
+# of each kind, the first of which is its usual one
 PATTERNS: Mapping[Kind, tuple[Pattern, ...]] = {
     "point": (), "line": ("points",), "plane": ("points", "grid", "circles", "spiral"), "circle": ("points",),
     "sphere": ("points", "sections", "spiral"), "cylinder": ("points", "sections", "lines", "spiral"),
     "cone": ("points", "sections", "lines", "spiral"),
 }  # fmt: skip
-"""Of each kind, the first of which is its usual one."""
-
 # kinds with a diameter, whose material lies inside of it or around it
 ROUND: tuple[Kind, ...] = ("circle", "sphere", "cylinder", "cone")
 # kinds that are nothing without a direction: that in which a point is probed is against its normal
 DIRECTED: tuple[Kind, ...] = ("point", "line", "plane", "circle", "cylinder", "cone")
 
+# ways in which each kind is made of its points
 ASSOCIATIONS: Mapping[Kind, tuple[Association, ...]] = {
     "point": ("least_squares",), "line": ("least_squares", "minimum_zone", "tangent"),
     "plane": ("least_squares", "minimum_zone", "tangent"),
     "circle": get_args(Association)[:4], "sphere": get_args(Association)[:4], "cylinder": get_args(Association)[:4],
     "cone": get_args(Association)[:2],
 }  # fmt: skip
-"""Ways in which each kind is made of its points."""
-
+# keys that only some kinds have
 KEYS: Mapping[str, tuple[Kind, ...]] = {
     "diameter_mm": (*ROUND, "plane"), "inner_diameter_mm": ("plane",), "angle_deg": ("cone",), "inner": ROUND,
     "length_mm": ("line", "plane", "cylinder", "cone"), "width_mm": ("plane",), "normal": ("line",),
     "along": ("plane", "circle", "sphere", "cylinder", "cone"),
 }  # fmt: skip
-"""Keys that only some kinds have."""
-
 _NEEDED: Mapping[Pattern, tuple[str, ...]] = {
     "points": ("points",), "grid": ("rows", "columns"), "sections": ("sections", "points"), "lines": ("lines", "points"),
     "circles": ("circles", "points"), "spiral": ("turns", "points"),
 }  # fmt: skip
 
+# keys of a strategy that only some patterns of some kinds heed
 _ONLY: Mapping[str, Callable[[Kind, Pattern], bool]] = {
     "cap_deg": lambda kind, _: kind == "sphere",
     "margin_mm": lambda kind, _: kind not in ("circle", "sphere"),
@@ -150,8 +147,6 @@ _ONLY: Mapping[str, Callable[[Kind, Pattern], bool]] = {
     "sweep_deg": lambda kind, pattern: _ONLY["start_deg"](kind, pattern)
     and (pattern != "spiral" and (kind, pattern) != ("sphere", "points")),
 }  # fmt: skip
-"""Keys of a strategy that only some patterns of some kinds heed."""
-
 Count = Annotated[int, Field(ge=1, le=LISTED.most)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
 _NONE_OF_LENGTH = 1e-9  # length of a vector below which it has no direction

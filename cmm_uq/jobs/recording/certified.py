@@ -31,9 +31,8 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertificateFile, Certifie
 from cmm_uq.jobs.tables.length_formula import Growing, growing_of, with_standard_uncertainty
 
 _METRES = {unit.dsi: Decimal(str(unit.si)) for unit in UNITS.values() if unit.dsi.endswith(r"\metre")}
+# parts of names, and of refTypes, of what is no certified value
 _NO_RESULT = ("nominal", "nenn", "deviation", "abweichung", "error", "écart")
-"""Parts of names, and of refTypes, of what is no certified value."""
-
 _RECALIBRATION = "basic_recalibration"  # what the good practice of DCC calls the statement of the next calibration
 _TRACEABLE = "basic_metrologicallyTraceableToSI"  # and the statement of traceability
 SAME = 1e-9  # relative difference of two numbers that say the same

@@ -26,9 +26,8 @@ from cmm_uq.jobs.tables.length_formula import factor_of
 
 EXPANDED = "reference_U_um"
 STANDARD = "reference_u_um"
+# columns of the standard uncertainty of certified distances or places
 OF_POINTS = (STANDARD, *(f"reference_u_{axis}_um" for axis in AXES))
-"""Columns of the standard uncertainty of certified distances or places."""
-
 REFERENCES = ("reference_mm", *(f"reference_{axis}_mm" for axis in AXES), *OF_POINTS, EXPANDED)
 
 _ANOTHER_U = re.compile(

@@ -42,6 +42,7 @@ class CertifiedValue:
 
 LENGTH_WORDS = ("length", "distance", "länge", "abstand", "longueur", "長さ", "距離")
 DIAMETER_WORDS = ("diameter", "durchmesser", "diamètre", "直径")
+# in English, German, French and Japanese
 FORM_WORDS = (
     "form dev",
     "form error",
@@ -52,8 +53,6 @@ FORM_WORDS = (
     "circularité",
     "真球度",
 )
-"""In English, German, French and Japanese."""
-
 LENGTH = CertifiedValue("length_mm", "u_um", LENGTH_WORDS)
 DIAMETER = CertifiedValue("length_mm", "u_um", DIAMETER_WORDS)
 

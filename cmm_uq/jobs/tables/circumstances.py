@@ -128,12 +128,11 @@ class TestUncertainty(JobTable):
         return any((self.u_cte_per_k, self.u_temperature_k, self.u_alignment_um, self.u_fixturing_um))
 
 
+# key of each line of the test uncertainty but the calibration, which ``[artefact]`` states
 LINE_KEYS = {
     "expansion": "u_cte_per_k", "temperature": "u_temperature_k", "alignment": "u_alignment_um",
     "fixturing": "u_fixturing_um", "form": "u_form_um", "repeat": "u_repeat_um",
 }  # fmt: skip
-"""Key of each line of the test uncertainty but the calibration, which ``[artefact]`` states."""
-
 TEST_KEYS = tuple(LINE_KEYS.values())
 Limits = Annotated[list[Temperature], Field(min_length=2, max_length=2)]
 Kelvins = Annotated[float, Field(gt=0, le=1000)]

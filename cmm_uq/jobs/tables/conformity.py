@@ -90,13 +90,12 @@ class Prior(JobTable):
             yield "give either sd_um or share_of_limit: how far errors of such machines scatter"
 
 
+# rules by name, with or without their edition
 RuleName = Literal[
     "simple", "ASME B89.7.3.1", "ASME B89.7.3.1-2001", "ISO 14253-1", "ISO 14253-1:2017",
     "ILAC-G8 binary", "ILAC-G8:09/2019 binary", "ILAC-G8 non-binary", "ILAC-G8:09/2019 non-binary",
     "JCGM 106", "JCGM 106:2012", "Z540.3", "ANSI/NCSL Z540.3", "ANSI/NCSL Z540.3-2006",
 ]  # fmt: skip
-"""Rules by name, with or without their edition."""
-
 Rule = RuleName | GuardBand | FalseAccept | UncertaintyRatio | PosteriorProbability | UnconditionalRisk
 _BY_PRIOR = ("JCGM 106", "JCGM 106:2012", "Z540.3", "ANSI/NCSL Z540.3", "ANSI/NCSL Z540.3-2006")
 

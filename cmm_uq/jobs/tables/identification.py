@@ -15,9 +15,8 @@ from cmm_uq.jobs.source import device_name
 
 RequiredText = Annotated[str, Field(min_length=1, pattern=r"\S")]  # words that must not be left out
 
+# results of the certificate that is replaced, as the records have them: an input, so that anybody can compare again
 REPLACED = "replaced-results.json"
-"""Results of the certificate that is replaced, as the records have them: an input, so that anybody can compare again."""
-
 _FIGURES = r"(?:figures?|values?|results?|numbers?|decisions?|outcomes?)"
 _WERTE = r"(?:(?:mess|zahlen)?werte?n?|zahl(?:en)?|ergebnis(?:se)?n?|entscheidung(?:en)?)"
 _VALEURS = r"(?:valeurs?|chiffres?|résultats?|décisions?)"

@@ -26,9 +26,8 @@ _SLOPE_ONLY = re.compile(rf"(?:(?P<slope>{_NUMBER})[*·×]?)?L/(?P<k>{_NUMBER})|
 _LEAST = re.compile(r"min\((?P<first>[^;]+?);(?P<second>[^;]+)\)")
 _LEAST_BY_COMMA = re.compile(r"min\((?P<first>[^,;]+),(?P<second>[^,;]+)\)")
 
+# what may be a thousand with its separator as well as a decimal: a factor of a thousand in the limit
 _THOUSAND = re.compile(r"[1-9]\d*,\d{3}(?!\d)|/\d+[.]\d{3}(?!\d)")
-"""What may be a thousand with its separator as well as a decimal: a factor of a thousand in the limit."""
-
 FLATTEST = 1000**0.5
 """K of L/K, L in mm, that is K·L of the same figure with L in m: of a smaller figure L/K is the larger error of the two."""
 
@@ -84,9 +83,8 @@ _LEVEL = 0.95
 _MINUS = str.maketrans(
     {"⁻": "-", "−": "-", "–": "-", **{raised: str(digit) for digit, raised in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")}}
 )
+# 0.5·10⁻⁶·L, both in one unit, 0.5e-6·L, and 0.5 µm/m·L
 _IN_A_METRE = re.compile(rf"(?P<slope>{_NUMBER})?(?:[*·×]?10\^?\(?-6\)?|(?<=\d)[eE]-0?6|(?:µm|μm|um)/m)[*·×]?L(?!/)")
-"""0.5·10⁻⁶·L, both in one unit, 0.5e-6·L, and 0.5 µm/m·L."""
-
 _BARE = re.compile(r"L(?!/)")
 _QUADRATIC = re.compile(r"Q[\[(](?P<first>[^;]+);(?P<second>[^;]+)[\])]")
 _QUADRATIC_BY_COMMA = re.compile(r"Q[\[(](?P<first>[^,;]+),(?P<second>[^,;]+)[\])]")

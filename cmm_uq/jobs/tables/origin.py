@@ -22,13 +22,11 @@ Origin = Literal["measured", "simulated", "compensated"]
 MEASURED: Final = "measured"
 SIMULATED: Final = "simulated"
 COMPENSATED: Final = "compensated"
+# commands that write a recording, and what they make of it
 DERIVING: Mapping[str, Origin] = {"simulate": SIMULATED, "compensate": COMPENSATED}
-"""Commands that write a recording, and what they make of it."""
-
 _WRITTEN = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*?# (simulated|compensated) by cmm-uq ")
+# first line of the recording that a plan writes for the operator to fill in
 PLANNED = "# planned, nothing is measured yet: nominal coordinates\n"
-"""First line of the recording that a plan writes for the operator to fill in."""
-
 _PLANNED = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*?# planned, nothing is measured yet")
 EXAMPLE = "EXAMPLE"  # first word behind a figure of a new job.toml that nobody has stated yet
 _EXAMPLE = re.compile(r"[ \t]*([A-Za-z_]+)[ \t]*=.*# EXAMPLE\b")
