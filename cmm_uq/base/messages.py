@@ -154,7 +154,6 @@ def signed(value: float, spec: str) -> Number:
 
 
 def day(date: dt.date) -> Day:
-    """A date."""
     return Day(date.isoformat())
 
 

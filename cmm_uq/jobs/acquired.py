@@ -40,7 +40,6 @@ class Instrument(ResultsPart):
 
     @property
     def sentence(self) -> Text:
-        """What identifies it."""
         parts: list[Text] = names(filter(None, (self.name, " ".join(filter(None, (self.maker, self.model))))))
         if self.serial:
             parts.append(say("serial number {serial}", serial=Verbatim(self.serial)))
@@ -91,8 +90,6 @@ class JoinedColumn(ResultsPart):
 
 
 class Withdrawal(ResultsPart):
-    """A point that was taken back."""
-
     measurement: int
     point: int
     repeat: int
@@ -235,5 +232,4 @@ def provenance_of(content: bytes, recording: bytes, origin: str, where: str) -> 
 
 
 def as_file(said: Mapping[str, Any]) -> bytes:
-    """The bytes of such a file."""
     return (AcquisitionRecord.model_validate(said).model_dump_json(indent=2, by_alias=True) + "\n").encode()

@@ -92,7 +92,6 @@ class Recorded(JobTable):
 
     @property
     def measurements_aside(self) -> tuple[int, ...]:
-        """Numbers of what is set aside."""
         return tuple(entry.measurement for entry in self.set_aside)
 
 
@@ -258,7 +257,6 @@ class Job:
 
     @property
     def recording_path(self) -> str:
-        """The recording, as messages name it."""
         return str(self.folder / self.facts.recording.file)
 
     def write(self, folder: str | Path, *, force: bool = False) -> dict[str, Path]:

@@ -83,7 +83,6 @@ class Verdicts(tuple[Verdict, ...]):
         return self.overall in ("pass", NONE)
 
     def of(self, *outcomes: str) -> list[Verdict]:
-        """Those with one of the outcomes."""
         return [one for one in self if one.outcome in outcomes]
 
     def data(self) -> dict[str, Any]:

@@ -198,7 +198,6 @@ class CsvTable:
     lines: tuple[int, ...]
 
     def number(self, row: int, column: str) -> float:
-        """A finite number."""
         text = self.rows[row][self.header.index(column)]
         if problem := number_problem(text):
             plain = problem[0].endswith(("a number", "a finite number", "no value"))
@@ -209,7 +208,6 @@ class CsvTable:
         return float(text)
 
     def at(self, row: int) -> str:
-        """File and line of a row."""
         return f"{self.where} line {self.lines[row]}"
 
 

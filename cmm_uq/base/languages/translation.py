@@ -46,7 +46,6 @@ class Language:
         return re.sub(r"(?<=\d)\.(?=\d)", self.decimal, text)
 
     def date(self, text: str) -> str:
-        """A date by ISO 8601."""
         date = dt.date.fromisoformat(text)
         return self.day.format(year=date.year, month=date.month, day=date.day)
 

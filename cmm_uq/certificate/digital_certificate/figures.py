@@ -162,7 +162,6 @@ def expanded_of(data: Mapping[str, Any]) -> dcc.Expanded | None:
 
 
 def interval_of(data: Mapping[str, Any]) -> dcc.Interval | None:
-    """The 95 % coverage interval."""
     if not data.get("interval95") or data["u"] is None:
         return None
     u, low, high = decimals((data["u"], *data["interval95"]))
@@ -207,8 +206,6 @@ _NO_RESULT = ("noise", "least_squares")
 
 @dataclass(frozen=True)
 class DigitalFigures:
-    """Makes quantities."""
-
     texts: Languages
     free: Collection[str] = ()  # paths of estimates that the recording does not determine: what is known is no result
     stated: Mapping[str, dcc.StatementMetadata] = field(default_factory=dict)  # of estimates, ``scale_x.ppm``, by name
@@ -291,7 +288,7 @@ class DigitalFigures:
 
     def _list(self, path: Path, values: Sequence[Any], unit: Unit) -> Iterator[Element]:
         if are_numbers(values):
-            yield self._quantity(path, dcc.RealList(values=decimals(values), units=(unit.dsi,)))
+            yield self._quantity(path, _series(values, (unit.dsi,)))
         elif all(isinstance(value, str | bool) for value in values):
             yield self._quantity(path, _texts(values))
         elif all(isinstance(value, Mapping) for value in values):
@@ -314,33 +311,31 @@ class DigitalFigures:
                 yield from self._column((*path, key), [row.get(key) for row in rows])
 
     def _column(self, path: Path, cells: Sequence[Any]) -> Iterator[Element]:
-        """A column; cells without a figure are left out, and labels then say which rows, from 1, the others are."""
-        if not (rows := [row for row, cell in enumerate(cells) if cell is not None]):
+        """A column, of which cells may have no figure."""
+        values, unit = [cell for cell in cells if cell is not None], unit_of(path[-1], None)
+        if not values:
             return
-        labels, values, unit = _labels(rows, cells), [cells[row] for row in rows], unit_of(path[-1], None)
         if all(map(is_number, values)):
-            yield self._quantity(path, dcc.RealList(labels=labels, values=decimals(values), units=(unit.dsi,)))
+            yield self._quantity(path, _series(cells, (unit.dsi,)))
         elif all(map(is_quantity, values)):
-            yield from self._column_of_quantities(path, dict(zip(rows, values, strict=True)), labels, unit)
+            yield from self._column_of_quantities(path, cells, values, unit)
         elif all(isinstance(value, list) for value in values) and len({len(value) for value in values}) == 1:
             for i in range(len(values[0])):
-                part = dcc.RealList(labels=labels, values=decimals([value[i] for value in values]), units=(unit.dsi,))
+                part = _series([None if cell is None else cell[i] for cell in cells], (unit.dsi,))
                 yield self._quantity((*path, str(i)), part, name=say("{what} {i}", what=self.title(path), i=i + 1))
         else:
             yield self._quantity(path, _texts([str(value) for value in values]))
 
     def _column_of_quantities(
-        self, path: Path, rows: Mapping[int, Mapping[str, Any]], labels: tuple[str, ...], unit: Unit
+        self, path: Path, cells: Sequence[Any], quantities: Sequence[Mapping[str, Any]], unit: Unit
     ) -> Iterator[Element]:
         """With the uncertainty of each, or one by one where D-SI has no list for what is known of them."""
-        quantities = list(rows.values())
         uncertainty, intervals = spread_of(quantities), intervals_of(quantities)
         if uncertainty is None:
-            for row, quantity in rows.items():
-                yield from self._with_uncertainty((*path, str(row)), quantity, unit)
+            for row, cell in enumerate(cells):
+                yield from () if cell is None else self._with_uncertainty((*path, str(row)), cell, unit)
             return
-        values = decimals([each["value"] for each in quantities])
-        column = dcc.RealList(labels=labels, values=values, units=(unit.dsi,), uncertainty=uncertainty)
+        column = _series([cell and cell["value"] for cell in cells], (unit.dsi,), uncertainty)
         yield self._quantity(path, column)
         if intervals is not None and not all(map(symmetric, quantities)):
             yield self._interval(path, column.with_changes(uncertainty=intervals))
@@ -348,8 +343,7 @@ class DigitalFigures:
     def _matrix(self, path: Path, rows: Sequence[Sequence[float]], units: Sequence[str]) -> Iterator[Element]:
         """A covariance matrix, row by row, each element in the product of its units."""
         for i, (row, unit) in enumerate(zip(rows, units, strict=True)):
-            elements = tuple(product(unit, other) for other in units)
-            yield self._quantity((*path, str(i)), dcc.RealList(values=decimals(row), units=elements))
+            yield self._quantity((*path, str(i)), _series(row, [product(unit, other) for other in units]))
 
     def _budget(self, path: Path, data: Mapping[str, Any]) -> Iterator[Element]:
         unit = dsi_of(data["unit"])
@@ -370,16 +364,18 @@ class DigitalFigures:
             "contribution": [unit] * len(lines), "share": ones, "dof": ones,
         }  # fmt: skip
         for key, units in columns.items():
-            rows = [i for i, line in enumerate(lines) if line[key] is not None]
-            if rows:
-                values, chosen = decimals([lines[i][key] for i in rows]), tuple(units[i] for i in rows)
-                column = dcc.RealList(labels=_labels(rows, lines), values=values, units=chosen)
-                yield self._quantity((*path, "budget", key), column)
+            if any(line[key] is not None for line in lines):
+                yield self._quantity((*path, "budget", key), _series([line[key] for line in lines], units))
 
 
-def _labels(rows: Sequence[int], whole: Sequence[object]) -> tuple[str, ...]:
-    """Numbers of rows, from 1, where they are not all."""
-    return tuple(str(row + 1) for row in rows) if len(rows) < len(whole) else ()
+def _series(cells: Sequence[Any], units: Sequence[str], uncertainty: Element | None = None) -> dcc.RealList:
+    """Numbers in one unit or each in its own; of those that are there labels say which, from 1, where they are not all."""
+    rows = [row for row, cell in enumerate(cells) if cell is not None]
+    labels = tuple(str(row + 1) for row in rows) if len(rows) < len(cells) else ()
+    units = tuple(units if len(units) == 1 else (units[row] for row in rows))
+    return dcc.RealList(
+        labels=labels, values=decimals([cells[row] for row in rows]), units=units, uncertainty=uncertainty
+    )
 
 
 def _texts(values: Sequence[Any]) -> Any:

@@ -70,8 +70,6 @@ def parsed(data: bytes, where: str) -> Node:
 
 
 class _Tree:
-    """The tree while it is read."""
-
     def __init__(self, where: str) -> None:
         self.where, self.count = where, 0
         self.open: list[Node] = []

@@ -28,8 +28,6 @@ PLACED = tuple(f"{sort}{_MEASUREMENT}" for sort in ("Sphere", "Point", "Circle")
 
 
 class Qif(Format):
-    """A document with results."""
-
     name = "qif"
     title = say("QIF results")
 
@@ -133,8 +131,6 @@ DCC = "digitalCalibrationCertificate"  # root of a certificate
 
 
 class Dcc(Format):
-    """A certificate."""
-
     name = "dcc"
     title = say("digital calibration certificate (DCC)")
 

@@ -76,7 +76,6 @@ HOSTILE_FIX = "Export it again; a measuring program writes no DOCTYPE or ENTITY"
 
 
 def root_of(content: bytes, where: str) -> Element:
-    """The root of an XML file."""
     from defusedxml.common import DefusedXmlException
     from defusedxml.ElementTree import fromstring
 

@@ -103,7 +103,6 @@ class Recognition:
 
     @property
     def rows(self) -> list[tuple[Text, Text]]:
-        """Everything, for a table."""
         columns = ((say("Column {name}", name=Verbatim(name)), Verbatim(text)) for name, text in self.columns.items())
         return [
             (say("File"), Verbatim(self.file)), (say("Format"), self.title),

@@ -40,8 +40,6 @@ Rows = tuple[list[list[str]], list[int]]  # cells of every line, and their lines
 
 
 class Delimited(Format):
-    """Any text."""
-
     name = "text"
     title = say("text table (CSV)")
 
@@ -198,8 +196,6 @@ def _check_width(width: int, place: str) -> None:
 
 
 class Excel(Format):
-    """A workbook."""
-
     name = "xlsx"
     title = say("Excel workbook")
 
@@ -252,8 +248,6 @@ def _excel_cell(value: Any) -> Cell:
 
 
 class OpenDocument(Format):
-    """A spreadsheet."""
-
     name = "ods"
     title = say("OpenDocument spreadsheet")
 

@@ -89,7 +89,6 @@ class CharacteristicFacts(Modelled):
 
     @property
     def asks(self) -> Asks:
-        """What it is of."""
         return ASKS[self.what]
 
     def problems(self) -> Iterator[str]:

@@ -100,15 +100,12 @@ _UNLABELLED = re.compile(r"^(?P<major>\w+)\s*(?:/\s*(?P<rest>.*))?$")
 
 
 def drawing_of_dmis(content: bytes, where: str) -> Drawing:
-    """A DMIS program."""
     text, _ = decoded(content, where, None)
     said = statements(report_lines(text, where), where)
     return _Program(where).whole([(line, statement.partition("$$")[0].strip()) for line, statement in said])
 
 
 class _Program:
-    """What was said so far."""
-
     def __init__(self, where: str) -> None:
         self.where = self.place = where
         self.line, self.drawing, self.frame = 0, Drawing(PROGRAM), drawings.DmisFrame()

@@ -43,8 +43,6 @@ class NotUnderstoodError(Exception):
 
 @dataclass(frozen=True)
 class NotUnderstood:
-    """Something that is not understood."""
-
     name: str  # of the feature or characteristic, or of the statement
     why: str  # what of it is not understood, to follow its name
     where: str  # file and line
@@ -52,8 +50,6 @@ class NotUnderstood:
 
 @dataclass
 class Drawing:
-    """What was read."""
-
     program: str  # format that it was read from
     # features, characteristics, styli: tables, in order
     features: list[Facts] = field(default_factory=list)
@@ -239,15 +235,12 @@ class QifUnits:
         }
 
     def mm(self, element: Element, *, pmi: bool = False) -> float:
-        """A length."""
         return number_of(text(element)) * self._scale(element, _LINEAR, pmi=pmi)
 
     def degrees(self, element: Element, *, pmi: bool = False) -> float:
-        """An angle."""
         return number_of(text(element)) * self._scale(element, _ANGULAR, pmi=pmi)
 
     def place(self, element: Element | None, where: str) -> list[float]:
-        """Coordinates."""
         scale = self._usual[_LINEAR] if element is None else self._scale(element, _LINEAR, pmi=False)
         return [scale * number_of(word) for word in three("" if element is None else text(element), where)]
 
@@ -371,7 +364,6 @@ def reference(word: str) -> tuple[str, str]:
 
 
 def numbers_of(words: list[str]) -> list[float]:
-    """Numbers."""
     try:
         found = [float(word) for word in words]
     except ValueError:

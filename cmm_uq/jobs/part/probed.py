@@ -153,7 +153,6 @@ class Probed:
 
 
 def probed(facts: FeatureFacts, where: str) -> Probed:
-    """A feature with its contact points."""
     axes = _axes(facts, where)
     stated = np.array(facts.points_mm or [], dtype=np.float64).reshape(-1, 3)
     if facts.kind == "point":

@@ -41,7 +41,6 @@ class _Recording:
 
     @classmethod
     def of_repeats(cls, content: bytes, where: str) -> _Recording:
-        """One that has rows."""
         found = cls.of(content, where)
         if not found.cells.rows:
             raise CmmUqError("has no rows", where=where, fix="Record the measurements")

@@ -84,7 +84,6 @@ class ShortGauge:
 
 
 def short_gauge_of(facts: ShortGaugeFacts, content: bytes, where: str, machine: Machine) -> ShortGauge:
-    """A short gauge with its recording."""
     points = read_recording(content, where, machine)
     for own in points.rows_of_groups:
         if sorted(points.point[own].tolist()) != [1, 2]:
