@@ -12,7 +12,7 @@ from math import hypot
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AliasPath, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LISTED
@@ -27,11 +27,6 @@ class ResultsPart(BaseModel):
     """Of a results.json only what is needed; further keys are no business of its reader."""
 
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
-
-
-def at(*path: str) -> Any:
-    """What stands at a path of keys."""
-    return Field(validation_alias=AliasPath(*path))
 
 
 class ResultsFile(ResultsPart):
@@ -225,6 +220,16 @@ class ReportResults(ResultsFile):
 _CALIBRATION = "Name the results.json that cmm-uq report wrote of a job of kind digitizer"
 
 
+class _Component(ResultsPart):
+    value: float
+
+
+class _Offset(ResultsPart):
+    U1: _Component
+    V1: _Component
+    W1: _Component
+
+
 class _Pose(ResultsPart):
     pose: int
     alpha_deg: float
@@ -236,14 +241,20 @@ Three = tuple[float, float, float]
 _Row = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
+class _Digitizer(ResultsPart):
+    offset_mm: _Offset
+    covariance_mm2: Annotated[list[_Row], Field(min_length=3, max_length=3)]
+    poses: Annotated[list[_Pose], Field(min_length=1, max_length=LISTED.most)]
+
+
+class _CalibratedJob(ResultsPart):
+    id: str
+    origin: Origin
+
+
 class _DigitizerResults(ResultsFile):
-    job_id: str = at("job", "id")
-    origin: Origin = at("job", "origin")
-    u1: float = at("digitizer", "offset_mm", "U1", "value")
-    v1: float = at("digitizer", "offset_mm", "V1", "value")
-    w1: float = at("digitizer", "offset_mm", "W1", "value")
-    covariance_mm2: Annotated[list[_Row], Field(min_length=3, max_length=3)] = at("digitizer", "covariance_mm2")
-    poses: Annotated[list[_Pose], Field(min_length=1, max_length=LISTED.most)] = at("digitizer", "poses")
+    job: _CalibratedJob
+    digitizer: _Digitizer
 
 
 @dataclass(frozen=True)
@@ -284,12 +295,13 @@ def digitizer_of(
     results = read_results(
         _DigitizerResults, inputs[name], str(folder / name), "is no calibration of a digitizer", _CALIBRATION
     )
-    if results.origin == SIMULATED and origin != SIMULATED:
-        raise CmmUqError(f"is of a simulated recording, job {results.job_id!r}", where=str(folder / name),
+    if results.job.origin == SIMULATED and origin != SIMULATED:
+        raise CmmUqError(f"is of a simulated recording, job {results.job.id!r}", where=str(folder / name),
                          fix="Measure the digitizer: a simulated calibration serves simulated jobs only")  # fmt: skip
-    poses = tuple(facts.poses) or tuple(Pose(**pose.model_dump()) for pose in results.poses)
-    covariance = tuple(map(_three, results.covariance_mm2))
-    return DescribedDigitizer((results.u1, results.v1, results.w1), poses, covariance, name, results.job_id)
+    calibrated, offset = results.digitizer, results.digitizer.offset_mm
+    poses = tuple(facts.poses) or tuple(Pose(**pose.model_dump()) for pose in calibrated.poses)
+    return DescribedDigitizer((offset.U1.value, offset.V1.value, offset.W1.value), poses,
+                              tuple(map(_three, calibrated.covariance_mm2)), name, results.job.id)  # fmt: skip
 
 
 def _three(values: Sequence[float]) -> Three:
