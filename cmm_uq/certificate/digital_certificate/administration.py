@@ -196,8 +196,8 @@ def formal_statements(job: Job, results: Mapping[str, Any], texts: Languages) ->
             paragraphs += [comparison.sentence, *(difference.sentence for difference in comparison.differences)]
         state(say("Replaces certificate"), *paragraphs, ref_type="basic_revision")
     if facts.recalibration_agreed:
-        name = say("Next calibration, as agreed with the customer")
-        state(name, date=facts.recalibration_agreed, ref_type="basic_recalibration")
+        agreed = say("Next calibration, as agreed with the customer")
+        state(agreed, date=facts.recalibration_agreed, ref_type="basic_recalibration")
     further = [
         (say("Place"), facts.place), (say("Deviations from the method"), facts.deviations),
         (say("Results of external providers"), facts.external), (say("Data from the customer"), facts.from_customer),
@@ -324,7 +324,7 @@ def _certified(
 
 def conditions(job: Job, texts: Languages) -> tuple[dcc.InfluenceCondition, ...]:
     """As the job states them, and the least and largest recorded temperatures, in K and in °C."""
-    found = []
+    found: list[tuple[Text, tuple[Any, ...], str]] = []
     if job.facts.job.conditions:
         parts = (texts.rich(Verbatim(job.facts.job.conditions)),)
         found.append((say("Conditions"), parts, "cmm_conditions"))
