@@ -186,8 +186,8 @@ def formal_statements(job: Job, results: Mapping[str, Any], texts: Languages) ->
     if mark is not None:
         state(mark.banner, mark.banner, valid=False, ref_type="cmm_notACertificate")
     if certifies(job):
-        for text in STATEMENTS:
-            state(None, text, ref_type="cmm_general")
+        for general in STATEMENTS:
+            state(None, general, ref_type="cmm_general")
         chain, ref_type = claimed(job), "basic_metrologicallyTraceableToSI"
         state(say("Traceability"), chain.statement, traceable=chain.claim == "traceable", ref_type=ref_type)
     if (replaces := facts.replaces) is not None:
