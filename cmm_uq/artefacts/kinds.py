@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from cmm_uq.base.files.limits import LISTED
-from cmm_uq.base.files.table import JobTable, Length, Number, Position, Triple, Uncertainty
+from cmm_uq.base.files.table import JobTable, Length, Number, Position, Triple, Uncertainty, key, required
 from cmm_uq.base.points import AXES, Machine, Points
 from cmm_uq.jobs.beginning import AT_20_C, SIX, Beginning, circumstances
 from cmm_uq.jobs.tables import artefact as tables
@@ -90,14 +91,10 @@ class TriangleFacts(ArtefactFacts):
         CertifiedValue("cylinders_mm", "u_cylinders_um", tables.DIAMETER_WORDS, count=3),
     )
 
-    blocks_mm: Triple
-    """Lengths of the gauge blocks 1–2, 2–3 and 3–1."""
-    u_blocks_um: Uncertainty = 0.0
-    """Standard uncertainty of each block."""
-    cylinders_mm: Triple
-    """Diameters of the cylinders 1, 2 and 3."""
-    u_cylinders_um: Uncertainty = 0.0
-    """Standard uncertainty of each diameter."""
+    blocks_mm: Triple = required("Lengths of the gauge blocks 1–2, 2–3 and 3–1.")
+    u_blocks_um: Uncertainty = key(0.0, "Standard uncertainty of each block.")
+    cylinders_mm: Triple = required("Diameters of the cylinders 1, 2 and 3.")
+    u_cylinders_um: Uncertainty = key(0.0, "Standard uncertainty of each diameter.")
 
     @property
     def traced(self) -> bool:
@@ -121,8 +118,7 @@ class SphereFacts(ArtefactFacts):
         tables.DIAMETER, CertifiedValue("form_um", "", tables.FORM_WORDS, needed=False),
     )  # fmt: skip
 
-    form_um: Uncertainty | None = None
-    """Form deviation of the sphere by its certificate."""
+    form_um: Uncertainty | None = key(None, "Form deviation of the sphere by its certificate.")
 
 
 SPHERE = _kind("sphere", SphereFacts, "sphere:SphereArtefact", Beginning(
@@ -145,8 +141,7 @@ class PlaneFacts(ArtefactFacts):
 
     probe_offset_mm: Length | None = None
     """Effective radius of the probe, by which the plane of its centres is moved to the surface."""
-    u_probe_offset_um: Uncertainty = 0.0
-    """Standard uncertainty of the probe's effective radius."""
+    u_probe_offset_um: Uncertainty = key(0.0, "Standard uncertainty of the probe's effective radius.")
     acceptance_deg: Annotated[float, Field(ge=0.01, le=89.99)] = 60.0
     """Largest angle between the normal and the direction of approach at which the radius is believed."""
 
@@ -202,14 +197,10 @@ DIGITIZER = _kind("digitizer", ReferenceSphereFacts, "digitizer:DigitizerArtefac
 class KnownLength(JobTable):
     """A known length between two points of a shifted artefact."""
 
-    from_point: Annotated[Number, Field(alias="from")]
-    """Point from which the known length goes."""
-    to_point: Annotated[Number, Field(alias="to")]
-    """Point to which it goes."""
-    length_mm: Length
-    """The known length."""
-    u_um: Uncertainty
-    """Standard uncertainty (k = 1) of the known length."""
+    from_point: Annotated[Number, Field(alias="from")] = required("Point from which the known length goes.")
+    to_point: Annotated[Number, Field(alias="to")] = required("Point to which it goes.")
+    length_mm: Length = required("The known length.")
+    u_um: Uncertainty = required("Standard uncertainty (k = 1) of the known length.")
 
 
 class ShiftFacts(ArtefactFacts):
@@ -219,25 +210,22 @@ class ShiftFacts(ArtefactFacts):
         CertifiedValue("known.length_mm", "known.u_um", tables.LENGTH_WORDS),
     )
 
-    axis: Literal["x", "y", "z"] | None = None
-    """Axis along which the artefact is shifted."""
+    axis: Literal["x", "y", "z"] | None = key(None, "Axis along which the artefact is shifted.")
     plane: Literal["xy", "yz", "zx"] | None = None
     """Plane in which a plate is shifted and turned, in place of `axis` and `shifts_mm`."""
     shifts_mm: Annotated[list[Position], Field(max_length=LISTED.most)] = Field(default_factory=list)
     """Nominal shift of each series along the axis."""
-    u_shift_um: Uncertainty = 0.0
-    """Standard uncertainty of the shifts; where it is not 0 they are estimated."""
+    u_shift_um: Uncertainty = key(0.0, "Standard uncertainty of the shifts; where it is not 0 they are estimated.")
     known: KnownLength | None = None
     """A known length between two points of the artefact, for the mean scale of the axis."""
 
-    @model_validator(mode="after")
-    def _axis_or_plane(self) -> Self:
+    def problems(self) -> Iterator[str]:
+        yield from super().problems()
         if self.plane is not None and (self.axis is not None or self.shifts_mm or self.u_shift_um):
-            raise ValueError(
+            yield (
                 "plane belongs to a plate that is shifted and turned: its placings are found from the readings; leave out "
                 "axis, shifts_mm and u_shift_um, or leave out plane"
             )
-        return self
 
     @property
     def traced(self) -> bool:

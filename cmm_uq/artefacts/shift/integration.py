@@ -134,18 +134,6 @@ def integrated(
     return IntegratedCurve(a, error, scaled.T @ scaled)
 
 
-def integrated_by_monte_carlo(
-    a: Floats, b: Floats, u: Floats, *, method: Method = "pitch", shift: float | None = None, u_shift: float = 0.0,
-    known: KnownSpan | None = None, trials: int = 100_000, seed: int = 0,
-) -> IntegratedCurve:  # fmt: skip
-    """The same by propagating distributions (JCGM 102:2011, 7): mean and covariance of Gaussian trials."""
-    check_readings(a, b)
-    inputs, sd = _inputs(a, b, u, shift, u_shift, known)
-    drawn = inputs + sd * np.random.default_rng(seed).standard_normal((trials, len(inputs)))
-    errors = _error(drawn, len(a), method, shift, known)
-    return IntegratedCurve(a, errors.mean(axis=0), np.cov(errors, rowvar=False))
-
-
 def _inputs(
     a: Floats, b: Floats, u: Floats, shift: float | None, u_shift: float, known: KnownSpan | None
 ) -> tuple[Floats, Floats]:

@@ -164,18 +164,11 @@ class Budget:
         import pandas as pd
 
         attributes = ("value", "u", "unit", "distribution", "dof", "sensitivity", "contribution")
-        return pd.DataFrame(
-            [
-                {
-                    "quantity": line.name,
-                    "depth": depth,
-                    **{name: getattr(line, name) for name in attributes},
-                    "share": share,
-                    "origin": line.origin,
-                }
-                for depth, line, share in self.flat()
-            ]
-        )
+        rows = []
+        for depth, line, share in self.flat():
+            own = {name: getattr(line, name) for name in attributes}
+            rows.append({"quantity": line.name, "depth": depth, **own, "share": share, "origin": line.origin})
+        return pd.DataFrame(rows)
 
     def as_text(self) -> list[tuple[Text, ...]]:
         """Rows of text under :data:`HEADINGS`, for a page, nested lines included."""
@@ -206,18 +199,10 @@ def _text(depth: int, line: BudgetLine, share: float) -> tuple[Text, ...]:
     )
 
 
+_BELL_AND_LIMITS = (say("normal"), say("t"), say("rectangular"), say("rectangular uncertain"), say("trapezoidal"))
+_OTHER_SHAPES = (say("triangular"), say("arcsine"), say("exponential"), say("gamma"))
 # by the names of JCGM 101 table 1 as model files write them
-_DISTRIBUTIONS = {
-    "normal": say("normal"),
-    "t": say("t"),
-    "rectangular": say("rectangular"),
-    "rectangular_uncertain": say("rectangular uncertain"),
-    "trapezoidal": say("trapezoidal"),
-    "triangular": say("triangular"),
-    "arcsine": say("arcsine"),
-    "exponential": say("exponential"),
-    "gamma": say("gamma"),
-}
+_DISTRIBUTIONS: Mapping[str, Text] = {name.replace(" ", "_"): name for name in (*_BELL_AND_LIMITS, *_OTHER_SHAPES)}
 
 
 def budget_of(

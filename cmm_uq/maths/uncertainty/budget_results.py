@@ -21,73 +21,55 @@ SCHEMA = "cmm-uq/budget/1"
 
 def results_of(evaluation: Evaluation) -> dict[str, Any]:
     """The evaluation as dicts, lists and finite numbers, ready for JSON; what has no value is None."""
-    request = evaluation.request
+    stated = enumerate(evaluation.stated.items())
     return {
         "schema": SCHEMA,
-        **{key: getattr(request, key) for key in ("coverage", "digits", "seed")},
-        "outputs": {
-            name: _output(evaluation, row, stated) for row, (name, stated) in enumerate(evaluation.stated.items())
-        },
-        "output_correlation": [[_finite(r) for r in line] for line in evaluation.correlation.tolist()],
+        **_data(evaluation.request, "coverage digits seed"),
+        "outputs": {name: _output(evaluation, row, result) for row, (name, result) in stated},
+        "output_correlation": [[_plain(r) for r in line] for line in evaluation.correlation.tolist()],
     }
 
 
-def _finite(number: float) -> float | None:
-    return number if isfinite(number) else None
+def _plain(value: Any) -> Any:
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _data(source: object, names: str) -> dict[str, Any]:
+    """Attributes by their names, what has no value as None."""
+    return {name: _plain(getattr(source, name)) for name in names.split()}
 
 
 def _output(evaluation: Evaluation, row: int, stated: Stated) -> dict[str, Any]:
-    ways, coverage, drawn = evaluation.ways, evaluation.request.coverage, evaluation.ways.simulated
+    ways, coverage = evaluation.ways, evaluation.request.coverage
+    if drawn := ways.simulated:
+        of_row = {name: getattr(drawn, name)[row].tolist() for name in ("value", "u", "interval", "symmetric_interval")}
+        simulated = {**of_row, **_data(drawn, "trials stable"), "tail_shape": _plain(float(drawn.shape[row]))}
     return {
-        "value": stated.value,
-        "u": stated.u,
-        "dof": _finite(stated.dof),
-        "interval": list(stated.interval),
-        "coverage_factor": stated.coverage_factor,
+        **_data(stated, "value u dof interval coverage_factor"),
         "unit": stated.budget.unit or None,
-        "method": stated.method,
-        "reason": stated.reason,
+        **_data(stated, "method reason"),
         "first": _propagated(ways.first, row, coverage),
         "second": _propagated(ways.second, row, coverage),
-        "monte_carlo": drawn
-        and {
-            "value": float(drawn.value[row]),
-            "u": float(drawn.u[row]),
-            "interval": drawn.interval[row].tolist(),
-            "symmetric_interval": drawn.symmetric_interval[row].tolist(),
-            "trials": drawn.trials,
-            "stable": drawn.stable,
-            "tail_shape": _finite(float(drawn.shape[row])),
-        },
+        "monte_carlo": simulated if drawn else None,
         "budget": _lines(stated.budget),
     }
 
 
 def budget_data(budget: Budget) -> dict[str, Any]:
     """A budget by itself, of an uncertainty alone or of a measurand with an estimate."""
-    return {
-        "measurand": budget.measurand,
-        "value": budget.value,
-        "u": budget.u,
-        "U": budget.expanded,
-        "k": budget.k,
-        "dof": _finite(budget.dof),
-        "unit": budget.unit or None,
-        "budget": _lines(budget),
-    }
+    figures = {**_data(budget, "measurand value u"), "U": budget.expanded, **_data(budget, "k dof")}
+    return {**figures, "unit": budget.unit or None, "budget": _lines(budget)}
 
 
 def _lines(budget: Budget) -> list[dict[str, Any]]:
     return [
         {
             "input": line.name,
-            "value": line.value,
-            "u": line.u,
-            "unit": line.unit or None,
-            "distribution": line.distribution or None,
-            "dof": _finite(line.dof),
-            "sensitivity": line.sensitivity,
-            "contribution": line.contribution,
+            **_data(line, "value u"),
+            **{name: getattr(line, name) or None for name in ("unit", "distribution")},
+            **_data(line, "dof sensitivity contribution"),
             "share": share,
             "source": line.origin,
         }
@@ -102,21 +84,13 @@ def _propagated(result: Propagated | None, row: int, coverage: float) -> dict[st
         ends = [float(end[row]) for end in result.interval(coverage)]
     except CmmUqError:  # too few effective degrees of freedom for any interval
         ends = []
-    value, u, dof = float(result.value[row]), float(result.u[row]), _finite(float(result.dof[row]))
-    return {"value": value, "u": u, "dof": dof, "interval": ends or None}
+    return {name: _plain(float(getattr(result, name)[row])) for name in ("value", "u", "dof")} | {
+        "interval": ends or None
+    }
 
 
-SUMMARY = (
-    say("Quantity"),
-    say("Estimate"),
-    say("Standard uncertainty"),
-    say("Unit"),
-    say("Interval"),
-    say("k"),
-    say("ν"),
-    say("Method"),
-)
 COMPARISON = (say("Method"), say("Estimate"), say("Standard uncertainty"), say("Interval"), say("Trials"))
+SUMMARY = (say("Quantity"), *COMPARISON[1:3], say("Unit"), say("Interval"), say("k"), say("ν"), COMPARISON[0])
 
 
 def summary_rows(evaluation: Evaluation) -> list[tuple[Text, ...]]:

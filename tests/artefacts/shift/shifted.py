@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from cmm_uq.artefacts.shift import integration
 from cmm_uq.base.points import Floats, Points
 
 Error = Callable[[Floats], Floats]
@@ -32,3 +33,14 @@ def read(
     x, series, point, repeat = np.array(rows).T
     whole = (values.astype(np.int64) for values in (series, point, repeat))
     return Points(np.column_stack([x, 0 * x, 0 * x]), *whole)
+
+
+def integrated_by_monte_carlo(
+    a: Floats, b: Floats, u: Floats, *, method: integration.Method = "pitch", shift: float | None = None, u_shift: float = 0.0,
+    known: integration.KnownSpan | None = None, trials: int = 100_000, seed: int = 0,
+) -> integration.IntegratedCurve:  # fmt: skip
+    """The curve by propagating distributions (JCGM 102:2011, 7): mean and covariance of Gaussian trials."""
+    inputs, sd = integration._inputs(a, b, u, shift, u_shift, known)
+    drawn = inputs + sd * np.random.default_rng(seed).standard_normal((trials, len(inputs)))
+    errors = integration._error(drawn, len(a), method, shift, known)
+    return integration.IntegratedCurve(a, errors.mean(axis=0), np.cov(errors, rowvar=False))

@@ -12,11 +12,11 @@ import pytest
 
 from cmm_uq.app.commands.report import analyse
 from cmm_uq.artefacts.shift.axis import CurveEstimate, ShiftResult, estimate_curve
-from cmm_uq.artefacts.shift.integration import KnownSpan, integrated, integrated_by_monte_carlo
+from cmm_uq.artefacts.shift.integration import KnownSpan, integrated
 from cmm_uq.artefacts.shift.series import shifted_series
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
-from tests.artefacts.shift.shifted import PITCH_20, bent, read
+from tests.artefacts.shift.shifted import PITCH_20, bent, integrated_by_monte_carlo, read
 from tests.conftest import ROOT
 
 NOISE = 1.1e-3

@@ -12,11 +12,11 @@ from cmm_uq.artefacts.shift.integration import (
     calibration_curve,
     estimated_shift,
     integrated,
-    integrated_by_monte_carlo,
     local_sensitivity,
     with_known_length,
 )
 from cmm_uq.base.errors import CmmUqError
+from tests.artefacts.shift.shifted import integrated_by_monte_carlo
 
 UNEQUAL = np.array([0, 40, 60, 120, 140, 180, 220, 240, 320, 340, 400, 440.0])
 

@@ -46,8 +46,7 @@ class PeriodicScale(OfAxis, Harmonic):
     """Periodic error of a scale, leadscrew or rack."""
 
     family, title = "periodic_scale", say("Periodic scale error of {axis}", axis=AXIS)
-    formula = "e_a = A·sin(2π a/λ + φ)"
-    mechanism = "scale"
+    formula, mechanism = "e_a = A·sin(2π a/λ + φ)", "scale"
     points_to = say("an error that repeats with the period: scale interpolation, leadscrew or rack")
     means = say(
         "the error of {axis} swings to either side by {amplitude} and repeats every {period}",
@@ -81,8 +80,7 @@ class Hysteresis(OfAxis):
     """Different readings from either side."""
 
     family, title = "hysteresis", say("Hysteresis of {axis}", axis=AXIS)
-    formula = "e_a = ½·gap·approach_a"
-    mechanism = "drive"
+    formula, mechanism = "e_a = ½·gap·approach_a", "drive"
     points_to = say("backlash or friction in this drive: the reading depends on the side it is reached from")
     means = say(
         "at the same reading {axis} stands {size} further towards {side} when it comes from minus than when it comes from "
@@ -104,8 +102,7 @@ class Drift(OfAxis):
     """Drift of an axis with time."""
 
     family, title = "drift", say("Drift of {axis} with time", axis=AXIS)
-    formula = "e_a = v · time"
-    mechanism = "temperature"
+    formula, mechanism = "e_a = v · time", "temperature"
     points_to = say("the axis drifts with time: warm-up, or the room's temperature")
     means = say("at the same reading {axis} moves towards {side} by {size}", axis=AXIS, side=SIDE, size=SIZE)
     coefficients = (Parameter("um_per_h", unit("µm/h"), 10.0),)
@@ -123,8 +120,7 @@ class Play(Family):
     """
 
     family, title = "play", say("Lateral play of {axis} along {direction}", axis=AXIS, direction=OTHER)
-    formula = "e_b = ½·gap·approach_a"
-    mechanism = "guideway"
+    formula, mechanism = "e_b = ½·gap·approach_a", "guideway"
     points_to = say(
         "play across the guideway of {axis}: check wear, preload and air gap of the bearings that hold the carriage along "
         "{direction}", axis=AXIS, direction=OTHER,
@@ -134,8 +130,7 @@ class Play(Family):
         "when it comes from plus", axis=AXIS, direction=OTHER, size=SIZE, side=SIDE,
     )  # fmt: skip
     coefficients = (Parameter("gap_um", unit("µm"), 10.0),)
-    columns = ("approach_{a}",)
-    tier = FURTHER
+    columns, tier = ("approach_{a}",), FURTHER
 
     def __init__(self, axis: str, direction: str) -> None:
         super().__init__(axis, direction)
@@ -152,15 +147,13 @@ class YawPlay(Family):
     """
 
     family, title = "yaw_play", say("Yaw of carriage {axis} at reversal", axis=AXIS)
-    formula = "e = ε × what carriage a carries, ε_z = ½·angle·approach_a"
-    mechanism = "guideway"
+    formula, mechanism = "e = ε × what carriage a carries, ε_z = ½·angle·approach_a", "guideway"
     points_to = say(
         "carriage {axis} yaws when it turns round: check the side bearings of its guideway, and where its drive takes hold "
         "beside its middle", axis=AXIS,
     )  # fmt: skip
     coefficients = (Parameter("angle_arcsec", unit("″"), 2.0),)
-    columns = ("approach_{a}",)
-    tier = FURTHER
+    columns, tier = ("approach_{a}",), FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         return turned(points, self.axis, "z", 0.5 * ARCSECOND * points.column(f"approach_{self.axis}"))
@@ -173,15 +166,13 @@ class WindUp(OfAxis):
     """
 
     family, title = "windup", say("Wind-up of the drive of {axis}", axis=AXIS)
-    formula = "e_a = ½·w·approach_a·(a − middle of the travel)"
-    mechanism = "drive"
+    formula, mechanism = "e_a = ½·w·approach_a·(a − middle of the travel)", "drive"
     points_to = say(
         "the drive of {axis} winds up, or is worn more at one end of the travel: check leadscrew, belt or rack, its tension "
         "and its end bearings", axis=AXIS,
     )  # fmt: skip
     coefficients = (Parameter("um_per_m", unit("µm/m"), 20.0),)
-    columns = ("approach_{a}",)
-    tier = FURTHER
+    columns, tier = ("approach_{a}",), FURTHER
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
         low, high = points.machine.travel(self.axis)
@@ -197,15 +188,13 @@ class SpeedLag(OfAxis):
     """
 
     family, title = "speed_lag", say("Lag of {axis} in proportion to speed", axis=AXIS)
-    formula = "e_a = lag·speed along a, in the sense of travel"
-    mechanism = "controller"
+    formula, mechanism = "e_a = lag·speed along a, in the sense of travel", "controller"
     points_to = say(
         "the scale of {axis} and the trigger are read at different moments: check how the controller latches this scale, and "
         "probe more slowly until then", axis=AXIS,
     )  # fmt: skip
     coefficients = (Parameter("lag_ms", unit("ms"), 1.0),)
-    columns = ("speed_mm_s", *(f"approach_{a}" for a in AXES))
-    tier = FURTHER
+    columns, tier = ("speed_mm_s", *(f"approach_{a}" for a in AXES)), FURTHER
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
         return _MILLISECOND * points.column("speed_mm_s") * travel(points)[:, AXES.index(self.axis)]
@@ -225,8 +214,7 @@ class ScaleCurvature(OfAxis):
     """
 
     family, title = "scale_curvature", say("Curvature of the scale of {axis}", axis=AXIS)
-    formula = "e_a = bow·(1 − (2(a − a0)/T − 1)²)"
-    mechanism = "scale"
+    formula, mechanism = "e_a = bow·(1 − (2(a − a0)/T − 1)²)", "scale"
     points_to = say(
         "the scale of {axis} is stretched unevenly: check how its ends are clamped and its joints, and compensate position by "
         "a table, which one factor cannot replace", axis=AXIS,
@@ -249,15 +237,13 @@ class AirScale(OfAxis):
     """
 
     family, title = "air_scale", say("Refractive index of air on the laser scale of {axis}", axis=AXIS)
-    formula = "e_a = −part·(n − n₀)·a"
-    mechanism = "scale"
+    formula, mechanism = "e_a = −part·(n − n₀)·a", "scale"
     points_to = say(
         "the laser of {axis} is not, or wrongly, corrected for air: check its sensors of air temperature, pressure and "
         "humidity, and that the compensation uses them", axis=AXIS,
     )  # fmt: skip
     coefficients = (Parameter("part", unit("1"), 1.0),)
-    columns = AIR
-    tier = FURTHER
+    columns, tier = AIR, FURTHER
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
         return -index_change(points) * points.readings[self.axis]
@@ -270,15 +256,13 @@ class DeadPath(OfAxis):
     """
 
     family, title = "dead_path", say("Dead path of the laser scale of {axis}", axis=AXIS)
-    formula = "e_a = −d·(n − n at the first point)"
-    mechanism = "scale"
+    formula, mechanism = "e_a = −d·(n − n at the first point)", "scale"
     points_to = say(
         "the dead path of the laser of {axis} is not compensated: enter it in the compensation, or zero the axis close to the "
         "interferometer", axis=AXIS,
     )  # fmt: skip
     coefficients = (Parameter("path_mm", unit("mm"), 300.0),)
-    columns = AIR
-    tier = FURTHER
+    columns, tier = AIR, FURTHER
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
         change = index_change(points)

@@ -125,8 +125,7 @@ class OwnFault(Effect):
     """A fault of the artefact itself; ``owner`` is that artefact, ``None`` in the catalogue."""
 
     mechanism = "artefact"
-    tier = OWN
-    of_artefact = True
+    tier, of_artefact = OWN, True
     owner: FaultyArtefact | None = None
 
     @property
@@ -215,8 +214,7 @@ class OwnGeometry(OwnFault):
 class OwnPattern(OwnFault, CommonSize):
     """Every place of the artefact has an error of its own, the same in all set-ups and repeats."""
 
-    name = "artefact_pattern"
-    title = say("Pattern of the artefact itself")
+    name, title = "artefact_pattern", say("Pattern of the artefact itself")
     formula = (
         "e = −(deviation of each ball, hole or face from its certified place, less a shift, a turn and a scale of all)"
     )

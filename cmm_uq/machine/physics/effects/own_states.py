@@ -25,8 +25,7 @@ class ArtefactTemperature(OwnFault):
     What is certified of it too short looks the same.
     """
 
-    name = "artefact_temperature"
-    title = say("Temperature of the artefact")
+    name, title = "artefact_temperature", say("Temperature of the artefact")
     formula = "e = −cte · k · (place about the middle of the set-up)"
     points_to = say(
         "the artefact was warmer or colder than recorded, or its certified length is not right: let it soak, and check its "
@@ -68,8 +67,7 @@ class OfSetUps(OwnFault, CommonSize):
 class SetUpTemperature(OfSetUps):
     """The artefact had another temperature in each set-up than was recorded."""
 
-    name = "artefact_set_up_temperature"
-    title = say("Temperature of the artefact from set-up to set-up")
+    name, title = "artefact_set_up_temperature", say("Temperature of the artefact from set-up to set-up")
     formula = "e = −cte · k of the set-up · (place about the middle of the set-up)"
     points_to = say(
         "the artefact was not at one temperature in all set-ups, or its thermometer did not follow: let it soak after each "
@@ -97,8 +95,7 @@ class SetUpTemperature(OfSetUps):
 class ArtefactBending(OwnFault):
     """A flat artefact bends between its supports by its own weight: most as it lies, not at all where it stands upright."""
 
-    name = "artefact_bending"
-    title = say("Bending of the artefact by its own weight")
+    name, title = "artefact_bending", say("Bending of the artefact by its own weight")
     formula = "e = +um·(n·Z)·(1 − ρ²)·n, n the artefact's normal, ρ the distance from its middle over the largest"
     points_to = say(
         "the artefact sags between its supports: support it at the marked points, as it was when it was calibrated"
@@ -114,8 +111,7 @@ class ArtefactBending(OwnFault):
 class ArtefactFixture(OfSetUps):
     """The fixture bends and twists a flat artefact, otherwise in each set-up."""
 
-    name = "artefact_fixture"
-    title = say("Bending of the artefact by its fixture")
+    name, title = "artefact_fixture", say("Bending of the artefact by its fixture")
     formula = "e = −(a·u² + b·v² + c·u·v)·n in each set-up, n the normal, u and v the place over the largest distance"
     points_to = say(
         "the artefact was bent or twisted when it was clamped: hold it at three points without strain, and set it up again"
@@ -134,8 +130,7 @@ class ArtefactFixture(OfSetUps):
 class OwnLobes(OwnFault, Harmonic):
     """The sphere itself has three lobes, which turn with it."""
 
-    name = "artefact_lobing"
-    title = say("Three lobes of the sphere itself")
+    name, title = "artefact_lobing", say("Three lobes of the sphere itself")
     formula = "e = −A·cos(3θ + φ)·n, θ = atan2(ny, nx) less how far the sphere was turned"
     points_to = say("the sphere is not round: turn it about its stem and probe it again; what turns with it is its own")
     amplitude = Parameter("amplitude_um", unit("µm"), 1.0)
@@ -155,8 +150,7 @@ class OwnLobes(OwnFault, Harmonic):
 class OwnForm(OwnFault, CommonSize):
     """The sphere itself is not round: spherical harmonics of the degrees 2 to 5, which turn with it."""
 
-    name = "artefact_form"
-    title = say("Form of the sphere itself")
+    name, title = "artefact_form", say("Form of the sphere itself")
     formula = "e = −Σ c_lm·Y_lm(n turned back with the sphere)·n, l = 2 … 5"
     points_to = say("the sphere's form deviates: turn it about its stem, or take another ball, and probe it again")
     coefficients = (Parameter("um", unit("µm"), 1.0),)

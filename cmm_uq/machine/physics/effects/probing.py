@@ -34,10 +34,8 @@ def normals_of(points: Points) -> Floats:
 class ProbeRadius(Effect):
     """Error of the effective stylus radius."""
 
-    name = "probe_radius"
-    title = say("Effective stylus radius")
-    formula = "true surface point = indicated + r·n"
-    mechanism = "probe"
+    name, title = "probe_radius", say("Effective stylus radius")
+    formula, mechanism = "true surface point = indicated + r·n", "probe"
     points_to = say("the effective stylus radius is wrong: qualify the probe again")
     means = say("probed surfaces are indicated {size} too {wrong}", size=SIZE, wrong=SENSE)
     sense = (say("deep, inside the material"), say("early, outside the material"))
@@ -51,10 +49,8 @@ class ProbeRadius(Effect):
 class ProbeLobing(Harmonic):
     """Three-lobed pre-travel."""
 
-    name = "probe_lobing"
-    title = say("Lobing of the probe")
-    formula = "true surface point = indicated + A·cos(3θ + φ)·n, θ = atan2(ny, nx)"
-    mechanism = "probe"
+    name, title = "probe_lobing", say("Lobing of the probe")
+    formula, mechanism = "true surface point = indicated + A·cos(3θ + φ)·n, θ = atan2(ny, nx)", "probe"
     points_to = say("the probe's pre-travel has three lobes: qualify it in more directions")
     means = say("the probing error swings to either side by {size}, three times in a turn about Z", size=SIZE)
     amplitude = Parameter("amplitude_um", unit("µm"), 5.0, say("amplitude"))
@@ -80,10 +76,8 @@ class ArtefactSag(Effect):
     the points apart along the bar, in proportion to their place on it, to where they would lie without sag.
     """
 
-    name = "artefact_sag"
-    title = say("Sag of the artefact")
-    formula = "true length = length − s·cos²(elevation above the table)"
-    mechanism = "artefact"
+    name, title = "artefact_sag", say("Sag of the artefact")
+    formula, mechanism = "true length = length − s·cos²(elevation above the table)", "artefact"
     points_to = say("the artefact sags or its supports are not at the right points")
     means = say("lying level the artefact is {size} {wrong} than upright", size=SIZE, wrong=SENSE)
     sense = (say("shorter"), say("longer"))
@@ -135,17 +129,14 @@ class PreTravel(Effect):
     The same gap on every axis, unlike hysteresis, whose axes differ. Travel is a unit vector against the normal.
     """
 
-    name = "pre_travel"
-    title = say("Pre-travel of the probe")
-    formula = "e = −amount·travel"
-    mechanism = "probe"
+    name, title = "pre_travel", say("Pre-travel of the probe")
+    formula, mechanism = "e = −amount·travel", "probe"
     points_to = say(
         "the probe's pre-travel or the stylus radius is wrong by as much in every direction: qualify the probe again, with "
         "the speed and the force of the measurement"
     )
     coefficients = (Parameter("um", unit("µm"), 10.0),)
-    columns = tuple(f"approach_{a}" for a in AXES)
-    tier = FURTHER
+    columns, tier = tuple(f"approach_{a}" for a in AXES), FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         return -MICROMETRE * travel(points)[:, :, None]
@@ -157,17 +148,14 @@ class ProbeAxial(Effect):
     A kinematic probe head triggers at once along its axis and late across it.
     """
 
-    name = "probe_axial"
-    title = say("Deflection of the probe along its axis")
-    formula = "e = amount·(n·t)·t"
-    mechanism = "probe"
+    name, title = "probe_axial", say("Deflection of the probe along its axis")
+    formula, mechanism = "e = amount·(n·t)·t", "probe"
     points_to = say(
         "the probe gives way differently along the stylus and across it: qualify it with points along the stylus too, and "
         "check its trigger force"
     )
     coefficients = (Parameter("um", unit("µm"), 5.0),)
-    columns = NORMAL
-    tier = FURTHER
+    columns, tier = NORMAL, FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         axis = _stylus(points)
@@ -181,17 +169,14 @@ class StylusBending(Effect):
     A cantilever under the probing force gives way by F·L³/(3·E·I).
     """
 
-    name = "stylus_bending"
-    title = say("Bending of the stylus")
-    formula = "e = amount·(L/100 mm)³·(n − (n·t)t)"
-    mechanism = "probe"
+    name, title = "stylus_bending", say("Bending of the stylus")
+    formula, mechanism = "e = amount·(L/100 mm)³·(n − (n·t)t)", "probe"
     points_to = say(
         "the stylus bends under the probing force: take a shorter or stiffer one, or a lower force, and qualify each stylus "
         "by itself"
     )
     coefficients = (Parameter("um", unit("µm"), 5.0),)
-    columns = (*NORMAL, *TIP)
-    tier = FURTHER
+    columns, tier = (*NORMAL, *TIP), FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         length = np.linalg.norm([points.column(name) for name in TIP], axis=0)
@@ -204,17 +189,14 @@ class StylusBending(Effect):
 class TriggerDelay(Effect):
     """Delay between contact and reading."""
 
-    name = "trigger_delay"
-    title = say("Delay of the probe's trigger")
-    formula = "e = delay·speed·n"
-    mechanism = "controller"
+    name, title = "trigger_delay", say("Delay of the probe's trigger")
+    formula, mechanism = "e = delay·speed·n", "controller"
     points_to = say(
         "the trigger reaches the controller late: check the probe's interface and cable, and qualify the probe at the speed "
         "of the measurement"
     )
     coefficients = (Parameter("delay_ms", unit("ms"), 1.0),)
-    columns = (*NORMAL, "speed_mm_s")
-    tier = FURTHER
+    columns, tier = (*NORMAL, "speed_mm_s"), FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         return _MILLISECOND * (points.column("speed_mm_s")[:, None] * normals_of(points))[:, :, None]
@@ -234,10 +216,8 @@ class DigitizerOffset(Effect):
     An alignment on the reference sphere that was off by [du dv], or a mount that has moved since (Harris 2004 eq. 14–25).
     """
 
-    name = "digitizer_offset"
-    title = say("Alignment of the digitizer")
-    formula = "e = du·u + dv·v"
-    mechanism = "optical probe"
+    name, title = "digitizer_offset", say("Alignment of the digitizer")
+    formula, mechanism = "e = du·u + dv·v", "optical probe"
     points_to = say(
         "the digitizer is out of alignment, or has moved in its mount: tighten the mount and align it on the reference "
         "sphere again, in every pose"
@@ -245,8 +225,7 @@ class DigitizerOffset(Effect):
     coefficients = (
         Parameter("u_um", unit("µm"), 20.0, say("along u")), Parameter("v_um", unit("µm"), 20.0, say("along v")),
     )  # fmt: skip
-    columns = ("gamma_deg",)
-    tier = FURTHER
+    columns, tier = ("gamma_deg",), FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         return MICROMETRE * attitudes(points)[:, :, :2]
@@ -255,16 +234,13 @@ class DigitizerOffset(Effect):
 class DigitizerDepth(Effect):
     """Error in proportion to scan depth, from the column ``depth_mm`` (Feng 2001, Xi 2001)."""
 
-    name = "digitizer_depth"
-    title = say("Depth bias of the digitizer")
-    formula = "e = k·depth·v"
-    mechanism = "optical probe"
+    name, title = "digitizer_depth", say("Depth bias of the digitizer")
+    formula, mechanism = "e = k·depth·v", "optical probe"
     points_to = say(
         "the digitizer's depth scale is wrong: calibrate it over its range, and scan in its middle until then"
     )
     coefficients = (Parameter("um_per_mm", unit("µm/mm"), 1.0),)
-    columns = ("gamma_deg", "depth_mm")
-    tier = FURTHER
+    columns, tier = ("gamma_deg", "depth_mm"), FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         return MICROMETRE * points.column("depth_mm")[:, None, None] * attitudes(points)[:, :, 1:2]
@@ -276,10 +252,8 @@ class DigitizerIncidence(Effect):
     The incident angle lies in the scan plane, the projected one across it.
     """
 
-    name = "digitizer_incidence"
-    title = say("Incidence of the digitizer's light")
-    formula = "e = (kᵢ·incident + kₚ·projected)·v"
-    mechanism = "optical probe"
+    name, title = "digitizer_incidence", say("Incidence of the digitizer's light")
+    formula, mechanism = "e = (kᵢ·incident + kₚ·projected)·v", "optical probe"
     points_to = say(
         "the digitizer errs where its light meets the surface askew: turn it square to the surface, or correct its readings "
         "for the angle"
@@ -288,8 +262,7 @@ class DigitizerIncidence(Effect):
         Parameter("incident_um_per_deg", unit("µm/°"), 1.0, say("by incidence")),
         Parameter("projected_um_per_deg", unit("µm/°"), 1.0, say("by projected angle")),
     )
-    columns = ("gamma_deg", *NORMAL)
-    tier = FURTHER
+    columns, tier = ("gamma_deg", *NORMAL), FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         frame = attitudes(points)

@@ -37,8 +37,7 @@ class Scale(OfAxis):
     """Linear scale error."""
 
     family, title = "scale", say("Scale error of {axis}", axis=AXIS)
-    formula = "e_a = s · a"
-    mechanism = "scale"
+    formula, mechanism = "e_a = s · a", "scale"
     points_to = say("the scale or its compensation: check the linear compensation of this axis")
     means = say("lengths along {axis} are indicated {size} too {wrong}", axis=AXIS, size=SIZE, wrong=SENSE)
     sense = (say("short"), say("long"))
@@ -96,8 +95,7 @@ class Straightness(Family):
     """Straightness of carriage a along b as one bow over the travel T from a0."""
 
     family, title = "straightness", say("Straightness of {axis} along {direction}", axis=AXIS, direction=OTHER)
-    formula = "e_b = bow · (1 − (2(a − a0)/T − 1)²)"
-    mechanism = "guideway"
+    formula, mechanism = "e_b = bow · (1 − (2(a − a0)/T − 1)²)", "guideway"
     points_to = say("a bowed guideway: check straightness and its compensation")
     means = say(
         "as {axis} moves, the probe runs in a bow: in the middle of the travel {size} towards {side} {direction}",
@@ -118,8 +116,7 @@ class Rotation(Family):
     """Carriage a turns about b in proportion to its travel from a0: roll, pitch or yaw."""
 
     family, title = "rotation", say("Rotation of carriage {axis} about {about}", axis=AXIS, about=OTHER)
-    formula = "e = ε × what carriage a carries, ε_b = r·(a − a0)"
-    mechanism = "guideway"
+    formula, mechanism = "e = ε × what carriage a carries, ε_b = r·(a − a0)", "guideway"
     points_to = say(
         "the carriage turns as it moves (roll, pitch or yaw): check bearings, guideway and angular compensation"
     )

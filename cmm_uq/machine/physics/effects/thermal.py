@@ -44,8 +44,7 @@ class ThermalScale(OfAxis):
     """Expansion of a scale."""
 
     family, title = "thermal_scale", say("Thermal expansion of scale {axis}", axis=AXIS)
-    formula = "e_a = α·(temp_a − 20 °C)·a"
-    mechanism = "temperature"
+    formula, mechanism = "e_a = α·(temp_a − 20 °C)·a", "temperature"
     points_to = say("the scale expands and its temperature is not, or wrongly, compensated")
     means = say("the scale of {axis} expands by {size} {more} than is compensated", axis=AXIS, size=SIZE, more=SENSE)
     sense = (say("more"), say("less"))
@@ -73,8 +72,7 @@ class Expanding(Effect):
 class ThermalArtefact(Expanding):
     """Expansion of the artefact."""
 
-    name = "thermal_artefact"
-    title = say("Thermal expansion of the artefact")
+    name, title = "thermal_artefact", say("Thermal expansion of the artefact")
     formula = "length = length at 20 °C · (1 + α·(temp_artefact − 20 °C))"
     points_to = say("the artefact expands and its temperature is not, or wrongly, compensated")
     means = say("the artefact expands by {size} {more} than is reckoned with", size=SIZE, more=SENSE)
@@ -92,15 +90,13 @@ class ArtefactLag(Expanding):
     the first recorded temperature, and temperatures between two records lie on a line.
     """
 
-    name = "artefact_lag"
-    title = say("Artefact lagging behind its thermometer")
+    name, title = "artefact_lag", say("Artefact lagging behind its thermometer")
     formula = "longer by α·(T′ − temp_artefact)·length, τ·dT′/dt = temp_artefact − T′"
     points_to = say(
         "the artefact takes on the temperature later than its thermometer: let it soak longer, and fix the thermometer to its "
         "body"
     )
-    shape = (LAG,)
-    columns = ("temp_artefact_c", "time_s")
+    shape, columns = (LAG,), ("temp_artefact_c", "time_s")
     tier = FURTHER
 
     def excess(self, points: Points, shape: Sequence[float]) -> Floats:
@@ -128,8 +124,7 @@ class CarriageGradient(Effect):
     As the table under ``thermal_gradient``: the bridge between its upper and lower side, the ram between front and back.
     """
 
-    formula = "e = ε × what carriage a carries, ε_b = k·(difference)·(a − a0)"
-    mechanism = "temperature"
+    formula, mechanism = "e = ε × what carriage a carries, ε_b = k·(difference)·(a − a0)", "temperature"
     coefficients = (Parameter("arcsec_per_m_k", unit("″/(m·K)"), 20.0),)
     tier = FURTHER
 
@@ -165,15 +160,13 @@ class ThermalSquareness(Lean):
     """
 
     family, title = "thermal_squareness", say("Squareness {one}–{other} with temperature", one=AXIS, other=OTHER)
-    formula = "as of squareness, with S = k·(mean of temp_x, temp_y, temp_z − 20 °C)"
-    mechanism = "temperature"
+    formula, mechanism = "as of squareness, with S = k·(mean of temp_x, temp_y, temp_z − 20 °C)", "temperature"
     points_to = say(
         "the angle between {one} and {other} follows the temperature of the frame: keep the machine at the temperature of its "
         "calibration, or compensate squareness by temperature", one=AXIS, other=OTHER,
     )  # fmt: skip
     coefficients = (Parameter("arcsec_per_k", unit("″/K"), 4.0),)
-    columns = tuple(f"temp_{a}_c" for a in AXES)
-    tier = FURTHER
+    columns, tier = tuple(f"temp_{a}_c" for a in AXES), FURTHER
 
     def lean(self, points: Points) -> Floats:
         excess = np.mean([points.column(name) for name in self.columns], axis=0) - REFERENCE_TEMPERATURE
@@ -184,8 +177,7 @@ class ScaleDrift(OfAxis):
     """A scale that grows with time. A room or a machine that warms steadily."""
 
     family, title = "scale_drift", say("Scale of {axis} growing with time", axis=AXIS)
-    formula = "e_a = r·time·a"
-    mechanism = "temperature"
+    formula, mechanism = "e_a = r·time·a", "temperature"
     points_to = say(
         "the scale of {axis} changes steadily while the machine or the room warms or cools: measure in thermal equilibrium, "
         "and check the temperature compensation of this scale", axis=AXIS,
@@ -193,8 +185,7 @@ class ScaleDrift(OfAxis):
     means = say("lengths along {axis} are indicated ever {wrong}, by {size}", axis=AXIS, wrong=SENSE, size=SIZE)
     sense = (say("shorter"), say("longer"))
     coefficients = (Parameter("ppm_per_h", unit("ppm/h"), 5.0),)
-    columns = ("time_s",)
-    tier = FURTHER
+    columns, tier = ("time_s",), FURTHER
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
         return PPM * points.hours * points.readings[self.axis]
@@ -204,8 +195,7 @@ class Settling(OfAxis):
     """Drift that settles. What follows switching on, or a door left open."""
 
     family, title = "settling", say("Settling of {axis}", axis=AXIS)
-    formula = "e_a = A·(1 − exp(−time/τ))"
-    mechanism = "temperature"
+    formula, mechanism = "e_a = A·(1 − exp(−time/τ))", "temperature"
     points_to = say(
         "the zero of {axis} moves and comes to rest: let machine, probe and artefact settle longer after switching on, "
         "setting up or an open door", axis=AXIS,
@@ -215,8 +205,7 @@ class Settling(OfAxis):
         axis=AXIS, size=SIZE, side=SIDE, settling=SECOND,
     )  # fmt: skip
     coefficients = (Parameter("um", unit("µm"), 20.0, say("way")),)
-    shape = (SETTLING,)
-    columns = ("time_s",)
+    shape, columns = (SETTLING,), ("time_s",)
     tier = FURTHER
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
@@ -228,8 +217,7 @@ class ScaleSettling(OfAxis):
     """A scale that settles. An axis warmed by its motor, an air supply that was switched on."""
 
     family, title = "scale_settling", say("Scale of {axis} settling", axis=AXIS)
-    formula = "e_a = s·(1 − exp(−time/τ))·a"
-    mechanism = "temperature"
+    formula, mechanism = "e_a = s·(1 − exp(−time/τ))·a", "temperature"
     points_to = say(
         "the scale of {axis} takes on another temperature and comes to rest: move the axis to warm it up before measuring, "
         "and look at what heats or cools it, its motor or the air supply", axis=AXIS,
@@ -240,8 +228,7 @@ class ScaleSettling(OfAxis):
     )  # fmt: skip
     sense = (say("short"), say("long"))
     coefficients = (Parameter("ppm", unit("ppm"), 20.0, say("change")),)
-    shape = (SETTLING,)
-    columns = ("time_s",)
+    shape, columns = (SETTLING,), ("time_s",)
     tier = FURTHER
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:

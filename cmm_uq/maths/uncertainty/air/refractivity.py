@@ -36,15 +36,15 @@ def _over_ice(kelvin: Any) -> Any:
     return _TRIPLE_POINT_PA * np.exp(-13.928169 * (1.0 - ratio**-1.5) + 34.7078238 * (1.0 - ratio**-1.25))
 
 
-def vapour_pressure(temperature_c: Any, relative_humidity_pct: Any) -> Any:
+def vapour_pressure(temperature_c: Any, humidity_pct: Any) -> Any:
     """Partial pressure of water vapour from the relative humidity, Pa."""
-    return 0.01 * relative_humidity_pct * saturation_pressure(temperature_c)
+    return 0.01 * humidity_pct * saturation_pressure(temperature_c)
 
 
-def mole_fraction(temperature_c: Any, pressure_pa: Any, relative_humidity_pct: Any) -> Any:
+def mole_fraction(temperature_c: Any, pressure_pa: Any, humidity_pct: Any) -> Any:
     """Mole fraction of water vapour, with the enhancement factor of moist air (Ciddor 1996, appendix A)."""
     enhancement = 1.00062 + 3.14e-8 * pressure_pa + 5.60e-7 * temperature_c**2
-    return enhancement * vapour_pressure(temperature_c, relative_humidity_pct) / pressure_pa
+    return enhancement * vapour_pressure(temperature_c, humidity_pct) / pressure_pa
 
 
 def relative_humidity(temperature_c: Any, dew_point_c: Any) -> Any:
@@ -58,10 +58,10 @@ _STANDARD_COMPRESSIBILITY, _STANDARD_VAPOUR_DENSITY = 0.9995922115, 0.00985938
 _TORR = 101325.0 / 760.0  # 1 mm Hg in Pa
 
 
-def ciddor(temperature_c: Any, pressure_pa: Any, relative_humidity_pct: Any, co2_ppm: Any, wavelength_nm: Any) -> Any:
+def ciddor(temperature_c: Any, pressure_pa: Any, humidity_pct: Any, co2_ppm: Any, wavelength_nm: Any) -> Any:
     """Phase refractivity n − 1; ``wavelength_nm`` is the vacuum wavelength."""
     kelvin = temperature_c + KELVIN
-    water = mole_fraction(temperature_c, pressure_pa, relative_humidity_pct)
+    water = mole_fraction(temperature_c, pressure_pa, humidity_pct)
     sigma2 = 1e6 / (wavelength_nm * wavelength_nm)  # µm⁻²
     dry = 1e-8 * (5792105.0 / (238.0185 - sigma2) + 167917.0 / (57.362 - sigma2)) * (1.0 + 5.34e-7 * (co2_ppm - 450.0))
     vapour = 1.022e-8 * (295.235 + sigma2 * (2.6422 + sigma2 * (-0.03238 + sigma2 * 0.004028)))
@@ -85,47 +85,39 @@ def _dry_updated(temperature_c: Any, pressure_pa: Any, sigma2: Any) -> Any:
     return pressure_pa * standard * density / 96095.43
 
 
-def birch_downs_1994(
-    temperature_c: Any, pressure_pa: Any, relative_humidity_pct: Any, co2_ppm: Any, wavelength_nm: Any
-) -> Any:
+def birch_downs_1994(temperature_c: Any, pressure_pa: Any, humidity_pct: Any, co2_ppm: Any, wavelength_nm: Any) -> Any:
     """Phase refractivity n − 1 by the updated Edlén equation, Birch and Downs, Metrologia 31 (1994) 315."""
     sigma2 = 1e6 / (wavelength_nm * wavelength_nm)
-    vapour = vapour_pressure(temperature_c, relative_humidity_pct)
+    vapour = vapour_pressure(temperature_c, humidity_pct)
     return _dry_updated(temperature_c, pressure_pa, sigma2) - 1e-10 * (3.7345 - 0.0401 * sigma2) * vapour
 
 
-def modified_edlen(
-    temperature_c: Any, pressure_pa: Any, relative_humidity_pct: Any, co2_ppm: Any, wavelength_nm: Any
-) -> Any:
+def modified_edlen(temperature_c: Any, pressure_pa: Any, humidity_pct: Any, co2_ppm: Any, wavelength_nm: Any) -> Any:
     """Phase refractivity n − 1 by the updated equation with NIST's water term, right away from 20 °C too.
 
     Stone and Zimmerman, NIST Engineering Metrology Toolbox, appendix A-IV.
     """
     sigma2 = 1e6 / (wavelength_nm * wavelength_nm)
-    vapour = vapour_pressure(temperature_c, relative_humidity_pct)
+    vapour = vapour_pressure(temperature_c, humidity_pct)
     water = 1e-10 * 292.75 / (temperature_c + KELVIN) * (3.7345 - 0.0401 * sigma2) * vapour
     return _dry_updated(temperature_c, pressure_pa, sigma2) - water
 
 
-def edlen_1966(
-    temperature_c: Any, pressure_pa: Any, relative_humidity_pct: Any, co2_ppm: Any, wavelength_nm: Any
-) -> Any:
+def edlen_1966(temperature_c: Any, pressure_pa: Any, humidity_pct: Any, co2_ppm: Any, wavelength_nm: Any) -> Any:
     """Phase refractivity n − 1, Edlén, Metrologia 2 (1966) 71, equations 1, 12 and 22 (pressures there in torr)."""
     sigma2 = 1e6 / (wavelength_nm * wavelength_nm)
     standard = 1e-8 * (8342.13 + 2406030.0 / (130.0 - sigma2) + 15997.0 / (38.9 - sigma2))
-    torr, vapour = pressure_pa / _TORR, vapour_pressure(temperature_c, relative_humidity_pct) / _TORR
+    torr, vapour = pressure_pa / _TORR, vapour_pressure(temperature_c, humidity_pct) / _TORR
     density = torr * (1.0 + 1e-6 * torr * (0.817 - 0.0133 * temperature_c)) / (1.0 + 0.0036610 * temperature_c)
     return standard * density / 720.775 - 1e-8 * (5.722 - 0.0457 * sigma2) * vapour
 
 
-def harris_2004(
-    temperature_c: Any, pressure_pa: Any, relative_humidity_pct: Any, co2_ppm: Any, wavelength_nm: Any
-) -> Any:
+def harris_2004(temperature_c: Any, pressure_pa: Any, humidity_pct: Any, co2_ppm: Any, wavelength_nm: Any) -> Any:
     """Phase refractivity n − 1 at 633 nm by the formula of Harris 2004 section 3.3 (after Kneppers 1999).
 
     Its printed factor 10⁶ is 10⁻⁶: it is Edlén's equation of 1966 at 633 nm with an exponential for saturation.
     """
     torr = pressure_pa / _TORR
     density = (1.0 + 1e-6 * torr * (0.817 - 0.0133 * temperature_c)) / (1.0 + 0.0036610 * temperature_c)
-    water = 3.033e-3 * relative_humidity_pct * np.exp(0.057627 * temperature_c)
+    water = 3.033e-3 * humidity_pct * np.exp(0.057627 * temperature_c)
     return 1e-6 * (0.3836391 * torr * density - water)

@@ -1,15 +1,23 @@
-"""The state of the air as it was measured, what stands in for what was not, and the refractive index that follows.
+"""The state of the air as it was measured, the refractive index that follows, and lengths by laser interferometer in it.
 
 What is not measured gets a default with the uncertainty of not knowing it, and the budget says so: weather moves the
 pressure by some ± 3 kPa about its mean at an altitude, the humidity of a room lies between 10 % and 90 %, its carbon
 dioxide between 300 and 600 ppm, and a helium-neon laser that nobody calibrated at (632.9908 ± 0.0019) nm (relative
 standard uncertainty 1.5·10⁻⁶, CIPM recommendation 2007).
+
+The counter of an interferometer adds up half wavelengths. Between zeroing (air of index n₀ all along the way) and reading
+(index n) the optical path difference changes by 2 [n (D + L) − n₀ D], where D is the dead path between the interferometer and
+the place of zeroing; so with V the displacement as vacuum wavelengths count it,
+
+    L = [V − D (n − n₀)] / (n cos θ)
+
+where θ is the angle between beam and motion. A workpiece of temperature t is 1 + α (t − 20) longer than at 20 °C.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,14 +25,8 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.uncertainty.air.refractivity import (
-    birch_downs_1994,
-    ciddor,
-    edlen_1966,
-    harris_2004,
-    modified_edlen,
-    relative_humidity,
-)
+from cmm_uq.base.units import REFERENCE_TEMPERATURE
+from cmm_uq.maths.uncertainty.air import refractivity as by
 from cmm_uq.maths.uncertainty.budget import Labels
 from cmm_uq.maths.uncertainty.distributions import Distribution, Number, constant, normal, rectangular
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
@@ -32,6 +34,10 @@ from cmm_uq.maths.uncertainty.propagation import first_order
 
 Range = tuple[float, float]
 HELIUM_NEON_NM = 632.9908
+_AIR = {"temperature_c": "degC", "pressure_pa": "Pa", "humidity_pct": "percent", "dew_point_c": "degC"}
+_AIR |= {"co2_ppm": "ppm", "wavelength_nm": "nm"}
+_BEAM = {"vacuum_mm": "mm", "dead_path_mm": "mm", "zero_refractivity": "1", "angle_rad": "rad"}
+_BEAM |= {"material_c": "degC", "cte_per_k": "1/K"}
 
 
 @dataclass(frozen=True)
@@ -44,12 +50,16 @@ class AirEquation:
 
 
 EQUATIONS: Mapping[str, AirEquation] = {
-    "ciddor": AirEquation("Ciddor 1996", ciddor, 1.0e-8),
-    "modified_edlen": AirEquation("modified Edlén (NIST)", modified_edlen, 1.5e-8),
-    "birch_downs_1994": AirEquation("Birch and Downs 1994", birch_downs_1994, 1.5e-8, (350.0, 1064.0), (0.0, 40.0)),
-    "edlen_1966": AirEquation("Edlén 1966", edlen_1966, 5.0e-8, (230.0, 2060.0), (0.0, 40.0)),
-    "harris_2004": AirEquation("Harris 2004", harris_2004, 5.0e-8, (632.0, 634.0), (0.0, 40.0)),
+    "ciddor": AirEquation("Ciddor 1996", by.ciddor, 1.0e-8),
+    "modified_edlen": AirEquation("modified Edlén (NIST)", by.modified_edlen, 1.5e-8),
+    "birch_downs_1994": AirEquation("Birch and Downs 1994", by.birch_downs_1994, 1.5e-8, (350.0, 1064.0), (0.0, 40.0)),
+    "edlen_1966": AirEquation("Edlén 1966", by.edlen_1966, 5.0e-8, (230.0, 2060.0), (0.0, 40.0)),
+    "harris_2004": AirEquation("Harris 2004", by.harris_2004, 5.0e-8, (632.0, 634.0), (0.0, 40.0)),
 }
+
+
+def _known(setup: object, names: Iterable[str]) -> dict[str, Distribution]:
+    return {name: known for name in names if (known := getattr(setup, name)) is not None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,25 +95,16 @@ class Air:
 
     @property
     def inputs(self) -> dict[str, Distribution]:
-        measured = {name: getattr(self, name) for name in _UNITS if name != "equation"}
-        return {name: given for name, given in measured.items() if given is not None} | self.assumed
+        return _known(self, _AIR) | self.assumed
 
     @property
     def labels(self) -> Labels:
         """Units, and where each figure comes from."""
         assumed = dict.fromkeys(self.assumed, say("judgement: not measured"))
-        return Labels(_UNITS, {**dict.fromkeys(self.inputs, say("measured")), **assumed, "equation": say("literature")})
-
-
-_UNITS: Mapping[str, str] = {
-    "temperature_c": "degC",
-    "pressure_pa": "Pa",
-    "humidity_pct": "percent",
-    "dew_point_c": "degC",
-    "co2_ppm": "ppm",
-    "wavelength_nm": "nm",
-    "equation": "1",
-}
+        return Labels(
+            _AIR | {"equation": "1"},
+            {**dict.fromkeys(self.inputs, say("measured")), **assumed, "equation": say("literature")},
+        )
 
 
 def standard_pressure(altitude_m: Number) -> Any:
@@ -122,7 +123,7 @@ def refractivity_of(equation: AirEquation, values: Mapping[str, Any]) -> Any:
     """Refractivity n − 1 from the inputs of :class:`Air` and the error of the equation, floats, arrays or jets."""
     humidity = values.get("humidity_pct")
     if humidity is None:
-        humidity = relative_humidity(values["temperature_c"], values["dew_point_c"])
+        humidity = by.relative_humidity(values["temperature_c"], values["dew_point_c"])
     found = equation.refractivity(
         values["temperature_c"], values["pressure_pa"], humidity, values["co2_ppm"], values["wavelength_nm"]
     )
@@ -154,7 +155,7 @@ def check_range(air: Air, equation: AirEquation) -> None:
     }
     inputs = air.inputs
     if "dew_point_c" in inputs:
-        dew = relative_humidity(np.asarray(air.temperature_c.mean), np.asarray(inputs["dew_point_c"].mean))
+        dew = by.relative_humidity(np.asarray(air.temperature_c.mean), np.asarray(inputs["dew_point_c"].mean))
         inputs["humidity_pct"] = constant(dew)
     for name, (low, high) in ranges.items():
         means = np.atleast_1d(inputs[name].mean)
@@ -162,3 +163,48 @@ def check_range(air: Air, equation: AirEquation) -> None:
         if len(outside):
             problem = f"{name} = {outside[0]:g} is out of the range {low:g} to {high:g} of {equation.name}"
             raise CmmUqError(problem, fix="Check its unit, or choose another equation")
+
+
+@dataclass(frozen=True, eq=False)
+class Interferometer:
+    """What a displacement measured by laser rests on."""
+
+    vacuum_mm: Distribution  # displacement in vacuum wavelengths; its uncertainty is that of resolution and noise
+    air: Air  # at the time of the reading
+    dead_path_mm: Distribution | None = None  # between the interferometer and the place of zeroing
+    zero_refractivity: Distribution | None = None  # n₀ − 1 at zeroing; None means the air has not changed since
+    angle_rad: Distribution | None = None  # between beam and motion
+    material_c: Distribution | None = None  # temperature of what is measured; None leaves the length as it is
+    cte_per_k: Distribution | None = None  # its expansion coefficient
+    origins: Mapping[str, str] = field(default_factory=dict)  # of the figures, by the names of the model's inputs
+
+    @property
+    def labels(self) -> Labels:
+        """Units and origins of the inputs and of the length."""
+        air = self.air.labels
+        return Labels({**air.units, **_BEAM, "length": "mm"}, {**air.origins, **self.origins})
+
+
+def interferometer_model(setup: Interferometer, equation: str = "ciddor") -> MeasurementModel:
+    """Measurement model of the length, mm, at 20 °C where the material's temperature is given.
+
+    The wavelength enters twice: through the count, as a relative error of V, and (hardly) through the dispersion of air.
+    Raises :class:`CmmUqError` for an unknown equation, or air out of its range.
+    """
+    chosen = equation_by_name(equation)
+    check_range(setup.air, chosen)
+    nominal = setup.air.inputs["wavelength_nm"].mean
+    inputs = _known(setup, _BEAM) | setup.air.inputs | {"equation": normal(0.0, chosen.u)}
+    inputs.setdefault("dead_path_mm", constant(0.0))
+
+    def length(**values: Any) -> Any:
+        refractivity = refractivity_of(chosen, values)
+        counted = values["vacuum_mm"] * values["wavelength_nm"] / nominal
+        changed = refractivity - values["zero_refractivity"] if "zero_refractivity" in values else 0.0
+        along_beam = (counted - values["dead_path_mm"] * changed) / (1.0 + refractivity)
+        straight = along_beam / np.cos(values["angle_rad"]) if "angle_rad" in values else along_beam
+        if "material_c" not in values:
+            return straight
+        return straight / (1.0 + values["cte_per_k"] * (values["material_c"] - REFERENCE_TEMPERATURE))
+
+    return MeasurementModel(length, inputs, ("length",))

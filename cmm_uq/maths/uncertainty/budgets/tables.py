@@ -7,15 +7,15 @@ everything is in millimetres.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import sqrt
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from cmm_uq.base.files.limits import LISTED
-from cmm_uq.base.files.table import JobTable, Length, Position, Temperature, Triple, Uncertainty
+from cmm_uq.base.files.table import JobTable, Length, Position, Temperature, Triple, Uncertainty, key, required
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, REFERENCE_TEMPERATURE, unit
@@ -50,8 +50,7 @@ class BudgetTable(JobTable):
     """What every ready budget has: its name, a title, and what the method is for (``meaning``)."""
 
     meaning: ClassVar[Text] = NOTHING
-    title: str = ""
-    """Title of the page; the file's name where it is left out."""
+    title: str = key("", "Title of the page; the file's name where it is left out.")
 
     @abstractmethod
     def budgets(self) -> Mapping[str, Budget]:
@@ -70,22 +69,16 @@ class CalibratedWorkpiece(BudgetTable):
 
     meaning = say("ISO 15530-3:2011: uncertainty of measuring workpieces, from readings of a calibrated one.")
 
-    method: Literal["ISO 15530-3"]
-    """Name of the ready budget."""
-    readings_mm: Readings
-    """Readings of the calibrated workpiece."""
-    calibrated_mm: Length
-    """Calibrated value of the workpiece."""
-    u_calibration_um: Uncertainty
-    """Standard uncertainty of the calibrated value."""
-    temperature_c: Temperature = REFERENCE_TEMPERATURE
-    """Temperature of the workpiece during the readings."""
+    method: Literal["ISO 15530-3"] = required("Name of the ready budget.")
+    readings_mm: Readings = required("Readings of the calibrated workpiece.")
+    calibrated_mm: Length = required("Calibrated value of the workpiece.")
+    u_calibration_um: Uncertainty = required("Standard uncertainty of the calibrated value.")
+    temperature_c: Temperature = key(REFERENCE_TEMPERATURE, "Temperature of the workpiece during the readings.")
     u_cte_calibrated_per_k: Coefficient = 0.0
     """Standard uncertainty of the calibrated workpiece's coefficient of expansion, 1/K."""
     u_cte_workpieces_per_k: Coefficient = 0.0
     """Standard uncertainty of the coefficient of expansion of the workpieces to be measured, 1/K."""
-    u_form_um: Uncertainty = 0.0
-    """Standard uncertainty by form and roughness of the workpieces to be measured."""
+    u_form_um: Uncertainty = key(0.0, "Standard uncertainty by form and roughness of the workpieces to be measured.")
 
     def budgets(self) -> Mapping[str, Budget]:
         return {
@@ -104,12 +97,9 @@ class CalibratedWorkpiece(BudgetTable):
 class NotSimulated(JobTable):
     """A contribution that a simulation leaves out."""
 
-    name: Annotated[str, Field(min_length=1)]
-    """What it is, in words."""
-    u_um: Uncertainty
-    """Its standard uncertainty."""
-    source: str = JUDGEMENT
-    """Where the figure comes from."""
+    name: Annotated[str, Field(min_length=1)] = required("What it is, in words.")
+    u_um: Uncertainty = required("Its standard uncertainty.")
+    source: str = key(JUDGEMENT, "Where the figure comes from.")
 
 
 class SimulatedTask(BudgetTable):
@@ -117,8 +107,7 @@ class SimulatedTask(BudgetTable):
 
     meaning = say("ISO/TS 15530-4:2008: uncertainty of a measurement task, from simulated measurements of it.")
 
-    method: Literal["ISO 15530-4"]
-    """Name of the ready budget."""
+    method: Literal["ISO 15530-4"] = required("Name of the ready budget.")
     simulated_errors_um: Annotated[list[float], Field(max_length=LISTED.most)]
     """Errors of the simulated measurements of the task."""
     not_simulated: Annotated[list[NotSimulated], Field(max_length=LISTED.most)] = Field(default_factory=list)
@@ -141,26 +130,16 @@ class LengthTest(BudgetTable):
 
     meaning = say("ISO/TS 23165:2006: test uncertainty of an error of length measurement E.")
 
-    error_um: float
-    """Error that the test found."""
-    method: Literal["ISO/TS 23165 length"]
-    """Name of the ready budget."""
-    length_mm: Length
-    """Calibrated length of the artefact."""
-    u_calibration_um: Uncertainty
-    """Standard uncertainty of that length."""
-    temperature_c: Temperature = REFERENCE_TEMPERATURE
-    """Temperature of the artefact during the test."""
-    cte_per_k: Coefficient = 0.0
-    """Coefficient of thermal expansion of the artefact, 1/K."""
-    u_cte_per_k: Coefficient = 0.0
-    """Standard uncertainty of that coefficient, 1/K."""
-    u_temperature_k: Kelvin = 0.0
-    """Standard uncertainty of the artefact's temperature."""
-    u_alignment_um: Uncertainty = 0.0
-    """Standard uncertainty of the length by misalignment."""
-    u_fixturing_um: Uncertainty = 0.0
-    """Standard uncertainty of the length by the clamping."""
+    error_um: float = required("Error that the test found.")
+    method: Literal["ISO/TS 23165 length"] = required("Name of the ready budget.")
+    length_mm: Length = required("Calibrated length of the artefact.")
+    u_calibration_um: Uncertainty = required("Standard uncertainty of that length.")
+    temperature_c: Temperature = key(REFERENCE_TEMPERATURE, "Temperature of the artefact during the test.")
+    cte_per_k: Coefficient = key(0.0, "Coefficient of thermal expansion of the artefact, 1/K.")
+    u_cte_per_k: Coefficient = key(0.0, "Standard uncertainty of that coefficient, 1/K.")
+    u_temperature_k: Kelvin = key(0.0, "Standard uncertainty of the artefact's temperature.")
+    u_alignment_um: Uncertainty = key(0.0, "Standard uncertainty of the length by misalignment.")
+    u_fixturing_um: Uncertainty = key(0.0, "Standard uncertainty of the length by the clamping.")
 
     def budgets(self) -> Mapping[str, Budget]:
         budget = length_test_uncertainty(
@@ -176,14 +155,10 @@ class ProbingTest(BudgetTable):
 
     meaning = say("ISO/TS 23165:2006: test uncertainty of a probing error P.")
 
-    error_um: float
-    """Error that the test found."""
-    method: Literal["ISO/TS 23165 probing"]
-    """Name of the ready budget."""
-    form_um: Uncertainty
-    """Form deviation of the test sphere by its certificate."""
-    u_form_um: Uncertainty
-    """Standard uncertainty of that form deviation."""
+    error_um: float = required("Error that the test found.")
+    method: Literal["ISO/TS 23165 probing"] = required("Name of the ready budget.")
+    form_um: Uncertainty = required("Form deviation of the test sphere by its certificate.")
+    u_form_um: Uncertainty = required("Standard uncertainty of that form deviation.")
 
     def budgets(self) -> Mapping[str, Budget]:
         budget = probing_test_uncertainty(self.form_um * MICROMETRE, self.u_form_um * MICROMETRE)
@@ -195,18 +170,12 @@ class BallbarBudget(BudgetTable):
 
     meaning = say("Length of a ballbar from one position of it, or from the mean of several.")
 
-    method: Literal["ballbar length"]
-    """Name of the ready budget."""
-    length_mm: Length
-    """Length of the bar."""
-    direction: Triple
-    """Direction of the bar, of any length."""
-    u_centre_um: Three
-    """Standard uncertainties along x, y, z of the centre of a ball."""
-    form_shift_um: Uncertainty = 0.0
-    """Largest shift of a centre by the form of its ball."""
-    probe_um: Uncertainty = 0.0
-    """Largest systematic shift of a ball by the probe."""
+    method: Literal["ballbar length"] = required("Name of the ready budget.")
+    length_mm: Length = required("Length of the bar.")
+    direction: Triple = required("Direction of the bar, of any length.")
+    u_centre_um: Three = required("Standard uncertainties along x, y, z of the centre of a ball.")
+    form_shift_um: Uncertainty = key(0.0, "Largest shift of a centre by the form of its ball.")
+    probe_um: Uncertainty = key(0.0, "Largest systematic shift of a ball by the probe.")
     probe_common: Annotated[float, Field(ge=-1, le=1)] = 0.0
     """Correlation of that shift between the two balls: 1 where both are seen the same way."""
     scale_um: Three = Field(default_factory=_none)
@@ -215,18 +184,13 @@ class BallbarBudget(BudgetTable):
         list[Annotated[float, Field(ge=0, le=36_000)]], Field(min_length=3, max_length=3)
     ] = Field(default_factory=_none)
     """Standard uncertainties of the squareness xy, yz, zx."""
-    u_temperature_k: Kelvin = 0.0
-    """Standard uncertainty of the bar's temperature."""
-    cte_per_k: Coefficient = 0.0
-    """Coefficient of thermal expansion of the bar, 1/K."""
-    repetitions: Annotated[int, Field(ge=1, le=10_000)] = 1
-    """Number of positions whose mean is stated."""
+    u_temperature_k: Kelvin = key(0.0, "Standard uncertainty of the bar's temperature.")
+    cte_per_k: Coefficient = key(0.0, "Coefficient of thermal expansion of the bar, 1/K.")
+    repetitions: Annotated[int, Field(ge=1, le=10_000)] = key(1, "Number of positions whose mean is stated.")
 
-    @model_validator(mode="after")
-    def _points_somewhere(self) -> Self:
+    def problems(self) -> Iterable[str]:
         if not any(self.direction):
-            raise ValueError("direction = [0, 0, 0] points nowhere")
-        return self
+            yield "direction = [0, 0, 0] points nowhere"
 
     def budgets(self) -> Mapping[str, Budget]:
         """Of the length; what repetitions do not share is divided by the root of their number."""
@@ -250,20 +214,14 @@ class FittedSphere(BudgetTable):
         "Centre and radius of a sphere fitted to points spread evenly over a cap about +z, form of the ball included."
     )
 
-    method: Literal["sphere fit"]
-    """Name of the ready budget."""
-    centre_mm: Triple
-    """Centre of the sphere."""
-    radius_mm: Length
-    """Radius of the sphere."""
-    points: Annotated[int, Field(ge=4, le=1_000_000)]
-    """Number of points, spread evenly."""
+    method: Literal["sphere fit"] = required("Name of the ready budget.")
+    centre_mm: Triple = required("Centre of the sphere.")
+    radius_mm: Length = required("Radius of the sphere.")
+    points: Annotated[int, Field(ge=4, le=1_000_000)] = required("Number of points, spread evenly.")
     cap_deg: Annotated[float, Field(gt=0, le=180)]
     """Angle from +z to the edge of the cap that the points cover: 90 for a hemisphere."""
-    u_point_um: Uncertainty
-    """Standard uncertainty of a point along its normal."""
-    sphericity_um: Uncertainty = 0.0
-    """Form deviation of the ball."""
+    u_point_um: Uncertainty = required("Standard uncertainty of a point along its normal.")
+    sphericity_um: Uncertainty = key(0.0, "Form deviation of the ball.")
 
     def budgets(self) -> Mapping[str, Budget]:
         """Of x, y, z and radius; the ball's axis may point anywhere."""

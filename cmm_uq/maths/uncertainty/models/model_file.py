@@ -21,7 +21,7 @@ from pydantic import Field
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.content import content_of, text_of
 from cmm_uq.base.files.limits import DRAWS, INPUTS, MODEL_BYTES, TEXT
-from cmm_uq.base.files.table import JobTable
+from cmm_uq.base.files.table import JobTable, key, required
 from cmm_uq.base.files.toml_file import toml_of
 from cmm_uq.base.messages import Text, say
 from cmm_uq.maths.uncertainty.budget import REPEATS, Labels
@@ -45,18 +45,13 @@ class ModelTable(JobTable):
     asin acos atan atan2 abs`."""
     ready: Literal[tuple(READY)] | None = None  # type: ignore[valid-type]
     """Name of a ready model, in place of `outputs`."""
-    coverage: Annotated[float, Field(gt=0, lt=1)] = 0.95
-    """Probability of the intervals."""
+    coverage: Annotated[float, Field(gt=0, lt=1)] = key(0.95, "Probability of the intervals.")
     method: Literal[tuple(METHODS)] = "auto"  # type: ignore[valid-type]
     """How it is evaluated; `auto` takes the simplest way that Monte Carlo confirms."""
-    digits: Annotated[int, Field(ge=1, le=4)] = 2
-    """Significant digits of u that Monte Carlo must support."""
-    seed: Annotated[int, Field(ge=0)] = 0
-    """Seed of the random numbers."""
-    title: str = ""
-    """Title of the page; the file's name where it is left out."""
-    units: dict[str, str] = {}
-    """Unit of each output; derived where the expression determines it."""
+    digits: Annotated[int, Field(ge=1, le=4)] = key(2, "Significant digits of u that Monte Carlo must support.")
+    seed: Annotated[int, Field(ge=0)] = key(0, "Seed of the random numbers.")
+    title: str = key("", "Title of the page; the file's name where it is left out.")
+    units: dict[str, str] = key({}, "Unit of each output; derived where the expression determines it.")
 
 
 class InputTable(JobTable):
@@ -64,34 +59,21 @@ class InputTable(JobTable):
 
     distribution: Literal[tuple(KINDS)] | None = None  # type: ignore[valid-type]
     """Distribution of JCGM 101:2008 table 1, `sampled` or `constant`; `t` where only samples are given."""
-    value: Figure | None = None
-    """Estimate: mean, middle of the limits, or count."""
-    u: Figure | None = None
-    """Standard uncertainty."""
-    dof: float | None = None
-    """Degrees of freedom of u; finite ones say how well u itself is known."""
+    value: Figure | None = key(None, "Estimate: mean, middle of the limits, or count.")
+    u: Figure | None = key(None, "Standard uncertainty.")
+    dof: float | None = key(None, "Degrees of freedom of u; finite ones say how well u itself is known.")
     expanded: Figure | None = None
     """Expanded uncertainty of a certificate, in place of `u`; needs `coverage_factor`."""
-    coverage_factor: float | None = None
-    """Coverage factor of `expanded`."""
-    low: Figure | None = None
-    """Lower limit."""
-    high: Figure | None = None
-    """Upper limit."""
-    half_width: Figure | None = None
-    """Half the distance of the limits, with `value`."""
-    limit: Figure | None = None
-    """How far each limit of `rectangular_uncertain` is in doubt."""
-    beta: float | None = None
-    """Ratio of top to base of a trapezoid, or doubt of the limits over the half-width."""
-    samples: list[Figure] | None = None
-    """Repeated readings, or draws of an earlier analysis (`sampled`)."""
-    unit: str = ""
-    """Unit in which the model takes the input."""
-    source: str = ""
-    """Where the figures come from, for the budget."""
-    description: str = ""
-    """What the input is, for the page."""
+    coverage_factor: float | None = key(None, "Coverage factor of `expanded`.")
+    low: Figure | None = key(None, "Lower limit.")
+    high: Figure | None = key(None, "Upper limit.")
+    half_width: Figure | None = key(None, "Half the distance of the limits, with `value`.")
+    limit: Figure | None = key(None, "How far each limit of `rectangular_uncertain` is in doubt.")
+    beta: float | None = key(None, "Ratio of top to base of a trapezoid, or doubt of the limits over the half-width.")
+    samples: list[Figure] | None = key(None, "Repeated readings, or draws of an earlier analysis (`sampled`).")
+    unit: str = key("", "Unit in which the model takes the input.")
+    source: str = key("", "Where the figures come from, for the budget.")
+    description: str = key("", "What the input is, for the page.")
     simultaneous: str = ""
     """The same word for inputs that were read together: their correlation comes from the samples."""
 
@@ -99,10 +81,8 @@ class InputTable(JobTable):
 class ModelFileTable(JobTable):
     """A measurement model of one's own."""
 
-    model: ModelTable
-    """What is evaluated, and how."""
-    inputs: dict[str, InputTable]
-    """What is known of each input, by its name."""
+    model: ModelTable = required("What is evaluated, and how.")
+    inputs: dict[str, InputTable] = required("What is known of each input, by its name.")
     correlation: dict[str, float] = {}
     """Correlation of two inputs, as `"x1,x2" = 0.9`."""
 
@@ -312,11 +292,11 @@ class _Reader:
 
     def _correlation(self, data: Mapping[str, Any]) -> dict[tuple[str, str], float]:
         pairs: dict[tuple[str, str], float] = {}
-        for key, number in self._table({"correlation": {}, **data}, "correlation", "").items():
-            names = [name.strip() for name in key.split(",")]
+        for pair, number in self._table({"correlation": {}, **data}, "correlation", "").items():
+            names = [name.strip() for name in pair.split(",")]
             if len(names) != 2:
-                raise self._refused(f"{key!r} is not a pair of inputs", "[correlation]", 'Write "x1,x2" = 0.9')
-            pairs[names[0], names[1]] = self._number(number, f"[correlation] {key}")
+                raise self._refused(f"{pair!r} is not a pair of inputs", "[correlation]", 'Write "x1,x2" = 0.9')
+            pairs[names[0], names[1]] = self._number(number, f"[correlation] {pair}")
         return pairs
 
     def _request(self, model: Mapping[str, Any]) -> Request:

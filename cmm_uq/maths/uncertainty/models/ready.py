@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from inspect import Parameter, signature
 from pathlib import Path
 from types import MappingProxyType
@@ -20,8 +20,7 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.table import JobTable
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.messages import Text, Verbatim, number, say
-from cmm_uq.maths.uncertainty.air.interferometer import Interferometer, interferometer_model
-from cmm_uq.maths.uncertainty.air.state import Air
+from cmm_uq.maths.uncertainty.air.state import Air, Interferometer, interferometer_model
 from cmm_uq.maths.uncertainty.budget import Budget, Labels
 from cmm_uq.maths.uncertainty.budgets.measurements import UNITS, length_at_20, scale_error, triangle_angles
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES, BudgetTable
@@ -58,11 +57,12 @@ def _interferometer(given: Mapping[str, Distribution], correlation: Correlations
     return MeasurementModel(model.function, model.inputs, model.outputs, dict(correlation)), setup.labels
 
 
-_INTERFEROMETER = {
-    "vacuum_mm": True, "temperature_c": True, "pressure_pa": False, "humidity_pct": False, "dew_point_c": False,
-    "co2_ppm": False, "wavelength_nm": False, "dead_path_mm": False, "zero_refractivity": False, "angle_rad": False,
-    "material_c": False, "cte_per_k": False,
-}  # fmt: skip
+_FIELDS = (
+    *fields(Interferometer)[:1],
+    *fields(Air)[:-1],
+    *fields(Interferometer)[2:-1],
+)  # those that are distributions
+_INTERFEROMETER = {each.name: each.default is MISSING for each in _FIELDS}
 _ANGLES = {"a_mm": "mm", "b_mm": "mm", "c_mm": "mm", "alpha": "rad", "beta": "rad", "gamma": "rad"}
 
 READY: Mapping[str, ReadyModel] = MappingProxyType(

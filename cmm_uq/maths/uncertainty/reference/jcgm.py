@@ -7,23 +7,19 @@ intermediate results, the recomputed one is expected.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from typing import Any
 
 import numpy as np
 
+from cmm_uq.maths.uncertainty import distributions as known
 from cmm_uq.maths.uncertainty.correlation import correlation_of
 from cmm_uq.maths.uncertainty.coverage import elliptical_factor
-from cmm_uq.maths.uncertainty.distributions import (
-    Distribution,
-    arcsine,
-    normal,
-    rectangular,
-    rectangular_uncertain,
-    student_t,
-)
+from cmm_uq.maths.uncertainty.distributions import Distribution, arcsine, normal, rectangular, student_t
 from cmm_uq.maths.uncertainty.evaluation import Request, compare, evaluate
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated, simulate, simulate_adaptively
@@ -40,6 +36,12 @@ class ReferenceCase:
     source: str  # document and clause, or how the figures were recomputed
     expected: Mapping[str, tuple[float, float]]  # value and tolerance by the name of the figure
     compute: Callable[[], Iterable[float]]  # gives the figures, in the same order
+
+
+def figures(text: str) -> dict[str, tuple[float, float]]:
+    """Values and their tolerances by name, as in ``length, nm: 50000838 ± 0.5; ν: 16.75 ± 0.005``."""
+    entries = re.findall(r"(.+?): (\S+) ± ([^;]+)(?:; |$)", text)
+    return {name: (float(value), float(tolerance)) for name, value, tolerance in entries}
 
 
 # table H.2: five simultaneous readings of voltage (V), current (A) and phase (rad)
@@ -106,7 +108,6 @@ def _thermometer() -> list[float]:
 
 _NORMAL = normal(0.0, 1.0)
 _FLAT, _WIDE = (rectangular(-width * np.sqrt(3), width * np.sqrt(3)) for width in (1, 10))
-_DELTA_MASS, _DELTA_BLOCK = 0.0005, 0.5
 
 
 def gauge_block() -> MeasurementModel:
@@ -119,8 +120,8 @@ def gauge_block() -> MeasurementModel:
         "a": rectangular(9.5e-6, 13.5e-6),
         "t": normal(-0.1, 0.2),
         "swing": arcsine(-0.5, 0.5),
-        "da": rectangular_uncertain(-1e-6, 1e-6, 0.1e-6),
-        "dt": rectangular_uncertain(-0.05, 0.05, 0.025),
+        "da": known.rectangular_uncertain(-1e-6, 1e-6, 0.1e-6),
+        "dt": known.rectangular_uncertain(-0.05, 0.05, 0.025),
     }
     return MeasurementModel(lambda ls, **rest: comparison(ls=ls + 50_000_000.0, **rest) - 50_000_000.0, inputs)
 
@@ -151,13 +152,10 @@ def _figures(result: Simulated | Propagated) -> tuple[float, ...]:
     return result.value[0], result.u[0], *(end[0] for end in result.interval(0.95))
 
 
-def _four(*inputs: Distribution) -> Callable[[], list[float]]:
-    def compute() -> list[float]:
-        model = MeasurementModel(lambda a, b, c, d: a + b + c + d, dict(zip("abcd", inputs, strict=True)))
-        drawn = simulate(model, 1_000_000, seed=SEED)
-        return [drawn.u[0], np.ptp(drawn.symmetric_interval[0]) / 2, first_order(model).interval(0.95)[1][0]]
-
-    return compute
+def _four(*inputs: Distribution) -> list[float]:
+    model = MeasurementModel(lambda a, b, c, d: a + b + c + d, dict(zip("abcd", inputs, strict=True)))
+    drawn = simulate(model, 1_000_000, seed=SEED)
+    return [drawn.u[0], np.ptp(drawn.symmetric_interval[0]) / 2, first_order(model).interval(0.95)[1][0]]
 
 
 def _mass() -> list[float]:
@@ -175,14 +173,10 @@ def _clause_8() -> list[float]:
     return [max(first.low, first.high), first.tolerance, *chosen]
 
 
-def _loss(x1: float) -> Callable[[], list[float]]:
-    def compute() -> list[float]:
-        model = comparison_loss(x1)
-        second = second_order(model)
-        drawn = simulate(model, 1_000_000, seed=SEED)
-        return [*_figures(drawn), first_order(model).u[0], second.value[0], second.u[0]]
-
-    return compute
+def _loss(x1: float) -> list[float]:
+    model = comparison_loss(x1)
+    second, drawn = second_order(model), simulate(model, 1_000_000, seed=SEED)
+    return [*_figures(drawn), first_order(model).u[0], second.value[0], second.u[0]]
 
 
 def _gauge_block() -> list[float]:
@@ -190,134 +184,101 @@ def _gauge_block() -> list[float]:
     return [*_figures(drawn), first_order(gauge_block()).u[0]]
 
 
-def _polar(x1: float) -> Callable[[], list[float]]:
-    def compute() -> list[float]:
-        model = MeasurementModel(
-            lambda x1, x2: {"modulus": np.sqrt(x1**2 + x2**2), "phase": np.arctan2(x2, x1)},
-            {"x1": normal(x1, 0.010), "x2": normal(0.0, 0.010)},
-            ("modulus", "phase"),
-        )
-        drawn = simulate(model, 1_000_000, seed=SEED)
-        return [drawn.value[0], drawn.u[0], drawn.value[1], drawn.u[1]]
+def _polar(x1: float) -> list[float]:
+    def polar(x1: Any, x2: Any) -> dict[str, Any]:
+        return {"modulus": np.sqrt(x1**2 + x2**2), "phase": np.arctan2(x2, x1)}
 
-    return compute
+    inputs = {"x1": normal(x1, 0.010), "x2": normal(0.0, 0.010)}
+    drawn = simulate(MeasurementModel(polar, inputs, ("modulus", "phase")), 1_000_000, seed=SEED)
+    return [drawn.value[0], drawn.u[0], drawn.value[1], drawn.u[1]]
 
 
 CASES = (
     ReferenceCase(
         "End gauge by comparison",
         "JCGM 100:2008 annex H.1",
-        {
-            "length, nm": (50_000_838, 0.5),
-            "u, nm": (31.66, 0.005),
-            "ν": (16.75, 0.005),
-            "t99": (2.92, 0.005),
-            "U99, nm": (92.5, 0.05),
-            "u(ls)": (25, 0.05),
-            "u(d)": (9.682, 0.005),
-            "u(δα)": (2.887, 0.0005),
-            "u(δθ)": (16.599, 0.0005),
-            "second order, δα and θ": (11.73, 0.05),
-            "u with second order, nm": (33.8, 0.05),
-        },
+        figures(
+            "length, nm: 50000838 ± 0.5; u, nm: 31.66 ± 0.005; ν: 16.75 ± 0.005; t99: 2.92 ± 0.005; U99, nm: 92.5 ± 0.05; "
+            "u(ls): 25 ± 0.05; u(d): 9.682 ± 0.005; u(δα): 2.887 ± 0.0005; u(δθ): 16.599 ± 0.0005; "
+            "second order, δα and θ: 11.73 ± 0.05; u with second order, nm: 33.8 ± 0.05"
+        ),
         _end_gauge,
     ),
     ReferenceCase(
         "Resistance, reactance and impedance from simultaneous readings",
         "JCGM 100:2008 annex H.2",
-        {
-            "R": (127.7322, 5e-5),
-            "X": (219.8465, 5e-5),
-            "Z": (254.2597, 5e-5),
-            "u(R)": (0.07107, 5e-6),
-            "u(X)": (0.29558, 5e-6),
-            "u(Z)": (0.23634, 5e-6),
-            "r(R,X)": (-0.588, 5e-4),
-            "r(R,Z)": (-0.485, 5e-4),
-            "r(X,Z)": (0.9925, 5e-5),
-            **{f"ν({name})": (4, 1e-6) for name in "RXZ"},
-            "U95(R)": (0.197, 5e-4),
-            "U95(X)": (0.821, 5e-4),
-            "U95(Z)": (0.656, 5e-4),
-        },
+        figures(
+            "R: 127.7322 ± 5e-5; X: 219.8465 ± 5e-5; Z: 254.2597 ± 5e-5; u(R): 0.07107 ± 5e-6; u(X): 0.29558 ± 5e-6; "
+            "u(Z): 0.23634 ± 5e-6; r(R,X): -0.588 ± 5e-4; r(R,Z): -0.485 ± 5e-4; r(X,Z): 0.9925 ± 5e-5; ν(R): 4 ± 1e-6; "
+            "ν(X): 4 ± 1e-6; ν(Z): 4 ± 1e-6; U95(R): 0.197 ± 5e-4; U95(X): 0.821 ± 5e-4; U95(Z): 0.656 ± 5e-4"
+        ),
         _impedance,
     ),
     ReferenceCase(
         "Thermometer calibration line",
         "JCGM 100:2008 annex H.3",
-        {
-            "intercept": (-0.17120, 5e-6),
-            "slope": (0.0021827, 5e-6),
-            "u(intercept)": (0.00288, 5e-6),
-            "u(slope)": (0.000668, 1e-6),
-            "r": (-0.9304, 1e-4),
-            "s": (0.0035, 5e-5),
-            "b(30 °C)": (-0.1494, 5e-5),
-            "u(b(30 °C))": (0.0041, 5e-5),
-        },
+        figures(
+            "intercept: -0.17120 ± 5e-6; slope: 0.0021827 ± 5e-6; u(intercept): 0.00288 ± 5e-6; u(slope): 0.000668 ± 1e-6; "
+            "r: -0.9304 ± 1e-4; s: 0.0035 ± 5e-5; b(30 °C): -0.1494 ± 5e-5; u(b(30 °C)): 0.0041 ± 5e-5"
+        ),
         _thermometer,
     ),
     ReferenceCase(
         "Rounding of a result",
         "JCGM 100:2008 7.2.6, ILAC-P14:09/2020",
-        {"value": (10.058, 0), "u": (0.027, 0)},
+        figures("value: 10.058 ± 0; u: 0.027 ± 0"),
         lambda: map(float, rounded(10.05762, 0.02712)),
     ),
     *(
         ReferenceCase(
             title,
             f"JCGM 101:2008 {clause}, recomputed",
-            {"u": u, "U by Monte Carlo": (drawn, 0.05), "U by first order": first},
-            _four(*inputs),
+            figures(f"u: {u}; U by Monte Carlo: {drawn} ± 0.05; U by first order: {first}"),
+            partial(_four, *inputs),
         )
         for title, clause, u, drawn, first, inputs in (
-            ("Sum of four normal quantities", "9.2.2", (2.0, 0.05), 3.91993, (3.91993, 5e-6), [_NORMAL] * 4),
-            ("Sum of four rectangular quantities", "9.2.3", (2.0, 0.05), 3.87941, (3.91993, 5e-6), [_FLAT] * 4),
-            ("One of the four ten times wider", "9.2.4", (10.149, 0.5), 17.0158, (19.891, 5e-4), [*[_FLAT] * 3, _WIDE]),
+            ("Sum of four normal quantities", "9.2.2", "2 ± 0.05", 3.91993, "3.91993 ± 5e-6", [_NORMAL] * 4),
+            ("Sum of four rectangular quantities", "9.2.3", "2 ± 0.05", 3.87941, "3.91993 ± 5e-6", [_FLAT] * 4),
+            (
+                "One of the four ten times wider",
+                "9.2.4",
+                "10.149 ± 0.5",
+                17.0158,
+                "19.891 ± 5e-4",
+                [*[_FLAT] * 3, _WIDE],
+            ),
         )
     ),
     ReferenceCase(
         "Mass calibration",
         "JCGM 101:2008 9.3, recomputed",
-        {
-            "Monte Carlo value": (1.2340, _DELTA_MASS),
-            "Monte Carlo u": (0.075480, _DELTA_MASS),
-            "Monte Carlo low": (1.08443, 2 * _DELTA_MASS),
-            "Monte Carlo high": (1.38357, 2 * _DELTA_MASS),
-            "first order u": (0.0539, 5e-5),
-            "first order low": (1.1285, 5e-5),
-            "first order high": (1.3395, 5e-5),
-            "second order u": (0.07496, 5e-6),
-            "second order low": (1.0871, 5e-5),
-            "second order high": (1.3809, 5e-5),
-        },
+        figures(
+            "Monte Carlo value: 1.2340 ± 0.0005; Monte Carlo u: 0.075480 ± 0.0005; Monte Carlo low: 1.08443 ± 0.001; "
+            "Monte Carlo high: 1.38357 ± 0.001; first order u: 0.0539 ± 5e-5; first order low: 1.1285 ± 5e-5; "
+            "first order high: 1.3395 ± 5e-5; second order u: 0.07496 ± 5e-6; second order low: 1.0871 ± 5e-5; "
+            "second order high: 1.3809 ± 5e-5"
+        ),
         _mass,
     ),
     ReferenceCase(
         "Validation of the mass calibration",
         "JCGM 101:2008 9.3 with clause 8",
-        {
-            "d of first order": (0.044, 0.005),
-            "δ for one digit": (0.005, 1e-9),
-            "second order chosen for one digit": (1, 0),
-            "Monte Carlo chosen for two digits": (1, 0),
-        },
+        figures(
+            "d of first order: 0.044 ± 0.005; δ for one digit: 0.005 ± 1e-9; second order chosen for one digit: 1 ± 0; "
+            "Monte Carlo chosen for two digits: 1 ± 0"
+        ),
         _clause_8,
     ),
     *(
         ReferenceCase(
             f"Comparison loss, x1 = {x1:g}, in 10⁻⁶",
             "JCGM 101:2008 9.4, recomputed",
-            {
-                "value": (value, delta),
-                "u": (u, delta),
-                "low": (low, delta),
-                "high": (high, 2 * delta),
-                "u by first order": (1e6 * 2 * x1 * 0.005, 1e-9),
-                "value by second order": (value, 1e-6),
-                "u by second order": (u, 0.05),
-            },
-            _loss(x1),
+            figures(
+                f"value: {value} ± {delta}; u: {u} ± {delta}; low: {low} ± {delta}; high: {high} ± {2 * delta}; "
+                f"u by first order: {1e6 * 2 * x1 * 0.005} ± 1e-9; value by second order: {value} ± 1e-6; "
+                f"u by second order: {u} ± 0.05"
+            ),
+            partial(_loss, x1),
         )
         for x1, value, u, low, high, delta in (
             (0.0, 50, 50, 0, 149.8, 0.5),
@@ -328,27 +289,21 @@ CASES = (
     ReferenceCase(
         "Comparison loss by first order, in 10⁻⁶",
         "JCGM 101:2008 9.4.2",
-        {"low by first order": (1520, 0.5), "high by first order": (3480, 0.5)},
+        figures("low by first order: 1520 ± 0.5; high by first order: 3480 ± 0.5"),
         lambda: _figures(first_order(comparison_loss(0.050)))[2:],
     ),
     ReferenceCase(
         "Gauge block, 99 %, nm",
         "JCGM 101:2008 9.5, recomputed",
-        {
-            "value": (838.0, _DELTA_BLOCK),
-            "u": (35.81, _DELTA_BLOCK),
-            "low": (744.4, 2 * _DELTA_BLOCK),
-            "high": (931.6, 2 * _DELTA_BLOCK),
-            "u by first order": (32, 0.5),
-        },
+        figures("value: 838 ± 0.5; u: 35.81 ± 0.5; low: 744.4 ± 1; high: 931.6 ± 1; u by first order: 32 ± 0.5"),
         _gauge_block,
     ),
     *(
         ReferenceCase(
             f"Polar from rectangular coordinates, x1 = {x1:g}",
             "JCGM 102:2011 9.3",
-            {"modulus": (modulus, 1e-4), "u(modulus)": (u, 1e-4), "phase": (0.0, 0.01), "u(phase)": (u_phase, 2e-3)},
-            _polar(x1),
+            figures(f"modulus: {modulus} ± 1e-4; u(modulus): {u} ± 1e-4; phase: 0 ± 0.01; u(phase): {u_phase} ± 2e-3"),
+            partial(_polar, x1),
         )
         for x1, modulus, u, u_phase in (
             (0.001, 0.0126, 0.0066, 1.744),
@@ -359,7 +314,7 @@ CASES = (
     ReferenceCase(
         "Factor of the 95 % ellipse",
         "JCGM 102:2011 table 1",
-        {"two outputs": (2.4477, 5e-5)},
+        figures("two outputs: 2.4477 ± 5e-5"),
         lambda: [elliptical_factor(2)],
     ),
 )

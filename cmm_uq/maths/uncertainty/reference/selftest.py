@@ -18,7 +18,7 @@ from cmm_uq.maths.uncertainty.correlation import correlation_of
 from cmm_uq.maths.uncertainty.measurement_model import derivatives
 from cmm_uq.maths.uncertainty.quantity import MINUS
 from cmm_uq.maths.uncertainty.reference import jcgm
-from cmm_uq.maths.uncertainty.reference.jcgm import ReferenceCase
+from cmm_uq.maths.uncertainty.reference.jcgm import ReferenceCase, figures
 
 # °C, %, kPa, nm; 10⁹ (n − 1) by Ciddor and by the modified Edlén equation
 _AIR_TABLE = (
@@ -98,49 +98,40 @@ _MEASUREMENTS = (
     ReferenceCase(
         "Laboratory air by Ciddor and its sensitivities",
         "recomputed with forty digits",
-        {
-            "(n − 1)·10⁸": (27137.275, 1e-3),
-            "dn/dt, /K": (-9.548e-7, 5e-11),
-            "dn/dp, /Pa": (2.683e-9, 5e-13),
-            "dn/dRH, /%": (-8.50e-9, 5e-12),
-            "dn/dCO2, /ppm": (1.435e-10, 5e-14),
-        },
+        figures(
+            "(n − 1)·10⁸: 27137.275 ± 1e-3; dn/dt, /K: -9.548e-7 ± 5e-11; dn/dp, /Pa: 2.683e-9 ± 5e-13; "
+            "dn/dRH, /%: -8.50e-9 ± 5e-12; dn/dCO2, /ppm: 1.435e-10 ± 5e-14"
+        ),
         _laboratory_air,
     ),
     ReferenceCase(
         "Constant of water vapour",
         "Birch and Downs, Metrologia 31 (1994) 315",
-        {"constant": (3.7345, 1e-9)},
+        figures("constant: 3.7345 ± 1e-9"),
         _water_constant,
     ),
     ReferenceCase(
         "Refractivity by the formula of Harris 2004, exponent mended",
         "Harris 2004 section 3.3, recomputed",
-        {"N": (271.307, 5e-4), "dN/dT": (-0.958, 5e-4), "dN/dP": (0.358, 5e-4), "dN/dH": (-0.0096, 5e-5)},
+        figures("N: 271.307 ± 5e-4; dN/dT: -0.958 ± 5e-4; dN/dP: 0.358 ± 5e-4; dN/dH: -0.0096 ± 5e-5"),
         _harris_air,
     ),
     ReferenceCase(
         "Sphere from 17,000 points on a hemisphere, 9 µm each",
         "information matrix in closed form",
-        {
-            "u(x), µm": (0.120, 1e-3),
-            "u(y), µm": (0.120, 1e-3),
-            "u(z), µm": (0.240, 1e-3),
-            "u(R), µm": (0.138, 1e-3),
-            "r(z,R)": (-0.866, 1e-3),
-        },
+        figures(
+            "u(x), µm: 0.120 ± 1e-3; u(y), µm: 0.120 ± 1e-3; u(z), µm: 0.240 ± 1e-3; u(R), µm: 0.138 ± 1e-3; "
+            "r(z,R): -0.866 ± 1e-3"
+        ),
         _hemisphere,
     ),
     ReferenceCase(
         "Ballbar length as printed",
         "Harris 2004 sections 6.2.3 and 6.4.1",
-        {
-            "centre, µm": (14, 0.6),
-            "length, compensated, µm": (20, 1.0),
-            "length, 20 °C, µm": (26, 0.5),
-            "length, 25 °C, µm": (41, 0.5),
-            "length, 30 °C, µm": (52, 0.5),
-        },
+        figures(
+            "centre, µm: 14 ± 0.6; length, compensated, µm: 20 ± 1; length, 20 °C, µm: 26 ± 0.5; "
+            "length, 25 °C, µm: 41 ± 0.5; length, 30 °C, µm: 52 ± 0.5"
+        ),
         _harris,
     ),
 )

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.maths.uncertainty.air.interferometer import Interferometer, interferometer_model
 from cmm_uq.maths.uncertainty.air.refractivity import (
     birch_downs_1994,
     ciddor,
@@ -15,7 +14,15 @@ from cmm_uq.maths.uncertainty.air.refractivity import (
     relative_humidity,
     saturation_pressure,
 )
-from cmm_uq.maths.uncertainty.air.state import EQUATIONS, Air, air_model, refractive_index, standard_pressure
+from cmm_uq.maths.uncertainty.air.state import (
+    EQUATIONS,
+    Air,
+    Interferometer,
+    air_model,
+    interferometer_model,
+    refractive_index,
+    standard_pressure,
+)
 from cmm_uq.maths.uncertainty.budget import budget_of
 from cmm_uq.maths.uncertainty.distributions import constant, normal, rectangular
 from cmm_uq.maths.uncertainty.evaluation import evaluate
