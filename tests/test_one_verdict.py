@@ -200,10 +200,11 @@ def test_results_json_the_terminal_and_exit_codes(seed: int) -> None:
     assert data["verdicts"]["overall"] == of.overall
     told = outcome(seed).summary.verdicts
     assert [one.word.lower() for one in told] == [*of.stated.values()]
-    ended = Written(outcome(seed), b"{}", {})
+    found = outcome(seed)
+    ended = Written(found, b"{}", {}, found.summary, found.conforming, "job")
     code = 0
     try:
-        conclude(ended, Ending(quiet=True), strict=True)
+        conclude(ended, Ending(quiet=True, strict=True))
     except typer.Exit as exit_:
         code = exit_.exit_code
     assert code == (0 if of.overall in ("pass", "none") else 4)

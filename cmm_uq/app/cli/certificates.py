@@ -9,13 +9,13 @@ import typer
 
 from cmm_uq.app.cli import options as opt, terminal
 from cmm_uq.app.cli.options import Ending, argument, examples, flag, option
-from cmm_uq.app.cli.terminal import put, put_data, put_json, say
+from cmm_uq.app.cli.terminal import put_json, say
 from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.affected import AffectedCertificate, FigureChange
     from cmm_uq.app.commands.certificates.verification import Verification
-    from cmm_uq.jobs.dcc.figures import CertificateView, Grid
+    from cmm_uq.jobs.dcc.figures import CertificateView
 
 
 FINDINGS_SHOWN = 20  # findings of a verification that are told one by one
@@ -41,18 +41,12 @@ def verify(
         from cmm_uq.app.commands.certificates.verify import verify
 
         found = verify(files, rerun=rerun, trust=trust or None, schema=schema, stage=stage or (lambda what, part: None))
-    inquiry = found.inquiry
-    if end.json:
-        put_data({"schema": "cmm-uq/verification/1", "subject": found.subject, **inquiry.as_data()})
-    elif not end.quiet:
-        _show_verification(found, verbose=end.verbose)
-    if inquiry.findings:
-        raise typer.Exit(terminal.NOT_VERIFIED)
-    if inquiry.unchecked:
-        raise typer.Exit(terminal.NOT_WHOLLY_CHECKED)
+    data = {"schema": "cmm-uq/verification/1", "subject": found.subject, **found.inquiry.as_data()}
+    left = terminal.NOT_WHOLLY_CHECKED if found.inquiry.unchecked else 0
+    end.put(data, _verified(found, verbose=end.verbose), terminal.NOT_VERIFIED if found.inquiry.findings else left)
 
 
-def _show_verification(found: Verification, *, verbose: bool) -> None:
+def _verified(found: Verification, *, verbose: bool) -> list[str]:
     from cmm_uq.certificate.verify.found import CHECKS
 
     inquiry = found.inquiry
@@ -66,8 +60,7 @@ def _show_verification(found: Verification, *, verbose: bool) -> None:
         count = inquiry.done.get(name, 0)
         if wrong or count:
             lines.append(f"  {name:<10}  {'✗' if wrong else '✓'}  {what} ({count})")
-    for line in [*lines, *(f"  {note}" for note in inquiry.notes)]:
-        say(printable(line))
+    return [*lines, *(f"  {note}" for note in inquiry.notes)]
 
 
 def sign(
@@ -88,16 +81,12 @@ def sign(
     from cmm_uq.app.commands.certificates.signing import sign_files
 
     done = sign_files(files, signing, out=out, records=records)
-    if end.json:
-        put_data({
-            "signer": signing.signer.name, "test_key": signing.signer.test_key, "at": signing.at.isoformat(),
-            "level": "B-B" if signing.stamping is None else signing.stamping.level,
-            "files": [str(path) for path in done.files], "records": done.records,
-        })  # fmt: skip
-    elif not end.quiet:
-        if done.records:
-            say(printable(f"Recorded in {done.records}."))
-        opt.show_signatures(signing, done.files)
+    recorded = [f"Recorded in {done.records}."] if done.records else []
+    end.put({
+        "signer": signing.signer.name, "test_key": signing.signer.test_key, "at": signing.at.isoformat(),
+        "level": "B-B" if signing.stamping is None else signing.stamping.level,
+        "files": [str(path) for path in done.files], "records": done.records,
+    }, [*recorded, *opt.signatures(signing, done.files)])  # fmt: skip
 
 
 def release(
@@ -130,18 +119,11 @@ def release(
             ask = _ask_why if not end.silent and terminal.can_answer() else None
             done = releases.release(history, certificate, by=by, reason=reason, despite=despite, ask=ask)
         signatures = history.signatures(done.certificate.entry)
-    now = done.certificate
-    if end.json:
-        signed = [
-            {"what": one.what, "by": one.by, "reason": one.reason, "at": one.at.isoformat()} for one in signatures
-        ]
-        put_data({
-            "certificate": now.number, "job": now.job, "entry": now.entry, "state": now.state, "waiting": done.waiting,
-            "signatures": signed,
-        })  # fmt: skip
-    elif not end.quiet:
-        waits = f"; {done.waiting} more must sign" if done.waiting else ""
-        say(printable(f"{now.number} of {now.day} ({now.machine}): {now.state}{waits}"))
+    now, waits = done.certificate, f"; {done.waiting} more must sign" if done.waiting else ""
+    end.put({
+        "certificate": now.number, "job": now.job, "entry": now.entry, "state": now.state, "waiting": done.waiting,
+        "signatures": [{"what": one.what, "by": one.by, "reason": one.reason, "at": one.at.isoformat()} for one in signatures],
+    }, [f"{now.number} of {now.day} ({now.machine}): {now.state}{waits}"])  # fmt: skip
 
 
 def _ask_why(stated: str) -> str:
@@ -177,19 +159,15 @@ def affected(
             certificates = list(affected_certificates(
                 history, version, last, recompute=not only_list, out=write, where=str(history.place), stage=stage or silent
             ))  # fmt: skip
-    if end.json:
-        put_data({"from": version, "to": last, "certificates": [_affected_data(one) for one in certificates]})
-    elif not end.quiet:
-        for one in certificates:
-            _show_affected(one)
-        count = len(certificates)
-        touched = "1 certificate touched" if count == 1 else f"{count} certificates touched"
-        say(touched if only_list else f"{touched}, {sum(one.changed for one in certificates)} changed")
-    if any(one.changed or (one.problem and not only_list) for one in certificates):
-        raise typer.Exit(terminal.NOT_CONFORMING)
+    count = "1 certificate touched" if len(certificates) == 1 else f"{len(certificates)} certificates touched"
+    changed = "" if only_list else f", {sum(one.changed for one in certificates)} changed"
+    lines = [*(line for one in certificates for line in _affected(one)), f"{count}{changed}"]
+    data = {"from": version, "to": last, "certificates": [_affected_data(one) for one in certificates]}
+    wrong = any(one.changed or (one.problem and not only_list) for one in certificates)
+    end.put(data, lines, terminal.NOT_CONFORMING if wrong else 0)
 
 
-def _show_affected(one: AffectedCertificate) -> None:
+def _affected(one: AffectedCertificate) -> list[str]:
     c = one.certificate
     lines = [f"{c.number} of {c.day}, {c.machine}, version {c.version}, {c.state}"]
     lines += [f"  {correction.version}: {correction.what}" for correction in one.corrections]
@@ -200,9 +178,7 @@ def _show_affected(one: AffectedCertificate) -> None:
     if one.changed and one.diagnosis != c.diagnosis:
         lines.append(f"  diagnosis: {c.diagnosis or 'none'} -> {one.diagnosis or 'none'}")
     lines += ["  no figure changes"] if one.changes is not None and not one.changed else []
-    lines += [f"  draft in {one.written}"] if one.written is not None else []
-    for line in lines:
-        say(printable(line))
+    return [*lines, *([f"  draft in {one.written}"] if one.written is not None else [])]
 
 
 def _change(change: FigureChange) -> str:
@@ -245,36 +221,28 @@ def read(
     from cmm_uq.jobs.dcc.figures import data, shown
 
     certificates = [(file, read_certificate(file, schema)) for file in files]
-    if end.json:
-        rows = [{"file": str(file), **data(one)} for file, one in certificates]
-        put_data({"schema": "cmm-uq/read/1", "certificates": rows})
-    elif not end.quiet:
-        for file, one in certificates:
-            put(_certificate_text(str(file), shown(one)))
+    rows = [{"file": str(file), **data(one)} for file, one in certificates]
+    lines = (line.rstrip() for file, one in certificates for line in _certificate(str(file), shown(one)))
+    end.put({"schema": "cmm-uq/read/1", "certificates": rows}, lines)
 
 
-def _certificate_text(file: str, certificate: CertificateView) -> str:
-    lines = [file, *_labels(certificate.rows)]
+def _certificate(file: str, certificate: CertificateView) -> list[str]:
+    """Labels in a column, the lines of a text below each other; columns of a table as wide as their widest cell."""
+
+    def labels(rows: tuple[tuple[str, str], ...]) -> list[str]:
+        width = max((len(label) for label, _ in rows), default=0)
+        each = ((label, number, line) for label, text in rows for number, line in enumerate(text.splitlines()))
+        return [f"  {'' if number else label:<{width}}  {line}" for label, number, line in each]
+
+    lines = [file, *labels(certificate.rows)]
     for title, rows, grids in certificate.parts:
-        lines += ["", title, *_labels(rows)]
+        lines += ["", title, *labels(rows)]
         for grid in grids:
-            lines += ["", *_table(grid)]
-    return "\n".join(printable(line).rstrip() for line in lines) + "\n\n"
-
-
-def _labels(rows: tuple[tuple[str, str], ...]) -> list[str]:
-    """Labels in a column, the lines of a text below each other."""
-    width = max((len(label) for label, _ in rows), default=0)
-    each = ((label, number, line) for label, text in rows for number, line in enumerate(text.splitlines()))
-    return [f"  {'' if number else label:<{width}}  {line}" for label, number, line in each]
-
-
-def _table(grid: Grid) -> list[str]:
-    """Columns as wide as their widest cell; a value never breaks."""
-    cells = [grid.headings, *grid.rows]
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    rows = ("  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)) for row in cells)
-    return [f"  {grid.title}", *(f"    {row}" for row in rows)]
+            cells = [grid.headings, *grid.rows]
+            widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+            table = ("  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)) for row in cells)
+            lines += ["", f"  {grid.title}", *(f"    {row}" for row in table)]
+    return [*lines, ""]
 
 
 def qif(
@@ -285,9 +253,7 @@ def qif(
     """Write every value that a standard decided on, and the error factors, as QIF 3.0. Nothing is overwritten."""
     from cmm_uq.app.commands.jobs.exchange import write_qif
 
-    file = write_qif(report, out)
-    if not quiet:
-        say(printable(str(file)))
+    Ending(quiet).put({}, [str(write_qif(report, out))])
 
 
 keys = opt.group(
@@ -313,8 +279,10 @@ def new_key(
     made = new_test_key(file, name, lambda question: opt.ask_secret(question, twice=True))
     end.put(
         {"key": str(made.key), "certificate": str(made.certificate), "test_key": True},
-        f"{made.key} signs until {made.until}; {made.certificate} is for whoever is to trust it.",
-        f"TEST KEY: whatever it signs says: {TEST_NOTE}",
+        [
+            f"{made.key} signs until {made.until}; {made.certificate} is for whoever is to trust it.",
+            f"TEST KEY: whatever it signs says: {TEST_NOTE}",
+        ],
     )
 
 
@@ -332,14 +300,13 @@ def standards(
     if name is None:
         if form is not None:
             raise CmmUqError("a form is of one standard", where="--form", fix="Name it: cmm-uq standards lists them")
-        for standard, characteristics in listed_standards():
-            say(printable(f"{standard}: {', '.join(characteristics)}" if characteristics else standard))
+        lines = [": ".join(filter(None, (standard, ", ".join(known)))) for standard, known in listed_standards()]
     elif form is not None:
-        say(printable(str(write_form(name, form))))
+        lines = [str(write_form(name, form))]
     else:
-        for clause in clauses_of(name):
-            say(printable(f"{clause.title}: {clause.does}"))
-            say(printable(f"    {'read' if clause.read else 'not read'}; {clause.source}"))
+        lines = [line for one in clauses_of(name) for line in (
+            f"{one.title}: {one.does}", f"    {'read' if one.read else 'not read'}; {one.source}")]  # fmt: skip
+    Ending().put({}, lines)
 
 
 def schema(

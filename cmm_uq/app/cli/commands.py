@@ -26,133 +26,72 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-COMMANDS: dict[str, tuple[Callable[..., None], str, str]] = {
-    "new": (
-        jobs.new, "A job folder that runs at once, to be filled with your own figures.",
-        examples("new", "new step_gauge my-gauge", "new ballbar --machine 'CMM 3' --set artefact.length_mm=500"),
-    ),
-    "import": (
-        jobs.import_export, "What is recognised of a laboratory's export.",
-        examples("import export.xlsx", "import export.csv --key unit=inch --out recording.csv",
-                 "new ballbar my-job --from export.xlsx --machine 'CMM 3' --set job.date=2026-05-31"),
-    ),
-    "check": (
-        jobs.check, "All that is wrong with jobs, without computing.",
-        examples("check JOB", "check jobs/a jobs/b", "check JOB --clauses", "check JOB --json"),
-    ),
-    "report": (
-        evaluations.report, "The certificate of a recording: estimates, figures, decisions.",
-        examples("report examples/iota-1102-20C", "report JOB --out DIR --seed 3",
-                 "report JOB --json --strict > results.json", "report JOB --sign laboratory.p12",
-                 "report --scheduled jobs --dry-run"),
-    ),
-    "part": (
-        evaluations.part, "The uncertainty of what is measured on a part, and whether it conforms.",
-        examples("part examples/part-plate-simulated", "part JOB --digits 2 --rerun",
-                 "part JOB --json --strict > results.json"),
-    ),
-    "batch": (
-        laboratory.batch, "The reports of many jobs, by processes or a cluster.",
-        examples("batch jobs/2026", "batch jobs --workers 8 --results-only --parquet values.parquet",
-                 "batch jobs --out /srv/reports --resume --json", "batch jobs --scheduler tcp://head:8786"),
-    ),
-    "diagnose": (
-        evaluations.diagnose, "What a recording shows that its model leaves out.",
-        examples("diagnose examples/iota-1102-20C", "diagnose JOB --against predicted.csv",
-                 "diagnose JOB --strict --quiet"),
-    ),
-    "plan": (
-        evaluations.plan, "What to measure, and what it will tell.",
-        examples("plan examples/plan-ballbar", "plan JOB --no-power", "plan JOB --verbose"),
-    ),
-    "prove": (
-        evaluations.prove, "The diagnosis tried on sealed cases with a job's set-ups.",
-        examples("prove examples/iota-1102-20C", "prove JOB --cases 400 --workers 8",
-                 "prove examples/plan-ballbar --strict"),
-    ),
-    "history": (
-        laboratory.history, "Every value of a machine over time, from the records.",
-        examples("history 1102", "history 1102 --out DIR", "history 'CMM of hall 3' --on 2026-12-31 --json"),
-    ),
-    "due": (
-        laboratory.due, "What is due for calibration, when and why, from the records.",
-        examples("due", "due --within 90d", "due 1102 --on 2026-12-31 --json", "due --strict --out DIR"),
-    ),
-    "acquire": (
-        laboratory.acquire, "A recording taken live, led by the plan.",
-        examples("acquire JOB", "acquire examples/plan-ballbar --simulate --out trial", "acquire JOB --plain"),
-    ),
-    "simulate": (
-        jobs.simulate, "A recording drawn from known errors, as a job of its own.",
-        examples("simulate JOB --truth truth.toml --out DIR", "simulate JOB --truth truth.toml --out DIR --seed 7"),
-    ),
-    "compensate": (
-        jobs.compensate, "A recording corrected by its machine's error maps.",
-        examples("compensate JOB --out DIR", "compensate JOB --out DIR --map-text 20",
-                 "compensate JOB --cloud scan.csv --out DIR"),
-    ),
-    "fleet": (
-        laboratory.fleet, "The drift that is usual for all machines of the records, and who differs.",
-        examples("fleet", "fleet --name scale_x.ppm --out DIR", "fleet --records lab.db --json"),
-    ),
-    "budget": (
-        evaluations.budget, "The uncertainty of any measurement model in a file.",
-        examples("budget model.toml", "budget model.toml --seed 2 --out DIR", "budget model.toml --json --strict"),
-    ),
-    "verify": (
-        certificates.verify, "A certificate's files against each other, its figures, and its inputs computed again.",
-        examples("verify certificate.pdf", "verify reports/iota-1102-20C",
-                 "verify certificate.pdf certificate.html --no-rerun", "verify certificate.pdf --trust roots --json"),
-    ),
-    "release": (
-        certificates.release, "A certificate released, withdrawn or replaced.",
-        examples("release K-2026-104 --by 'A. Huber' --reason 'checked against the recording'",
-                 "release K-2026-105 --by 'A. Huber' --despite 'customer informed, to be adjusted'",
-                 "release K-2026-104 --withdraw --by 'A. Huber' --reason 'wrong artefact'",
-                 "release K-2026-104 --replaced-by K-2026-118 --by 'A. Huber' --reason 'corrected'"),
-    ),
-    "qif": (
-        certificates.qif, "The results of a report as QIF 3.0.",
-        examples("qif reports/iota-1102-20C", "qif reports/iota-1102-20C/results.json --out iota.qif"),
-    ),
-    "read": (
-        certificates.read, "A digital calibration certificate (DCC), printed.",
-        examples("read certificate.xml", "read ball-plate.xml --json", "read certificate.xml --schema schemas"),
-    ),
-    "sign": (
-        certificates.sign, "A certificate signed electronically: PDF and XML.",
-        examples(
-            "sign reports/K-2026-104/certificate.pdf --key laboratory.p12",
-            "sign certificate.pdf certificate.xml --key laboratory.p12 --time-server https://stamps.example/ --out signed",
-        ),
-    ),
-    "affected": (
-        certificates.affected, "Which certificates a correction of the package touches.",
-        examples("affected --version 0.4.0", "affected --version 0.4.0 --list --json",
-                 "affected --version 0.4.0 --write replacements"),
-    ),
-    "serve": (
-        laboratory.serve, "The records to look at, in a browser.",
-        examples("serve", "serve --records lab.db --open", "serve --records postgresql://lab@db/records --port 9000"),
-    ),
-    "standards": (
-        certificates.standards, "The standards that are decided, clause by clause, and forms to check them by.",
-        examples("standards", 'standards "ISO 10360-2:2009"',
-                 'standards "ISO 10360-2:2009" --form iso-10360-2-clauses.toml'),
-    ),
-    "schema": (
-        certificates.schema, "JSON Schema of a file, for editors that complete and explain.",
-        examples("schema job > job.schema.json", "schema budget", "schema truth"),
-    ),
-    "selftest": (
-        evaluations.selftest, "Published reference figures, computed here and compared.",
-        examples("selftest", "selftest --verbose > selftest.txt", "selftest --json"),
-    ),
+COMMANDS: dict[str, tuple[Callable[..., None], str, *tuple[str, ...]]] = {
+    "new": (jobs.new, "A job folder that runs at once, to be filled with your own figures.", "new", "new step_gauge my-gauge",
+        "new ballbar --machine 'CMM 3' --set artefact.length_mm=500"),
+    "import": (jobs.import_export, "What is recognised of a laboratory's export.", "import export.xlsx",
+        "import export.csv --key unit=inch --out recording.csv",
+        "new ballbar my-job --from export.xlsx --machine 'CMM 3' --set job.date=2026-05-31"),
+    "check": (jobs.check, "All that is wrong with jobs, without computing.", "check JOB", "check jobs/a jobs/b",
+        "check JOB --clauses", "check JOB --json"),
+    "report": (evaluations.report, "The certificate of a recording: estimates, figures, decisions.",
+        "report examples/iota-1102-20C", "report JOB --out DIR --seed 3", "report JOB --json --strict > results.json",
+        "report JOB --sign laboratory.p12", "report --scheduled jobs --dry-run"),
+    "part": (evaluations.part, "The uncertainty of what is measured on a part, and whether it conforms.",
+        "part examples/part-plate-simulated", "part JOB --digits 2 --rerun", "part JOB --json --strict > results.json"),
+    "batch": (laboratory.batch, "The reports of many jobs, by processes or a cluster.", "batch jobs/2026",
+        "batch jobs --workers 8 --results-only --parquet values.parquet", "batch jobs --out /srv/reports --resume --json",
+        "batch jobs --scheduler tcp://head:8786"),
+    "diagnose": (evaluations.diagnose, "What a recording shows that its model leaves out.", "diagnose examples/iota-1102-20C",
+        "diagnose JOB --against predicted.csv", "diagnose JOB --strict --quiet"),
+    "plan": (evaluations.plan, "What to measure, and what it will tell.", "plan examples/plan-ballbar", "plan JOB --no-power",
+        "plan JOB --verbose"),
+    "prove": (evaluations.prove, "The diagnosis tried on sealed cases with a job's set-ups.", "prove examples/iota-1102-20C",
+        "prove JOB --cases 400 --workers 8", "prove examples/plan-ballbar --strict"),
+    "history": (laboratory.history, "Every value of a machine over time, from the records.", "history 1102",
+        "history 1102 --out DIR", "history 'CMM of hall 3' --on 2026-12-31 --json"),
+    "due": (laboratory.due, "What is due for calibration, when and why, from the records.", "due", "due --within 90d",
+        "due 1102 --on 2026-12-31 --json", "due --strict --out DIR"),
+    "acquire": (laboratory.acquire, "A recording taken live, led by the plan.", "acquire JOB",
+        "acquire examples/plan-ballbar --simulate --out trial", "acquire JOB --plain"),
+    "simulate": (jobs.simulate, "A recording drawn from known errors, as a job of its own.",
+        "simulate JOB --truth truth.toml --out DIR", "simulate JOB --truth truth.toml --out DIR --seed 7"),
+    "compensate": (jobs.compensate, "A recording corrected by its machine's error maps.", "compensate JOB --out DIR",
+        "compensate JOB --out DIR --map-text 20", "compensate JOB --cloud scan.csv --out DIR"),
+    "fleet": (laboratory.fleet, "The drift that is usual for all machines of the records, and who differs.", "fleet",
+        "fleet --name scale_x.ppm --out DIR", "fleet --records lab.db --json"),
+    "budget": (evaluations.budget, "The uncertainty of any measurement model in a file.", "budget model.toml",
+        "budget model.toml --seed 2 --out DIR", "budget model.toml --json --strict"),
+    "verify": (certificates.verify, "A certificate's files against each other, its figures, and its inputs computed again.",
+        "verify certificate.pdf", "verify reports/iota-1102-20C", "verify certificate.pdf certificate.html --no-rerun",
+        "verify certificate.pdf --trust roots --json"),
+    "release": (certificates.release, "A certificate released, withdrawn or replaced.",
+        "release K-2026-104 --by 'A. Huber' --reason 'checked against the recording'",
+        "release K-2026-105 --by 'A. Huber' --despite 'customer informed, to be adjusted'",
+        "release K-2026-104 --withdraw --by 'A. Huber' --reason 'wrong artefact'",
+        "release K-2026-104 --replaced-by K-2026-118 --by 'A. Huber' --reason 'corrected'"),
+    "qif": (certificates.qif, "The results of a report as QIF 3.0.", "qif reports/iota-1102-20C",
+        "qif reports/iota-1102-20C/results.json --out iota.qif"),
+    "read": (certificates.read, "A digital calibration certificate (DCC), printed.", "read certificate.xml",
+        "read ball-plate.xml --json", "read certificate.xml --schema schemas"),
+    "sign": (certificates.sign, "A certificate signed electronically: PDF and XML.",
+        "sign reports/K-2026-104/certificate.pdf --key laboratory.p12",
+        "sign certificate.pdf certificate.xml --key laboratory.p12 --time-server https://stamps.example/ --out signed"),
+    "affected": (certificates.affected, "Which certificates a correction of the package touches.", "affected --version 0.4.0",
+        "affected --version 0.4.0 --list --json", "affected --version 0.4.0 --write replacements"),
+    "serve": (laboratory.serve, "The records to look at, in a browser.", "serve", "serve --records lab.db --open",
+        "serve --records postgresql://lab@db/records --port 9000"),
+    "standards": (certificates.standards, "The standards that are decided, clause by clause, and forms to check them by.",
+        "standards", 'standards "ISO 10360-2:2009"', 'standards "ISO 10360-2:2009" --form iso-10360-2-clauses.toml'),
+    "schema": (certificates.schema, "JSON Schema of a file, for editors that complete and explain.",
+        "schema job > job.schema.json", "schema budget", "schema truth"),
+    "selftest": (evaluations.selftest, "Published reference figures, computed here and compared.", "selftest",
+        "selftest --verbose > selftest.txt", "selftest --json"),
 }  # fmt: skip
 """By name: the function, what the list of commands says of it, and calls as they are typed."""
 
-for name, (function, short, epilog) in COMMANDS.items():
-    app.command(name, short_help=short, epilog=epilog)(with_ending(function))
+for name, (function, short, *calls) in COMMANDS.items():
+    app.command(name, short_help=short, epilog=examples(*calls))(with_ending(function))
 for name, group, short in (
     ("instruments", instruments.app, "Instruments: ready profiles, tried at a port, new ones."),
     ("schedule", records.schedule_app, "Scheduled runs: what they go by, whom they tell, what starts them."),

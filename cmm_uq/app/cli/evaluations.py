@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
 from cmm_uq.app.cli import options as opt
 from cmm_uq.app.cli.jobs import show_imported
 from cmm_uq.app.cli.options import Ending, argument, flag, job_folder, option
-from cmm_uq.app.cli.summary import conclude, screen_layout, show_summary
-from cmm_uq.app.cli.terminal import NOT_CONFORMING, put_data, put_json, say, show
+from cmm_uq.app.cli.summary import conclude, screen_layout
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, put_data, say, show
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.translation import ENGLISH, Code
+from cmm_uq.base.languages.translation import ENGLISH
 
-if TYPE_CHECKING:
-    from cmm_uq.certificate.wording import Summary
-    from cmm_uq.maths.uncertainty.evaluation import Evaluation
-    from cmm_uq.maths.uncertainty.reference.selftest import SelfTestResult
+DOCUMENTS = "force strict quiet verbose json language"
+OF_CASES = "Rate of false alarms that the diagnosis is asked for."
 
 
 def report(
@@ -30,10 +26,7 @@ def report(
     ),
     out: Path | None = opt.out(None, "reports/<job id>"),
     seed: int = opt.seed(),
-    force: bool = opt.FORCE,
-    strict: bool = opt.STRICT,
-    end: Ending = opt.END,
-    language: Code | None = opt.LANGUAGE,
+    end: Ending = opt.ending(DOCUMENTS),
     records: str | None = opt.RECORDS,
     sign: str | None = opt.SIGN,
     time_server: str | None = opt.TIME_SERVER,
@@ -49,12 +42,11 @@ def report(
     dry_run: bool = flag(False, "--dry-run", "With --scheduled: say what would happen, and do nothing."),
 ) -> None:
     """Estimate, decide, and write certificate.html, certificate.pdf, certificate.xml and results.json."""
-    alone = {"--force": force, "--strict": strict, "--verbose": end.verbose, "--language": language, "--sign": sign}
+    alone = {**{f"--{name}": getattr(end, name) for name in ("force", "strict", "verbose", "language")}, "--sign": sign}
     many = {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run}
-    for name, value in (alone if scheduled else many).items():
-        if value:
-            fix = "Leave it out" if scheduled else "Add --scheduled"
-            raise CmmUqError(f"goes {'without' if scheduled else 'with'} --scheduled", where=name, fix=fix)
+    if name := next((name for name, value in (alone if scheduled else many).items() if value), ""):
+        wrong, fix = ("without", "Leave it out") if scheduled else ("with", "Add --scheduled")
+        raise CmmUqError(f"goes {wrong} --scheduled", where=name, fix=fix)
     if scheduled:
         from cmm_uq.app.cli.records import STANDARD_OUTPUT, run
         from cmm_uq.app.commands.laboratory.schedule import ScheduledOptions
@@ -68,15 +60,15 @@ def report(
     with end.progress() as stage:
         from cmm_uq.app.commands.report import write_report
 
-        written = write_report(
-            job[0], out, seed=seed, force=force, stage=stage, told=None if end.silent else show_imported,
-            records=records, language=language, signing=signing,
-        )  # fmt: skip
+        told = None if end.silent else show_imported
+        written = write_report(job[0], out, seed=seed, force=end.force, stage=stage, told=told, records=records,
+                               language=end.language, signing=signing)  # fmt: skip
     try:
-        conclude(written, end, strict=strict)
+        conclude(written, end)
     finally:
-        if signing is not None and not end.silent:
-            opt.show_signatures(signing, [path for path in written.files.values() if path.suffix in (".pdf", ".xml")])
+        if signing is not None:
+            signed = [path for path in written.files.values() if path.suffix in (".pdf", ".xml")]
+            Ending(end.silent).put({}, opt.signatures(signing, signed))
 
 
 def diagnose(
@@ -87,10 +79,7 @@ def diagnose(
     against: Path | None = option(
         None, "Coordinates or lengths that a simulation predicts, or an error map.", "FILE", "the job's model"
     ),
-    force: bool = opt.FORCE,
-    strict: bool = opt.STRICT,
-    end: Ending = opt.END,
-    language: Code | None = opt.LANGUAGE,
+    end: Ending = opt.ending(DOCUMENTS),
     records: str | None = opt.RECORDS,
 ) -> None:
     """Locate a mismatch, name the physics that was left out, and show what modelling it improves."""
@@ -98,11 +87,9 @@ def diagnose(
         from cmm_uq.app.commands.diagnose import write_diagnosis
 
         told = None if end.silent else show_imported
-        written = write_diagnosis(
-            job, out, seed=seed, alpha=alpha, against=against, force=force, stage=stage, told=told, language=language,
-            records=records,
-        )  # fmt: skip
-    conclude(written, end, strict=strict)
+        written = write_diagnosis(job, out, seed=seed, alpha=alpha, against=against, force=end.force, stage=stage, told=told,
+                                  language=end.language, records=records)  # fmt: skip
+    conclude(written, end)
 
 
 def plan(
@@ -112,17 +99,14 @@ def plan(
         True, "Predict how large an effect must be for the diagnosis to find it; takes most of the time."
     ),
     seed: int = option(0, "Seed of the recordings drawn for that.", "N", min=0),
-    force: bool = opt.FORCE,
-    strict: bool = opt.STRICT,
-    end: Ending = opt.END,
-    language: Code | None = opt.LANGUAGE,
+    end: Ending = opt.ending(DOCUMENTS),
 ) -> None:
     """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
     with end.progress() as stage:
         from cmm_uq.app.commands.plans.plan import write_plan
 
-        written = write_plan(job, out, power=power, seed=seed, force=force, stage=stage, language=language)
-    conclude(written, end, strict=strict)
+        written = write_plan(job, out, power=power, seed=seed, force=end.force, stage=stage, language=end.language)
+    conclude(written, end)
 
 
 def prove(
@@ -133,11 +117,8 @@ def prove(
         None, "Processes at once; the figures do not depend on it.", "N", "as many as there are processors"
     ),
     seed: int = option(0, "Seed of the cases; the same seed gives the same bytes.", "N", min=0),
-    alpha: float = option(0.01, "Rate of false alarms that the diagnosis is asked for.", "P"),
-    force: bool = opt.FORCE,
-    strict: bool = flag(False, "--strict", "Exit code 4 where the cases show that an acceptance figure is missed."),
-    end: Ending = opt.END,
-    language: Code | None = opt.LANGUAGE,
+    alpha: float = option(0.01, OF_CASES, "P"),
+    end: Ending = opt.ending(DOCUMENTS, "where the cases show that an acceptance figure is missed"),
 ) -> None:
     """Draw cases with known truth on a job's set-ups, diagnose them, and write what a laboratory files as validation."""
 
@@ -152,8 +133,8 @@ def prove(
 
         options = ProofOptions(cases, processes() if workers is None else workers, seed, alpha)
         tell = None if end.silent else sealed
-        written = write_proof(job, options, out, force=force, stage=stage, sealed=tell, language=language)
-    conclude(written, end, strict=strict)
+        written = write_proof(job, options, out, force=end.force, stage=stage, sealed=tell, language=end.language)
+    conclude(written, end)
 
 
 def part(
@@ -171,19 +152,15 @@ def part(
     records: str | None = option(
         None, "Records of the machine's history, from which its drift is known: a file, a postgresql:// URL, or none.",
         "WHERE", "none"),
-    force: bool = opt.FORCE,
-    strict: bool = flag(False, "--strict", "Exit code 4 unless every characteristic conforms."),
-    end: Ending = opt.END,
-    language: Code | None = opt.LANGUAGE,
+    end: Ending = opt.ending(DOCUMENTS, "unless every characteristic conforms"),
 ) -> None:  # fmt: skip
     """Verify the machine's certificate, measure the part virtually, and write part.html, part.pdf and results.json."""
     with end.progress() as stage:
-        from cmm_uq.app.commands.files import silent
         from cmm_uq.app.commands.parts.part import PartOptions, write_part
 
         options = PartOptions(seed, trials, digits, rerun, None if trust is None else tuple(trust), records)
-        written = write_part(job, out, options=options, force=force, stage=stage or silent, language=language)
-    conclude(written, end, strict=strict)
+        written = write_part(job, out, options=options, force=end.force, stage=stage, language=end.language)
+    conclude(written, end)
 
 
 def budget(
@@ -192,39 +169,14 @@ def budget(
     ),
     out: Path | None = opt.out(None, "reports/<name of the file>"),
     seed: int | None = option(None, "Seed of the Monte Carlo.", "N", "the file's", min=0),
-    force: bool = opt.FORCE,
-    strict: bool = flag(False, "--strict", "Exit code 4 unless Monte Carlo is stable to the digits asked for."),
-    end: Ending = opt.END,
-    language: Code | None = opt.LANGUAGE,
+    end: Ending = opt.ending(DOCUMENTS, "unless Monte Carlo is stable to the digits asked for"),
 ) -> None:
     """Propagate uncertainty by the GUM and by Monte Carlo, and write budget.html, budget.pdf and results.json."""
     with end.progress() as stage:
         from cmm_uq.app.commands.budget import write_budget
-        from cmm_uq.app.commands.files import silent
 
-        written = write_budget(file, out, seed=seed, force=force, stage=stage or silent, language=language or ENGLISH)
-    if end.json:
-        put_json(written.results.decode())
-    elif not end.quiet:
-        show_summary(_budget_summary(written.evaluation), written.files, verbose=end.verbose, name=file.name)
-    if strict and not written.evaluation.stable:
-        raise typer.Exit(NOT_CONFORMING)
-
-
-def _budget_summary(evaluation: Evaluation) -> Summary:
-    """Each output as a certificate could state it; in full as the row of a table too."""
-    from cmm_uq.base.messages import Verbatim, plural, say
-    from cmm_uq.certificate.wording import Headline, Summary
-    from cmm_uq.maths.uncertainty.budget_results import SUMMARY, statement, summary_rows
-
-    names = tuple(evaluation.stated)
-    unstable = () if evaluation.stable else tuple(
-        Headline("NOT STABLE", "open", Verbatim(name), (evaluation.stated[name].reason,)) for name in names
-    )  # fmt: skip
-    return Summary(
-        plural(len(names), one=say("one output"), many=say("{count} outputs", count=len(names))), verdicts=unstable,
-        remarks=tuple(statement(evaluation, name) for name in names), details=(SUMMARY, *summary_rows(evaluation)),
-    )  # fmt: skip
+        written = write_budget(file, out, seed=seed, force=end.force, stage=stage, language=end.language or ENGLISH)
+    conclude(written, end)
 
 
 def selftest(
@@ -234,7 +186,9 @@ def selftest(
 ) -> None:
     """Compute published reference figures and compare: expected, got, source. Exit code 4 when any differs."""
     from cmm_uq import __version__
-    from cmm_uq.maths.uncertainty.reference.selftest import run
+    from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+    from cmm_uq.certificate.wording import Headline, Summary
+    from cmm_uq.maths.uncertainty.reference.selftest import as_text, run
 
     outcomes = run()
     passed = int(sum(outcome.passed for outcome in outcomes))
@@ -243,34 +197,24 @@ def selftest(
         program = f"cmm-uq {__version__}"
         put_data({"schema": "cmm-uq/selftest/1", "program": program, "passed": passed, "figures": figures})
     else:
-        show(screen_layout(verbose=verbose).screen(_selftest_summary(outcomes, passed, quiet=quiet, verbose=verbose)))
+
+        def verdict(what: Text, good: bool, *remarks: Text) -> Headline:
+            return Headline("PASS" if good else "FAIL", "good" if good else "bad", what, remarks)
+
+        count = say(
+            "cmm-uq {version}: {passed} of {total} figures within their tolerance", version=Verbatim(__version__),
+            passed=passed, total=len(outcomes),
+        )  # fmt: skip
+        verdicts = [verdict(count, passed == len(outcomes))]
+        for (case, expected, tolerance, got, source, _), outcome in zip(as_text(outcomes), outcomes, strict=True):
+            if not outcome.passed or (verbose and not quiet):
+                text = Verbatim(f"{got}, expected {expected} within {tolerance} ({source})")
+                verdicts.append(verdict(Verbatim(case), outcome.passed, text))
+        sources: dict[str, list[bool]] = {}  # how many there are of each, where not each is told
+        for outcome in () if quiet or verbose else outcomes:
+            sources.setdefault(outcome.source, []).append(outcome.passed)
+        rows = [(Verbatim(source), say("{passed} of {total}", passed=sum(each), total=len(each)), NOTHING)
+                for source, each in sources.items()]  # fmt: skip
+        show(screen_layout(verbose=verbose).screen(Summary(verdicts=tuple(verdicts), figures=tuple(rows))))
     if passed < len(outcomes):
         raise typer.Exit(NOT_CONFORMING)
-
-
-def _selftest_summary(outcomes: Sequence[SelfTestResult], passed: int, *, quiet: bool, verbose: bool) -> Summary:
-    """The count, what fails or all figures, and how many there are of each source."""
-    from cmm_uq import __version__
-    from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
-    from cmm_uq.certificate.wording import Headline, Summary
-    from cmm_uq.maths.uncertainty.reference.selftest import as_text
-
-    def verdict(what: Text, passed: bool, *remarks: Text) -> Headline:
-        return Headline("PASS" if passed else "FAIL", "good" if passed else "bad", what, remarks)
-
-    count = say(
-        "cmm-uq {version}: {passed} of {total} figures within their tolerance", version=Verbatim(__version__),
-        passed=passed, total=len(outcomes),
-    )  # fmt: skip
-    verdicts = [verdict(count, passed == len(outcomes))]
-    for (case, expected, tolerance, got, source, _), outcome in zip(as_text(outcomes), outcomes, strict=True):
-        if not outcome.passed or (verbose and not quiet):
-            figures = Verbatim(f"{got}, expected {expected} within {tolerance} ({source})")
-            verdicts.append(verdict(Verbatim(case), outcome.passed, figures))
-    sources: dict[str, list[bool]] = {}
-    for outcome in () if quiet or verbose else outcomes:
-        sources.setdefault(outcome.source, []).append(outcome.passed)
-    return Summary(verdicts=tuple(verdicts), figures=tuple(
-        (Verbatim(source), say("{passed} of {total}", passed=sum(each), total=len(each)), NOTHING)
-        for source, each in sources.items()
-    ))  # fmt: skip

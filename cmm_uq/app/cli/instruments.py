@@ -19,8 +19,8 @@ import typer
 
 from cmm_uq.app.cli import options as opt
 from cmm_uq.app.cli.asking import instrument_answers
-from cmm_uq.app.cli.options import argument, examples, option
-from cmm_uq.app.cli.terminal import on_terminal, put_data, say, say_now
+from cmm_uq.app.cli.options import Ending, argument, examples, option
+from cmm_uq.app.cli.terminal import on_terminal, say, say_now
 from cmm_uq.base.errors import CmmUqError, printable
 from cmm_uq.base.output.interruption import speaking
 
@@ -51,8 +51,10 @@ def operated(acquisition: Acquisition, *, plain: bool, quiet: bool) -> None:
     else:
         with Whole.shown(typed) as whole:
             acquisition.run(whole)
-    if not quiet:
-        _ended(acquisition)
+    if not quiet:  # how it stands at the end
+        view, story = acquisition.conductor.view(), acquisition.conductor.story
+        say(f"{view.head}; {len(story.points)} points are kept in {acquisition.journals.folder}")
+        say(f"cmm-uq report {acquisition.folder}" if acquisition.conductor.reportable else "no set-up is complete yet")
 
 
 class Plain:
@@ -185,13 +187,6 @@ def _every_key() -> Iterator[Callable[[], None]]:
         restore()
 
 
-def _ended(acquisition: Acquisition) -> None:
-    """How it stands at the end."""
-    view, story = acquisition.conductor.view(), acquisition.conductor.story
-    say(f"{view.head}; {len(story.points)} points are kept in {acquisition.journals.folder}")
-    say(f"cmm-uq report {acquisition.folder}" if acquisition.conductor.reportable else "no set-up is complete yet")
-
-
 app = typer.Typer(
     help="Instruments as live sources: which profiles are ready, one tried at its port, a new one from an example line.",
     epilog=examples("instruments list", "instruments test fluke-1502a /dev/ttyUSB0"),
@@ -201,15 +196,10 @@ app = typer.Typer(
 
 SHOWN = 44  # characters of a message beside what was understood of it
 
-PROFILE = argument(
-    ..., "Ready profile, a TOML file, or with --job the name of a source in it.", "PROFILE", autocompletion=opt.profiles
-)
-PORT = argument(
-    "",
-    "/dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port, tcp://host:port or file:NAME.",
-    "PORT",
-    "that of the job",
-)
+_READY = "Ready profile, a TOML file, or with --job the name of a source in it."
+PROFILE = argument(..., _READY, "PROFILE", autocompletion=opt.profiles)
+_PORTS = "/dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port, tcp://host:port or file:NAME."
+PORT = argument("", _PORTS, "PORT", "that of the job")
 JOB = option(None, "Job folder whose source is meant.", "JOB", "none", "--job")
 SECONDS = option(None, "How long.", "S", "until it is interrupted", min=0.1)
 
@@ -217,28 +207,21 @@ SECONDS = option(None, "How long.", "S", "until it is interrupted", min=0.1)
 @app.callback()
 def _alone(context: typer.Context) -> None:
     if context.invoked_subcommand is None:
-        list_all(json=False)
+        list_all(Ending())
 
 
 @opt.command(app, "list", "instruments list", "instruments list --json")
-def list_all(json: bool = opt.JSON) -> None:
+def list_all(end: Ending = opt.ONLY_JSON) -> None:
     """List the ready profiles and the serial ports of this computer."""
     from cmm_uq.app.commands.laboratory.instruments import ready_profiles
     from cmm_uq.laboratory.live.instruments.source import serial_ports
 
     rows, ports = ready_profiles(), serial_ports()
-    if json:
-        keys = ("name", "title", "tried")
-        put_data({"profiles": [dict(zip(keys, row, strict=True)) for row in rows], "ports": dict(ports)})
-        return
     wide = max(len(name) for name, _, _ in rows)
-    for name, title, _ in rows:
-        say(f"{name:{wide}}  {title}")
-    say()
-    for port, description in ports:
-        say(f"{port}  {description}".rstrip())
-    if not ports:
-        say("No serial port is here.")
+    lines = [*(f"{name:{wide}}  {title}" for name, title, _ in rows), ""]
+    lines += [f"{port}  {description}".rstrip() for port, description in ports] or ["No serial port is here."]
+    profiles = [dict(zip(("name", "title", "tried"), row, strict=True)) for row in rows]
+    end.put({"profiles": profiles, "ports": dict(ports)}, lines)
 
 
 @opt.command(app, "test", "instruments test fluke-1502a /dev/ttyUSB0", "instruments test table_top --job my-job")
@@ -247,7 +230,7 @@ def try_out(
     port: str = PORT,
     job: Path | None = JOB,
     seconds: float = option(5.0, "How long.", "S", min=0.1, max=86400),
-    json: bool = opt.JSON,
+    end: Ending = opt.ONLY_JSON,
 ) -> None:
     """Try an instrument for a few seconds: who it is, and each message beside what was understood of it.
 
@@ -257,20 +240,16 @@ def try_out(
 
     attempt = Attempt(profile, port, job)
     for event in attempt.events(seconds):
-        if not json:
+        if not end.json:
             _show(event)
     attempt.trial.conclude()
     trial, identity = attempt.trial, attempt.source.identity()
-    if json:
-        put_data({
-            "identity": vars(identity), "messages": trial.messages, "with_values": trial.with_values, "wrong": trial.wrong,
-            "quantities": trial.quantities,
-        })  # fmt: skip
-        return
     who = ", ".join(printable(f"{key} {value}") for key, value in vars(identity).items() if value and key != "name")
-    say()
-    say(f"{identity.name}: {who or 'does not say who it is'}")
-    say(f"{trial.messages} messages, {trial.with_values} with values, {trial.wrong} with something wrong")
+    count = f"{trial.messages} messages, {trial.with_values} with values, {trial.wrong} with something wrong"
+    end.put({
+        "identity": vars(identity), "messages": trial.messages, "with_values": trial.with_values, "wrong": trial.wrong,
+        "quantities": trial.quantities,
+    }, ["", f"{identity.name}: {who or 'does not say who it is'}", count])  # fmt: skip
 
 
 @opt.command(app, "watch", "instruments watch line-logger socket://logger:4001")
@@ -291,12 +270,10 @@ class Parity(StrEnum):
     NONE, EVEN, ODD = "none", "even", "odd"
 
 
-@opt.command(
-    app,
-    "new",
-    "instruments new my-gauge.toml",
-    "instruments new my-gauge.toml --line 'T=20.13 C<CR><LF>' --quantity temp_c=1 --ask 'T?<CR>'",
-)
+_NEW = "instruments new my-gauge.toml"
+
+
+@opt.command(app, "new", _NEW, f"{_NEW} --line 'T=20.13 C<CR><LF>' --quantity temp_c=1 --ask 'T?<CR>'")
 def new(
     file: Path = argument(..., "New file: NAME.toml.", "FILE"),
     line: str = option("", "An example line with its end: T=20.13 C<CR><LF>.", "TEXT", "asked for on a terminal"),
@@ -317,7 +294,12 @@ def new(
     from cmm_uq.laboratory.live.instruments.library import ProfileDraft, range_of
 
     settings: dict[str, str | int] = {"baud": baud, "data_bits": bits, "parity": parity.value, "stop_bits": stop}
-    places = {_whole(text, name): name for name, text in _pairs(quantity, "--quantity", "temp_c=1")}
+    places: dict[int, str] = {}
+    for name, text in _pairs(quantity, "--quantity", "temp_c=1"):
+        if not text.isdecimal():
+            where = f"--quantity {name}"
+            raise CmmUqError(f"{text!r} is no number of the line", where=where, fix="Write it as temp_c=1")
+        places[int(text)] = name
     ranges = {name: range_of(text, name) for name, text in _pairs(limits, "--range", "temp_c=0:40")}
     if not line:
         if sys.stdin is None or not sys.stdin.isatty():
@@ -360,9 +342,3 @@ def _pairs(given: list[str] | None, option: str, like: str) -> list[tuple[str, s
             raise CmmUqError(f"{text!r} says nothing", where=option, fix=f"Write it as {like}")
         found.append((name.strip(), value.strip()))
     return found
-
-
-def _whole(text: str, name: str) -> int:
-    if not text.isdecimal():
-        raise CmmUqError(f"{text!r} is no number of the line", where=f"--quantity {name}", fix="Write it as temp_c=1")
-    return int(text)

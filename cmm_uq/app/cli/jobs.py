@@ -8,13 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from cmm_uq.app.cli import options as opt
 from cmm_uq.app.cli.asking import job_answers, part_answers, value_of
 from cmm_uq.app.cli.options import Ending, argument, flag, job_folder, option
 from cmm_uq.app.cli.summary import conclude_derived, put_manifest, screen_layout
-from cmm_uq.app.cli.terminal import BAD_INPUT, can_answer, put, put_data, say, show
+from cmm_uq.app.cli.terminal import BAD_INPUT, can_answer, put, say, show
 from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
@@ -24,16 +22,10 @@ if TYPE_CHECKING:
     from cmm_uq.jobs.importing.keys import ImportKeys
     from cmm_uq.jobs.job import Job
 
-COLUMN = option(
-    None,
-    'Column of the recording and of the file: x_mm="X actual", or its number: x_mm=3.',
-    "NAME=COLUMN",
-    "as recognised",
-    "--column",
-)
-KEY = option(
-    None, 'Any other key of an import: unit=inch, sheet="Run 2", decimal=",".', "KEY=VALUE", "as recognised", "--key"
-)
+_COLUMN = 'Column of the recording and of the file: x_mm="X actual", or its number: x_mm=3.'
+COLUMN = option(None, _COLUMN, "NAME=COLUMN", "as recognised", "--column")
+_KEY = 'Any other key of an import: unit=inch, sheet="Run 2", decimal=",".'
+KEY = option(None, _KEY, "KEY=VALUE", "as recognised", "--key")
 
 
 def new(
@@ -60,17 +52,14 @@ def new(
     from cmm_uq.app.commands.parts.new import PART
 
     if not kind:
-        if end.json:
-            put_data({"kinds": titles()})
-        else:
-            put("".join(f"{name}  {title}\n" for name, title in titles().items()))
+        kinds = titles()
+        end._replace(quiet=False).put({"kinds": kinds}, (f"{name}  {title}" for name, title in kinds.items()))
         return
     target, silent = folder or Path(kind), end.silent
     check_empty(target)
     if kind == PART and (column or key):
-        raise CmmUqError(
-            "the plan of a part has no columns that an option could name", where="--column", fix="Leave it out"
-        )
+        what = "the plan of a part has no columns that an option could name"
+        raise CmmUqError(what, where="--column", fix="Leave it out")
     tables = _tables(machine, serial, settings or [])
     if export is not None and kind != PART:
         from cmm_uq.app.commands.jobs.exchange import read_export, write_job_of_export
@@ -95,15 +84,14 @@ def new(
 
 def _tables(machine: str, serial: str, settings: list[str]) -> dict[str, dict[str, Any]]:
     """What the options say, by table and key."""
-    named = {name: value for name, value in (("name", machine), ("serial", serial)) if value}
-    tables: dict[str, dict[str, Any]] = {"machine": dict(named)} if named else {}
+    named: dict[str, Any] = {name: value for name, value in (("name", machine), ("serial", serial)) if value}
+    tables = {"machine": named} if named else {}
     for setting in settings:
         place, equals, text = setting.partition("=")
         table, dot, key = place.strip().partition(".")
         if not (equals and dot and key):
-            raise CmmUqError(
-                f"{setting!r} names no key of a table", where="--set", fix="Write it as artefact.length_mm=500"
-            )
+            what = f"{setting!r} names no key of a table"
+            raise CmmUqError(what, where="--set", fix="Write it as artefact.length_mm=500")
         tables.setdefault(table, {})[key] = value_of(text.strip())
     return tables
 
@@ -179,28 +167,25 @@ def check(
     from cmm_uq.app.commands.jobs.check import check_job
 
     checks = [check_job(job) for job in jobs]
-    if end.json:
-        put_data({"schema": "cmm-uq/check/1", "jobs": [each.as_data() for each in checks]})
-    elif not end.quiet:
-        for each in checks:
-            show(screen_layout(verbose=True).screen(_check_summary(each)))
-            if clauses:
-                _show_clauses(each)
-    if not all(each.sound for each in checks):
-        raise typer.Exit(BAD_INPUT)
+    for each in () if end.silent else checks:
+        show(screen_layout(verbose=True).screen(_check_summary(each)))
+        for line in _clauses_shown(each) if clauses else ():
+            say(printable(line))
+    data = {"schema": "cmm-uq/check/1", "jobs": [each.as_data() for each in checks]}
+    end.put(data, (), 0 if all(each.sound for each in checks) else BAD_INPUT)
 
 
-def _show_clauses(check: JobCheck) -> None:
+def _clauses_shown(check: JobCheck) -> Iterable[str]:
     """Each clause on a line: what it asks for, and what satisfies it or would."""
     if not check.clauses:
-        put("No calibration certificate is made of this job, so ISO/IEC 17025:2017, 7.8 asks nothing of it.\n")
+        yield "No calibration certificate is made of this job, so ISO/IEC 17025:2017, 7.8 asks nothing of it."
     for clause in check.clauses:
         content = {
             "stated": clause.stated, "missing": f"MISSING: {clause.key}",
             "not applicable": f"none stated ({clause.key})",
             "laboratory": "of the laboratory, not of the certificate",
         }[clause.status].removesuffix(" ()")  # fmt: skip
-        say(printable(f"{clause.clause:<11} {clause.asks}: {content}"))
+        yield f"{clause.clause:<11} {clause.asks}: {content}"
 
 
 def _check_summary(check: JobCheck) -> Summary:
@@ -226,13 +211,12 @@ def simulate(
     ),
     out: Path = option(..., "Folder for the simulated job.", "DIR"),
     seed: int | None = option(None, "Seed of everything random.", "N", "the truth's", min=0),
-    force: bool = opt.FORCE,
-    end: Ending = opt.END,
+    end: Ending = opt.FORCED,
 ) -> None:
     """Draw a recording from the same model that report fits, as a job folder of its own."""
     from cmm_uq.app.commands.jobs.simulate import write_simulation
 
-    files = write_simulation(job, truth, out, seed=seed, force=force)
+    files = write_simulation(job, truth, out, seed=seed, force=end.force)
     conclude_derived(files, f"A recording of {job}, drawn from {truth}", end)
 
 
@@ -245,8 +229,7 @@ def compensate(
     cloud: Path | None = option(
         None, "Cloud of a digitizer to correct instead: .csv, .parquet, .npy or a folder of them.", "FILE",
         "the job's recording"),
-    force: bool = opt.FORCE,
-    end: Ending = opt.END,
+    end: Ending = opt.FORCED,
 ) -> None:  # fmt: skip
     """Correct a recording by its machine's error maps, as a job folder of its own."""
     from cmm_uq.app.commands.jobs.compensate import write_compensated, write_compensated_cloud
@@ -254,12 +237,12 @@ def compensate(
 
     beyond: Beyond = "extrapolate" if extrapolate else "refuse"
     if cloud is None:
-        files = write_compensated(job, out, beyond=beyond, map_text_c=map_text, force=force)
+        files = write_compensated(job, out, beyond=beyond, map_text_c=map_text, force=end.force)
     elif map_text is not None:
         raise CmmUqError("--map-text goes with a recording, not with --cloud", fix="Leave out one of them")
     else:
         with end.progress() as stage:
             part = None if stage is None else partial(stage, f"Compensating {cloud.name}")
-            files = write_compensated_cloud(job, cloud, out, beyond=beyond, force=force, progress=part)
+            files = write_compensated_cloud(job, cloud, out, beyond=beyond, force=end.force, progress=part)
     what = f"{'The recording' if cloud is None else cloud.name} of {job}, compensated by its error maps"
     conclude_derived(files, what, end, is_job=cloud is None)

@@ -70,47 +70,41 @@ def batch(
     time_limit: float = option(1800.0, "Seconds that one job may take before it is stopped.", "S"),
     tries: int = option(3, "Processes that one job may end (killed, out of memory) before it is given up.", "N"),
     seed: int = opt.seed(),
-    force: bool = opt.FORCE,
-    strict: bool = opt.STRICT,
-    end: Ending = opt.END,
+    end: Ending = opt.ending("force strict quiet verbose json"),
     records: str | None = opt.RECORDS,
 ) -> None:
     """Write the report of every job as `report` does; one that fails never stops the others. Exit code 2 when one failed."""
     with end.progress() as stage:
         from cmm_uq.app.commands.laboratory.batch import BatchOptions, write_batch
 
-        options = BatchOptions(workers, scheduler, results_only, seed, resume, force, time_limit, tries)
+        options = BatchOptions(workers, scheduler, results_only, seed, resume, end.force, time_limit, tries)
         done = write_batch(folders, out, options, parquet=parquet, stage=stage, records=records)
     if end.json:
         put_data(done.as_data())
     elif not end.quiet:
-        show(screen_layout(verbose=end.verbose).screen(_batch_summary(done, verbose=end.verbose)))
+        show(screen_layout(verbose=end.verbose).screen(_batch_summary(done, None if end.verbose else FAILED_SHOWN)))
     if done.failed:
         raise typer.Exit(BAD_INPUT)
-    if strict and done.not_conforming:
+    if end.strict and done.not_conforming:
         raise typer.Exit(NOT_CONFORMING)
 
 
-def _batch_summary(batch: Batch, *, verbose: bool) -> Summary:
-    """What came of it, and which jobs failed."""
+def _batch_summary(batch: Batch, most: int | None) -> Summary:
+    """What came of it, and which jobs failed, the first of them or all."""
     from cmm_uq.base.messages import Text, Verbatim, plural, say
     from cmm_uq.certificate.wording import Headline, Summary
     from cmm_uq.laboratory.schedule.state import duration, pace
 
-    counts = (
-        (batch.already, say("{count} there already", count=batch.already)),
-        (batch.planned, say("{count} still to be measured", count=batch.planned)),
-        (batch.not_conforming, say("{count} not conforming or inconsistent", count=batch.not_conforming)),
-        (len(batch.failed), say("{count} failed", count=len(batch.failed))),
-    )
+    counts = ((batch.already, say("{count} there already", count=batch.already)),
+              (batch.planned, say("{count} still to be measured", count=batch.planned)),
+              (batch.not_conforming, say("{count} not conforming or inconsistent", count=batch.not_conforming)),
+              (len(batch.failed), say("{count} failed", count=len(batch.failed))))  # fmt: skip
     counted = (say("{count} written", count=batch.written), *(text for count, text in counts if count))
     jobs = plural(batch.count, one=say("1 job"), many=say("{count} jobs", count=batch.count))
     verdict = Headline("FAILED" if batch.failed else "DONE", "bad" if batch.failed else "good", jobs, counted)
     remarks: list[Text] = [say("Reports: {folder}", folder=Verbatim(batch.out))]
-    if batch.records:
-        remarks.append(say("Recorded in {records}", records=Verbatim(batch.records)))
-    if batch.parquet is not None:
-        remarks.append(say("Values: {file}", file=Verbatim(batch.parquet)))
+    remarks += [say("Recorded in {records}", records=Verbatim(batch.records))] if batch.records else []
+    remarks += [say("Values: {file}", file=Verbatim(batch.parquet))] if batch.parquet is not None else []
     if batch.written and batch.seconds > 0:
         took, rate = Verbatim(duration(batch.seconds)), Verbatim(pace(batch.written / batch.seconds))
         remarks.append(say("{took}, {rate}", took=took, rate=rate))
@@ -118,7 +112,7 @@ def _batch_summary(batch: Batch, *, verbose: bool) -> Summary:
         one = say("1 process ended over a job, which was then given to another.")
         many = say("{count} processes ended over a job, which was then given to another.", count=batch.ended)
         remarks.append(plural(batch.ended, one=one, many=many))
-    warnings: list[Text] = [Verbatim(each) for each in (batch.failed if verbose else batch.failed[:FAILED_SHOWN])]
+    warnings: list[Text] = [Verbatim(each) for each in batch.failed[:most]]
     if more := len(batch.failed) - len(warnings):
         warnings.append(say("{more} more failed; --verbose names them all, --json as data.", more=more))
     return Summary(verdicts=(verdict,), remarks=tuple(remarks), warnings=tuple(warnings))
@@ -133,15 +127,13 @@ def due(
     fleet: Path | None = opt.FLEET,
     within: str | None = option(None, "Only what is due that soon (90d, 12w, 3m, 1y), or has no date.", "TIME", "all"),
     out: Path | None = option(None, "Folder for due.html and due.json.", "DIR", "none"),
-    force: bool = opt.FORCE,
-    strict: bool = flag(False, "--strict", "Exit code 4 where anything is overdue."),
-    end: Ending = opt.BRIEF,
+    end: Ending = opt.ending("force strict quiet json", "where anything is overdue"),
 ) -> None:
     """Say which machines and artefacts are due for calibration, when, and why."""
     from cmm_uq.app.commands.laboratory.due import what_is_due, write_due
 
     found = what_is_due(records, machines or (), on=opt.day_of(on), within=opt.time_of(within), fleet=fleet)
-    files = {} if out is None else write_due(found, out, force=force)
+    files = {} if out is None else write_due(found, out, force=end.force)
     if end.json:
         put_data(found.data())
     elif not end.quiet:
@@ -151,7 +143,7 @@ def due(
         head = ((f"{found.on.isoformat()}: ", HEADING), (text, COLOURS[standing]))
         # every reason whole: a list that says why is what is asked for
         _show_table(head, [due_row(one, found.on, found.within) for one in found.items], (), files, verbose=True)
-    if strict and found.of("overdue"):
+    if end.strict and found.of("overdue"):
         raise typer.Exit(NOT_CONFORMING)
 
 
@@ -162,9 +154,7 @@ def fleet(
     ),
     out: Path | None = option(None, "Folder for fleet.html, fleet.json and fleet.csv.", "DIR", "none"),
     seed: int = opt.seed(1),
-    force: bool = opt.FORCE,
-    strict: bool = flag(False, "--strict", "Exit code 4 where a machine does not belong."),
-    end: Ending = opt.END,
+    end: Ending = opt.ending("force strict quiet verbose json", "where a machine does not belong"),
 ) -> None:
     """Learn from all machines of the records what drift is usual for models and places, and which do not belong."""
     with end.progress() as stage:
@@ -172,12 +162,12 @@ def fleet(
         from cmm_uq.certificate.pages.fleet_summary import fleet_data, fleet_summary
 
         found = fleet(records, name or (), seed=seed, stage=stage)
-        files = {} if out is None else write_fleet(found, out, force=force)
+        files = {} if out is None else write_fleet(found, out, force=end.force)
     if end.json:
         put_data(fleet_data(found))
     elif not end.quiet:
         show_summary(fleet_summary(found), files, verbose=end.verbose)
-    if strict and found.outsiders:
+    if end.strict and found.outsiders:
         raise typer.Exit(NOT_CONFORMING)
 
 
@@ -187,15 +177,14 @@ def history(
     on: str | None = opt.ON,
     fleet: Path | None = opt.FLEET,
     out: Path | None = option(None, "Folder for history.html, with pictures, and history.json.", "DIR", "none"),
-    force: bool = opt.FORCE,
-    end: Ending = opt.END,
+    end: Ending = opt.FORCED,
 ) -> None:
     """Say how every error factor and figure of a machine has gone, what changed last, and when a limit will be crossed."""
     from cmm_uq.app.commands.laboratory.due import history_of, write_history
     from cmm_uq.certificate.pages.history import history_data, summary_row, terminal_note
 
     found = history_of(machine, records, on=opt.day_of(on), fleet=fleet)
-    files = {} if out is None else write_history(found, out, force=force)
+    files = {} if out is None else write_history(found, out, force=end.force)
     if end.json:
         put_data(history_data(found))
     elif not end.quiet:

@@ -17,6 +17,7 @@ import typer
 
 from cmm_uq.app.cli.terminal import on_terminal, progress, put_data, say
 from cmm_uq.base.errors import CmmUqError, printable
+from cmm_uq.base.languages.translation import Code
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.signing import Signing
@@ -108,11 +109,14 @@ def seed(default: int = 0) -> Any:
 
 
 class Ending(NamedTuple):
-    """How a command ends: with nothing but errors, with everything whole, or with one JSON object."""
+    """How a command ends, by its options: with nothing but errors, with everything whole, or with one JSON object."""
 
     quiet: bool = False
     verbose: bool = False
     json: bool = False
+    force: bool = False
+    strict: bool = False
+    language: Code | None = None
 
     @property
     def silent(self) -> bool:
@@ -121,16 +125,22 @@ class Ending(NamedTuple):
     def progress(self) -> AbstractContextManager[Stage | None]:
         return progress(quiet=self.silent, verbose=self.verbose)
 
-    def put(self, data: Mapping[str, Any], *lines: str) -> None:
-        """The data where JSON is asked for, else the lines."""
+    def put(self, data: Mapping[str, Any], lines: Iterable[str], code: int = 0) -> None:
+        """The data where JSON is asked for, else the lines; then the exit code."""
         if self.json:
             put_data(data)
         for line in () if self.silent else lines:
             say(printable(line))
+        if code:
+            raise typer.Exit(code)
 
 
-END: Any = ("quiet", "verbose", "json")  # options of a command's end
-BRIEF: Any = ("quiet", "json")
+def ending(
+    names: str = "quiet verbose json", strict: str = "unless everything conforms and agrees with the model"
+) -> Any:
+    """Options of a command's end by name, in place of its parameter ``end``."""
+    return {name: flag(False, "--strict", f"Exit code 4 {strict}.") if name == "strict" else ENDS[name]
+            for name in names.split()}  # fmt: skip
 
 
 def with_ending(function: Callable[..., None]) -> Callable[..., None]:
@@ -138,18 +148,18 @@ def with_ending(function: Callable[..., None]) -> Callable[..., None]:
     signature = inspect.signature(function, eval_str=True)
     if "end" not in signature.parameters:
         return function
-    options = {"quiet": QUIET, "verbose": VERBOSE, "json": JSON}
-    names = signature.parameters["end"].default
+    options = signature.parameters["end"].default
 
     @wraps(function)
     def called(**given: Any) -> None:
-        end = Ending(**{name: given.pop(name) for name in names})
+        end = Ending(**{name: given.pop(name) for name in options})
         function(**given, end=end)
 
     parameters: list[inspect.Parameter] = []
     for one in signature.parameters.values():
-        spelt = [one.replace(name=name, default=options[name], annotation=bool) for name in names]
-        parameters += spelt if one.name == "end" else [one]
+        spelt = [one.replace(name=name, default=option, annotation=Code | None if name == "language" else bool)
+                 for name, option in options.items()] if one.name == "end" else [one]  # fmt: skip
+        parameters += spelt
     called.__dict__["__signature__"] = signature.replace(parameters=parameters)
     return called
 
@@ -182,51 +192,32 @@ def examples(*lines: str) -> str:
 
 
 JOB = job_folder(..., "Job folder: job.toml and the recording that it names.")
-LANGUAGE = option(None, "Language of the documents; files for programs stay English.", None, "the job's, else en")
 QUIET = flag(False, "--quiet", "Print nothing but errors.", "-q")
 VERBOSE = flag(False, "--verbose", "Print everything, whole; without a terminal also the stages.", "-v")
 JSON = flag(False, "--json", "Print one JSON object instead of the summary; an error is one too.")
-FORCE = flag(False, "--force", "Keep what stands in the way as NAME.previous instead of refusing.")
-STRICT = flag(False, "--strict", "Exit code 4 unless everything conforms and agrees with the model.")
-RECORDS = of_environment(
-    "Records that it is kept in: a file, a postgresql:// URL, or none.",
-    "WHERE",
-    "--records",
-    "CMM_UQ_RECORDS",
-    "records.db beside the reports",
-)
-READ_RECORDS = option(
-    None,
-    "The records: a file, or the URL of a PostgreSQL database.",
-    "WHERE",
-    "CMM_UQ_RECORDS, or reports/records.db",
-    "--records",
-)
+ENDS = {
+    "quiet": QUIET, "verbose": VERBOSE, "json": JSON,
+    "force": flag(False, "--force", "Keep what stands in the way as NAME.previous instead of refusing."),
+    "language": option(None, "Language of the documents; files for programs stay English.", None, "the job's, else en"),
+}  # fmt: skip
+END, BRIEF, ONLY_JSON, FORCED = map(ending, ("quiet verbose json", "quiet json", "json", "force quiet verbose json"))
+_KEPT_IN = "Records that it is kept in: a file, a postgresql:// URL, or none."
+RECORDS = of_environment(_KEPT_IN, "WHERE", "--records", "CMM_UQ_RECORDS", "records.db beside the reports")
+_READ = "The records: a file, or the URL of a PostgreSQL database."
+READ_RECORDS = option(None, _READ, "WHERE", "CMM_UQ_RECORDS, or reports/records.db", "--records")
 ON = option(None, "The day asked about; later recordings do not count.", "DATE", "today", "--on")
-FLEET = option(
-    None, "fleet.json of the fleet that the drift model takes as prior.", "FILE", "a prior without a fleet", "--fleet"
-)
+_PRIOR = "fleet.json of the fleet that the drift model takes as prior."
+FLEET = option(None, _PRIOR, "FILE", "a prior without a fleet", "--fleet")
 _KEY = "a PKCS#12 file, or pkcs11:token=LABEL;object=LABEL?module-path=FILE"
 _SIGN = "CMM_UQ_SIGN_KEY"
 SIGN = of_environment(f"Sign with this key: {_KEY}.", "KEY", "--sign", _SIGN, f"{_SIGN}, else nobody signs")
 KEY = of_environment(f"The key: {_KEY}.", "KEY", "--key", _SIGN, _SIGN, default=...)
-TIME_SERVER = of_environment(
-    "Time stamp server (RFC 3161) for the PDF.",
-    "URL",
-    "--time-server",
-    "CMM_UQ_SIGN_TIME_SERVER",
-    "CMM_UQ_SIGN_TIME_SERVER, else none",
-)
-LEVEL = of_environment(
-    "Of the PDF's signature: B-B, B-T, B-LT or B-LTA.",
-    "LEVEL",
-    "--level",
-    "CMM_UQ_SIGN_LEVEL",
-    "B-T with a time stamp server, else B-B",
-)
-TRUSTED = of_environment(
-    "Certificates that one trusts: PEM file or folder; again for more.", "PATH", "--trust", "CMM_UQ_TRUST", "nobody"
-)
+_SERVER, _STAMP = "CMM_UQ_SIGN_TIME_SERVER", "Time stamp server (RFC 3161) for the PDF."
+TIME_SERVER = of_environment(_STAMP, "URL", "--time-server", _SERVER, f"{_SERVER}, else none")
+_LEVELS, _USUAL = "Of the PDF's signature: B-B, B-T, B-LT or B-LTA.", "B-T with a time stamp server, else B-B"
+LEVEL = of_environment(_LEVELS, "LEVEL", "--level", "CMM_UQ_SIGN_LEVEL", _USUAL)
+_TRUST = "Certificates that one trusts: PEM file or folder; again for more."
+TRUSTED = of_environment(_TRUST, "PATH", "--trust", "CMM_UQ_TRUST", "nobody")
 
 _DAYS = {"d": 1, "w": 7, "m": 30, "y": 365}
 _LONGEST = 36_500
@@ -274,12 +265,11 @@ def ask_secret(question: str, *, twice: bool = False) -> str:
     return found
 
 
-def show_signatures(signing: Signing, files: Iterable[Path]) -> None:
+def signatures(signing: Signing, files: Iterable[Path]) -> list[str]:
     """Who signed which files, and whether the key is a test's."""
     from cmm_uq.certificate.sign import TEST_NOTE
 
     names = ", ".join(path.name for path in files)
     level = "" if signing.stamping is None else f", PAdES {signing.stamping.level}"
-    say(printable(f"Signed by {signing.signer.name} on {signing.at:%Y-%m-%d %H:%M UTC}{level}: {names}"))
-    if signing.signer.test_key:
-        say(f"TEST KEY: {TEST_NOTE}")
+    line = f"Signed by {signing.signer.name} on {signing.at:%Y-%m-%d %H:%M UTC}{level}: {names}"
+    return [line, *([f"TEST KEY: {TEST_NOTE}"] if signing.signer.test_key else [])]

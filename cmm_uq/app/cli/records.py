@@ -9,15 +9,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from cmm_uq.app.cli import options as opt
 from cmm_uq.app.cli.options import Ending, argument, examples, flag, option
-from cmm_uq.app.cli.terminal import NEEDS_A_PERSON, NOT_CONFORMING, closed, put, put_data, put_json, say
+from cmm_uq.app.cli.terminal import NEEDS_A_PERSON, NOT_CONFORMING, closed, put, put_json, say
 from cmm_uq.base.errors import CmmUqError, OutputError, printable
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.laboratory.schedule import ScheduledOptions
+    from cmm_uq.laboratory.records.store import Records
 
 
 app = opt.group(
@@ -26,6 +25,12 @@ app = opt.group(
 )
 
 SHOWN = 50  # findings that are printed
+
+
+def _opened(where: str | None, *, create: bool = False, read_only: bool = False) -> Records:
+    from cmm_uq.laboratory.records import open_records
+
+    return open_records(where, create=create, read_only=read_only)
 
 
 def _entries(count: int) -> str:
@@ -37,44 +42,30 @@ def verify(
     records: str | None = opt.RECORDS,
     head: str | None = option(None, "Hash that records head printed, filed elsewhere.", "HASH", "none", "--head"),
     files: bool = flag(True, "--files/--no-files", "Compare the files of the reports too."),
-    json: bool = opt.JSON,
+    end: Ending = opt.ONLY_JSON,
 ) -> None:
     """Find every entry that was altered, deleted or exchanged, every table and file that is not as it was recorded.
 
     Exit code 4 where something is wrong. Files that are gone are told; they may only have been moved.
     """
-    from cmm_uq.laboratory.records import open_records
-
-    with open_records(records, read_only=True) as opened:
+    with _opened(records, read_only=True) as opened:
         findings = opened.verify(None if head is None else head.strip().lower(), files=files)
         number, last = opened.head()
     sound = all(finding.kind == "missing" for finding in findings)
-    if json:
-        put_data({
-            "records": str(opened.shown), "entries": number, "head": last, "sound": sound,
-            "findings": [{"kind": one.kind, "entry": one.entry, "problem": one.problem} for one in findings],
-        })  # fmt: skip
-    else:
-        for one in findings[:SHOWN]:
-            say(printable(f"{one.kind}: {f'entry {one.entry}: ' if one.entry else ''}{one.problem}"))
-        if len(findings) > SHOWN:
-            say(f"and {len(findings) - SHOWN} more")
-        say(f"{_entries(number)}, {'sound' if sound else 'NOT sound'}; the last has the hash {last}")
-    if not sound:
-        raise typer.Exit(NOT_CONFORMING)
+    lines = [f"{one.kind}: {f'entry {one.entry}: ' if one.entry else ''}{one.problem}" for one in findings[:SHOWN]]
+    lines += [f"and {len(findings) - SHOWN} more"] if len(findings) > SHOWN else []
+    told = [{"kind": one.kind, "entry": one.entry, "problem": one.problem} for one in findings]
+    data = {"records": str(opened.shown), "entries": number, "head": last, "sound": sound, "findings": told}
+    last_line = f"{_entries(number)}, {'sound' if sound else 'NOT sound'}; the last has the hash {last}"
+    end.put(data, [*lines, last_line], 0 if sound else NOT_CONFORMING)
 
 
 @opt.command(app, "head", "records head")
-def head(records: str | None = opt.RECORDS, json: bool = opt.JSON) -> None:
+def head(records: str | None = opt.RECORDS, end: Ending = opt.ONLY_JSON) -> None:
     """Print number and hash of the last entry, to be filed elsewhere: on paper, in a mail, on another machine."""
-    from cmm_uq.laboratory.records import open_records
-
-    with open_records(records, read_only=True) as opened:
+    with _opened(records, read_only=True) as opened:
         number, last = opened.head()
-    if json:
-        put_data({"entries": number, "head": last})
-    else:
-        say(f"{number} {last}")
+    end.put({"entries": number, "head": last}, [f"{number} {last}"])
 
 
 @opt.command(app, "import", "records import reports", "records import /archive/2025 --records lab.db")
@@ -85,21 +76,16 @@ def import_reports(
 ) -> None:
     """Record reports and diagnoses that were written before; what is recorded already is passed over."""
     from cmm_uq.app.commands.laboratory import records as commands
-    from cmm_uq.laboratory.records import open_records
 
     reports = commands.reports_in(folders)  # before records are made for them
-    with open_records(records, create=True) as opened:
+    with _opened(records, create=True) as opened:
         done = commands.import_reports(opened, reports)
-    if end.json:
-        put_data({
-            "recorded": len(done.added), "recorded_before": len(done.known),
-            "without_inputs": [str(path) for path in done.bare],
-            "refused": [{"report": str(path), "error": str(error)} for path, error in done.refused],
-        })  # fmt: skip
-    elif not end.quiet:
-        say(f"{len(done.added)} recorded, {len(done.known)} recorded before, {len(done.refused)} refused")
-        for path in done.bare:
-            say(printable(f"{path}: the inputs of its job cannot be read, so only results.json was gone by"))
+    refused = [{"report": str(path), "error": str(error)} for path, error in done.refused]
+    data = {"recorded": len(done.added), "recorded_before": len(done.known),
+            "without_inputs": [str(path) for path in done.bare], "refused": refused}  # fmt: skip
+    bare = [f"{path}: the inputs of its job cannot be read, so only results.json was gone by" for path in done.bare]
+    count = f"{len(done.added)} recorded, {len(done.known)} recorded before, {len(done.refused)} refused"
+    end.put(data, [count, *bare])
     for path, error in done.refused[1 : SHOWN + 1]:
         say(printable(f"{path}: not recorded: {error}"))
     if done.refused:
@@ -113,22 +99,21 @@ def backup(
     end: Ending = opt.BRIEF,
 ) -> None:
     """Write everything into one new SQLite file, while others go on writing, and verify its chain."""
-    from cmm_uq.laboratory.records import open_records
     from cmm_uq.laboratory.records.backup import back_up
 
-    with open_records(records) as opened:
+    with _opened(records) as opened:
         number, last = back_up(opened, file)
     data = {"backup": str(file), "entries": number, "head": last}
-    end.put(data, f"{_entries(number)} in {file}; the last has the hash {last}")
+    end.put(data, [f"{_entries(number)} in {file}; the last has the hash {last}"])
 
 
-def _place(records: str | None) -> str | Path:
-    from cmm_uq.laboratory.records.place import place_of
+def _place(records: str | None) -> tuple[str | Path, str]:
+    """Where they are, and how that is shown: without a password."""
+    from cmm_uq.laboratory.records.place import place_of, shown
 
-    place = place_of(records)
-    if place is None:
+    if (place := place_of(records)) is None:
         raise CmmUqError("no records are asked for", where="--records none", fix="Name a file or a URL")
-    return place
+    return place, shown(place)
 
 
 @opt.command(app, "restore", "records restore records-2026-11-22.db --records reports/records.db")
@@ -139,12 +124,11 @@ def restore(
 ) -> None:
     """Make records of a backup whose chain holds; a file in its place is kept as NAME.before-restore."""
     from cmm_uq.laboratory.records import backup as backups
-    from cmm_uq.laboratory.records.place import shown
 
-    place = _place(records)
+    place, name = _place(records)
     number, last = backups.restore(file, place)
-    data = {"records": shown(place), "entries": number, "head": last}
-    end.put(data, f"{_entries(number)} restored; the last has the hash {last}")
+    data = {"records": name, "entries": number, "head": last}
+    end.put(data, [f"{_entries(number)} restored; the last has the hash {last}"])
 
 
 @opt.command(app, "retain", "records retain --keep-years 10 --dry-run")
@@ -159,27 +143,25 @@ def retain(
     Entries are never removed. Only files that are as they were written are; years count from the day of the measurement.
     """
     from cmm_uq.app.commands.laboratory.records import remove_retained, retention
-    from cmm_uq.laboratory.records import open_records
 
-    with open_records(records, read_only=dry_run) as opened:
+    with _opened(records, read_only=dry_run) as opened:
         found = retention(opened, keep_years, dt.datetime.now(dt.UTC).date())
         if not dry_run:
             remove_retained(opened, found, keep_years)
     paths, count = [str(path) for path in found.files], len(found.certificates)
     last = f"{len(paths)} files of {count} reports {'would be removed' if dry_run else 'removed'}"
-    end.put({"removed": not dry_run, "files": paths, "certificates": count}, *paths, last)
+    end.put({"removed": not dry_run, "files": paths, "certificates": count}, [*paths, last])
 
 
 @opt.command(app, "migrate", "records backup before.db", "records migrate")
 def migrate(records: str | None = opt.RECORDS, end: Ending = opt.BRIEF) -> None:
     """Bring the tables of an older version to this one; entries stay as they are. Back up first."""
     from cmm_uq.laboratory.records import backup as backups
-    from cmm_uq.laboratory.records.place import shown
 
-    place = _place(records)
+    place, name = _place(records)
     before, after = backups.migrate(place)
     change = f"are of revision {after} already" if before == after else f"brought from revision {before} to {after}"
-    end.put({"records": shown(place), "from": before, "to": after}, f"{shown(place)}: {change}")
+    end.put({"records": name, "from": before, "to": after}, [f"{name}: {change}"])
 
 
 STANDARD_OUTPUT = Path("-")  # in place of a file for the lines
@@ -205,26 +187,21 @@ def new(file: Path = argument(Path("schedule.toml"), "New file: schedule.toml.",
 def try_out(
     folders: list[Path] | None = argument(None, "Folders with jobs.", "FOLDER", "none"),
     schedule: Path | None = SCHEDULE,
-    json: bool = opt.JSON,
+    end: Ending = opt.ONLY_JSON,
 ) -> None:
     """Send a trial message to everybody whom the schedule names. Exit code 1 when one did not go out."""
     from cmm_uq.app.commands.laboratory.schedule import schedule_of, send_trial
 
     trials = send_trial(schedule_of(folders or (), schedule))
-    if json:
-        put_data({"channels": [{"channel": one.channel, "sent": one.sent, "why": one.why or None} for one in trials]})
-    for one in () if json else trials:
-        say(printable(f"{one.channel}: {'sent' if one.sent else 'not sent'}{'. ' if one.why else ''}{one.why}"))
-    if not all(one.sent for one in trials):
-        raise typer.Exit(NEEDS_A_PERSON)
+    lines = (f"{one.channel}: {'sent' if one.sent else 'not sent'}{'. ' if one.why else ''}{one.why}" for one in trials)
+    data = {"channels": [{"channel": one.channel, "sent": one.sent, "why": one.why or None} for one in trials]}
+    end.put(data, lines, 0 if all(one.sent for one in trials) else NEEDS_A_PERSON)
 
 
-@opt.command(
-    schedule_app,
-    "print",
-    "schedule print cron jobs",
-    "schedule print systemd jobs --at 06:15 --days MON,THU --out units",
-)
+_UNITS = "schedule print systemd jobs --at 06:15 --days MON,THU --out units"
+
+
+@opt.command(schedule_app, "print", "schedule print cron jobs", _UNITS)
 def ready(
     scheduler: str = argument(..., "cron, systemd or windows.", "SCHEDULER"),
     folders: list[Path] = argument(..., "Folders with jobs.", "FOLDER"),
@@ -269,9 +246,8 @@ def run(options: ScheduledOptions, lines: Path | None) -> int:
                 put_json(line)
                 sys.stdout.flush()  # a line that a program waits for, whatever comes of the next job
             elif lines is not None:
-                os.write(
-                    descriptor, line.encode("utf-8", "backslashreplace")
-                )  # whole, so that two runs may write at once
+                whole = line.encode("utf-8", "backslashreplace")  # in one piece, so that two runs may write at once
+                os.write(descriptor, whole)
         except OutputError as error:
             failed.append(error)
         except (OSError, ValueError) as error:

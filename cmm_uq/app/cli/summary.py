@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.cells import cell_len
@@ -22,6 +22,7 @@ from cmm_uq.base.errors import printable
 from cmm_uq.base.output import MANIFEST
 
 if TYPE_CHECKING:
+    from cmm_uq.app.commands.files import Written
     from cmm_uq.certificate.document import Standing
     from cmm_uq.certificate.wording import Summary
 
@@ -190,26 +191,7 @@ def show_summary(
     show(screen_layout(verbose=verbose).screen(summary, name=name, banner=banner, files=rows, folder=folder))
 
 
-class CommandResult(Protocol):
-    """What a command wrote and found: a job's or a part's."""
-
-    @property
-    def results(self) -> bytes: ...
-    @property
-    def files(self) -> Mapping[str, Path]: ...
-    @property
-    def summary(self) -> Summary: ...
-    @property
-    def conforming(self) -> bool: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def origin(self) -> str: ...
-    @property
-    def recorded(self) -> str: ...
-
-
-def conclude(result: CommandResult, end: Ending, *, strict: bool) -> None:
+def conclude(result: Written[Any], end: Ending) -> None:
     """How a command ends that wrote an outcome: results.json or a summary; exit code 4 if strict, when not all is well."""
     if end.json:
         put_json(result.results.decode())
@@ -220,7 +202,7 @@ def conclude(result: CommandResult, end: Ending, *, strict: bool) -> None:
         show_summary(result.summary, result.files, verbose=end.verbose, name=result.name, banner=banner)
         if result.recorded:
             say(result.recorded)
-    if strict and not result.conforming:
+    if end.strict and not result.conforming:
         raise typer.Exit(NOT_CONFORMING)
 
 

@@ -170,7 +170,7 @@ def write_diagnosis(
     job: Path, out: Path | None = None, *, seed: int = 0, alpha: float = FALSE_ALARMS, against: Path | None = None,
     force: bool = False, stage: Stage | None = None, told: Told | None = None, records: str | Path | None = NONE,
     language: Code | None = None,
-) -> Written:  # fmt: skip
+) -> Written[Outcome]:  # fmt: skip
     """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf`` and ``results.json``, all or none.
 
     Where further set-ups would tell more, ``next_plan.csv`` comes with them. ``against``: file of a simulation's prediction

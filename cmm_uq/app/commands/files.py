@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.output import Ledger, Owner, staged
 from cmm_uq.certificate.plots.style import fonts_of
-from cmm_uq.certificate.result import AnalysisResult, Outcome
+from cmm_uq.certificate.result import Outcome
 from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.content import certificate_content, folder_from, kind_of_entry
@@ -93,41 +93,21 @@ def silent(what: str, part: float) -> None:
     """Nobody is told."""
 
 
-@dataclass(frozen=True, eq=False)
-class Written:
-    """What a command found, contents of results.json, its files by name, and the records that have it; empty for none."""
+Found = TypeVar("Found")
 
-    outcome: Outcome
+
+@dataclass(frozen=True, eq=False)
+class Written(Generic[Found]):
+    """What a command found, contents of results.json, its files by name, and what is said at its end."""
+
+    found: Found
     results: bytes
     files: dict[str, Path]
-    records: str = ""
-
-    @property
-    def found(self) -> AnalysisResult:
-        return self.outcome.found
-
-    @property
-    def name(self) -> str:
-        return self.found.job.facts.job.id
-
-    @property
-    def origin(self) -> str:
-        return self.found.job.origin
-
-    @property
-    def recorded(self) -> str:
-        """Where it was recorded, in a sentence; empty where it was not."""
-        serial = self.found.job.facts.machine.serial
-        nameless = "" if serial else "; the machine has no [machine] serial and is known by its name"
-        return f"Recorded in {self.records}{nameless}." if self.records else ""
-
-    @property
-    def summary(self) -> Summary:
-        return self.outcome.summary
-
-    @property
-    def conforming(self) -> bool:
-        return self.outcome.conforming
+    summary: Summary
+    conforming: bool
+    name: str  # id of the job, or of the file that it read
+    origin: str = ""  # of the recording
+    recorded: str = ""  # where it was recorded, in a sentence; empty where it was not
 
 
 @dataclass(frozen=True)
@@ -150,7 +130,7 @@ class Form:
     def write(
         self, job: Job, outcome: Callable[[], Outcome], out: Path | None = None, *, force: bool = False,
         stage: Stage = silent, records: str | Path | None = NONE, signing: Signing | None = None,
-    ) -> Written:  # fmt: skip
+    ) -> Written[Outcome]:  # fmt: skip
         """Make sure of the folder, then compute, render and write, all or none, and record it with that.
 
         ``records``: file or URL; ``none`` for none, ``None`` for those of the environment, else beside the folder.
@@ -173,9 +153,13 @@ class Form:
             stage(f"Writing: {len(contents)} files to {folder}", 0.95)
             ledger = None if history is None else ledger_of(history, job, self.command, folder, contents, RESULTS)
             files = place.write(contents, ledger=ledger)
-            where = "" if history is None else history.shown
+            nameless = (
+                "" if job.facts.machine.serial else "; the machine has no [machine] serial and is known by its name"
+            )
+            recorded = "" if history is None else f"Recorded in {history.shown}{nameless}."
         stage("Done", 1.0)
-        return Written(found, contents[RESULTS], files, where)
+        ends = (found.summary, found.conforming, job.facts.job.id, job.origin, recorded)
+        return Written(found, contents[RESULTS], files, *ends)
 
     def owner(self, job: Job) -> Owner:
         return Owner(self.command, job.facts.job.id, job.origin)

@@ -228,7 +228,7 @@ def prove_outcome(
 def write_proof(
     job: Path, options: ProofOptions, out: Path | None = None, *, force: bool = False, stage: Stage | None = None,
     sealed: Sealed | None = None, language: Code | None = None,
-) -> Written:  # fmt: skip
+) -> Written[Outcome]:  # fmt: skip
     """Prove the diagnosis on a job's set-ups and write page, truth, answers and ``results.json``, all or none.
 
     Truth and answers are kept in ``cases.unfinished`` while they come; the same call goes on with what an interrupted

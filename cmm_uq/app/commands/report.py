@@ -139,7 +139,7 @@ def write_report(
     job: Path, out: Path | None = None, *, seed: int = 0, force: bool = False, stage: Stage | None = None,
     told: Told | None = None, records: str | Path | None = NONE, language: Code | None = None,
     signing: Signing | None = None,
-) -> Written:  # fmt: skip
+) -> Written[Outcome]:  # fmt: skip
     """Analyse a job and write its certificate (HTML, PDF, DCC), ``results.json`` and ``provenance.json``, all or none.
 
     A kind may add files of its own. Documents of a recording that was not measured carry its origin in their names.

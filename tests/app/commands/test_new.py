@@ -201,7 +201,7 @@ def test_a_new_plan_is_planned_and_a_new_budget_is_evaluated(tmp_path: Path) -> 
     (problem,) = check_job(tmp_path / "plan").problems
     assert "no such file" in problem.problem
     write_new(BUDGET, tmp_path / "budget", {})
-    (stated,) = write_budget(tmp_path / "budget" / "budget.toml", tmp_path / "evaluated").evaluation.stated.values()
+    (stated,) = write_budget(tmp_path / "budget" / "budget.toml", tmp_path / "evaluated").found.stated.values()
     by_hand = 100.0021 - 100.0 * 11.5e-6 * 0.4
     u = np.sqrt(0.0004**2 + (100 * 0.4 * 1e-6) ** 2 / 3 + (100 * 11.5e-6 * 0.2) ** 2 / 3)
     assert stated.value == pytest.approx(by_hand, abs=1e-9)

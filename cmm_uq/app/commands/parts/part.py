@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,7 +27,7 @@ from cmm_uq.analysis.parts.setup import (
     refuse_unfit,
 )
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
-from cmm_uq.app.commands.files import REPORTS, RESULTS, Finished, Stage, silent, unchanged
+from cmm_uq.app.commands.files import REPORTS, RESULTS, Finished, Stage, Written, silent, unchanged
 from cmm_uq.app.commands.parts.drift import further_of
 from cmm_uq.app.commands.parts.machine import state_machine, with_calibration, with_history
 from cmm_uq.base.errors import CmmUqError
@@ -50,7 +50,6 @@ from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, simulate, si
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.document import Document
-    from cmm_uq.certificate.wording import Summary
 
 # virtual measurements: ten thousand over one less the probability of the interval (JCGM 101:2008, 7.2.2).
 TRIALS = 200_000
@@ -234,35 +233,6 @@ DOCUMENTS = ("part.html", "part.pdf")
 COMMAND = "part"
 
 
-@dataclass(frozen=True, eq=False)
-class WrittenPart:
-    """What was found of a part, contents of results.json, and what was written, by name."""
-
-    found: PartMeasurement
-    results: bytes
-    files: Mapping[str, Path] = field(default_factory=dict)
-    recorded: str = ""
-
-    @property
-    def summary(self) -> Summary:
-        """For the end of the command."""
-        return part_summary(self.found)
-
-    @property
-    def conforming(self) -> bool:
-        return self.found.conforming
-
-    @property
-    def name(self) -> str:
-        """Id of the job."""
-        return self.found.job.facts.job.id
-
-    @property
-    def origin(self) -> str:
-        """Of the recording."""
-        return self.found.job.facts.job.origin
-
-
 def in_language(job: PartJob, language: Code | None) -> PartJob:
     """A job whose page is to be said in a language; without one as job.toml has it."""
     if language is None:
@@ -272,23 +242,24 @@ def in_language(job: PartJob, language: Code | None) -> PartJob:
 
 
 def write_part(
-    folder: Path, out: Path | None = None, *, options: PartOptions | None = None, force: bool = False, stage: Stage = silent,
-    language: Code | None = None,
-) -> WrittenPart:  # fmt: skip
+    folder: Path, out: Path | None = None, *, options: PartOptions | None = None, force: bool = False,
+    stage: Stage | None = None, language: Code | None = None,
+) -> Written[PartMeasurement]:  # fmt: skip
     """Evaluate a part's job and write ``part.html``, ``part.pdf``, ``results.json`` and what comes with them, all or none.
 
     ``out``: where to write; ``reports/<job id>`` by default. ``force``: keep what stands in the way as ``NAME.previous``
     instead of refusing.
     """
-    stage("Reading the job", 0.0)
+    tell = stage or silent
+    tell("Reading the job", 0.0)
     job = in_language(read_part(folder), language)
-    return written(job, lambda: evaluate_part(job, options, stage), out, force=force, stage=stage)
+    return written(job, lambda: evaluate_part(job, options, tell), out, force=force, stage=tell)
 
 
 def written(
     job: PartJob, evaluate: Callable[[], PartMeasurement], out: Path | None = None, *, force: bool = False,
     stage: Stage = silent,
-) -> WrittenPart:  # fmt: skip
+) -> Written[PartMeasurement]:  # fmt: skip
     """Make sure of the folder, then evaluate, render and write, all or none."""
     facts = job.facts.job
     fonts_of(facts.language)  # refused before anything is computed
@@ -301,7 +272,8 @@ def written(
         stage(f"Writing: {len(contents)} files to {folder}", 0.95)
         files = place.write(contents)
     stage("Done", 1.0)
-    return WrittenPart(measurement, contents[RESULTS], files)
+    ends = (part_summary(measurement), measurement.conforming, facts.id, facts.origin)
+    return Written(measurement, contents[RESULTS], files, *ends)
 
 
 def contents_of(found: PartMeasurement, stage: Stage = silent, *, finished: Finished = unchanged) -> dict[str, bytes]:

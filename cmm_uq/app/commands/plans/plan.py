@@ -58,7 +58,7 @@ def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = 
 def write_plan(
     job: Path, out: Path | None = None, *, power: bool = True, seed: int = 0, force: bool = False,
     stage: Stage | None = None, language: Code | None = None,
-) -> Written:  # fmt: skip
+) -> Written[Outcome]:  # fmt: skip
     """Plan a job and write ``plan.csv``, ``plan.html`` and ``results.json``, all or none.
 
     ``plan.csv`` has the columns of a recording of the artefact, at nominal coordinates; it is left out where nothing is left
