@@ -17,7 +17,7 @@ from urllib.parse import quote
 
 from cmm_uq.app.serve import page as p
 from cmm_uq.app.serve.exchange import OWN, RECORDED, RefusedRequest, WebRequest, WebResponse
-from cmm_uq.app.serve.page import Block, Cell, PageNotice, PageParagraph, PageSection, PageTable, address
+from cmm_uq.app.serve.page import Block, Cell, PageNotice, PageParagraph, PageTable, address
 from cmm_uq.app.serve.trends import values_table
 from cmm_uq.app.serve.view import SiteView, machine_cell
 from cmm_uq.base.errors import CmmUqError
@@ -56,12 +56,12 @@ def certificate_page(view: SiteView, request: WebRequest) -> p.WebPage:
         title, "/certificates", lead=lead, above=(Cell(say("Certificates"), "/certificates"), machine_cell(one.machine)),
         blocks=(*_notices(one), _facts(view, one, entry)),
         sections=(
-            PageSection(
+            (
                 say("Values"), (values_table(say("Values as stated"), values, say("It states no value."), heard=True),)
             ),
             *(diagnosis_section(diagnosis) if isinstance(diagnosis, Mapping) else ()),
             *_signatures(view, one),
-            PageSection(say("Files"), (_files(one, files),)),
+            (say("Files"), (_files(one, files),)),
         ),
     )  # fmt: skip
 
@@ -132,7 +132,7 @@ def _facts(view: SiteView, one: RecordedCertificate, entry: Entry) -> p.PageFact
     return p.PageFacts(tuple(rows))
 
 
-def _signatures(view: SiteView, one: RecordedCertificate) -> tuple[PageSection, ...]:
+def _signatures(view: SiteView, one: RecordedCertificate) -> tuple[p.Section, ...]:
     words = {"release": say("Released"), "withdrawal": say("Withdrawn"), "replacement": say("Replaced")}
     headings = p.columns(say("What"), say("By"), say("When"), say("Reason"), say("In its place"))
     rows = tuple(
@@ -143,7 +143,7 @@ def _signatures(view: SiteView, one: RecordedCertificate) -> tuple[PageSection, 
         for each in view.records.signatures(one.entry)
     )  # fmt: skip
     table = PageTable(say("Who released, withdrew or replaced it"), headings, rows, heard=True)
-    return (PageSection(say("Release"), (table,)),) if rows else ()
+    return ((say("Release"), (table,)),) if rows else ()
 
 
 def _files(one: RecordedCertificate, files: tuple[RecordedFile, ...]) -> PageTable:
@@ -163,7 +163,7 @@ def _files(one: RecordedCertificate, files: tuple[RecordedFile, ...]) -> PageTab
     return PageTable(say("Files as recorded"), headings, rows, empty, (note,), heard=True)
 
 
-def diagnosis_section(diagnosis: Mapping[str, Any]) -> tuple[PageSection, ...]:
+def diagnosis_section(diagnosis: Mapping[str, Any]) -> tuple[p.Section, ...]:
     """A section, where there is a verdict."""
     if not diagnosis.get("verdict"):
         return ()
@@ -180,7 +180,7 @@ def diagnosis_section(diagnosis: Mapping[str, Any]) -> tuple[PageSection, ...]:
             blocks.append(PageParagraph(say("This recording cannot tell apart: {names}.", names=names)))
     further = [one.get("what") for one in _list(diagnosis.get("suggested_measurements")) if isinstance(one, Mapping)]
     blocks += [PageParagraph(say("Measure next: {what}", what=Verbatim(str(what)))) for what in further if what]
-    return (PageSection(say("Diagnosis"), tuple(blocks)),)
+    return ((say("Diagnosis"), tuple(blocks)),)
 
 
 def _effect(one: Any) -> tuple[Cell, ...]:

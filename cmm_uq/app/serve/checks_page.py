@@ -16,7 +16,7 @@ from typing import Literal
 from cmm_uq.app.serve import page as p
 from cmm_uq.app.serve.certificate_page import files_of
 from cmm_uq.app.serve.exchange import LARGEST, UploadedFile, WebRequest, read_dropped
-from cmm_uq.app.serve.page import Block, Cell, PageFacts, PageNotice, PageParagraph, PageSection, WebPage
+from cmm_uq.app.serve.page import Block, Cell, PageFacts, PageNotice, PageParagraph, WebPage
 from cmm_uq.app.serve.view import MOST, SiteView, machine_cell
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, number, plural, say
 from cmm_uq.certificate.document import Standing
@@ -107,7 +107,7 @@ def dropped_page(view: SiteView, request: WebRequest) -> WebPage:
     return WebPage(
         say("Check a file"), "/file", lead=Verbatim(dropped.name),
         blocks=(verdict(known), PageFacts(tuple(rows), wide=True), PageParagraph(_SCOPE, "note")),
-        sections=(PageSection(say("Another file"), _form()),),
+        sections=((say("Another file"), _form()),),
     )  # fmt: skip
 
 
@@ -182,7 +182,7 @@ def integrity_page(view: SiteView, request: WebRequest) -> WebPage:
     return WebPage(
         say("Integrity"), "/integrity", lead=NOTHING,
         blocks=(*_comparison(view, (count, head)), PageFacts(rows, wide=True)),
-        sections=(PageSection(say("Compare the records with their chain"), forms),),
+        sections=((say("Compare the records with their chain"), forms),),
     )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from http import HTTPStatus
 
 from cmm_uq.app.serve import page as p, view as v
@@ -20,6 +20,40 @@ _ANY = ("", say("Any"))
 _KEYS = ("text", "machine", "artefact", "origin", "state", "decision", "since", "until", "page")
 
 
+def _list(
+    request: WebRequest, title: Text, lead: Text, choose: Text, fields: Iterable[p.FormField], table: p.PageTable, total: int,
+    *, clear: Text, above: tuple[p.Block, ...] = (), between: tuple[p.Block, ...] = (), kept: tuple[str, ...] = (),
+) -> p.WebPage:  # fmt: skip
+    """A page of a list: the form that narrows it, its rows, and where in it the reader is."""
+    given = tuple((name, request.text(name)) for name in kept if request.text(name))
+    reset = p.Cell(clear, request.path) if _narrowed(request) else None
+    form = p.Chooser(choose, request.path, tuple(fields), say("Show"), reset, given)
+    blocks = (*above, *((form,) if form.fields else ()), *between, table, *v.pager(request, total, table.caption))
+    return p.WebPage(title, request.path, lead, blocks)
+
+
+def _narrowed(request: WebRequest) -> bool:
+    return any(request.text(name) for name in request.query if name != "page")
+
+
+def _field(request: WebRequest, name: str, label: Text, *options: tuple[str, Text], usual: str = "") -> p.FormField:
+    """A line of text, or a choice where there are options, with what was chosen."""
+    return p.FormField(name, label, request.text(name) or usual, options, "select" if options else "search")
+
+
+def _options(words: Mapping[str, p.Word]) -> tuple[tuple[str, Text], ...]:
+    return tuple((name, text) for name, (text, _) in words.items())
+
+
+def _dates(request: WebRequest) -> tuple[dt.date | None, dt.date | None, tuple[p.FormField, ...]]:
+    """First and last day of a list, and the fields that they are chosen by."""
+    since, until = request.day("since"), request.day("until")
+    if since is not None and until is not None and since > until:
+        raise bad(say("the list would end before it begins"), say("Exchange the two dates"))
+    ends = (("since", say("From")), ("until", say("To")))
+    return since, until, tuple(p.FormField(name, label, request.text(name), sort="date") for name, label in ends)
+
+
 def certificates_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     """Certificates and interim checks."""
     request.only(_KEYS)
@@ -27,53 +61,41 @@ def certificates_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     origin = request.one_of("origin", tuple(p.ORIGINS)) or "measured"
     state = request.one_of("state", facts.STATES)
     decision = request.one_of("decision", tuple(p.DECISIONS))
-    since, until = _dates(request)
+    since, until, dates = _dates(request)
     choice = CertificateFilter(
         text=text, machine=machine, artefact=artefact, origin=origin, states=(state,) if state else (),
         decisions=(decision,) if decision else (), since=since, until=until,
     )  # fmt: skip
-    page = request.count("page")
-    rows, total = v.paged(view.records, choice, page)
+    rows, total = v.paged(view.records, choice, request)
     count = plural(total, one=say("1 certificate"), many=say("{count} certificates", count=number(total, ",d")))
     fields = (
-        p.FormField("text", say("Number, job or machine"), text),
-        p.FormField("state", say("State"), state, (_ANY, *_options(p.STATES)), "select"),
-        p.FormField("decision", say("Decision"), decision, (_ANY, *_options(p.DECISIONS)), "select"),
-        p.FormField("origin", say("Recording"), origin, tuple(p.ORIGINS.items()), "select"),
-        *_date_fields(request),
-    )
-    kept = tuple((name, request.text(name)) for name in ("machine", "artefact") if request.text(name))
-    narrowed = any(request.text(name) for name in _KEYS if name != "page")
-    clear = p.Cell(say("Show all"), "/certificates") if narrowed else None
-    empty = say("No certificate is as chosen.") if narrowed else say("No certificate of a measurement is recorded yet.")
+        _field(request, "text", say("Number, job or machine")),
+        _field(request, "state", say("State"), _ANY, *_options(p.STATES)),
+        _field(request, "decision", say("Decision"), _ANY, *_options(p.DECISIONS)),
+        _field(request, "origin", say("Recording"), *p.ORIGINS.items(), usual=origin), *dates,
+    )  # fmt: skip
+    none = say("No certificate of a measurement is recorded yet.")
     lead = say("Newest first.")
     if machine:
         lead = say("Of machine {serial}, newest first.", serial=Verbatim(machine))
     elif artefact:
         lead = say("Made with artefact {serial}, newest first.", serial=Verbatim(artefact))
     warning = p.NOT_MEASURED.get(origin)
-    return p.WebPage(
-        say("Certificates"), "/certificates", lead=lead,
-        blocks=(
-            p.Chooser(say("Choose certificates"), "/certificates", fields, say("Show"), clear, kept),
-            *((p.PageNotice(warning, "open"),) if warning else ()),
-            v.certificates_table(rows, count, empty),
-            *v.pager(request, total, page, count),
-        ),
+    return _list(
+        request, say("Certificates"), lead, say("Choose certificates"), fields,
+        v.certificates_table(rows, count, say("No certificate is as chosen.") if _narrowed(request) else none), total,
+        clear=say("Show all"), between=(p.PageNotice(warning, "open"),) if warning else (), kept=("machine", "artefact"),
     )  # fmt: skip
 
 
 def diagnoses_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     """Verdicts of certificates and of diagnoses on whether a recording agrees with its model."""
     request.only(("text", "verdict", "since", "until", "page"))
-    verdict, text = request.one_of("verdict", (*p.VERDICTS, "all")), request.text("text")
-    verdicts: tuple[str, ...] = ("explained", "partial", "unexplained")
-    if verdict:
-        verdicts = tuple(p.VERDICTS) if verdict == "all" else (verdict,)
-    since, until = _dates(request)
-    choice = CertificateFilter(text=text, command="", verdicts=verdicts, since=since, until=until)
-    page = request.count("page")
-    rows, total = v.paged(view.records, choice, page)
+    verdict = request.one_of("verdict", (*p.VERDICTS, "all"))
+    verdicts = {"": ("explained", "partial", "unexplained"), "all": tuple(p.VERDICTS)}.get(verdict, (verdict,))
+    since, until, dates = _dates(request)
+    choice = CertificateFilter(text=request.text("text"), command="", verdicts=verdicts, since=since, until=until)
+    rows, total = v.paged(view.records, choice, request)
     count = plural(total, one=say("1 recording"), many=say("{count} recordings", count=number(total, ",d")))
     cells = tuple(
         (v.certificate_cell(one), p.cell_of(p.VERDICTS, one.diagnosis), v.machine_cell(one.machine, one.machine_name),
@@ -85,38 +107,13 @@ def diagnoses_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
         say("Certificate or diagnosis"), say("Verdict"), say("Machine"), (say("Measured on"), "day"), say("State")
     )
     options = (("", say("Not consistent")), *_options(p.VERDICTS), ("all", say("All")))
-    fields = (
-        p.FormField("text", say("Number, job or machine"), text),
-        p.FormField("verdict", say("Verdict"), verdict, options, "select"),
-        *_date_fields(request),
-    )
-    narrowed = any(request.text(name) for name in ("text", "verdict", "since", "until"))
-    clear = p.Cell(say("Show what is not consistent"), "/diagnoses") if narrowed else None
-    return p.WebPage(
-        say("Diagnoses"), "/diagnoses",
-        lead=say("Measured recordings that contradict the model of their machine, newest first.") if not verdict else NOTHING,
-        blocks=(
-            p.Chooser(say("Choose diagnoses"), "/diagnoses", fields, say("Show"), clear),
-            p.PageTable(count, headings, cells, say("There is none.")),
-            *v.pager(request, total, page, count),
-        ),
+    fields = (_field(request, "text", say("Number, job or machine")),
+              _field(request, "verdict", say("Verdict"), *options), *dates)  # fmt: skip
+    lead = say("Measured recordings that contradict the model of their machine, newest first.")
+    return _list(
+        request, say("Diagnoses"), NOTHING if verdict else lead, say("Choose diagnoses"), fields,
+        p.PageTable(count, headings, cells, say("There is none.")), total, clear=say("Show what is not consistent"),
     )  # fmt: skip
-
-
-def _options(words: Mapping[str, p.Word]) -> tuple[tuple[str, Text], ...]:
-    return tuple((name, text) for name, (text, _) in words.items())
-
-
-def _dates(request: WebRequest) -> tuple[dt.date | None, dt.date | None]:
-    since, until = request.day("since"), request.day("until")
-    if since is not None and until is not None and since > until:
-        raise bad(say("the list would end before it begins"), say("Exchange the two dates"))
-    return since, until
-
-
-def _date_fields(request: WebRequest) -> tuple[p.FormField, ...]:
-    ends = (("since", say("From")), ("until", say("To")))
-    return tuple(p.FormField(name, label, request.text(name), sort="date") for name, label in ends)
 
 
 ARTEFACT_COLUMNS = p.columns(
@@ -128,9 +125,8 @@ ARTEFACT_COLUMNS = p.columns(
 def artefacts_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     """All artefacts."""
     request.only(("text", "page"))
-    text, page = request.text("text"), request.count("page")
+    folded = request.text("text").casefold()
     known = sorted(view.records.artefacts(), key=lambda one: (one.due or dt.date.max, one.serial))
-    folded = text.casefold()
     found = [
         one for one in known if any(folded in name.casefold() for name in (one.serial, one.certificate, one.laboratory))
     ]
@@ -139,17 +135,15 @@ def artefacts_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
         (p.Cell(p.shown(one.serial)), _state(one, view.today), p.day_cell(one.due), p.day_cell(one.calibrated),
          p.Cell(p.shown(one.certificate)), p.Cell(p.shown(one.laboratory)), p.Cell(p.shown(one.kind)),
          p.Cell(say("Show them"), p.address("/certificates", artefact=one.serial)))
-        for one in found[(page - 1) * v.PER_PAGE : page * v.PER_PAGE]
+        for one in v.on_page(found, request)
     )  # fmt: skip
-    clear = p.Cell(say("Show all"), "/artefacts") if text else None
-    field = p.FormField("text", say("Serial, certificate or laboratory"), text)
-    chooser = (p.Chooser(say("Choose artefacts"), "/artefacts", (field,), say("Show"), clear),) if known else ()
     empty = say("No artefact is as chosen.") if known else say("No artefact is recorded yet.")
-    table = p.PageTable(count, ARTEFACT_COLUMNS, rows, empty)
-    lead = say("On {day}, first what is out of date: no certificate can rest on that.", day=day(view.today))
-    return p.WebPage(
-        say("Artefacts"), "/artefacts", lead=lead, blocks=(*chooser, table, *v.pager(request, len(found), page, count))
-    )
+    fields = (_field(request, "text", say("Serial, certificate or laboratory")),) if known else ()
+    return _list(
+        request, say("Artefacts"),
+        say("On {day}, first what is out of date: no certificate can rest on that.", day=day(view.today)),
+        say("Choose artefacts"), fields, p.PageTable(count, ARTEFACT_COLUMNS, rows, empty), len(found), clear=say("Show all"),
+    )  # fmt: skip
 
 
 def _state(one: ArtefactRow, today: dt.date) -> p.Cell:
@@ -177,36 +171,27 @@ def machines_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     """All machines, or those that were chosen."""
     request.only(("text", "state", "place", "page"))
     text, state, place = request.text("text"), request.one_of("state", tuple(v.GROUPS)), request.text("place")
-    page, machines = request.count("page"), view.standing()
+    request.count("page")  # refused before anything is worked out
+    machines = view.standing()
     found = [one for one in machines if _has(one, text.casefold(), state, place)]
     counts = Counter(group for one in machines for group in one.groups)
     tally = tuple(
         p.Count(counts[name], group.count, "/" if name == state else p.address("/", state=name), group.standing, name == state)
         for name, group in v.GROUPS.items() if counts[name] or name in ("overdue", "failing", "due", "order")
     )  # fmt: skip
-    rows = tuple(_row(one) for one in found[(page - 1) * v.PER_PAGE : page * v.PER_PAGE])
+    rows = tuple(_row(one) for one in v.on_page(found, request))
     count = plural(len(found), one=say("1 machine"), many=say("{count} machines", count=number(len(found), ",d")))
     empty = say("No machine is as chosen.") if machines else say("No machine is recorded yet.")
     places = sorted({one.newest.machine.place for one in machines} - {""})
-    states = (("", say("Any")), *((name, group.word) for name, group in v.GROUPS.items()))
-    fields = [
-        p.FormField("text", say("Serial, name, model or place"), text),
-        p.FormField("state", say("State"), state, states, "select"),
-    ]
+    states = tuple((name, group.word) for name, group in v.GROUPS.items())
+    fields = [_field(request, "text", say("Serial, name, model or place")),
+              _field(request, "state", say("State"), _ANY, *states)]  # fmt: skip
     if 1 < len(places) <= MOST_PLACES:
-        options = (("", say("Any")), *((one, Verbatim(one)) for one in places))
-        fields.append(p.FormField("place", say("Place"), place, options, "select"))
-    clear = p.Cell(say("Show all"), "/") if text or state or place else None
-    return p.WebPage(
-        say("Machines"), "/",
-        lead=say("On {day}, the most urgent first.", day=day(view.today)),
-        blocks=(
-            p.Tally(say("By state"), tally),
-            *_overdue_artefacts(view),
-            p.Chooser(say("Choose machines"), "/", tuple(fields), say("Show"), clear),
-            p.PageTable(count, COLUMNS, rows, empty),
-            *v.pager(request, len(found), page, count),
-        ),
+        fields.append(_field(request, "place", say("Place"), _ANY, *((one, Verbatim(one)) for one in places)))
+    return _list(
+        request, say("Machines"), say("On {day}, the most urgent first.", day=day(view.today)), say("Choose machines"), fields,
+        p.PageTable(count, COLUMNS, rows, empty), len(found), clear=say("Show all"),
+        above=(p.Tally(say("By state"), tally), *_overdue_artefacts(view)),
     )  # fmt: skip
 
 
@@ -290,8 +275,8 @@ def machine_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
         above=(p.Cell(say("Machines"), "/"),),
         blocks=(*notices, p.PageFacts(tuple(facts))),
         sections=(
-            p.PageSection(say("Trends"), trends(view.records, machine)),
-            p.PageSection(say("Certificates"), (table, p.Links((every,)))),
+            (say("Trends"), trends(view.records, machine)),
+            (say("Certificates"), (table, p.Links((every,)))),
         ),
     )  # fmt: skip
 

@@ -9,9 +9,8 @@ from __future__ import annotations
 import datetime as dt
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from http import HTTPStatus
-from typing import ClassVar, Literal, NamedTuple
+from typing import Literal, NamedTuple
 from urllib.parse import urlencode
 
 from cmm_uq.base.messages import DASH, NOTHING, Day, Text, Verbatim, day, say
@@ -40,15 +39,6 @@ class Cell(NamedTuple):
     download: bool = False  # whether the address gives a file to keep rather than to look at
 
 
-class Block:
-    """Part of a page; ``kind`` names its macro in the template."""
-
-    kind: ClassVar[str]
-
-    def __init_subclass__(cls) -> None:
-        cls.kind = re.sub("^Page(?=[A-Z])", "", cls.__name__).lower()
-
-
 class PageColumn(NamedTuple):
     """Heading of a column; figures stand to the right under each other, a date is never broken."""
 
@@ -61,8 +51,7 @@ def columns(*headings: Text | tuple[Text, Literal["number", "day"]]) -> tuple[Pa
     return tuple(PageColumn(*one) if isinstance(one, tuple) else PageColumn(one) for one in headings)
 
 
-@dataclass(frozen=True)
-class PageTable(Block):
+class PageTable(NamedTuple):
     """Rows under headings; the first cell names its row. Where there is no row, ``empty`` says so.
 
     A caption that would only say the title of its section again is for those who hear the page (``heard``).
@@ -76,8 +65,7 @@ class PageTable(Block):
     heard: bool = False
 
 
-@dataclass(frozen=True)
-class PageFacts(Block):
+class PageFacts(NamedTuple):
     """Labels and values; in one column where values are long (``wide``)."""
 
     rows: tuple[tuple[Text, Cell], ...]
@@ -94,16 +82,14 @@ class Count(NamedTuple):
     chosen: bool = False
 
 
-@dataclass(frozen=True)
-class Tally(Block):
+class Tally(NamedTuple):
     """Counts side by side: what a reader with five seconds sees."""
 
     title: Text
     counts: tuple[Count, ...]
 
 
-@dataclass(frozen=True)
-class PageNotice(Block):
+class PageNotice(NamedTuple):
     """A verdict, or what must not be overlooked, with what belongs to it."""
 
     head: Text
@@ -111,8 +97,7 @@ class PageNotice(Block):
     lines: tuple[Cell, ...] = ()
 
 
-@dataclass(frozen=True)
-class PageParagraph(Block):
+class PageParagraph(NamedTuple):
     """Running text; a note is set smaller."""
 
     text: Text
@@ -129,8 +114,7 @@ class FormField(NamedTuple):
     sort: Literal["search", "date", "select"] = "search"
 
 
-@dataclass(frozen=True)
-class Chooser(Block):
+class Chooser(NamedTuple):
     """A form that narrows a list; ``kept`` is what else of the query stays as it is."""
 
     title: Text
@@ -141,8 +125,7 @@ class Chooser(Block):
     kept: tuple[tuple[str, str], ...] = ()
 
 
-@dataclass(frozen=True)
-class Pager(Block):
+class Pager(NamedTuple):
     """Where in a long list the reader is, and its neighbours."""
 
     title: Text
@@ -161,16 +144,14 @@ class Chart(NamedTuple):
     standing: Standing | None = None
 
 
-@dataclass(frozen=True)
-class Charts(Block):
+class Charts(NamedTuple):
     """Pictures side by side."""
 
     charts: tuple[Chart, ...]
     notes: tuple[Text, ...] = ()
 
 
-@dataclass(frozen=True)
-class Drop(Block):
+class Drop(NamedTuple):
     """The form that takes a file, dropped or chosen."""
 
     path: str
@@ -179,26 +160,26 @@ class Drop(Block):
     button: Text
 
 
-@dataclass(frozen=True)
-class Links(Block):
+class Links(NamedTuple):
     """Where to go from here."""
 
     cells: tuple[Cell, ...]
 
 
-@dataclass(frozen=True)
-class Press(Block):
+class Press(NamedTuple):
     """A form with nothing but a button."""
 
     path: str
     button: Text
 
 
-class PageSection(NamedTuple):
-    """A titled part of a page."""
+Block = PageTable | PageFacts | Tally | PageNotice | PageParagraph | Chooser | Pager | Charts | Drop | Links | Press
+Section = tuple[Text, tuple[Block, ...]]  # a titled part of a page
 
-    title: Text
-    blocks: tuple[Block, ...]
+
+def kind(block: Block) -> str:
+    """Name of its macro in the template."""
+    return re.sub("^Page(?=[A-Z])", "", type(block).__name__).lower()
 
 
 class WebPage(NamedTuple):
@@ -208,7 +189,7 @@ class WebPage(NamedTuple):
     place: str
     lead: Text = NOTHING
     blocks: tuple[Block, ...] = ()
-    sections: tuple[PageSection, ...] = ()
+    sections: tuple[Section, ...] = ()
     above: tuple[Cell, ...] = ()
     status: HTTPStatus = HTTPStatus.OK
 

@@ -29,7 +29,7 @@ from cmm_uq.app.serve.certificate_page import certificate_page, recorded_file
 from cmm_uq.app.serve.checks_page import dropped_page, file_page, integrity_page
 from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse, bad, read_address
 from cmm_uq.app.serve.lists import artefacts_page, certificates_page, diagnoses_page, machine_page, machines_page
-from cmm_uq.app.serve.page import Cell, Chart, PageNotice, WebPage
+from cmm_uq.app.serve.page import Cell, Chart, PageNotice, WebPage, kind
 from cmm_uq.app.serve.view import ChainComparing, DueDates, MachineStanding, SiteView, by_rule, overview, problem_of
 from cmm_uq.base.errors import CmmUqError, OutputError, printable
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
@@ -74,7 +74,7 @@ def _environment() -> Environment:
         loader=FileSystemLoader(template_folder() / "serve"), autoescape=True, undefined=StrictUndefined,
         finalize=_visible, trim_blocks=True, lstrip_blocks=True, auto_reload=False,
     )  # fmt: skip
-    environment.filters["picture"] = _picture
+    environment.filters |= {"picture": _picture, "kind": kind}
     return environment
 
 

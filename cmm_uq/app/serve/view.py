@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from cmm_uq.app.commands.laboratory.due import due_in
 from cmm_uq.app.serve import page as p
@@ -124,13 +124,23 @@ def certificates_table(
     )
 
 
-def paged(records: Records, choice: CertificateFilter, page: int) -> tuple[list[ListedCertificate], int]:
+Listed = TypeVar("Listed")
+
+
+def on_page(found: Sequence[Listed], request: WebRequest) -> Sequence[Listed]:
+    """Those of a list that stand on the page that is asked for."""
+    first = (request.count("page") - 1) * PER_PAGE
+    return found[first : first + PER_PAGE]
+
+
+def paged(records: Records, choice: CertificateFilter, request: WebRequest) -> tuple[list[ListedCertificate], int]:
     """The certificates of a page of a list, and how many there are on all."""
-    return chosen(records, choice, PER_PAGE, (page - 1) * PER_PAGE)
+    return chosen(records, choice, PER_PAGE, (request.count("page") - 1) * PER_PAGE)
 
 
-def pager(request: WebRequest, count: int, page: int, what: Text) -> tuple[p.Pager, ...]:
+def pager(request: WebRequest, count: int, what: Text) -> tuple[p.Pager, ...]:
     """Where in the list the reader is; nothing where there is only one page."""
+    page = request.count("page")
     if count <= PER_PAGE and page == 1:
         return ()
     last = max(1, -(-count // PER_PAGE))
@@ -173,8 +183,7 @@ def by_rule(records: Records, today: dt.date) -> dict[str, DueDate]:
     return {one.serial: DueDate(one.due, one.why, one.beyond) for one in found if one.item == "machine"}
 
 
-@dataclass(frozen=True)
-class MachineGroup:
+class MachineGroup(NamedTuple):
     """Machines of which the same is true, what a number of them is called, and how that is to be taken."""
 
     word: Text

@@ -7,7 +7,6 @@ import os
 import re
 import sqlite3
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
 from hashlib import sha256
 from html.parser import HTMLParser
 from pathlib import Path
@@ -345,8 +344,8 @@ NO_TEXT = {"address", "place", "name", "value", "sort", "path", "svg", "kept", "
 def texts_of(value: Any) -> Iterator[str]:
     if isinstance(value, str):
         yield value
-    elif is_dataclass(value) or hasattr(value, "_fields"):
-        for name in [field.name for field in fields(value)] if is_dataclass(value) else value._fields:
+    elif hasattr(value, "_fields"):
+        for name in value._fields:
             if name == "options":
                 yield from (text for _, text in value.options)
             elif name not in NO_TEXT:
