@@ -189,10 +189,10 @@ def part(
     >>> cmm_uq.part("examples/part-plate-simulated")  # doctest: +SKIP
     <Part of part-plate-simulated: 5 characteristics, pass>
     """
-    from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part, in_language as in_its_language
+    from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
     from cmm_uq.jobs.part.job import PartJob, read_part
 
-    read = in_its_language(job if isinstance(job, PartJob) else read_part(Path(job)), language)
+    read = in_language(job if isinstance(job, PartJob) else read_part(Path(job)), language)
     trusted = None if trust is None else tuple(map(Path, trust))
     return Part(evaluate_part(read, PartOptions(seed, trials, digits, rerun, trusted, records)))
 

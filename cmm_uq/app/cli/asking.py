@@ -138,7 +138,9 @@ def part_answers() -> Answers:
     answers.alignment = _ask(f"Datums of the alignment in order, as A, B, C, or {_BEST_FIT}", _BEST_FIT, lambda text:
                              answers.aligned([] if text == _BEST_FIT else _names(text)))  # fmt: skip
     say("Tolerances, one after another.")
-    while name := _ask("Name or number of a tolerance, empty for no more", "", answers.free_tolerance):
+    while name := _ask(
+        "Name or number of a tolerance, empty for no more", "", lambda text: answers.free_name(text, tolerance=True)
+    ):
         _ask_until_sound(name, _characteristic, answers.add_characteristic)
     return answers
 

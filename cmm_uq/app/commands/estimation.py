@@ -87,8 +87,7 @@ def with_noise(model: RecordingModel) -> tuple[RecordingModel, Estimate, float |
 
 def parameters(model: RecordingModel, values: Floats) -> dict[str, dict[str, Quantity]]:
     """Reported parameters of each effect, by effect and name, of draws (N, k) of the unknowns."""
-    found = _quantities(model, values)
-    return {effect.name: found[effect.name] for effect in model.effects}
+    return {effect.name: _quantities(model, values)[effect.name] for effect in model.effects}
 
 
 def named_draws(

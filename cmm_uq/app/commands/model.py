@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,10 +40,10 @@ OVERFLOW_FIX = (  # where figures leave the range of numbers
 
 def model_of(job: Job, artefact: Artefact) -> RecordingModel:
     if len(artefact.noise_scale) > OBSERVATIONS.most:
+        many = f"{len(artefact.noise_scale)} observations are more than are estimated from at once"
         raise CmmUqError(
-            f"{len(artefact.noise_scale)} observations are more than are estimated from at once",
-            where=job.recording_path, fix=f"{OBSERVATIONS.most} are the most: thin out the recording",
-        )  # fmt: skip
+            many, where=job.recording_path, fix=f"{OBSERVATIONS.most} are the most: thin out the recording"
+        )
     if (count := Freedoms.of(artefact.placing(artefact.points.xyz)).count) > FREEDOMS.most:
         raise CmmUqError(
             f"the placings have {count} freedoms together, more than are estimated beside the machine's errors at once",
@@ -57,29 +57,33 @@ def model_of(job: Job, artefact: Artefact) -> RecordingModel:
     copies = group[counted_with(artefact.points, aside)[rows]] != group[rows]
     used = ~(np.isin(artefact.measurement, aside) | copies | artefact.unread())
     if not used.any():
-        raise CmmUqError(
-            "no observation is left to estimate from", where="job.toml [recording] set_aside" if aside else job.recording_path,
-            fix="Set fewer measurements aside, or record what the machine reads",
-        )  # fmt: skip
+        where = "job.toml [recording] set_aside" if aside else job.recording_path
+        raise CmmUqError("no observation is left to estimate from", where=where,
+                         fix="Set fewer measurements aside, or record what the machine reads")  # fmt: skip
     named = effects(job.facts.model.effects, where="job.toml [model] effects")
     if unfit := next(filter(None, (effect.unfit(artefact.points) for effect in named)), None):
         raise unfit
     model = RecordingModel(artefact, named, None if stated is None else stated * MICROMETRE, used)
-    _refuse_open_sizes(model, job.recording_path)
-    _refuse_hidden_noise(model, job.recording_path)
+    _refuse_undetermined(model, job.recording_path)
     return model
 
 
-def _refuse_open_sizes(model: RecordingModel, where: str) -> None:
-    """Refuse measurements that leave open, whatever the machine's errors, what the measurement is made for."""
-    sought = [i for i, size in enumerate(model.artefact.sizes) if size.role == "sought"]
-    if not sought:
-        return
-    rank, _ = _rank(replace(model, effects=()), sought)
-    if rank < len(sought):
+def _refuse_undetermined(model: RecordingModel, where: str) -> None:
+    """Refuse what leaves open, whatever the machine's errors, what the measurement is made for, or shows no noise."""
+    roles = [size.role for size in model.artefact.sizes]
+    sought = [i for i, role in enumerate(roles) if role == "sought"]
+    if sought and _rank(replace(model, effects=()), sought)[0] < len(sought):
         names = ", ".join(model.artefact.sizes[i].title for i in sought)
         raise CmmUqError(f"the measurements that are used leave a combination of {names} open", where=where,
                          fix="Set fewer measurements aside, or record more")  # fmt: skip
+    if model.sigma is None and "set-up" in roles:
+        rank, count = _rank(model)
+        if (left := count - rank) < FEWEST_LEFT:
+            raise CmmUqError(
+                f"what is in doubt about each set-up explains all but {left} of {count} observations, so the noise "
+                "of a coordinate does not show", where=where,
+                fix="State u_coordinate_um in job.toml [recording], or record more points in each measurement",
+            )  # fmt: skip
 
 
 def _rank(model: RecordingModel, columns: Sequence[int] | slice = slice(None)) -> tuple[int, int]:
@@ -87,20 +91,6 @@ def _rank(model: RecordingModel, columns: Sequence[int] | slice = slice(None)) -
     linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
     design = (linear.reduced.design * np.array([unknown.scale for unknown in model.unknowns]))[:, columns]
     return int(np.linalg.matrix_rank(design, tol=RANK_TOLERANCE * np.linalg.norm(design, 2))), linear.reduced.count
-
-
-def _refuse_hidden_noise(model: RecordingModel, where: str) -> None:
-    """Refuse to estimate the noise where what is in doubt about each set-up could explain every residual."""
-    if model.sigma is not None or all(size.role != "set-up" for size in model.artefact.sizes):
-        return
-    rank, count = _rank(model)
-    left = count - rank
-    if left < FEWEST_LEFT:
-        raise CmmUqError(
-            f"what is in doubt about each set-up explains all but {left} of {count} observations, so the noise "
-            "of a coordinate does not show", where=where,
-            fix="State u_coordinate_um in job.toml [recording], or record more points in each measurement",
-        )  # fmt: skip
 
 
 def recorded_model(job: Job, *, placings: bool = False) -> tuple[RecordingModel, tuple[Finding, ...]]:
@@ -175,8 +165,7 @@ def recipe_of(
     refuse_unmeasured(job)
     kind = kind_of(job)
     offered = kind.offers("own", OwnAnalysis)
-    recipe = None if offered is None else own(offered)
-    if recipe is not None:
+    if offered is not None and (recipe := own(offered)) is not None:
         return recipe
     kind.observing(what)
     return usual(kind)
@@ -215,15 +204,13 @@ def against_simulation(job: Job, facts: SimulationFacts) -> Against:
     elif job.prediction is not None:
         found = predicted_errors(artefact, job.prediction, where, length_mm=facts.length_mm)
     else:
-        raise CmmUqError(
-            "the prediction was not read", where=f"job.toml {KEY} file", fix="Read the job with its recording"
-        )
+        unread = "the prediction was not read"
+        raise CmmUqError(unread, where=f"job.toml {KEY} file", fix="Read the job with its recording")
     points = artefact.points.at(artefact.points.xyz - found.errors)
     named = effects(facts.effects, where=f"job.toml {KEY} effects")
     observe = kind_of(job).observing("compared with a simulation")
-    plain = replace(
-        recorded, artefact=observe(job.facts.artefact, points, where=where), effects=named if facts.refit else ()
-    )
+    left = observe(job.facts.artefact, points, where=where)
+    plain = replace(recorded, artefact=left, effects=named if facts.refit else ())
     if plain.estimate().least_squares.sigma_of_residuals < _NO_NOISE:
         raise CmmUqError(
             "prediction and recording differ by no noise at all: one of them is made of the other",
@@ -231,9 +218,14 @@ def against_simulation(job: Job, facts: SimulationFacts) -> Against:
             fix="Name the file that the simulation wrote, and the recording that the machine made",
         )
     stated = job.facts.recording.u_coordinate_um
-    every = np.hypot(found.u, found.turned)
-    u = float(np.sqrt(np.mean(every**2)))
-    ratio = _ratios(plain, every, u, stated)
+    each = np.hypot(found.u, found.turned)
+    u = float(np.sqrt(np.mean(each**2)))
+    ratio = np.ones(len(each))  # of each point's uncertainty, recorded and predicted, over that of a typical one
+    if np.ptp(each) > 0:
+        residual = plain.estimate().least_squares.sigma_of_residuals
+        own = np.sqrt(max(residual**2 - u**2, 0.0)) if stated is None else stated * MICROMETRE
+        ratio = np.maximum(np.hypot(own, each) / np.hypot(own, u), _LEAST_WEIGHT)
+        ratio = np.exp(_STEP * np.round(np.log(ratio) / _STEP))
     weighed = _weighing(observe, points, ratio, facts.u_common_um * MICROMETRE)
     # repeats share what is predicted wrongly: their mean is no better known
     places = np.unique(np.column_stack([points.measurement, points.point]), axis=0)
@@ -273,26 +265,17 @@ def _of_maps(job: Job, facts: SimulationFacts, points: Points) -> PredictedError
     return PredictedErrors(errors, exact + facts.u_um * MICROMETRE, exact, SAME, 0.0, 0)
 
 
-def _ratios(model: RecordingModel, u: Floats, usual: float, stated_um: float | None) -> Floats:
-    """Uncertainty (n,) of each point, recorded and predicted, over that of a typical one."""
-    if np.ptp(u) == 0:
-        return np.ones(len(u))
-    residual = model.estimate().least_squares.sigma_of_residuals
-    own = np.sqrt(max(residual**2 - usual**2, 0.0)) if stated_um is None else stated_um * MICROMETRE
-    ratio = np.maximum(np.hypot(own, u) / np.hypot(own, usual), _LEAST_WEIGHT)
-    return np.asarray(np.exp(_STEP * np.round(np.log(ratio) / _STEP)))
-
-
 def _weighing(observe: Observe, points: Points, ratio: Floats, u_common: float) -> Observe:
     """Makes artefacts whose observations are as uncertain as recorded and predicted points are together."""
-    keys = zip(points.measurement.tolist(), points.point.tolist(), points.repeat.tolist(), strict=True)
-    known: Mapping[tuple[int, int, int], float] = dict(zip(keys, ratio.tolist(), strict=True))
+
+    def keys(of: Points) -> Iterator[tuple[int, int, int]]:
+        return zip(of.measurement.tolist(), of.point.tolist(), of.repeat.tolist(), strict=True)
+
+    known = dict(zip(keys(points), ratio.tolist(), strict=True))
 
     def made(facts: ArtefactFacts, some: Points, *, where: str | None = None) -> Artefact:
         artefact = observe(facts, some, where=where)
-        own = artefact.points
-        keys = zip(own.measurement.tolist(), own.point.tolist(), own.repeat.tolist(), strict=True)
-        each = np.array([known.get(key, 1.0) for key in keys])
+        each = np.array([known.get(key, 1.0) for key in keys(artefact.points)])
         artefact.noise_scale = artefact.noise_scale * np.sqrt(np.mean(each[artefact.rows] ** 2, axis=1))
         if u_common and artefact.sizes and artefact.sizes[0].certified:
             first = replace(artefact.sizes[0], sd=float(np.hypot(artefact.sizes[0].sd, u_common)))

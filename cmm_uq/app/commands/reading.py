@@ -6,7 +6,7 @@ import datetime as dt
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from cmm_uq.analysis.conformity.standards import names as standard_names, standard_named
 from cmm_uq.artefacts import names, table_of
@@ -24,6 +24,8 @@ from cmm_uq.jobs.tables.conformity import Standards
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from cmm_uq.jobs.part.job import PartJob
 
 NAMEABLE = Nameable(table_of, names, Standards(standard_named, standard_names))
 """Every kind and every standard that there is, of other packages too."""
@@ -47,7 +49,10 @@ def job_of(files: Mapping[str, bytes], *, recorded: bool = True) -> Job:
     return reading.job_of(files, NAMEABLE, recorded=recorded)
 
 
-def in_language(job: Job, language: Code | None) -> Job:
+Either = TypeVar("Either", Job, "PartJob")
+
+
+def in_language(job: Either, language: Code | None) -> Either:
     """A job whose documents are to be said in a language; without one as job.toml has it."""
     if language is None:
         return job

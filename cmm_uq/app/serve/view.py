@@ -183,7 +183,8 @@ def by_rule(records: Records, today: dt.date) -> dict[str, DueDate]:
     return {one.serial: DueDate(one.due, one.why, one.beyond) for one in found if one.item == "machine"}
 
 
-class MachineGroup(NamedTuple):
+@dataclass(frozen=True)
+class MachineGroup:
     """Machines of which the same is true, what a number of them is called, and how that is to be taken."""
 
     word: Text

@@ -20,7 +20,8 @@ from cmm_uq.app.commands.certificates.verification import (
 from cmm_uq.app.commands.files import Stage
 from cmm_uq.app.commands.parts.drift import FILE as HISTORY
 from cmm_uq.app.commands.parts.machine import CALIBRATION, attached_calibration, standing_of, verified, with_history
-from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part, in_language
+from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
+from cmm_uq.app.commands.reading import in_language
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.verify.again import Again, check_part_job, check_results, check_standing
 from cmm_uq.certificate.verify.decisions import check_part_decisions

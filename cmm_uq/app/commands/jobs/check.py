@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import re
 import tomllib
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -69,7 +68,7 @@ class Problem:
         return f"{place}. {self.fix}" if self.fix else place
 
     def as_data(self) -> dict[str, Any]:
-        return {"file": self.file, "line": self.line, "key": self.key, "problem": self.problem, "fix": self.fix}
+        return {name: getattr(self, name) for name in ("file", "line", "key", "problem", "fix")}
 
 
 @dataclass(frozen=True)
@@ -132,8 +131,8 @@ def _checked(name: str, job: Job | None, path: Path, wrong: Gathered) -> JobChec
             warnings += _unfit(job, wrong)
         warnings += _to_be_known(job, path)
     requirements = clauses(job) if job is not None and certifies(job) else ()
-    problems = _once(Problem.of(_placed(error, path)) for error in wrong.problems)
-    return JobCheck(name, problems, _once(warnings), requirements)
+    problems = dict.fromkeys(Problem.of(_placed(error, path)) for error in wrong.problems)
+    return JobCheck(name, tuple(problems), tuple(dict.fromkeys(warnings)), requirements)
 
 
 def _check_part(folder: Path, path: Path) -> JobCheck:
@@ -146,9 +145,8 @@ def _check_part(folder: Path, path: Path) -> JobCheck:
     with wrong.going_on():
         job = read_part(folder, machine=False)
         refuse_unfit(job)
-        warnings += [
-            Problem(str.__str__(text), str(path), key=f"[{table}]", fix=fix) for table, text, fix in lacking(job)
-        ]
+        told = ((str.__str__(text), f"[{table}]", fix) for table, text, fix in lacking(job))
+        warnings += [Problem(text, str(path), key=key, fix=fix) for text, key, fix in told]
     if job is not None:
         with wrong.going_on():
             whole = read_part(folder)  # with the files that state the machine
@@ -156,7 +154,8 @@ def _check_part(folder: Path, path: Path) -> JobCheck:
         if (origin := job.facts.job.origin) != MEASURED:
             text = f"the figures are {origin}, and all that is made of them says so"
             warnings.append(Problem(text, str(path), key="[job] origin", fix="Put in your own, and take origin away"))
-    return JobCheck(str(folder), _once(Problem.of(error) for error in wrong.problems), tuple(warnings), command=PART)
+    problems = dict.fromkeys(map(Problem.of, wrong.problems))
+    return JobCheck(str(folder), tuple(problems), tuple(warnings), command=PART)
 
 
 def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
@@ -184,10 +183,8 @@ def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
     model, findings = recorded_model(job)
     with wrong.going_on():
         model.estimate()
-    return [
-        Problem(str(one.why), job.recording_path, one.lines[0] if one.lines else None, one.column or "")
-        for one in findings
-    ]
+    lines = ((one, one.lines[0] if one.lines else None) for one in findings)
+    return [Problem(str(one.why), job.recording_path, line, one.column or "") for one, line in lines]
 
 
 def _to_be_known(job: Job, path: Path) -> list[Problem]:
@@ -208,14 +205,11 @@ def _parts_by_themselves(path: Path, wrong: Gathered) -> None:
         data = tomllib.loads(content_of(path, JOB_BYTES, "").decode("utf-8-sig"))
     except (CmmUqError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
         return
-    named, name = (
-        table.get(key) if isinstance(table := data.get(title), dict) else None
-        for title, key in (("model", "effects"), ("recording", "file"))
-    )
-    if isinstance(named, list):
+    tables = [table if isinstance(table := data.get(title), dict) else {} for title in ("model", "recording")]
+    if isinstance(named := tables[0].get("effects"), list):
         with wrong.going_on():
             effects([name for name in named if isinstance(name, str)], where="job.toml [model] effects")
-    if isinstance(name, str) and name:
+    if isinstance(name := tables[1].get("file"), str) and name:
         with wrong.going_on():
             found = inside(path.parent, name, str(path))
             content = content_of(found, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {path}")
@@ -227,11 +221,9 @@ def _placed(error: CmmUqError, path: Path) -> CmmUqError:
     where = error.where or ""
     if not where.startswith("job.toml"):
         return error
-    rest = where.removeprefix("job.toml").lstrip(": ")
-    try:
+    rest, line = where.removeprefix("job.toml").lstrip(": "), None
+    with contextlib.suppress(OSError, ValueError):
         line = _line_of(rest, path.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError):
-        line = None
     return CmmUqError(error.problem, where=f"{path}{f' line {line}' if line else ''}: {rest}" if rest else str(path),
                       fix=error.fix)  # fmt: skip
 
@@ -246,7 +238,3 @@ def _line_of(key: str, text: str) -> int | None:
     if entry:
         return line_of([found[1], str(int(entry[1]) - 1), entry[2]], text)
     return line_of([*found[1].split("."), *found[2].split(".")], text)
-
-
-def _once(problems: Iterable[Problem]) -> tuple[Problem, ...]:
-    return tuple(dict.fromkeys(problems))

@@ -70,7 +70,14 @@ def write_compensated(
     """
     read = read_job(job)
     _refuse(read)
-    text = {} if map_text_c is None else _map_text(read, map_text_c, beyond)
+    text: dict[str, bytes] = {}  # the error map at one temperature, by the name of its file
+    if map_text_c is not None:
+        name = f"error-map-{map_text_c:g}C.txt"
+        if name in read.inputs:
+            clash = f"has a file {name!r}, the name of the map to be written"
+            raise CmmUqError(clash, where=str(read.folder), fix="Rename it")
+        found = ErrorMaps(maps_of(read)).map_at(map_text_c, beyond=beyond)
+        text[name] = error_map_text(found, name=name).encode()
     owner = Owner("compensate", read.facts.job.id, read.origin)
     with staged(out, owner, inputs=read.paths, force=force, expected=(*read.inputs, *text, PROVENANCE)) as place:
         return place.write(_files(read, beyond, text))
@@ -104,17 +111,6 @@ def _files(read: Job, beyond: Beyond, text: Mapping[str, bytes]) -> dict[str, by
     }
     toml = derived_toml(read, "compensate", files, without=("error_map", "squareness_arcsec", *IN_THE_RECORDING))
     return {"job.toml": toml, **files}
-
-
-def _map_text(job: Job, temperature: float, beyond: Beyond) -> dict[str, bytes]:
-    """The error map at one temperature in the contractors' text form, by the name of its file."""
-    name = f"error-map-{temperature:g}C.txt"
-    if name in job.inputs:
-        raise CmmUqError(
-            f"has a file {name!r}, the name of the map to be written", where=str(job.folder), fix="Rename it"
-        )
-    found = ErrorMaps(maps_of(job)).map_at(temperature, beyond=beyond)
-    return {name: error_map_text(found, name=name).encode()}
 
 
 def _with_probe(job: Job) -> Points:
@@ -174,12 +170,8 @@ def _chain(job: Job, cloud: Path, compensation: Compensation) -> tuple[Digitized
             'or { calibration = "FOLDER" }',
         )  # fmt: skip
     offset = np.array(digitizer.offset_mm)
-    poses = {
-        given.pose: Digitizer(
-            euler_313(*np.radians([given.alpha_deg, given.beta_deg, given.gamma_deg])), offset, compensation
-        )
-        for given in digitizer.poses
-    }
+    angles = {one.pose: np.radians([one.alpha_deg, one.beta_deg, one.gamma_deg]) for one in digitizer.poses}
+    poses = {pose: Digitizer(euler_313(*each), offset, compensation) for pose, each in angles.items()}
     log = log_of(job.facts.machine, job.inputs, job.folder)
     columns = columns_for(cloud_header(cloud), len(poses), logged=log is not None, where=str(cloud))
     at = None if log is None else lambda times: log.at(times, lambda row: f"point {row + 1}")

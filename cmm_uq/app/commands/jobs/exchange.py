@@ -12,6 +12,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import DCC_BYTES, TABLE_BYTES
+from cmm_uq.base.output import Owner
 from cmm_uq.base.output.new_file import refuse_taken, write_new
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
@@ -39,11 +40,8 @@ def own_format(found: ImportedTable) -> bytes:
     """The same in the project's own format: numbers with as many digits as they need to be read back the same."""
     names = [name for name in _FIRST if name in found.columns]
     names += [name for name in found.columns if name not in _FIRST]
-    columns = [
-        map(repr, (values.astype(np.int64) if name in WHOLE else values).tolist())
-        for name in names
-        for values in (found.columns[name],)
-    ]
+    whole = ((found.columns[name], np.int64 if name in WHOLE else np.float64) for name in names)
+    columns = [map(repr, values.astype(sort).tolist()) for values, sort in whole]
     lines = [",".join(names), *(",".join(row) for row in zip(*columns, strict=True))]
     return ("\n".join(lines) + "\n").encode()
 
@@ -65,8 +63,7 @@ def write_job_of_export(
 
     folder : that does not exist, or is empty.
     """
-    from cmm_uq.app.commands.jobs.new import check_empty, job_id, job_of_export
-    from cmm_uq.base.output import Owner, staged
+    from cmm_uq.app.commands.jobs.new import check_empty, job_id, job_of_export, put_new
 
     check_empty(folder)
     if not given.get("machine", {}).get("name"):
@@ -76,9 +73,7 @@ def write_job_of_export(
     name = job_id(folder, given)
     tables = {**given, "recording": {"file": export.name, **said, **given.get("recording", {})}}
     files = job_of_export(kind, tables, {export.name: content}, id=name)
-    with staged(folder, Owner("new", name), expected=files, inputs=(export,)) as place:
-        check_empty(folder, but=".unfinished-")
-        return place.write(files)
+    return put_new(folder, Owner("new", name), files, (export,))
 
 
 _FIX = "Name the results.json of a report, or the folder it lies in"
@@ -86,9 +81,8 @@ _FIX = "Name the results.json of a report, or the folder it lies in"
 
 def write_qif(report: Path, out: Path | None = None) -> Path:
     path = report / RESULTS if report.is_dir() else report
-    found = read_results(
-        ReportResults, content_of(path, TABLE_BYTES, _FIX), str(path), "is no results.json of a report", _FIX
-    )
+    content = content_of(path, TABLE_BYTES, _FIX)
+    found = read_results(ReportResults, content, str(path), "is no results.json of a report", _FIX)
     file = out or Path(f"{found.job.id}.qif")
     refuse_taken(file)
     write_new(file, qif(found))

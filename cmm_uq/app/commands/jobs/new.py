@@ -63,9 +63,8 @@ def kind_or_refused(name: str) -> Kind:
 
 
 def read_new(kind: Kind, tables: Tables, files: Mapping[str, bytes]) -> Job:
-    return job_of(
-        {"job.toml": as_toml(tables, "job.toml"), **files}, recorded=bool(files) or not kind.table.with_recording
-    )
+    recorded = bool(files) or not kind.table.with_recording
+    return job_of({"job.toml": as_toml(tables, "job.toml"), **files}, recorded=recorded)
 
 
 def example_keys(tables: Mapping[str, Any], given: Tables) -> set[str]:
@@ -81,30 +80,25 @@ def example_keys(tables: Mapping[str, Any], given: Tables) -> set[str]:
 
 def _job_text(kind: Kind, begin: Beginning, tables: Tables, examples: Collection[str]) -> bytes:
     """job.toml with a comment for whatever else a job of this kind may say."""
-    out = {"job.derived_from", *(f"job.{key}" for key in ("as_found",) if SIMULATED in tables["job"].values())}
-    if not kind.tested:
-        out |= {"conformity", "short_gauge", "test_uncertainty", "rated_conditions"} - set(tables)
-    out |= set() if kind.plan else {"plan"}
-    out |= set() if kind.table.with_recording else {"recording"}
-    out |= set() if kind.table.with_earlier else {"recording.earlier", "recording.earlier_date"}
-    head = [
-        f"#:schema ./{SCHEMA}",
-        f"# {begin.title}. What stands behind # is the default, or what may be said besides.",
-    ]
-    if tables["job"].get("origin") == SIMULATED:
-        head.append(
-            "# THE READINGS ARE SIMULATED: put in your own, then take away their first line and origin below. Figures marked "
-            f"{EXAMPLE} are nobody's."
-        )
+    tests = {"conformity", "short_gauge", "test_uncertainty", "rated_conditions"} - set(tables)
+    out = {"job.derived_from"}.union(*(keys for keys, needless in (
+        ({"job.as_found"}, SIMULATED in tables["job"].values()), (tests, not kind.tested), ({"plan"}, not kind.plan),
+        ({"recording"}, not kind.table.with_recording),
+        ({"recording.earlier", "recording.earlier_date"}, not kind.table.with_earlier),
+    ) if needless))  # fmt: skip
+    head = f"#:schema ./{SCHEMA}\n# {begin.title}. What stands behind # is the default, or what may be said besides.\n"
+    simulated = (
+        "# THE READINGS ARE SIMULATED: put in your own, then take away their first line and origin below. Figures marked "
+        f"{EXAMPLE} are nobody's.\n"
+    )
     body = commented(json.loads(shipped("job")), tables, out, kind.name, examples=examples)
-    return ("\n".join(head) + "\n\n" + body).encode()
+    return (head + (simulated if tables["job"].get("origin") == SIMULATED else "") + "\n" + body).encode()
 
 
 def _readme_text(job: Job, begin: Beginning) -> str:
     facts = job.facts
     columns = ", ".join(f"`{name}`" for name in (*REQUIRED, *begin.columns))
     further = ", ".join(f"`{name}`" for name in ("repeat", *begin.further))
-    simulated = facts.job.origin == SIMULATED
     lines = [
         f"# {begin.title}", "",
         f"`cmm-uq {begin.command} .` in this folder makes the pages; `cmm-uq check .` says what is missing or wrong.", "",
@@ -115,7 +109,7 @@ def _readme_text(job: Job, begin: Beginning) -> str:
             f"- `{facts.recording.file}`: one row a point. {begin.numbering}",
             f"- Its columns: {columns}; it may have {further} and temperatures besides.",
         ]
-    if simulated:
+    if facts.job.origin == SIMULATED:
         lines.append(
             "- **The figures are simulated**, and all that is made of them says so. Put in your own, then take away their "
             f'first line and `origin = "simulated"` in job.toml, and state what is marked {EXAMPLE} there.'
@@ -127,19 +121,15 @@ def _readme_text(job: Job, begin: Beginning) -> str:
     return "\n".join(lines) + "\n"
 
 
-BUDGET_FILE, BUDGET_SCHEMA, BUDGET_README = "budget.toml", ".cmm-uq/budget.schema.json", "README.md"
+BUDGET_FILE, BUDGET_SCHEMA = "budget.toml", ".cmm-uq/budget.schema.json"
 
-_MODEL = {
-    "outputs": {"length": "indicated - gauge * cte * (temperature - 20)"}, "title": "Length at 20 °C",
-    "units": {"length": "mm"},
-}  # fmt: skip
+_MODEL = {"outputs": {"length": "indicated - gauge * cte * (temperature - 20)"}, "title": "Length at 20 °C",
+          "units": {"length": "mm"}}  # fmt: skip
 _INPUTS = {
     "indicated": {"distribution": "normal", "value": 100.0021, "u": 0.0004, "unit": "mm", "source": "repeats"},
     "gauge": {"distribution": "constant", "value": 100.0, "unit": "mm", "source": "drawing"},
     "cte": {"distribution": "rectangular", "value": 11.5e-6, "half_width": 1e-6, "unit": "1/K", "source": "data sheet"},
-    "temperature": {
-        "distribution": "rectangular", "value": 20.4, "half_width": 0.2, "unit": "°C", "source": "thermometer",
-    },
+    "temperature": {"distribution": "rectangular", "value": 20.4, "half_width": 0.2, "unit": "°C", "source": "thermometer"},
 }  # fmt: skip
 
 
@@ -154,10 +144,10 @@ def budget_files() -> dict[str, bytes]:
         for i, (name, given) in enumerate(_INPUTS.items())
     ]  # fmt: skip
     model = commented({"properties": {"model": keys["model"]}}, {"model": _MODEL})
-    head = (
-        f"#:schema ./{BUDGET_SCHEMA}\n# An example: put in your own model and figures. What stands behind # is the default, "
-        "or what may be said besides.\n"
+    example = (
+        "# An example: put in your own model and figures. What stands behind # is the default, or what may be said"
     )
+    head = f"#:schema ./{BUDGET_SCHEMA}\n{example} besides.\n"
     correlation = f'# [correlation]  # {keys["correlation"]["description"]}\n# "indicated,temperature" = 0.0\n'
     readme = (
         "# A measurement model and its uncertainty\n\n"
@@ -166,13 +156,8 @@ def budget_files() -> dict[str, bytes]:
         f"- Editors that know TOML schemas explain every key (`{BUDGET_SCHEMA}`).\n"
     )
     text = "\n".join([head, model, *inputs, correlation])
-    return {BUDGET_FILE: text.encode(), BUDGET_README: readme.encode(), BUDGET_SCHEMA: shipped("budget").encode()}
+    return {BUDGET_FILE: text.encode(), README: readme.encode(), BUDGET_SCHEMA: shipped("budget").encode()}
 
-
-__all__ = [
-    "BUDGET", "KEPT", "PART", "PLAN", "README", "RECORDING", "SCHEMA", "job_files", "job_id", "job_of_export", "known",
-    "new_job", "new_plan", "titles", "usual", "write_new",
-]  # fmt: skip
 
 SEED = 1  # of the simulated readings
 
@@ -185,13 +170,10 @@ def known() -> dict[str, str]:
 
 def titles() -> dict[str, str]:
     """What a new job can be asked for by, each with what it is."""
+    others = {PLAN: "A job that is only planned (--set artefact.kind=…)", BUDGET: "A measurement model of one's own",
+              PART: "A part: its features, tolerances, and the machine that measures it"}  # fmt: skip
     kinds = {name: kind_or_refused(kind).beginning(name).title for name, kind in known().items()}
-    return {
-        **kinds,
-        PLAN: "A job that is only planned (--set artefact.kind=…)",
-        PART: "A part: its features, tolerances, and the machine that measures it",
-        BUDGET: "A measurement model of one's own",
-    }
+    return kinds | {name: others[name] for name in (PLAN, PART, BUDGET)}
 
 
 def usual(name: str) -> dict[str, Any]:
@@ -213,9 +195,8 @@ def new_job(name: str, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: 
     from cmm_uq.app.commands.jobs.simulate import recording
 
     content = first_line("simulate", f"{PROGRAM} new", ": put in your own readings, and take this line away").encode()
-    return job_files(
-        kind.name, tables, {RECORDING: content + recording(points)}, example_keys(tables, given), begin=begin
-    )
+    files = {RECORDING: content + recording(points)}
+    return job_files(kind.name, tables, files, example_keys(tables, given), begin=begin)
 
 
 def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: str) -> dict[str, bytes]:  # noqa: A002
@@ -251,21 +232,21 @@ def write_new(
     """
     check_empty(folder)
     id = job_id(folder, given, name)  # noqa: A001
+    if name == BUDGET and given:
+        raise CmmUqError("a new budget has no machine, artefact or job", where="--set", fix="Leave it out")
     if name == BUDGET:
-        if given:
-            raise CmmUqError("a new budget has no machine, artefact or job", where="--set", fix="Leave it out")
-        files, origin = budget_files(), MEASURED
+        files = budget_files()
+    elif name == PART and answers is not None:
+        files = part_of_answers(answers, id=id)
     elif name == PART:
-        origin = SIMULATED
-        if answers is not None:
-            files = part_of_answers(answers, id=id)
-        else:
-            files = part_of_drawing(drawing, given, id=id) if drawing else part_files(given, id=id)
-    elif name == PLAN:
-        files, origin = new_plan(given, id=id), MEASURED
+        files = part_of_drawing(drawing, given, id=id) if drawing else part_files(given, id=id)
     else:
-        files, origin = new_job(name, given, id=id), SIMULATED
-    with staged(folder, Owner("new", id, origin), expected=files) as place:
+        files = new_plan(given, id=id) if name == PLAN else new_job(name, given, id=id)
+    return put_new(folder, Owner("new", id, MEASURED if name in (BUDGET, PLAN) else SIMULATED), files)
+
+
+def put_new(folder: Path, owner: Owner, files: Mapping[str, bytes], inputs: tuple[Path, ...] = ()) -> dict[str, Path]:
+    with staged(folder, owner, expected=files, inputs=inputs) as place:
         check_empty(folder, but=".unfinished-")
         return place.write(files)
 
@@ -304,7 +285,7 @@ def _tables(kind: Kind, begin: Beginning, given: Tables, id: str, origin: Origin
     """What job.toml says: what the kind begins with, and over it what is given."""
     recorded, today = kind.table.with_recording, dt.datetime.now(tz=dt.UTC).date()
     whole: dict[str, Any] = {
-        "job": {"id": id, "date": today, **({} if origin == MEASURED else {"origin": origin})},
+        "job": {"id": id, "date": today} | ({} if origin == MEASURED else {"origin": origin}),
         "machine": {**MACHINE, **begin.machine},
         "artefact": {"kind": kind.name, **begin.artefact},
         **({"recording": {"file": RECORDING}} if recorded else {}),
@@ -312,15 +293,13 @@ def _tables(kind: Kind, begin: Beginning, given: Tables, id: str, origin: Origin
         **({"conformity": [dict(begin.conformity)]} if begin.conformity else {}),
         **{table: dict(keys) for table, keys in begin.test.items() if table not in given},
     }
-    for table, keys in given.items():
-        if table == "conformity":
-            whole[table] = [{**(whole.get(table) or [{}])[0], **keys}]
-        else:
-            whole[table] = {**whole.get(table, {}), **keys}
-    artefact = whole["artefact"]
-    if "U_um" in given.get("artefact", {}):
-        artefact.pop("u_um", None)
     conformity = given.get("conformity", {})
+    for table, keys in given.items():
+        listed = table == "conformity"
+        begun = (whole.get(table) or [{}])[0] if listed else whole.get(table, {})
+        whole[table] = [{**begun, **keys}] if listed else {**begun, **keys}
+    if "U_um" in given.get("artefact", {}):
+        whole["artefact"].pop("u_um", None)
     for one, other in (("limit_um", "mpe"), ("mpe", "limit_um")):
         if one in conformity and other not in conformity:
             whole["conformity"][0].pop(other, None)

@@ -78,25 +78,24 @@ def attached_history(past: MachineHistory, until: dt.date) -> bytes:
 
 def known_of(content: bytes) -> KnownChanges:
     """The history that :func:`attached_history` wrote."""
+
+    def series(one: Mapping[str, Any]) -> Series:
+        named: dict[str, Any] = {key: str(one[key]) for key in ("name", "quantity", "unit")}
+        columns: dict[str, Any] = {name: np.asarray(one[name], dtype=sort) for name, sort in _COLUMNS.items()}
+        if len({column.shape for column in columns.values()}) != 1 or columns["day"].ndim != 1:
+            raise ValueError("columns of different length")
+        limit = None if one["limit"] is None else float(one["limit"])
+        return Series(limit=limit, **named, **columns)
+
     try:
         said = json.loads(content)
         if said["schema"] != SCHEMA:
             raise ValueError(said["schema"])
-        adjusted = tuple(map(dt.date.fromisoformat, said["adjusted"]))
-        return KnownChanges(
-            adjusted, {str(one["name"]): (_series(one), one["adjusted_after"]) for one in said["values"]}
-        )
+        values = {str(one["name"]): (series(one), one["adjusted_after"]) for one in said["values"]}
+        return KnownChanges(tuple(map(dt.date.fromisoformat, said["adjusted"])), values)
     except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
         raise CmmUqError("is no history of a machine", where=FILE,
                          fix="Evaluate the part again, with --records") from error  # fmt: skip
-
-
-def _series(one: Mapping[str, Any]) -> Series:
-    columns: dict[str, Any] = {name: np.asarray(one[name], dtype=sort) for name, sort in _COLUMNS.items()}
-    if len({column.shape for column in columns.values()}) != 1 or columns["day"].ndim != 1:
-        raise ValueError("columns of different length")
-    limit = None if one["limit"] is None else float(one["limit"])
-    return Series(name=str(one["name"]), quantity=str(one["quantity"]), unit=str(one["unit"]), limit=limit, **columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +120,7 @@ def with_drift(
     since = state.calibrated or on
     if kept is None and (records is None or str(records) == NONE):
         found = aged(state, on)
-        return AgedMachine(found, _not_known(found))
+        return AgedMachine(found, _drift(found, known=False))
     if kept is None:
         from cmm_uq.app.commands.laboratory.due import history_of
 
@@ -140,27 +139,20 @@ def with_drift(
         return found
 
     found = aged(state, on, change)
-    return AgedMachine(found, _known(found), changes, kept)
+    return AgedMachine(found, _drift(found, known=True), changes, kept)
 
 
-def _not_known(state: MachineState) -> Text:
+def _drift(state: MachineState, *, known: bool) -> Text:
+    """What the records say of the days since the calibration, where there are some, and of which errors they say nothing."""
     days = state.age_days or 0
     if not days:
         return say("The machine was calibrated on the day of the measurement.")
-    return plural(
-        days,
-        one=say("What changed in the day since the calibration is not known and not reckoned with."),
-        many=say(
+    if not known:
+        one = say("What changed in the day since the calibration is not known and not reckoned with.")
+        many = say(
             "What changed in the {count} days since the calibration is not known and not reckoned with.", count=days
-        ),
-    )
-
-
-def _known(state: MachineState) -> Text:
-    """What the records say, and of which errors they say nothing."""
-    days = state.age_days or 0
-    if not days:
-        return _not_known(state)
+        )
+        return plural(days, one=one, many=many)
     if len(state.drift_unknown) == len(state.effects):
         return say("The machine's records do not say how its errors change; {days} days have passed since the calibration.",
                    days=days)  # fmt: skip
@@ -201,30 +193,24 @@ def further_of(calibrated: Job | None, unseen: Iterable[UnseenError]) -> Planned
 
     Returns ``None`` where nothing is unseen, or the calibration is not at hand.
     """
-    wanted = _by_share(unseen)
-    if not wanted or calibrated is None or kind_of(calibrated).observe is None:
-        return None
-    here = [one for one in wanted if _why_not(calibrated, one) is None][:MOST]
-    plan = _plan(calibrated, here)
-    found = () if plan is None else _found_by(plan, here)
-    missed = tuple(one.name for one in wanted if one.name not in found)
-    text = sentences([part for part in (_setups(plan, found), _missed(calibrated, missed)) if part])
-    names = tuple(one.name for one in wanted)
-    if plan is None or not found:
-        return PlannedSetUps(FurtherSetUps(names, 0, text, missed=missed))
-    command, file = f"cmm-uq plan {FOLDER}", f"{FOLDER}/job.toml"
-    return PlannedSetUps(
-        FurtherSetUps(names, len(plan.to_measure), text, command, file, missed), _files(calibrated, found)
-    )
-
-
-def _by_share(unseen: Iterable[UnseenError]) -> list[Effect]:
-    """Errors of the machine, that of the largest share of any characteristic first."""
-    shares: dict[str, float] = {}
+    shares: dict[str, float] = {}  # the largest of any characteristic
     for one in unseen:
         if one.effect in every():
             shares[one.effect] = max(shares.get(one.effect, 0.0), one.share)
-    return [every()[name] for name in sorted(shares, key=lambda name: -shares[name])]
+    wanted = [every()[name] for name in sorted(shares, key=lambda name: -shares[name])]
+    if not wanted or calibrated is None or kind_of(calibrated).observe is None:
+        return None
+    here = [effect for effect in wanted if _why_not(calibrated, effect) is None][:MOST]
+    plan = _plan(calibrated, here)
+    found = () if plan is None else _found_by(plan, here)
+    names = tuple(effect.name for effect in wanted)
+    missed = tuple(name for name in names if name not in found)
+    text = sentences([part for part in (_setups(plan, found), _missed(calibrated, missed)) if part])
+    if plan is None or not found:
+        return PlannedSetUps(FurtherSetUps(names, 0, text, missed=missed))
+    command, file = f"cmm-uq plan {FOLDER}", f"{FOLDER}/job.toml"
+    further = FurtherSetUps(names, len(plan.to_measure), text, command, file, missed)
+    return PlannedSetUps(further, _files(calibrated, found))
 
 
 def _why_not(calibrated: Job, effect: Effect) -> Text | None:
@@ -242,20 +228,16 @@ def _asked(calibrated: Job, names: Iterable[str]) -> list[str]:
 
 
 def _plan(calibrated: Job, wanted: Sequence[Effect]) -> MeasurementPlan | None:
-    if not wanted:
-        return None
-    facts = calibrated.facts
+    facts, wishes = (
+        calibrated.facts,
+        {"criterion": "separation", "more": SET_UPS, "number": None, "candidates": CANDIDATES},
+    )
     model = facts.model.model_copy(update={"effects": _asked(calibrated, (one.name for one in wanted))})
-    plan = facts.plan.model_copy(update=_WISHES)
+    changed = facts.model_copy(update={"model": model, "plan": facts.plan.model_copy(update=wishes)})
     try:
-        return make_plan(
-            replace(calibrated, facts=facts.model_copy(update={"model": model, "plan": plan})), power=False
-        )
+        return make_plan(replace(calibrated, facts=changed), power=False) if wanted else None
     except CmmUqError:  # no room for further set-ups
         return None
-
-
-_WISHES = {"criterion": "separation", "more": SET_UPS, "number": None, "candidates": CANDIDATES}
 
 
 def _found_by(plan: MeasurementPlan, wanted: Sequence[Effect]) -> tuple[str, ...]:

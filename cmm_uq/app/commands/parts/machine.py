@@ -29,12 +29,12 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, day, say
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.certificate.clauses import draft
 from cmm_uq.certificate.part.measurement import CertificateStatus, Source, VerificationCheck
+from cmm_uq.certificate.verify.found import CHECKS
 from cmm_uq.certificate.verify.given import Given, given_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.source import sha256 as hashes
 from cmm_uq.jobs.tables.origin import COMPENSATED, MEASURED, SIMULATED
-from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.draws import Draws
 
 _ORIGINS = {SIMULATED: say("simulated"), COMPENSATED: say("compensated")}
@@ -206,19 +206,18 @@ def _certified(job: PartJob, found: Verification, *, rerun: bool) -> _Stated:
     results = {} if given.results is None else given.results[1]
     read = found.job
     source: Source = "results" if read is None else "certificate"
-    again = rerun and "again" in found.inquiry.done
-    return _Stated(source, job.stated_by, results, _drawn(job, given, results, where), read, found.inquiry.word,
-                   _checks(found), again, NOTHING if again else _not_again(str(results["software"]["version"])))  # fmt: skip
-
-
-def _not_again(made: str) -> Text:
-    """Why a certificate was not computed again where that was asked for."""
+    again, made = rerun and "again" in found.inquiry.done, str(results["software"]["version"])
+    not_again = say("The machine's certificate was to be computed again and was not: cmm-uq verify says why.")
     if made != __version__:
-        return say(
+        not_again = say(
             "The machine's certificate was to be computed again and was not: version {made} made it, and this is {here}. "
             "Verify it with the version that made it, or issue it anew.", made=Verbatim(made), here=Verbatim(__version__),
         )  # fmt: skip
-    return say("The machine's certificate was to be computed again and was not: cmm-uq verify says why.")
+    done = found.inquiry.done
+    checked = [VerificationCheck(what, done[name]) for name, what in CHECKS.items() if done.get(name)]
+    checked += [VerificationCheck(left.what, 0, left.why) for left in found.inquiry.unchecked]
+    return _Stated(source, job.stated_by, results, _drawn(job, given, results, where), read, found.inquiry.word,
+                   tuple(checked), again, NOTHING if again else not_again)  # fmt: skip
 
 
 def _drawn(job: PartJob, given: Given, results: Mapping[str, Any], where: str) -> dict[str, Floats]:
@@ -236,14 +235,6 @@ def _drawn(job: PartJob, given: Given, results: Mapping[str, Any], where: str) -
         raise CmmUqError(f"{named} is not the file whose hash results.json has", where=where,
                          fix="Give both as the same report wrote them")  # fmt: skip
     return Draws.of_npz(content, named).flat()
-
-
-def _checks(found: Verification) -> tuple[VerificationCheck, ...]:
-    from cmm_uq.certificate.verify.found import CHECKS
-
-    inquiry = found.inquiry
-    done = [VerificationCheck(what, inquiry.done[name]) for name, what in CHECKS.items() if inquiry.done.get(name)]
-    return (*done, *(VerificationCheck(left.what, 0, left.why) for left in inquiry.unchecked))
 
 
 def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
@@ -280,9 +271,8 @@ def attached_calibration(job: PartJob) -> dict[str, bytes]:
     """Inputs of the machine's own job, of a part's report that has them inside; by their names in that job."""
     if job.facts.machine_state.job is None:
         return {}
-    return {
-        name.removeprefix(CALIBRATION): content for name, content in job.inputs.items() if name.startswith(CALIBRATION)
-    }
+    own = {name: content for name, content in job.inputs.items() if name.startswith(CALIBRATION)}
+    return {name.removeprefix(CALIBRATION): content for name, content in own.items()}
 
 
 def with_calibration(job: PartJob, calibration: Job | None) -> PartJob:
@@ -318,8 +308,7 @@ def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> CertificateSta
         serial=str(said.get("serial") or ""), origin=str(said["origin"]), date=date, age=on - date, valid_until=until,
         verdict=stated.verdict, checked=stated.checked, again=stated.again, trusted=trusted,
         draft=stated.job is not None and draft(stated.job),
-        given_recording=False,
-        path=NOTHING, drift=NOTHING,
+        given_recording=False, path=NOTHING, drift=NOTHING,
         temperature_c=None if recorded is None else float(np.mean(recorded)),
         inputs_sha256=dict(said["inputs_sha256"]) if stated.job is None else hashes(stated.job.inputs),
     )  # fmt: skip
@@ -372,7 +361,10 @@ def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineStat
         model, _ = screened_model(job)
         model, _, _ = with_noise(model)
         count, observe = int(model.used.sum()), kind_of(job).observing("the machine of a part")
-        most = _MOST * count // max(_quantities(model), 1)
+        artefact, rows = model.artefact, model.artefact.rows[model.used, 0]  # with which repeats are one quantity
+        place = np.column_stack([artefact.measurement[model.used], artefact.points.point[rows]])
+        quantities = np.unique(place, axis=0)
+        most = _MOST * count // max(len(quantities), 1)
         model = thin_out(model, partial(observe, job.facts.artefact, where=job.recording_path), seed, most)
         together = given_recording(state, model, seed=seed)
     except CmmUqError as error:
@@ -385,10 +377,3 @@ def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineStat
     if (some := int(model.used.sum())) < count:
         text = after(text, say("{some} of its {count} observations are reckoned with.", some=some, count=count))
     return together, text, True
-
-
-def _quantities(model: RecordingModel) -> int:
-    """How many of the used observations are no repeats of others."""
-    artefact = model.artefact
-    first = artefact.points.point[artefact.rows[model.used, 0]]
-    return len(np.unique(np.column_stack([artefact.measurement[model.used], first]), axis=0))

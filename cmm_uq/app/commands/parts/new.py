@@ -58,16 +58,13 @@ class Answers:
         """What ``[machine_state] certificate`` names: the certificate alone, or the folder of all files."""
         return next((name for name in self.machine if name.lower().endswith(_WHOLE)), FOLDER)
 
-    def free_name(self, name: str) -> str:
-        """A name that no feature has."""
-        return _free(name, self.probed)
-
-    def free_tolerance(self, name: str) -> str:
-        """A name that no tolerance has; see :meth:`free_name`."""
-        return _free(name, [one["name"] for one in self.characteristics])
+    def free_name(self, name: str, *, tolerance: bool = False) -> str:
+        """A name that no feature has, or no tolerance."""
+        if name in ([one["name"] for one in self.characteristics] if tolerance else self.probed):
+            raise CmmUqError(f"{name!r} is there already", fix="Give it another name")
+        return name
 
     def add_feature(self, given: Facts) -> None:
-        """Take a feature."""
         self.probed[given["name"]] = probed_of(given)
         self.features.append(given)
 
@@ -81,7 +78,6 @@ class Answers:
         return {"datums": list(datums)}
 
     def add_characteristic(self, given: Facts) -> None:
-        """Take a tolerance."""
         try:
             facts = CharacteristicFacts.model_validate(given)
         except ValidationError as error:
@@ -91,12 +87,6 @@ class Answers:
         if found := unfit(facts, self.probed):
             raise CmmUqError(found[0], fix=found[2])
         self.characteristics.append(given)
-
-
-def _free(name: str, taken: Any) -> str:
-    if name in taken:
-        raise CmmUqError(f"{name!r} is there already", fix="Give it another name")
-    return name
 
 
 def certificate_files(path: Path) -> dict[str, bytes]:
@@ -135,16 +125,13 @@ def part_of_answers(answers: Answers, *, id: str) -> dict[str, bytes]:  # noqa: 
     if answers.characteristics:
         tables["characteristic"] = answers.characteristics
     elif answers.features:  # something has to be asked of them: where the first one is
-        tables["characteristic"] = [{"name": "1", **_of_the_first(answers)}]
+        first = answers.features[0]["name"]
+        tables["characteristic"] = [{"name": "1", "what": "position", "features": [first], "tolerance_mm": 0.1}]
     said = ("feature",) if answers.features else ()
     marked = {f"{name}.{key}" for name, table in TABLES.items() if name not in said for key in _keys(table)}
     marked -= _given_keys(own) | {f"stylus.{key}" for key in answers.stylus}
     marked -= {f"characteristic.{key}" for key in _keys(TABLES["characteristic"])} if answers.characteristics else set()
     return {**_files(_with(tables, own, id), marked, {}), **answers.machine}
-
-
-def _of_the_first(answers: Answers) -> dict[str, Any]:
-    return {"what": "position", "features": [answers.features[0]["name"]], "tolerance_mm": 0.1}
 
 
 def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
@@ -166,10 +153,16 @@ def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]: 
     set_aside_unsound(drawing, where)
     left_out = drawing.settled(without, where)
     example = {name: _copied(TABLES[name]) for name in ("machine_state", "stylus", "environment", "form")}
+    holes = [one["diameter_mm"] for one in drawing.features if one.get("inner") and one.get("diameter_mm")]
+
+    def tip(usual: float) -> float:
+        """Diameter of the example's, or of half of the smallest hole where that does not go in."""
+        return float(round(min([usual, *(hole / 2 for hole in holes)]), 3))
+
     whole: dict[str, Any] = example | {
         PART: {"name": path.stem[:100], **({"not_measured": left_out} if left_out else {})},
         "feature": drawing.features, "characteristic": drawing.characteristics, **_aligned(drawing),
-        "stylus": drawing.styli or _that_fits(example["stylus"], drawing),
+        "stylus": drawing.styli or [{**one, "diameter_mm": tip(one["diameter_mm"])} for one in example["stylus"]],
     }  # fmt: skip
     said = {name: dict(keys) for name, keys in given.items()}
     said.get(PART, {}).pop("not_measured", None)
@@ -178,12 +171,6 @@ def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]: 
     marked |= {"alignment.best_fit"}
     opened = {name: set(keys) for name, keys in drawing.open_keys.items()}
     return _files(_with(whole, said, id), marked - _given_keys(said), opened, drawing.unknown)
-
-
-def _that_fits(styli: list[dict[str, Any]], drawing: Drawing) -> list[dict[str, Any]]:
-    """The example's stylus, with a tip of half of the smallest hole where its own does not go in."""
-    holes = [one["diameter_mm"] for one in drawing.features if one.get("inner") and one.get("diameter_mm")]
-    return [{**one, "diameter_mm": round(min([one["diameter_mm"], *(hole / 2 for hole in holes)]), 3)} for one in styli]
 
 
 def _aligned(drawing: Drawing) -> dict[str, Any]:
@@ -257,12 +244,9 @@ def _marks(name: str, said: Any, marked: Collection[str], opened: Mapping[str, C
 
 
 def _short(name: str, said: Mapping[str, Any], marks: Collection[str]) -> str:
-    lines = [f"[[{name}]]"]
-    for key, value in said.items():
-        lines.append(
-            f"{key} = {written(value)}" + (f"  # {EXAMPLE}, put in your own" if f"{name}.{key}" in marks else "")
-        )
-    return "\n".join(lines) + "\n"
+    mark = f"  # {EXAMPLE}, put in your own"
+    lines = (f"{key} = {written(value)}{mark if f'{name}.{key}' in marks else ''}\n" for key, value in said.items())
+    return f"[[{name}]]\n{''.join(lines)}"
 
 
 def _keys(table: Any) -> list[str]:

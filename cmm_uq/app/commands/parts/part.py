@@ -12,8 +12,7 @@ import numpy as np
 
 from cmm_uq.analysis.conformity.decision import PriorKnowledge
 from cmm_uq.analysis.conformity.limits import LimitDecision, Limits, judge
-from cmm_uq.analysis.parts.budget import DRAWS as SHARED, VarianceShares, point_errors, variance_shares, ways
-from cmm_uq.analysis.parts.machine.state import MachineState
+from cmm_uq.analysis.parts.budget import DRAWS as SHARED, point_errors, variance_shares, ways
 from cmm_uq.analysis.parts.methods.of_job import compare_methods, methods_of
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.result import conforming, evaluated, middle, stated, within_bounds
@@ -30,6 +29,7 @@ from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.app.commands.files import REPORTS, RESULTS, Finished, Stage, Written, silent, unchanged
 from cmm_uq.app.commands.parts.drift import further_of
 from cmm_uq.app.commands.parts.machine import state_machine, with_calibration, with_history
+from cmm_uq.app.commands.reading import in_language
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.messages import say
@@ -106,10 +106,18 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
     stage("Shares of each cause", 0.6)
     shares = variance_shares(virtual, min(affordable(SHARED, plan), trials), seed)
     stage("What would change the uncertainty", 0.7)
-    draws, twice = min(affordable(COMPARED, plan), trials), partial(_with_twice_the_points, job, machine.state)
-    reductions = ways(plan, circumstances, draws, seed, doubled=twice, planned=virtual)
+
+    def with_twice_the_points() -> tuple[Plan, MeasurementConditions]:
+        other = doubled(job)
+        return (twice := plan_of(other)), circumstances_of(other, machine.state, twice, PLACES)
+
+    draws = min(affordable(COMPARED, plan), trials)
+    reductions = ways(plan, circumstances, draws, seed, doubled=with_twice_the_points, planned=virtual)
     stage("What to measure on the machine", 0.8)
-    unseen = _unseen(virtual, shares)
+    unseen = tuple(  # what the calibration left free or did not see, by characteristic, the largest share first
+        UnseenError(name, line, effect := line.partition(": ")[2], effect_title(effect), share, why)
+        for name in shares.characteristics for line, share, why in shares.told(name, virtual.named, MATTERS)
+    )  # fmt: skip
     further = further_of(machine.job, unseen)
 
     # values, limits, decisions (JCGM 106)
@@ -144,12 +152,6 @@ def _together(together: float, decisions: Iterable[LimitDecision | None]) -> flo
     return within_bounds(together, np.array(each)) if each else None
 
 
-def _with_twice_the_points(job: PartJob, machine: MachineState) -> tuple[Plan, MeasurementConditions]:
-    other = doubled(job)
-    plan = plan_of(other)
-    return plan, circumstances_of(other, machine, plan, PLACES)
-
-
 def _simulate(virtual: Virtual, trials: int, digits: int | None, seed: int, stage: Stage) -> tuple[Simulated, Floats]:
     """Figures of the errors, and (N, c) errors of the first of the virtual measurements that they come from."""
     blocks, made = list[Floats](), 0
@@ -167,16 +169,6 @@ def _simulate(virtual: Virtual, trials: int, digits: int | None, seed: int, stag
     if digits is None:
         return simulate(source, trials, COVERAGE, seed), np.concatenate(blocks)
     return simulate_adaptively(source, COVERAGE, digits, seed, fewest_trials=trials), np.concatenate(blocks)
-
-
-def _unseen(virtual: Virtual, shares: VarianceShares) -> tuple[UnseenError, ...]:
-    """What the calibration left free or did not see, by characteristic, the largest share first."""
-    found = []
-    for name in shares.characteristics:
-        for line, share, why in shares.told(name, virtual.named, MATTERS):
-            effect = line.partition(": ")[2]
-            found.append(UnseenError(name, line, effect, effect_title(effect), share, why))
-    return tuple(found)
 
 
 def decide_limits(
@@ -231,14 +223,6 @@ def _prior(
 
 DOCUMENTS = ("part.html", "part.pdf")
 COMMAND = "part"
-
-
-def in_language(job: PartJob, language: Code | None) -> PartJob:
-    """A job whose page is to be said in a language; without one as job.toml has it."""
-    if language is None:
-        return job
-    told = job.facts.job.model_copy(update={"language": language})
-    return replace(job, facts=job.facts.model_copy(update={"job": told}))
 
 
 def write_part(
@@ -313,9 +297,7 @@ def document_of(found: PartMeasurement) -> Document:
     facts = found.job.facts.job
     with lettered_in(facts.language):
         document = part_document(found)
-    told = say(
-        "Figures of this job are simulated or an example's: no part was measured, and nothing here certifies one."
-    )
-    return said(
-        marked_as(document, facts.origin, facts.id, [told] if facts.origin == SIMULATED else []), facts.language
-    )
+    told = [
+        say("Figures of this job are simulated or an example's: no part was measured, and nothing here certifies one.")
+    ]
+    return said(marked_as(document, facts.origin, facts.id, told if facts.origin == SIMULATED else []), facts.language)

@@ -53,13 +53,11 @@ def combination(parts: Mapping[tuple[str, str], float]) -> Text:
     if not effects:
         return say("The artefact's own length") if one else say("The artefact's own dimensions")
     words = listed(_families([effect_title(effect) for effect in effects]))
+    together = say("{effects} together", effects=words) if len(effects) > 1 else words
     if sizes:
         own = say("the artefact's own length") if one else say("the artefact's own dimensions")
-        together = say("{effects} together", effects=words) if len(effects) > 1 else words
         return say("{effects}, with {own}", effects=together, own=own)
-    if len(effects) > 1:
-        return say("{effects} together", effects=words)
-    return say("{effect}: nothing shows of it", effect=words)
+    return together if len(effects) > 1 else say("{effect}: nothing shows of it", effect=words)
 
 
 def _families(titles: Sequence[Text]) -> list[Text]:
@@ -103,10 +101,9 @@ def named(unknown: Unknown) -> Text:
     plain = name.removesuffix("_mm")
     what, _, which = plain.partition("_")
     size: Text = say("length") if plain == "length" else Verbatim(plain.replace("_", " "))
-    if which.isdigit() and what == "block":
-        size = say("block {which}", which=Verbatim(which))
-    if which.isdigit() and what == "cylinder":
-        size = say("cylinder {which}", which=Verbatim(which))
+    if which.isdigit():
+        block, cylinder = say("block {which}", which=Verbatim(which)), say("cylinder {which}", which=Verbatim(which))
+        size = {"block": block, "cylinder": cylinder}.get(what, size)
     return say("Artefact, {size}", size=size)
 
 
@@ -123,12 +120,9 @@ def pairs(found: Identifiability) -> list[Text]:
 def absorbed(found: Identifiability) -> list[Text]:
     """Effects that would be taken for others: ``sag of the artefact for scale error of X and scale error of Y``."""
     own = say("the artefact's own size")
-    each = (
-        (name, listed([own if other == ARTEFACT else effect_title(other) for other in others]))
-        for name, others in found.absorbed
-        if others
-    )
-    return [say("{effect} for {others}", effect=effect_title(name), others=others) for name, others in each]
+    each = [(effect_title(name), [own if other == ARTEFACT else effect_title(other) for other in others])
+            for name, others in found.absorbed if others]  # fmt: skip
+    return [say("{effect} for {others}", effect=effect, others=listed(others)) for effect, others in each]
 
 
 def smallest(amplitude: float | None) -> Text:
@@ -195,8 +189,7 @@ def worth(plan: MeasurementPlan) -> tuple[Block, ...]:
     if enough is None:
         advice = say(
             "Up to {most} repeats, a minute of one more repeat lowers at least one expected uncertainty more than a minute "
-            "of one more placing. The plan has {repeats}.",
-            most=most - 1, repeats=repeats,
+            "of one more placing. The plan has {repeats}.", most=most - 1, repeats=repeats,
         )  # fmt: skip
     elif repeats > enough:
         advice = say(
@@ -223,17 +216,14 @@ def plan_document(plan: MeasurementPlan) -> Document:
     facts, findings = plan.job.facts, plan.outlook.identifiability
     artefact = Verbatim(facts.artefact.name or facts.artefact.kind.replace("_", " "))
     count = len(plan.start.placings)
-    start = say("{name} ({count} placings)", name=plan.name, count=count)
-    if plan.name == RECORDED:
-        start = say("the recording ({count} placings)", count=count)
+    recording = say("the recording ({count} placings)", count=count)
+    start = recording if plan.name == RECORDED else say("{name} ({count} placings)", name=plan.name, count=count)
     warnings: list[Text] = [say("Not met: {what}.", what=each.what) for each in plan.conditions if not each.met]
     if findings is not None and not findings.complete:
         free = commas(named(p.unknown) for p in findings.parameters if p.status == "free")
         warnings.append(say("Not determined by these placings: {free}.", free=free))
-    conditions = (
-        Paragraph(say("{mark} {what}", mark=Verbatim("✓" if each.met else "✗"), what=each.what))
-        for each in plan.conditions
-    )
+    marks = ((Verbatim("✓" if each.met else "✗"), each.what) for each in plan.conditions)
+    conditions = (Paragraph(say("{mark} {what}", mark=mark, what=what)) for mark, what in marks)
     pictures = placing_pictures(plan.to_measure, plan.setting.volume.box, plan.first)
     return working_page(
         facts, say("Measurement plan"), artefact,
@@ -343,21 +333,17 @@ def _gain(plan: MeasurementPlan) -> tuple[Block | None, ...]:
         both, say("Expected standard uncertainty"),
     )  # fmt: skip
     if plan.start.powers and plan.better.powers:
-        both_powers = zip(plan.start.powers, plan.better.powers, strict=True)
-        shown = [
-            (p, p.identifiable, q.identifiable)
-            for p, q in both_powers
-            if (p.identifiable, q.identifiable) != (None, None)
-        ]
-        blocks += _beside(
-            [(effect_title(p.effect), one, other, p.unit, smallest(one), smallest(other)) for p, one, other in shown],
-            both, say("Smallest effect named rightly"),
-        )  # fmt: skip
+        sizes = (
+            (p, p.identifiable, q.identifiable) for p, q in zip(plan.start.powers, plan.better.powers, strict=True)
+        )
+        rows = [(effect_title(p.effect), one, other, p.unit, smallest(one), smallest(other))
+                for p, one, other in sizes if (one, other) != (None, None)]  # fmt: skip
+        blocks += _beside(rows, both, say("Smallest effect named rightly"))
     return tuple(blocks)
 
 
 def _beside(
-    rows: list[tuple[Text, float | None, float | None, Text, Text, Text]], names: tuple[Text, Text], quantity: Text
+    rows: Sequence[tuple[Text, float | None, float | None, Text, Text, Text]], names: tuple[Text, Text], quantity: Text
 ) -> list[Block | None]:
     """Both plans beside each other as a picture and in numbers: label, both values, unit, both in words."""
     if not rows:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,24 +10,15 @@ import numpy as np
 
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.app.commands.files import Form, Stage, Written, silent
-from cmm_uq.app.commands.plans.page import (
-    STATUS,
-    absorbed,
-    combination,
-    expected,
-    named,
-    pairs,
-    placing_rows,
-    to_measure_words,
-    unit_of,
-)
-from cmm_uq.app.commands.plans.planning import MeasurementPlan, Outlook
+from cmm_uq.app.commands.plans import page as words
+from cmm_uq.app.commands.plans.planning import MeasurementPlan, Outlook, make_plan
 from cmm_uq.app.commands.reading import in_language, read_job
 from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.certificate.document import Standing
 from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.result import Outcome
 from cmm_uq.certificate.results.contents import head
@@ -40,14 +32,10 @@ PLAN = Form("plan", ("plan.html",), "plan", (TO_FILL_IN,))
 @naming_package()
 def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = silent) -> Outcome:
     """Plan a job that was read, whose recording may be missing; nothing is written."""
-    from cmm_uq.app.commands.plans.planning import make_plan
-
     plan = make_plan(job, power=power, seed=seed, progress=stage)
-    from cmm_uq.app.commands.plans.page import plan_document
-
     stage("Drawing the placings", 0.95)
     with lettered_in(job.facts.job.language):
-        document = plan_document(plan)
+        document = words.plan_document(plan)
     return Outcome(
         plan, lambda: document, plan_results(plan), plan_summary(plan), document.warnings,
         {TO_FILL_IN: recording_to_be(plan)} if plan.to_measure else {},
@@ -65,21 +53,16 @@ def write_plan(
     to measure.
     """
     read, tell = in_language(read_job(job, recorded=False), language), stage or silent
-    return PLAN.write(
-        read, lambda: plan_outcome(read, power=power, seed=seed, stage=tell), out, force=force, stage=tell
-    )
+    outcome = partial(plan_outcome, read, power=power, seed=seed, stage=tell)
+    return PLAN.write(read, outcome, out, force=force, stage=tell)
 
 
 def recording_to_be(plan: MeasurementPlan) -> bytes:
     """The placings that are still to be measured, as the CSV of a recording at nominal coordinates."""
     from cmm_uq.app.commands.jobs.simulate import to_fill_in
 
-    wishes = plan.setting.plan
-    points = join(
-        plan.to_measure, seconds_per_point=wishes.seconds_per_point, minutes_per_placing=wishes.minutes_per_placing,
-        first=plan.first,
-    )  # fmt: skip
-    return to_fill_in(points)
+    each = {name: getattr(plan.setting.plan, name) for name in ("seconds_per_point", "minutes_per_placing")}
+    return to_fill_in(join(plan.to_measure, first=plan.first, **each))
 
 
 SCHEMA = "cmm-uq/plan/1"
@@ -116,7 +99,8 @@ def _outlook_data(outlook: Outlook) -> dict[str, Any]:
             for p in found.parameters
         ],
         "undetermined": [
-            {"parameters": {f"{owner}.{name}": part for (owner, name), part in parts.items()}, "words": combination(parts)}
+            {"parameters": {f"{owner}.{name}": part for (owner, name), part in parts.items()},
+             "words": words.combination(parts)}
             for parts in found.free
         ],
         "singular_values": found.singular_values.tolist(),
@@ -137,12 +121,9 @@ def noise_data(plan: MeasurementPlan) -> dict[str, Any]:
     each = {"coordinate_um": setting.sigma / MICROMETRE, "stated": setting.stated is not None}
     if noise is None:
         return each
-    return each | {
-        **{f"{axis}_um": size / MICROMETRE for axis, size in zip("xyz", noise.reading, strict=True)},
-        "placing_um": None if noise.placing is None else noise.placing / MICROMETRE,
-        "growth_um": None if noise.growth is None else noise.growth / MICROMETRE,
-        "from": setting.plan.noise_from,
-    }
+    sizes = dict(zip("xyz", noise.reading, strict=True)) | {"placing": noise.placing, "growth": noise.growth}
+    known = {f"{name}_um": None if size is None else size / MICROMETRE for name, size in sizes.items()}
+    return {**each, **known, "from": setting.plan.noise_from}
 
 
 def worth_data(plan: MeasurementPlan) -> dict[str, Any] | None:
@@ -165,23 +146,27 @@ def worth_data(plan: MeasurementPlan) -> dict[str, Any] | None:
 def plan_summary(plan: MeasurementPlan) -> Summary:
     """For the end of the command; its details are the placings, below their headings."""
     found = plan.outlook.identifiability
-    met = tuple(
-        Headline("MET" if one.met else "NOT MET", "good" if one.met else "open", one.what, ())
-        for one in plan.conditions
-    )
+    words_of: dict[bool, tuple[str, Standing]] = {True: ("MET", "good"), False: ("NOT MET", "open")}
+    met = tuple(Headline(*words_of[one.met], one.what, ()) for one in plan.conditions)
     heads = (say("No."), say("Set up"), say("From → to / mm"), say("Points"), say("min"))
-    placings = tuple(placing_rows(plan))
+    placings = tuple(words.placing_rows(plan))
     figures: tuple[Figure, ...] = ()
     remarks: list[Text] = [say("No reading shows: {what}.", what=text) for text in plan.free]
     if found is not None:
         figures = tuple(
-            (named(p.unknown), say("u = {u} {unit}", u=expected(p, p.u), unit=unit_of(p.unknown)), STATUS[p.status])
+            (
+                words.named(p.unknown),
+                say("u = {u} {unit}", u=words.expected(p, p.u), unit=words.unit_of(p.unknown)),
+                words.STATUS[p.status],
+            )
             for p in found.parameters
         )
-        remarks += [say("Stays free: {what}.", what=combination(parts)) for parts in found.free]
-        remarks += [say("Could not be told apart: {effects}.", effects=text) for text in pairs(found)]
-        remarks += [say("Would be taken for what the job names: {effects}.", effects=text) for text in absorbed(found)]
+        remarks += [say("Stays free: {what}.", what=words.combination(parts)) for parts in found.free]
+        remarks += [say("Could not be told apart: {effects}.", effects=text) for text in words.pairs(found)]
+        remarks += [
+            say("Would be taken for what the job names: {effects}.", effects=text) for text in words.absorbed(found)
+        ]
     return Summary(
-        to_measure_words(plan), verdicts=met, figures=figures, remarks=tuple(remarks),
+        words.to_measure_words(plan), verdicts=met, figures=figures, remarks=tuple(remarks),
         details=(heads, *placings) if placings else (),
     )  # fmt: skip

@@ -12,13 +12,8 @@ from cmm_uq.analysis.conformity.plans import READY, Condition
 from cmm_uq.analysis.conformity.standards import standard_named
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.analysis.diagnosis.power import DrawnNoise, Power, powers, without_fault
+from cmm_uq.analysis.planning import identifiability as design
 from cmm_uq.analysis.planning.candidates import candidates, ready_plan, thinned
-from cmm_uq.analysis.planning.identifiability import (
-    Identifiability,
-    RepeatsComparison,
-    compare_repeats,
-    identifiability,
-)
 from cmm_uq.analysis.planning.information import choose, recording_information, score_of, set_up_information
 from cmm_uq.analysis.planning.set_up import SetUp, append, join, split
 from cmm_uq.analysis.planning.setting import Setting, Start, white_noise
@@ -102,7 +97,7 @@ class Outlook:
 
     placings: tuple[SetUp, ...]
     points: Points
-    identifiability: Identifiability | None
+    identifiability: design.Identifiability | None
     powers: tuple[Power, ...]
 
 
@@ -130,7 +125,7 @@ class MeasurementPlan:
     scores: tuple[float, float] | None
     conditions: tuple[Condition, ...]
     free: tuple[Text, ...] = ()
-    worth: RepeatsComparison | None = None
+    worth: design.RepeatsComparison | None = None
 
     @property
     def outlook(self) -> Outlook:
@@ -165,18 +160,23 @@ def minutes(setting: Setting, placing: SetUp) -> float:
 @refusing_overflow("job.toml", OVERFLOW_FIX)
 def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress | None = None) -> MeasurementPlan:
     tell = progress or (lambda what, part: None)
+
+    def predicting(low: float, high: float) -> Callable[[int, int], None]:
+        what = "Predicting the diagnosis: effect"
+        return lambda count, total: tell(f"{what} {count} of {total}", low + (high - low) * count / total)
+
     tell("Finding what the placings determine", 0.05)
     refuse_planned(job)
     setting = Setting.of(job, kind_of(job))
     refuse_unfit(job)
     if setting.planning.free is not None:
-        return _series_plan(job, setting)
+        return _series_plan(job, setting, setting.planning.free)
     name, placings, points = _start(job, setting)
     setting = setting.sized(points)
     setting = _with_noise(setting, name, points)
     rivals = setting.rivals(points)
     compared = setting.plan.criterion in (None, "separation")
-    start = _outlook(setting, placings, points, rivals, power and compared, seed, _part(tell, 0.1, 0.5))
+    start = _outlook(setting, placings, points, rivals, power and compared, seed, predicting(0.1, 0.5))
     tell("Searching for better placings", 0.55)
     chosen, kept, scores = _searched(setting, start, rivals, name)
     if chosen is None and name == RECORDED:
@@ -185,11 +185,11 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
     better = None
     if chosen is not None:
         points = _after(setting, points, chosen[kept:]) if name == RECORDED else _joined(setting, chosen)
-        better = _outlook(setting, chosen, points, rivals, power, seed, _part(tell, 0.6, 0.95))
+        better = _outlook(setting, chosen, points, rivals, power, seed, predicting(0.6, 0.95))
     final = start if better is None else better
     recorded = len(start.points) if name == RECORDED else 0
     met = of_standards(job, setting, name, final.points, recorded) + _in_time(setting, name, placings)
-    worth = None if name == RECORDED else compare_repeats(setting, final.placings)
+    worth = None if name == RECORDED else design.compare_repeats(setting, final.placings)
     return MeasurementPlan(job, setting, name, start, better, kept, scores, met, worth=worth)
 
 
@@ -206,11 +206,6 @@ def _with_noise(setting: Setting, name: Text, points: Points) -> Setting:
     model = setting.model(points)
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     return replace(setting, noise=setting.noise.over(model, values))
-
-
-def _part(tell: Progress, low: float, high: float) -> Callable[[int, int], None]:
-    what = "Predicting the diagnosis: effect"
-    return lambda count, total: tell(f"{what} {count} of {total}", low + (high - low) * count / total)
 
 
 def _start(job: Job, setting: Setting) -> tuple[Text, tuple[SetUp, ...], Points]:
@@ -239,11 +234,9 @@ def _joined(setting: Setting, placings: Sequence[SetUp]) -> Points:
 def _after(setting: Setting, recorded: Points, added: Sequence[SetUp]) -> Points:
     """A recording and further placings, what else was recorded being at its mean there."""
     points = _joined(setting, added)
-    places = split(replace(points, columns={
-        name: points.columns.get(name, np.full(len(points), float(values.mean())))
-        for name, values in recorded.columns.items()
-    }))  # fmt: skip
-    return append(recorded, places)
+    columns = {name: points.columns.get(name, np.full(len(points), float(values.mean())))
+               for name, values in recorded.columns.items()}  # fmt: skip
+    return append(recorded, split(replace(points, columns=columns)))
 
 
 def _outlook(
@@ -251,10 +244,9 @@ def _outlook(
     tell: Callable[[int, int], None],
 ) -> Outlook:  # fmt: skip
     model = setting.model(points)
-    found = identifiability(model, rivals, setting.noise)
+    found = design.identifiability(model, rivals, setting.noise)
     predicted: list[Power] = []
     if power and rivals:
-        stated = setting.stated
         noise = setting.noise or white_noise(model)
         quiet = without_fault(setting.observed, model, noise.drawn, seed)
         drawn = None
@@ -262,12 +254,11 @@ def _outlook(
             values = np.array([unknown.prior_mean for unknown in model.unknowns])
             components = setting.noise.components(model, values)
             drawn = DrawnNoise(components, setting.noise.typical, model.artefact.noise_scale)
-        predictions = powers(
-            quiet, rivals, stated=stated, sigma=setting.sigma, alpha=FALSE_ALARMS, seed=seed, noise=drawn
-        )
-        for i, each in enumerate(predictions):
+        for each in powers(
+            quiet, rivals, stated=setting.stated, sigma=setting.sigma, alpha=FALSE_ALARMS, seed=seed, noise=drawn
+        ):
             predicted.append(each)
-            tell(i + 1, len(rivals))
+            tell(len(predicted), len(rivals))
     return Outlook(placings, points, found, tuple(predicted))
 
 
@@ -322,13 +313,13 @@ def _in_time(setting: Setting, name: str, placings: Sequence[SetUp]) -> tuple[Co
     return (Condition(say("at most {budget:g} min: {total:.0f} min", budget=budget, total=total), over),)
 
 
-def _series_plan(job: Job, setting: Setting) -> MeasurementPlan:
+def _series_plan(
+    job: Job, setting: Setting, left_open: Callable[[Setting, Points, str], tuple[Text, ...]]
+) -> MeasurementPlan:
     """Placings of a kind that names no effects, and what their readings cannot tell."""
-    if setting.planning.free is None:
-        raise ValueError("a kind that says nothing of what its placings leave open")
     if setting.plan.criterion is not None:
         candidates(setting)  # which says why there are none
     name, placings, points = _start(job, setting)
-    free = setting.planning.free(setting, points, job.recording_path)
     start = Outlook(placings, points, None, ())
-    return MeasurementPlan(job, setting, name, start, None, 0, None, _in_time(setting, name, placings), free)
+    return MeasurementPlan(job, setting, name, start, None, 0, None, _in_time(setting, name, placings),
+                           left_open(setting, points, job.recording_path))  # fmt: skip
