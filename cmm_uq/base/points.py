@@ -31,22 +31,18 @@ class Machine:
 
     A machine with further axes, or with others, is a class of its own, whose :meth:`coordinates` and :meth:`readings` say how
     they belong together; everything else is said by axis.
-
-    name : as on the certificate.
-    chain : carriages from the table to the ram, a permutation of ``XYZ``.
-    travel_mm : (axes, 2) lowest and highest scale reading of each axis, mm; ``nan`` where the job does not say.
-    origin_mm : (3,) scale reading = recorded coordinate + origin, mm.
-    tip_on_every_carriage : whether rotations of all carriages act on the stylus tip offset, as they do in truth, or those
-        of the ram alone, as job files have it, where the other levers are so much longer.
-    axes : names of the axes that are read.
     """
 
-    name: str = ""
-    chain: str = "XYZ"
+    name: str = ""  # as on the certificate
+    chain: str = "XYZ"  # carriages from the table to the ram, a permutation of ``XYZ``
+    # (axes, 2) lowest and highest scale reading of each axis, mm; ``nan`` where the job does not say
     travel_mm: Floats = field(default_factory=lambda: np.full((3, 2), np.nan))
+    # (3,) scale reading = recorded coordinate + origin, mm
     origin_mm: Floats = field(default_factory=lambda: np.zeros(3))
+    # whether rotations of all carriages act on the stylus tip offset, as they do in truth, or those of the ram alone,
+    # as job files have it, where the other levers are so much longer
     tip_on_every_carriage: bool = False
-    axes: tuple[str, ...] = tuple(AXES)
+    axes: tuple[str, ...] = tuple(AXES)  # names of the axes that are read
 
     def coordinates(self, readings: Floats) -> Floats:
         """Recorded coordinates (n, 3), mm, of scale readings (n, axes)."""
@@ -82,26 +78,22 @@ def beyond_travel(readings: Floats, travel_mm: Floats) -> list[tuple[int, int]]:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Indicated coordinates of one recording, and all that was recorded beside them.
+    """Indicated coordinates of one recording, and all that was recorded beside them."""
 
-    xyz : (n, 3) indicated coordinates, mm, in the recorded frame.
-    measurement, point, repeat : (n,) what belongs together; see the recording's columns of the same names.
-    machine : the machine that read them.
-    columns : further recorded columns by their name in the recording, each (n,).
-    lines : (n,) line of each point in its file, for messages; 0 where there is no file.
-    directions : (3, 3) or (n, 3, 3) unit vectors of the motions of carriages x, y, z, a row each; ``None`` where they are
-        taken as the axes of the coordinates.
-    start_s : what ``time_s`` was at the start; by default 0 or, by a clock that began long before, at the first reading.
-    """
-
-    xyz: Floats
+    xyz: Floats  # (n, 3) indicated coordinates, mm, in the recorded frame
+    # measurement, point, repeat: (n,) what belongs together; see the recording's columns of the same names
     measurement: Ints
     point: Ints
     repeat: Ints
-    machine: Machine = field(default_factory=Machine)
+    machine: Machine = field(default_factory=Machine)  # the machine that read them
+    # further recorded columns by their name in the recording, each (n,)
     columns: Mapping[str, Floats] = field(default_factory=dict)
+    # (n,) line of each point in its file, for messages; 0 where there is no file
     lines: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    # (3, 3) or (n, 3, 3) unit vectors of the motions of carriages x, y, z, a row each; ``None`` where they are taken
+    # as the axes of the coordinates
     directions: Floats | None = None
+    # what ``time_s`` was at the start; by default 0 or, by a clock that began long before, at the first reading
     start_s: float | None = None
 
     def __len__(self) -> int:

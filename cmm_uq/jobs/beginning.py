@@ -15,40 +15,27 @@ SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squar
 
 @dataclass(frozen=True)
 class Beginning:
-    """What a new job of a kind begins with.
+    """What a new job of a kind begins with."""
 
-    title : what is measured, in words.
-    numbering : what ``measurement`` and ``point`` number, in a sentence.
-    artefact : keys of ``[artefact]`` beside its kind.
-    effects : that the model names.
-    conformity : one statement, or none.
-    test : tables of the circumstances that a pass needs beside it.
-    recorded : columns of the first recording at a constant value.
-    plan : keys of ``[plan]`` by which the kind's usual plan makes the set-ups of the first recording.
-    columns : that the recording must have beside those of every kind, with a sentence for those that are the kind's own.
-    further : that it may have, likewise.
-    points : the set-ups, where the kind has no plan of placings.
-    files : contents of files that the machine's table names, by name, where there is no recording; with ``machine``.
-    machine : keys of ``[machine]`` that name them.
-    noise_um : standard deviation of the readings of the first recording.
-    command : that serves such a job.
-    """
-
-    title: str
-    numbering: str
-    artefact: Mapping[str, Any] = field(default_factory=dict)
-    effects: tuple[str, ...] = SIX
-    conformity: Mapping[str, Any] | None = None
+    title: str  # what is measured, in words
+    numbering: str  # what ``measurement`` and ``point`` number, in a sentence
+    artefact: Mapping[str, Any] = field(default_factory=dict)  # keys of ``[artefact]`` beside its kind
+    effects: tuple[str, ...] = SIX  # that the model names
+    conformity: Mapping[str, Any] | None = None  # one statement, or none
+    # tables of the circumstances that a pass needs beside it
     test: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    recorded: Mapping[str, float] = field(default_factory=dict)
+    recorded: Mapping[str, float] = field(default_factory=dict)  # columns of the first recording at a constant value
+    # keys of ``[plan]`` by which the kind's usual plan makes the set-ups of the first recording
     plan: Mapping[str, Any] = field(default_factory=dict)
+    # that the recording must have beside those of every kind, with a sentence for those that are the kind's own
     columns: Mapping[str, str] = field(default_factory=dict)
-    further: Mapping[str, str] = field(default_factory=dict)
-    points: Callable[[Machine], Points] | None = None
+    further: Mapping[str, str] = field(default_factory=dict)  # that it may have, likewise
+    points: Callable[[Machine], Points] | None = None  # the set-ups, where the kind has no plan of placings
+    # contents of files that the machine's table names, by name, where there is no recording; with ``machine``
     files: Callable[[Machine], Mapping[str, bytes]] | None = None
-    machine: Mapping[str, Any] = field(default_factory=dict)
-    noise_um: float = 0.5
-    command: str = "report"
+    machine: Mapping[str, Any] = field(default_factory=dict)  # keys of ``[machine]`` that name them
+    noise_um: float = 0.5  # standard deviation of the readings of the first recording
+    command: str = "report"  # that serves such a job
 
 
 # ``[machine]`` of a new job of any kind

@@ -31,29 +31,18 @@ class Fact:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A table with whatever stands around it.
+    """A table with whatever stands around it."""
 
-    Parameters
-    ----------
-    name : of the sheet, or of the sort of feature; empty where a file has only one.
-    rows, lines : cells, in rows that may differ in length; the line of each row in the file.
-    spreadsheet : whether places are named as in a spreadsheet.
-    listed : whether the format made the table of a report of features: it has no header in the file.
-    unended : whether the last line of the file has no end, as where it was cut off.
-    unit : of its lengths, where the format or the file says it.
-    decimal : sign, where the format says it.
-    facts : recognised so far.
-    """
-
-    name: str
+    name: str  # of the sheet, or of the sort of feature; empty where a file has only one
+    # rows, lines: cells, in rows that may differ in length; the line of each row in the file
     rows: Sequence[Sequence[Cell]]
     lines: Sequence[int]
-    spreadsheet: bool = False
-    listed: bool = False
-    unended: bool = False
-    unit: str | None = None
-    decimal: str | None = None
-    facts: tuple[Fact, ...] = ()
+    spreadsheet: bool = False  # whether places are named as in a spreadsheet
+    listed: bool = False  # whether the format made the table of a report of features: it has no header in the file
+    unended: bool = False  # whether the last line of the file has no end, as where it was cut off
+    unit: str | None = None  # of its lengths, where the format or the file says it
+    decimal: str | None = None  # sign, where the format says it
+    facts: tuple[Fact, ...] = ()  # recognised so far
 
     def at(self, where: str, row: int, column: int | None = None, heading: str = "") -> str:
         """Place of a row of the file, or of a cell below a heading, by their indices."""
@@ -128,39 +117,20 @@ class Recognition:
 
 
 class Format(ABC):
-    """A format; those of other packages are entry points of the group ``cmm_uq.imports``, of the format's name.
+    """A format; those of other packages are entry points of the group ``cmm_uq.imports``, of the format's name."""
 
-    Attributes
-    ----------
-    name : of the entry point, and in results.json.
-    title : as printed.
-    """
-
-    name: str
-    title: Text
+    name: str  # of the entry point, and in results.json
+    title: Text  # as printed
 
     @abstractmethod
     def recognises(self, head: bytes) -> bool:
-        """Whether a file is of this format.
-
-        Parameters
-        ----------
-        head : its first :data:`HEAD` bytes.
-        """
+        """Whether a file is of this format, by its first :data:`HEAD` bytes."""
 
     @abstractmethod
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        """Sheets of a file, at least one.
+        """Sheets of a file, at least one; a ``CmmUqError`` where it is damaged, hostile, or holds nothing that can be read.
 
-        Parameters
-        ----------
-        content : of the file.
-        where : its name, for messages.
-        keys : what the job says beside.
-
-        Raises
-        ------
-        CmmUqError : it is damaged, hostile, or holds nothing that can be read.
+        ``where``: its name, for messages; ``keys``: what the job says beside.
         """
 
 
