@@ -94,19 +94,16 @@ class Verdicts(tuple[Verdict, ...]):
         """Of a results.json; of one without the key from what its standards and tolerances decided."""
         there = results.get("verdicts")
         if isinstance(there, Mapping) and "statements" in there:
-            return cls(_read(one) for one in there["statements"])
+            return cls(
+                Verdict(str(one["name"]), str(one["outcome"]), one["value"], one["U"], one["limit"], Verbatim(one["unit"]),
+                        one["by"] or "", Verbatim(one["title"] or ""), tuple(map(Verbatim, one["missing"])))
+                for one in there["statements"]
+            )  # fmt: skip
         return cls((*map(_by_standard, results.get("conformity") or ()), *_by_tolerance(results),
                     *_of_part(results.get("characteristics") or ())))  # fmt: skip
 
 
 NO_VERDICTS = Verdicts()  # of what states no conformity
-
-
-def _read(one: Mapping[str, Any]) -> Verdict:
-    return Verdict(
-        str(one["name"]), str(one["outcome"]), one["value"], one["U"], one["limit"], Verbatim(one["unit"]),
-        one["by"] or "", Verbatim(one["title"] or ""), tuple(map(Verbatim, one["missing"])),
-    )  # fmt: skip
 
 
 def _by_standard(one: Mapping[str, Any]) -> Verdict:
@@ -131,15 +128,13 @@ def _by_tolerance(results: Mapping[str, Any]) -> Iterator[Verdict]:
 def _of_part(characteristics: Any) -> Iterator[Verdict]:
     for one in characteristics:
         if isinstance(one, Mapping) and one.get("decision"):
-            limits = one.get("limits") or {}
-            limit = _nearest(one.get("value"), limits.get("lower"), limits.get("upper"))
-            yield Verdict(str(one["name"]), str(one["decision"]["outcome"]), one.get("value"), one.get("U"), limit,
+            value, limits = one.get("value"), one.get("limits") or {}
+            ends = [end for end in (limits.get("lower"), limits.get("upper")) if end is not None]
+            # the limit that the value is nearest to, or farthest beyond
+            limit = (
+                ends[-1]
+                if len(ends) == 2 and value is not None and value - ends[0] >= ends[1] - value
+                else (*ends, None)[0]
+            )
+            yield Verdict(str(one["name"]), str(one["decision"]["outcome"]), value, one.get("U"), limit,
                           Verbatim(one.get("unit") or ""))  # fmt: skip
-
-
-def _nearest(value: float | None, lower: float | None, upper: float | None) -> float | None:
-    """The limit that a value is nearest to, or farthest beyond."""
-    ends = [end for end in (lower, upper) if end is not None]
-    if value is None or len(ends) < 2:
-        return ends[0] if ends else None
-    return lower if value - ends[0] < ends[1] - value else upper

@@ -18,7 +18,6 @@ import datetime as dt
 import math
 import re
 from base64 import b64decode, b64encode
-from binascii import Error as Base64Error
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
@@ -201,24 +200,11 @@ def _number(what: str, plural: str, pattern: str, form: str = "") -> Simple:
     return Simple(what, plural, read, lambda value: format(value, form))
 
 
-def _not_empty(text: str) -> str:
-    if not text or text != text.strip():
-        raise ValueError(text)
-    return text
-
-
-def _bytes(text: str) -> bytes:
-    try:
-        return b64decode("".join(text.split()), validate=True)
-    except Base64Error as error:
-        raise ValueError(text) from error
-
-
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 _UNSIGNED = r"((\d*\.\d+)|(\d+\.\d*)|(\d+\.?))([Ee][-+]?\d+)?"
 _SIMPLE: Mapping[str, Simple] = {
     "string": Simple("a text", "words", str),
-    "text": Simple("a text without spaces at its ends", "words", _not_empty),
+    "text": _matching("a text without spaces at its ends", r"\S(?s:.*\S)?", "words"),
     "country": _matching("a country of ISO 3166-1, two capital letters", "[A-Z]{2}"),
     "language": _matching("a language of ISO 639-1, two small letters", "[a-z]{2}"),
     "name": _matching("a name that XML takes as an id", r"[^\W\d][\w.\-]*", "ids"),
@@ -230,7 +216,8 @@ _SIMPLE: Mapping[str, Simple] = {
     ),
     "probability": _number("a probability", "probabilities", r"\+?((0(\.\d*)?)|(1(\.0*)?))", "f"),
     "bool": Simple("true or false", "true and false", lambda text: _BOOLEANS[text.strip()], lambda value: str(value).lower()),
-    "bytes": Simple("base64", "", _bytes, lambda data: b64encode(data).decode()),
+    "bytes": Simple("base64", "", lambda text: b64decode("".join(text.split()), validate=True),
+                    lambda data: b64encode(data).decode()),
     "date": Simple("a date", "", lambda text: dt.date.fromisoformat(text.strip()[:10]), dt.date.isoformat),
     "datetime": Simple("a date with time", "dates with times", lambda text: dt.datetime.fromisoformat(text.strip()),
                        dt.datetime.isoformat),

@@ -58,52 +58,42 @@ class Node:
 def parsed(data: bytes, where: str) -> Node:
     if len(data) > DCC_BYTES.most:
         raise CmmUqError(f"is larger than {DCC_BYTES.most} {DCC_BYTES.unit}", where=where, fix="Is it the right file?")
-    tree = _Tree(where)
+    parser, open_ = expat.ParserCreate(namespace_separator=" "), [Node("", {})]  # whose first is around the root
+    count = 0
+
+    def refuse(problem: str) -> NoReturn:
+        at = f"{where}, line {parser.CurrentLineNumber}"
+        raise CmmUqError(problem, where=at, fix="A certificate is XML without that")
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
+        limits = ((count, XML_ELEMENTS), (len(open_) - 1, XML_DEPTH), (len(attributes), XML_ATTRIBUTES))
+        for number, limit in limits:
+            if number > limit.most:
+                refuse(f"has more than {limit.most} {limit.unit}")
+        named = {_named(key): value for key, value in attributes.items()}
+        node = Node(_named(name), named, parser.CurrentLineNumber, open_[-1] if len(open_) > 1 else None)
+        open_[-1].children.append(node)
+        open_.append(node)
+
+    def read_text(text: str) -> None:
+        open_[-1].text += text
+
+    def doctype(*declared: object) -> None:
+        refuse("has a document type (DOCTYPE), which can pull in other files")
+
+    parser.buffer_text = True
+    parser.StartElementHandler, parser.EndElementHandler = start, lambda _: open_.pop()
+    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = read_text, doctype
     try:
-        tree.parser.Parse(data, True)
+        parser.Parse(data, True)
     except expat.ExpatError as error:
         problem, where = expat.errors.messages[error.code], f"{where}, line {error.lineno}"
         raise CmmUqError(f"is no XML: {problem}", where=where, fix="Ask for it again") from None
     except (ValueError, LookupError) as error:
         raise CmmUqError(f"is no XML: {error}", where=where, fix="Ask for it again") from None
-    return tree.root
-
-
-class _Tree:
-    def __init__(self, where: str) -> None:
-        self.where, self.count = where, 0
-        self.open: list[Node] = []
-        self.root = Node("", {})
-        self.parser = parser = expat.ParserCreate(namespace_separator=" ")
-        parser.buffer_text = True
-        parser.StartElementHandler, parser.EndElementHandler = self._start, lambda _: self.open.pop()
-        parser.CharacterDataHandler = self._text
-        parser.StartDoctypeDeclHandler = self._doctype
-
-    def _start(self, name: str, attributes: dict[str, str]) -> None:
-        self.count += 1
-        limits = ((self.count, XML_ELEMENTS), (len(self.open), XML_DEPTH), (len(attributes), XML_ATTRIBUTES))
-        for count, limit in limits:
-            if count > limit.most:
-                self._refuse(f"has more than {limit.most} {limit.unit}")
-        parent = self.open[-1] if self.open else None
-        named = {_named(key): value for key, value in attributes.items()}
-        node = Node(_named(name), named, self.parser.CurrentLineNumber, parent)
-        if parent is None:
-            self.root = node
-        else:
-            parent.children.append(node)
-        self.open.append(node)
-
-    def _text(self, text: str) -> None:
-        self.open[-1].text += text
-
-    def _doctype(self, *declared: object) -> None:
-        self._refuse("has a document type (DOCTYPE), which can pull in other files")
-
-    def _refuse(self, problem: str) -> NoReturn:
-        line = self.parser.CurrentLineNumber
-        raise CmmUqError(problem, where=f"{self.where}, line {line}", fix="A certificate is XML without that")
+    return open_[0].children[0]
 
 
 def _named(name: str) -> str:
