@@ -189,15 +189,11 @@ class Provenance:
 
     @property
     def data(self) -> dict[str, Any]:
-        said = self.said
+        said = self.said.model_dump(mode="json")
+        further = ("instruments", "typed", "files", "gaps", "columns", "undone", "clock_jumps_s", "damaged")
         return {
-            "program": said.program, "simulated": said.simulated, "changed": self.changed, "sessions": len(said.sessions),
-            "instruments": [one.model_dump() for one in said.instruments], "typed": said.typed,
-            "files": dict(said.files), "gaps": [gap.model_dump() for gap in said.gaps],
-            "columns": {name: {"u": column.u, "u_largest": column.u_largest, "missing": [list(at) for at in column.missing]}
-                        for name, column in said.columns.items()},
-            "undone": [one.model_dump() for one in said.undone], "clock_jumps_s": list(said.clock_jumps_s),
-            "damaged": list(said.damaged),
+            "program": said["program"], "simulated": said["simulated"], "changed": self.changed,
+            "sessions": len(said["sessions"]), **{name: said[name] for name in further},
         }  # fmt: skip
 
     def with_joined(self, stated: TestUncertainty) -> TestUncertainty:

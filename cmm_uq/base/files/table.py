@@ -89,7 +89,6 @@ Limit = Annotated[float, Field(gt=0, le=LARGEST_UM), at_least(SMALLEST_UM)]
 # A standard uncertainty, µm, or 0 where it does not count
 Uncertainty = Annotated[float, Field(ge=0, le=LARGEST_UM), AfterValidator(_zero_or_more_than_nothing)]
 Temperature = Annotated[float, Field(ge=-273.15, le=1000)]  # °C
-Duration = Annotated[float, Field(ge=0, le=1e6)]  # minutes or seconds
 Number = Annotated[int, Field(ge=-1_000_000_000, le=1_000_000_000)]  # of a measurement or point
 
 # A number in a unit that only its name knows: as large as in a recording

@@ -1,12 +1,24 @@
-"""Text and XML of a file, in whatever encoding it was exported in: no entities, no external documents."""
+"""Text, XML and numbers of a file, in whatever encoding and with whatever decimal sign it was exported.
+
+XML has no entities, and no external documents. One group of three digits after a comma, and nothing else in the file to go by,
+may be thousands or thousandths: that is refused, never guessed. A point alone is a decimal point.
+"""
 
 from __future__ import annotations
 
 import codecs
+import re
+from collections.abc import Callable, Sequence
 from xml.etree.ElementTree import Element, ParseError
 
+import numpy as np
+
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.csv_table import GIVE, LARGEST, number_problem, numbers
 from cmm_uq.base.files.limits import LINES
+from cmm_uq.base.points import Floats
+from cmm_uq.jobs.importing.format import Cell
+from cmm_uq.jobs.importing.keys import WrittenUnit, apart, unit_named
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig", "UTF-8 with a byte-order mark"),
@@ -100,3 +112,128 @@ def begins_with(head: bytes, *roots: str) -> bool:
     """Whether a file is XML whose root is one of these."""
     text = head_text(head).lstrip("\ufeff \r\n\t")
     return text.startswith("<") and any(f"<{root}" in text or f":{root}" in text for root in roots)
+
+
+_E = r"(?:[eE][+-]?\d+)?"
+_BLANKS = " \u00a0\u202f\u2009'’"
+# A comma that can only be a decimal one
+_COMMA_DECIMAL = re.compile(
+    rf"^[+-]?(?:\d{{1,3}}(?:[.{_BLANKS}]\d{{3}})+,\d+|0\d*,\d+|\d{{4,}},\d+|\d*,(?:\d{{1,2}}|\d{{4,}})|,\d+"
+    rf"|\d+,\d+(?=[eE])){_E}$", re.MULTILINE,
+)  # fmt: skip
+# commas that can only be between groups of three digits
+_COMMA_GROUPS = re.compile(rf"^[+-]?[1-9]\d{{0,2}}(?:(?:,\d{{3}})+\.\d*|(?:,\d{{3}}){{2,}}){_E}$", re.MULTILINE)
+# A point that can only be a decimal one
+_POINT_DECIMAL = re.compile(
+    rf"^[+-]?(?:0\d*\.\d+|\d{{4,}}\.\d*|\d*\.(?:\d{{1,2}}|\d{{4,}})?|\.\d+|\d+\.\d+(?=[eE])){_E}$", re.MULTILINE
+)
+_TWO_COMMAS = re.compile(r",\d*,")
+_POINT_GROUPS = re.compile(r"^[+-]?[1-9]\d{0,2}(?:\.\d{3}){2,}$", re.MULTILINE)
+# A number with groups of three digits
+_GROUPED = {
+    sign: re.compile(rf"[+-]?\d{{1,3}}(?:(?:[{_BLANKS}]\d{{3}})+|(?:{group}\d{{3}})+)(?:{mark}\d*)?{_E}")
+    for sign, mark, group in ((".", r"\.", ","), (",", ",", r"\."))
+}
+At = Callable[[int, int], str]  # place of a cell, by indices of column and row
+
+
+def decimal_sign(columns: Sequence[Sequence[Cell]], at: At, asked: str | None) -> str:
+    """The decimal sign of the numbers of a table."""
+    if asked is not None:
+        return asked
+    texts = ["\n".join([cell if isinstance(cell, str) else "" for cell in column]) for column in columns]
+    if not any("," in text for text in texts):
+        return "," if any(_POINT_GROUPS.search(text) for text in texts) else "."
+    points = any("." in text for text in texts)
+    comma = _first(texts, (_COMMA_DECIMAL, _POINT_GROUPS) if points else (_COMMA_DECIMAL,))
+    groups = (_COMMA_GROUPS,) if any(_TWO_COMMAS.search(text) for text in texts) or points else ()
+    point = _first(texts, (*groups, _POINT_DECIMAL) if points else groups)
+    if comma and point:
+        raise CmmUqError(
+            f"{comma[2]!r} has a decimal comma, and {point[2]!r} ({at(*point[:2])}) has a decimal point",
+            where=at(*comma[:2]), fix="Export it again with one decimal sign; if it was put together, mend the odd rows",
+        )  # fmt: skip
+    if comma or point:
+        return "," if comma else "."
+    i = next(i for i, text in enumerate(texts) if "," in text)
+    row = next(row for row, cell in enumerate(columns[i]) if isinstance(cell, str) and "," in cell)
+    value = str(columns[i][row])
+    thousands, thousandths = value.replace(",", ""), value.replace(",", ".")
+    raise CmmUqError(f"{value!r} can be {thousands} or {thousandths}, and no number of the file tells", where=at(i, row),
+                     fix='Say decimal = "," or decimal = "."')  # fmt: skip
+
+
+def _first(texts: Sequence[str], patterns: Sequence[re.Pattern[str]]) -> tuple[int, int, str] | None:
+    """Column, row and text of the first cell that shows one of the patterns."""
+    for i, text in enumerate(texts):
+        for pattern in patterns:
+            if found := pattern.search(text):
+                return i, text.count("\n", 0, found.start()), found[0]
+    return None
+
+
+def split_units(cells: Sequence[Cell], at: Callable[[int], str]) -> tuple[Sequence[Cell], WrittenUnit | None]:
+    """Cells without the unit that all of them end in, and that unit."""
+    first = next((cell for cell in cells if isinstance(cell, str) and cell), None)
+    parts = apart(first) if first else None
+    if parts is None:
+        return cells, None
+    unit, bare = parts[1], list(cells)
+    for row, cell in enumerate(cells):
+        if cell == "":
+            continue
+        own = apart(cell) if isinstance(cell, str) else None
+        if own is None or own[1] != unit:
+            raise CmmUqError(f"{cell!r} among numbers in {unit.name}: the column mixes units", where=at(row),
+                             fix="Export the column in one unit")  # fmt: skip
+        bare[row] = own[0]
+    return bare, unit
+
+
+def values_of(cells: Sequence[Cell], sign: str, at: Callable[[int], str], fix: str = GIVE) -> Floats:
+    """Values (n,) of cells."""
+    sorts = set(map(type, cells))
+    if str not in sorts:
+        values = np.array(cells, dtype=np.float64)
+        bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
+        if bad.size:
+            raise CmmUqError(f"{values[bad[0]]:g} is no number that can be used", where=at(int(bad[0])), fix=fix)
+        return values
+    if len(sorts) > 1:
+        return np.array([values_of([cell], sign, lambda _, row=row: at(row), fix)[0] for row, cell in enumerate(cells)])  # type: ignore[misc]
+    texts: Sequence[str] = cells  # type: ignore[assignment]
+    joined = "\n".join(texts)
+    if "−" in joined:
+        joined = joined.replace("−", "-")
+        texts = joined.split("\n")
+    if (sign == "," and "." in joined) or (sign == "." and "," in joined) or any(blank in joined for blank in _BLANKS):
+        texts = [_plain(text, sign, row, at) for row, text in enumerate(texts)]
+    elif sign == ",":
+        texts = joined.replace(",", ".").split("\n")
+    return numbers(texts, at, fix)
+
+
+def _plain(text: str, sign: str, row: int, at: Callable[[int], str]) -> str:
+    """A number with a decimal point and no groups; whatever is no number stays as it is, and is refused as such."""
+    other = "." if sign == "," else ","
+    if other in text or any(blank in text for blank in _BLANKS):
+        if _GROUPED[sign].fullmatch(text):
+            text = text.translate(_WITHOUT[sign])
+        elif other in text and number_problem(text.replace(other, ".")) is None:
+            raise CmmUqError(f"{text!r} has its decimal sign as {other!r}, the others as {sign!r}", where=at(row),
+                             fix="Export the table again with one decimal sign, or say decimal")  # fmt: skip
+    return text.replace(",", ".") if sign == "," else text
+
+
+_WITHOUT = {sign: str.maketrans("", "", other + _BLANKS) for sign, other in ((".", ","), (",", "."))}
+
+
+def is_number(cell: Cell) -> bool:
+    """Whether a cell is a number in any of the ways of writing one."""
+    if not isinstance(cell, str):
+        return True
+    plain = cell.replace("−", "-")
+    if (parts := apart(plain)) is not None and unit_named(plain) is None:
+        plain = parts[0]
+    grouped = any(pattern.fullmatch(plain) for pattern in _GROUPED.values())
+    return grouped or number_problem(plain.replace(",", ".")) is None

@@ -82,12 +82,8 @@ class _Document:
         if not any(local(element).endswith(_FEATURES) for element in root.iter()):
             raise CmmUqError("is of no feature: it has neither FeatureItem nor FeatureNominal", where=where,
                              fix="Export the plan, or the model with its product information (PMI)")  # fmt: skip
-        self.units, self.root, self.where, self.drawing = (
-            drawings.QifUnits(root, where),
-            root,
-            where,
-            drawings.Drawing(PROGRAM),
-        )
+        self.root, self.where = root, where
+        self.units, self.drawing = drawings.QifUnits(root, where), drawings.Drawing(PROGRAM)
         self.by_id = {element.get("id", ""): element for element in root.iter() if element.get("id")}
         # names of features that are read, by the number of their item, and of their nominal
         self.names: dict[str, str] = {}

@@ -9,20 +9,10 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED
-from cmm_uq.base.files.table import (
-    AnyFloat,
-    Column,
-    Duration,
-    JobTable,
-    Length,
-    Names,
-    Range,
-    Uncertainty,
-    at_least,
-    key,
-)
+from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Length, Names, Range, Uncertainty, at_least, key
 
 Criterion = Literal["separation", "D", "A", "worst"]
+Duration = Annotated[float, Field(ge=0, le=1e6)]  # minutes or seconds
 _SHORTEST = 1e-6  # length of a direction below which it is none
 Direction = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=3, max_length=3)]
 
