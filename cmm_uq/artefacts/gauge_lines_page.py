@@ -211,8 +211,7 @@ def _plot(result: Result, gauge: StepGauge) -> Block:
         flagged=result.flagged,
         position_label=say("Certified distance from the first face / mm (lines side by side)"),
         caption=say(
-            "Deviation of each face from its certified distance, as recorded and after the fitted model, "
-            "with U (k = {k}).",
+            "Deviation of each face from its certified distance, as recorded and after the fitted model, with U (k = {k}).",
             k=number(factor, ".2f"),
         ),
         alternative=deviating(what, say("from the mean of their line"), deviations, residuals),

@@ -300,9 +300,8 @@ def _surfaces(result: Result, probed: tuple[ProbedPlane, ...]) -> Table:
         *text_columns(say("Outward normal")), Column(say("U across"), unit("µm")), Column(say("Approach"), unit("°")),
     )  # fmt: skip
     note = say(
-        "The plane of the probe's centre, moved by the probe's offset against the normal that points "
-        "to where the probe came from (US 4,866,643, claim 1). U (k = {k}) of the surface's position "
-        "along the normal, at its middle.",
+        "The plane of the probe's centre, moved by the probe's offset against the normal that points to where the probe came "
+        "from (US 4,866,643, claim 1). U (k = {k}) of the surface's position along the normal, at its middle.",
         k=number(result.noise.coverage_factor, ".2f"),
     )
     return Table(say("Surface, compensated for the probe's offset"), columns, tuple(rows), (note,))

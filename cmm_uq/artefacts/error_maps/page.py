@@ -308,8 +308,7 @@ def _compared_of_page(found: MapsDiagnosed) -> Table:
         *parts.text_columns(say("Most probable explanation")), Column(say("Probability")),
     )  # fmt: skip
     note = say(
-        "p is corrected for having looked at all of them. Each error is a free function of position "
-        "that the maps share."
+        "p is corrected for having looked at all of them. Each error is a free function of position that the maps share."
     )
     return Table(say("What was compared"), heads, tuple(rows), (note,))
 

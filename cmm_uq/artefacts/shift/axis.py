@@ -17,14 +17,14 @@ from cmm_uq.artefacts.shift import result as shared
 from cmm_uq.artefacts.shift.integration import IntegratedCurve, KnownSpan, Method, integrated
 from cmm_uq.artefacts.shift.result import Curve, Reported, ShiftFound
 from cmm_uq.artefacts.shift.series import RepeatedDrift, ShiftedSeries, Undetermined, shifted_series, undetermined
-from cmm_uq.artefacts.shift.smooth import FINEST, Coefficients, SmoothFunction, SmoothModel, sampled
+from cmm_uq.artefacts.shift.smooth import FINEST, SmoothFunction, SmoothModel, sampled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import HOUR, MICROMETRE, PPM, unit
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.effects.rigid_body import SCALE
 from cmm_uq.machine.physics.error_map import ErrorMap
-from cmm_uq.maths.inference.ensembles import Chains, Progress
+from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of
 
 _TYPICAL = 5 * MICROMETRE
@@ -32,14 +32,11 @@ _DRIFT = 10 * MICROMETRE  # standard deviation of the drift, mm per hour
 
 
 @dataclass(frozen=True, eq=False)
-class CurveEstimate:
+class CurveEstimate(shared.Estimated):
     """All that the readings say of an axis."""
 
     series: ShiftedSeries  # series, known: what it was made from
     known: KnownSpan | None
-    coefficients: Coefficients  # joint draws of everything linear
-    chains: Chains  # of the hyper-parameters, and how they converged
-    seed: int  # of everything random
     scale_known: bool  # whether the mean sensitivity is determined: by a known length, or by shifts known exactly
 
     @cached_property
@@ -84,11 +81,6 @@ class CurveEstimate:
             nominal[:, 1:] += self.coefficients.columns[:, : len(self.series.shifts) - 1]
         return nominal
 
-    @property
-    def sigma(self) -> Floats:
-        """(N,) draws of the standard uncertainty of one reading, mm."""
-        return self.coefficients.sigma
-
     @cached_property
     def artefact(self) -> Floats:
         """(N, p) draws of the distances of the points from the first along the artefact, mm."""
@@ -124,8 +116,7 @@ def estimate_curve(
     if len(series.reading) - model.flat.shape[1] < 1:
         raise CmmUqError(f"{len(series.reading)} readings of {len(series.numbers)} points leave nothing to compare",
                          fix="Read more points in both placings, or a third placing")  # fmt: skip
-    coefficients, chains = sampled(model, seed, progress)
-    return CurveEstimate(series, known, coefficients, chains, seed, known is not None or series.u_shift == 0)
+    return CurveEstimate(*sampled(model, seed, progress), seed, series, known, known is not None or series.u_shift == 0)
 
 
 def _point_columns(series: ShiftedSeries, known: KnownSpan | None) -> Floats:

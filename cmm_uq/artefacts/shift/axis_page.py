@@ -142,10 +142,9 @@ def _beside_integrations(result: ShiftResult) -> tuple[Table, ...]:
     )
     each = _in_um(say("Integrated"), say("u"), say("Improved"), say("u"), say("Joint fit"), say("u"))
     note = say(
-        "Integrated: sum of local slopes, improved: with slopes of both neighbours (Shimizu, Kiyono "
-        "and Gao, equations 6 and 8 with their signs mended); u by the law of propagation (JCGM "
-        "102:2011), from repeatability alone. Without a known length and with shifts not known "
-        "exactly the mean slope is that of the readings."
+        "Integrated: sum of local slopes, improved: with slopes of both neighbours (Shimizu, Kiyono and Gao, equations 6 and "
+        "8 with their signs mended); u by the law of propagation (JCGM 102:2011), from repeatability alone. Without a known "
+        "length and with shifts not known exactly the mean slope is that of the readings."
     )
     title = say("Beside the integrations of the method's source")
     return (Table(title, (Column(say("Reading"), unit("mm")), *each), rows, (note,)),)
@@ -161,9 +160,8 @@ def warnings(result: ShiftResult) -> list[Text]:
     if not result.estimate.scale_known:
         found.append(
             say(
-                "The mean sensitivity of the axis is not determined: no length of the artefact is known and "
-                "the shifts are not known exactly. The curve is the linearity error, zero at both ends of "
-                "the first series."
+                "The mean sensitivity of the axis is not determined: no length of the artefact is known and the shifts are "
+                "not known exactly. The curve is the linearity error, zero at both ends of the first series."
             )
         )
     if free := result.undetermined.patterns.shape[1]:
@@ -266,9 +264,8 @@ def _artefact(result: ShiftResult) -> Section:
 
 def _method(result: ShiftResult) -> Section:
     text = say(
-        "The error of the axis, the artefact's dimensions and the shifts are fitted to all readings "
-        "at once; the error is a smooth function (Gaussian process, Matérn 7/2) whose size, "
-        "correlation length and growth towards the ends are sampled, all else is drawn from its "
-        "exact conditional distribution."
+        "The error of the axis, the artefact's dimensions and the shifts are fitted to all readings at once; the error is a "
+        "smooth function (Gaussian process, Matérn 7/2) whose size, correlation length and growth towards the ends are "
+        "sampled, all else is drawn from its exact conditional distribution."
     )
     return shared.method_section(result, text, len(result.estimate.series.reading), *_beside_integrations(result))

@@ -19,7 +19,7 @@ from cmm_uq.artefacts.shift.integration import KnownSpan
 from cmm_uq.artefacts.shift.placed_plate import PlacedPlate, placed_plate
 from cmm_uq.artefacts.shift.plane_model import FreeInPlane, PlaneModel, free_in_plane, plane_model
 from cmm_uq.artefacts.shift.result import Curve, Reported, ShiftFound
-from cmm_uq.artefacts.shift.smooth import Coefficients, sampled
+from cmm_uq.artefacts.shift.smooth import sampled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, Unit, unit
@@ -27,7 +27,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.machine.physics.error_map import ErrorMap
 from cmm_uq.machine.physics.kinematics import carried_offset
-from cmm_uq.maths.inference.ensembles import Chains, Progress
+from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of
 
 _FINE = 41
@@ -35,16 +35,13 @@ _LEAST_LEFT = 6  # coordinates beyond balls and placings that must be left to te
 
 
 @dataclass(frozen=True, eq=False)
-class PlaneEstimate:
+class PlaneEstimate(shared.Estimated):
     """All that the placings say."""
 
     plate: PlacedPlate  # plate, known: what it was made from
     known: KnownSpan | None
     model: PlaneModel  # linear model about its start
-    coefficients: Coefficients  # joint draws of everything linear
-    chains: Chains  # of the hyper-parameters, and how they converged
     free: FreeInPlane  # what the placings leave open
-    seed: int  # of everything random
 
     @cached_property
     def positions(self) -> tuple[Floats, Floats]:
@@ -109,11 +106,6 @@ class PlaneEstimate:
             found[axis] = Curve(x, values - values.mean(axis=1, keepdims=True))
         return found
 
-    @property
-    def sigma(self) -> Floats:
-        """(N,) draws of the standard uncertainty of one coordinate of one reading, mm."""
-        return self.coefficients.sigma
-
     @cached_property
     def balls(self) -> Floats:
         """(N, p, 2) draws of the balls, mm, from the first, as they lay in the first placing.
@@ -162,8 +154,7 @@ def estimate_plane(
     if (left := len(model.smooth.observed) - model.smooth.flat.shape[1]) < _LEAST_LEFT:
         raise CmmUqError(f"{len(plate.ball)} readings of {len(plate.numbers)} balls leave {left} coordinates to compare",
                          fix="Read more balls in each placing, or one more placing")  # fmt: skip
-    coefficients, chains = sampled(model.smooth, seed, progress)
-    return PlaneEstimate(plate, known, model, coefficients, chains, free_in_plane(plate, model), seed)
+    return PlaneEstimate(*sampled(model.smooth, seed, progress), seed, plate, known, model, free_in_plane(plate, model))
 
 
 PEAK_TO_VALLEY = "peak_to_valley_um"

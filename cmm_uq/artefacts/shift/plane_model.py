@@ -161,25 +161,6 @@ def _functions(plate: PlacedPlate, turning: tuple[int, ...], chain: str) -> tupl
 _ALIKE = 0.02  # what changes the readings by less than this part of its own size is not determined by them
 _SQUARE_DEG = 5.0  # placings turned by less than this against each other are shifts of each other
 
-_TITLES: dict[str, Text] = {
-    **{effect.name: say("scale of {axis}", axis=Verbatim(a.upper())) for a, effect in SCALE.items()},
-    **{
-        effect.name: say("squareness {plane}", plane=Verbatim("–".join(plane.upper())))
-        for plane, effect in SQUARENESS.items()
-    },
-    **{
-        effect.name: say(
-            "straightness of {axis} along {direction}", axis=Verbatim(a.upper()), direction=Verbatim(b.upper())
-        )
-        for (a, b), effect in STRAIGHTNESS.items()
-    },
-    **{
-        effect.name: say("rotation of {axis} about {about}", axis=Verbatim(a.upper()), about=Verbatim(b.upper()))
-        for (a, b), effect in ROTATION.items()
-    },
-    **{f"linearity_{a}": say("linearity of {axis}", axis=Verbatim(a.upper())) for a in AXES},
-}
-
 
 @dataclass(frozen=True, eq=False)
 class FreeInPlane:
@@ -263,4 +244,12 @@ def _period(shifts: Floats) -> float | None:
 
 def title(name: str) -> Text:
     """A name in words, as of an effect: ``straightness_x_y`` is the straightness of X along Y."""
-    return _TITLES[name]
+    kind, first, *second = name.split("_")
+    axis, other = Verbatim(first.upper()), Verbatim("".join(second).upper())
+    return {
+        "scale": say("scale of {axis}", axis=axis),
+        "squareness": say("squareness {plane}", plane=Verbatim("–".join(axis))),
+        "straightness": say("straightness of {axis} along {direction}", axis=axis, direction=other),
+        "rotation": say("rotation of {axis} about {about}", axis=axis, about=other),
+        "linearity": say("linearity of {axis}", axis=axis),
+    }[kind]

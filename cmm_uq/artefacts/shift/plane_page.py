@@ -195,9 +195,8 @@ def _figures(result: PlaneShiftResult) -> Section:
         for axis, place in zip(AXES, plate.middle, strict=True)
     )
     meaning = say(
-        "Scale and linearity: along the line through the middle of what was read, {middle}. "
-        "Straightness: about the line through its ends. Squareness: of these lines of {a} and {b}, "
-        "the angle between them less 90°.",
+        "Scale and linearity: along the line through the middle of what was read, {middle}. Straightness: about the line "
+        "through its ends. Squareness: of these lines of {a} and {b}, the angle between them less 90°.",
         middle=middle,
         a=a,
         b=b,
@@ -216,8 +215,7 @@ def _open(result: PlaneShiftResult) -> Section:
     if not free.square_known:
         texts.append(
             say(
-                "A plate that is only shifted shears and stretches as the machine does: a placing turned by "
-                "90° parts them."
+                "A plate that is only shifted shears and stretches as the machine does: a placing turned by 90° parts them."
             )
         )
     if not free.size_known:
@@ -290,9 +288,8 @@ def _coordinate(x: float, U: float) -> tuple[Text, Text]:
 
 def _method(result: PlaneShiftResult) -> Section:
     text = say(
-        "The errors of both axes, the positions of the balls and all placings are fitted to all "
-        "readings at once. Linearity, straightness and rotation are smooth functions (Gaussian "
-        "processes, Matérn 7/2) whose sizes, correlation length and growth towards the ends are "
-        "sampled; all else is drawn from its exact conditional distribution."
+        "The errors of both axes, the positions of the balls and all placings are fitted to all readings at once. Linearity, "
+        "straightness and rotation are smooth functions (Gaussian processes, Matérn 7/2) whose sizes, correlation length and "
+        "growth towards the ends are sampled; all else is drawn from its exact conditional distribution."
     )
     return shared.method_section(result, text, len(result.estimate.plate.ball))

@@ -13,12 +13,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.artefacts.kinds import ShiftFacts
+from cmm_uq.artefacts.shift.smooth import Coefficients
 from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
@@ -125,20 +126,23 @@ Reported = Mapping[str, tuple[Floats, str]]  # draws (N,) of something that is r
 _STILL = 1e-9  # part of the largest spread in a list up to which an item does not move but for rounding
 
 
-class Estimated(Protocol):
-    """All that the readings say: chains and their seed, draws (N,) of u of one reading, mm, and what does not fit, mm.
+@dataclass(frozen=True, eq=False)
+class Estimated(ABC):
+    """All that the readings say."""
 
-    The latter with no error of the machine but its scale, and with what was estimated.
-    """
+    coefficients: Coefficients  # joint draws of everything linear
+    chains: Chains  # of the hyper-parameters, and how they converged
+    seed: int  # of everything random
 
     @property
-    def chains(self) -> Chains: ...
+    def sigma(self) -> Floats:
+        """(N,) draws of the standard uncertainty of one coordinate of one reading, mm."""
+        return self.coefficients.sigma
+
     @property
-    def seed(self) -> int: ...
-    @property
-    def sigma(self) -> Floats: ...
-    @property
-    def residuals(self) -> tuple[Floats, Floats]: ...
+    @abstractmethod
+    def residuals(self) -> tuple[Floats, Floats]:
+        """What does not fit, mm: with no error of the machine but scale and squareness, and with what was estimated."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,16 +18,9 @@ from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.messages import Text, foreign
 from cmm_uq.base.plugins import EFFECTS, Plugin, offered
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.machine.physics.effect import (
-    CONTRACT,
-    FURTHER as RARER,
-    OWN as OF_ARTEFACTS,
-    Amount,
-    Effect,
-    Parameter,
-    Shape,
-)
+from cmm_uq.machine.physics.effect import CONTRACT, FURTHER as RARER, OWN as OF_ARTEFACTS, Effect, Parameter, Shape
 from cmm_uq.machine.physics.effects import drives, own_errors, own_states, probing, rigid_body, thermal
+from cmm_uq.machine.physics.words import Amount
 
 
 class EffectPlugin(Plugin):

@@ -16,26 +16,16 @@ from typing import ClassVar
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.messages import NOTHING, Message, Text, Verbatim, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import Unit, unit
+from cmm_uq.machine.physics.words import AXIS, OTHER, SECOND, SENSE, SIDE, SIZE, Amount, filled
 
 # tiers: effects that every job file may count on, rarer ones, and faults of the artefact itself
 CONTRACT, FURTHER, OWN = "contract", "further", "own"
 # how readily an effect of a tier is thought of: a judgement of how many machines show it
 PRIOR_WEIGHT = {CONTRACT: 1.0, FURTHER: 0.1, OWN: 0.1}
 TRIALS = 7  # values of a nonlinear parameter
-# blanks in words: the axes, and of the reported amount its size, side and sense, and the size of a second parameter
-_BLANKS = ("axis", "other", "size", "side", "sense", "second")
-AXIS, OTHER, SIZE, SIDE, SENSE, SECOND = (Verbatim(f"‹{blank}›") for blank in _BLANKS)
-
-
-def filled(text: Text, blanks: Mapping[Text, Text]) -> Text:
-    """A message with its blanks filled in."""
-    if not isinstance(text, Message):
-        return text
-    given = text.arguments.items()
-    return Message(text.pattern, {k: blanks.get(v, v) if isinstance(v, Text) else v for k, v in given})
 
 
 @dataclass(frozen=True)
@@ -64,23 +54,6 @@ class Shape:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", unit(self.unit))
-
-
-@dataclass(frozen=True)
-class Amount:
-    """How much of a parameter, for a sentence: without its sign, with unit and uncertainty, as printed; and the sign."""
-
-    size: Text
-    negative: bool = False
-
-    @property
-    def side(self) -> Text:
-        """Towards which end of an axis the sign points."""
-        return say("minus") if self.negative else say("plus")
-
-    def more(self, more: Text, less: Text) -> Text:
-        """The one word for a positive amount, the other for a negative one."""
-        return less if self.negative else more
 
 
 @dataclass(frozen=True)

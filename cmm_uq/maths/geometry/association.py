@@ -202,7 +202,7 @@ _CRITERIA: Mapping[Association, Callable[[Placed, Floats], Extreme]] = {
 }
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Associated:
     """A feature associated with n points."""
 
@@ -273,20 +273,11 @@ def _answer(
     pointing = None if direction is None else direction[0]
     if outward is not None and of.shape is PLANE and pointing is not None and _against(pointing, outward, feature):
         pointing, deviations = -pointing, -deviations
-    return Associated(
-        feature=feature,
-        association=association,
-        position=of.position(state)[0],
-        direction=pointing,
-        size=None if size is None else float(size[0]),
-        half_angle=None if angle is None else float(angle[0]),
-        form=float(2 * deviations.max() if of.shape is LINE else np.ptp(deviations)),
-        deviations=deviations,
-        contacts=found.contacts,
-        multipliers=found.multipliers,
-        condition=of.condition,
-        gap=found.gap,
-    )
+    form = float(2 * deviations.max() if of.shape is LINE else np.ptp(deviations))
+    diameter, opening = (None if one is None else float(one[0]) for one in (size, angle))
+    figures = pointing, diameter, opening, form, deviations
+    held = found.contacts, found.multipliers, of.condition, found.gap
+    return Associated(feature, association, of.position(state)[0], *figures, *held)
 
 
 def _tangent(feature: FeatureKind, of: Placed, local: Floats, outward: ArrayLike | None) -> Associated:

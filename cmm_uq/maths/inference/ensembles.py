@@ -15,14 +15,17 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.inference.proposals import LogDensity, Numbers, Proposes
+from cmm_uq.maths.inference.proposals import LogDensity, Numbers
+
+if TYPE_CHECKING:
+    from cmm_uq.maths.inference.presence import Proposes
 
 SHARES = (0.9, 0.1)  # how often the step is an independence proposal, and one of differential evolution
 _AHEAD = 40  # most steps that are drawn ahead

@@ -34,11 +34,8 @@ ABSENT = {AXES: 0.5, PLACING: 0.5, GROWTH: 0.8, SLOW: 0.6}  # probability, befor
 # with that spread, are then exponentially distributed as far as their distance from zero goes (∫ 2·φ(s)·exp(−r²/2s²) ds =
 # exp(−r)), and that distance and a direction are sampled: what is known well of two numbers is no curved ridge in three.
 AXES_SPREAD = 0.7
-RATIO = {
-    PLACING: 1.0,
-    GROWTH: 1.0,
-    SLOW: 1.0,
-}  # scale (half-Cauchy) of a component's standard deviation over that of a reading
+# scale (half-Cauchy) of a component's standard deviation over that of a reading
+RATIO = dict.fromkeys((PLACING, GROWTH, SLOW), 1.0)
 LARGEST_RATIO = 300.0
 # cosines of slow noise that one observation may see, of all axes together, where it is quick and where it is not
 FREQUENCIES, FEWER = 72, 24

@@ -23,8 +23,8 @@ from cmm_uq.maths.inference.ensembles import BURN_IN, LEAST_EFFECTIVE_SAMPLES, C
 from cmm_uq.maths.inference.linear_model import Freedoms, LeastSquares, LinearModel, Unknown
 from cmm_uq.maths.inference.marginal import SIGMA_BOUNDS, Marginal
 from cmm_uq.maths.inference.noise import NEGLIGIBLE, SLOW, Components, Sizes
-from cmm_uq.maths.inference.presence import beginning, present
-from cmm_uq.maths.inference.proposals import Proposal, Proposes, tempered, weights
+from cmm_uq.maths.inference.presence import Proposes, beginning, present
+from cmm_uq.maths.inference.proposals import Proposal, tempered, weights
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 # of ln σ: how near to the end of the range searched is at its end, and the step through the whole range

@@ -186,6 +186,9 @@ class Present:
     log_probability = log_density  # the numbers are proposed as they are
 
 
+Proposes = Proposal | Present  # what a sampler takes its steps from
+
+
 def beginning(names: Sequence[str], log_sigma: float = 0.0, width: float = 1.0) -> Present:
     """The prior, and where the reading noise is looked for."""
     numbers = Numbers(tuple(names))

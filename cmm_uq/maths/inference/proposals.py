@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,34 +31,11 @@ _REFITS, _RECALLED, _LEAST_ENOUGH = 5, 3, 0.02
 _FITS = 8  # mixtures fitted to the density itself from which the best is taken
 
 
-class Proposes(Protocol):
-    """What a sampler takes its steps from: draws in coordinates z, their density, and the parameters that they mean."""
-
-    @property
-    def centre(self) -> Floats:
-        """(d,) the parameters where z is zero."""
-
-    def parameters(self, z: Floats) -> Floats:
-        """(w, d) for coordinates z."""
-
-    def draws(self, count: int, random: Any) -> Floats:
-        """Coordinates (count, d)."""
-
-    def numbers_of(self, count: int, random: Any) -> Numbers:
-        """What draws are made of: arrays (count, …) of random numbers, taken in a fixed order."""
-
-    def made(self, numbers: Numbers) -> Floats:
-        """Coordinates (w, d) from such numbers, also of several draws one after another."""
-
-    def log_density(self, z: Floats) -> Floats:
-        """(w,) up to a constant."""
-
-
 @dataclass(frozen=True, eq=False)
 class Proposal:
     """Student's t distributions with six degrees of freedom in whitened coordinates z; x = centre + factor @ z."""
 
-    centre: Floats  # (d,)
+    centre: Floats  # (d,) the parameters where z is zero
     factor: Floats  # (d, d)
     weights: Floats  # (K,)
     centres: Floats  # (K, d) in z
@@ -70,18 +47,20 @@ class Proposal:
         return cls(centre, factor, np.ones(1), np.zeros((1, d)), np.eye(d)[None])
 
     def parameters(self, z: Floats) -> Floats:
+        """(w, d) for coordinates z."""
         return np.asarray(self.centre + z @ self.factor.T)
 
     def draws(self, count: int, random: Any) -> Floats:
         return self.made(self.numbers_of(count, random))
 
     def numbers_of(self, count: int, random: Any) -> Numbers:
-        """Normal numbers (count, d), χ² (count, 1), and which distribution (count,)."""
+        """What draws are made of, taken in a fixed order: normal numbers (count, d), χ² (count, 1), distribution (count,)."""
         normal = random.standard_normal((count, len(self.centre)))
         squares = random.chisquare(_DOF, size=(count, 1))
         return normal, squares, chosen(self._cumulative, count, random)
 
     def made(self, numbers: Numbers) -> Floats:
+        """Coordinates (w, d) from such numbers, also of several draws one after another."""
         normal, squares, part = numbers
         t = np.asarray(normal / np.sqrt(squares / _DOF))
         if len(self.weights) == 1:
@@ -89,6 +68,7 @@ class Proposal:
         return np.asarray(self.centres[part] + np.einsum("wij,wj->wi", self.factors[part], t))
 
     def log_density(self, z: Floats) -> Floats:
+        """(w,) up to a constant."""
         log, _ = self.log_each(z)
         return log[:, 0] if len(self.weights) == 1 else np.asarray(np.logaddexp.reduce(log, axis=1))
 

@@ -29,9 +29,8 @@ if TYPE_CHECKING:
     from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
     from cmm_uq.maths.uncertainty.propagation import Propagated
 
-CERTIFICATE, SPECIFICATION = say("certificate"), say("specification")
 # where a figure comes from, in the fewest words; a line may say more (``"certificate 4711"``)
-REPEATS, JUDGEMENT = say("repeats"), say("judgement")
+REPEATS, JUDGEMENT, CERTIFICATE = say("repeats"), say("judgement"), say("certificate")
 _ROUNDING = 1e-10
 Method = Literal["first", "second", "monte_carlo"]
 NAMES: Mapping[Method, Text] = {

@@ -20,19 +20,13 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, commas, foreign, names, say, semicolons
 from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.base.points import Floats
+from cmm_uq.maths.uncertainty import monte_carlo
 from cmm_uq.maths.uncertainty.budget import NAMES, Budget, Labels, Method, budget_of, joint_line, line_of
 from cmm_uq.maths.uncertainty.correlation import correlation_of
 from cmm_uq.maths.uncertainty.coverage import NO_VARIANCE
 from cmm_uq.maths.uncertainty.distributions import constant
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.monte_carlo import (
-    HIGHEST_COVERAGE,
-    LARGEST,
-    Simulated,
-    numerical_tolerance,
-    simulate,
-    simulate_adaptively,
-)
+from cmm_uq.maths.uncertainty.monte_carlo import HIGHEST_COVERAGE, LARGEST, Simulated, numerical_tolerance
 from cmm_uq.maths.uncertainty.propagation import Propagated, first_order, second_order
 from cmm_uq.maths.uncertainty.quantity import figure, rounded
 from cmm_uq.maths.uncertainty.type_a import check_coverage, coverage_factor
@@ -320,7 +314,7 @@ def _ways(model: MeasurementModel, request: Request) -> Ways:
         clear = [np.abs(np.abs(end - figures[:, 4:]) - tolerance) > doubt for end in ends]
         return all(np.all(one | (doubt <= tolerance / _OF_TOLERANCE)) for one in clear)
 
-    simulated = simulate_adaptively(model, request.coverage, digits, request.seed, request.largest, settled)
+    simulated = monte_carlo.simulate_adaptively(model, request.coverage, digits, request.seed, request.largest, settled)
     return replace(ways, simulated=simulated)
 
 
@@ -362,9 +356,8 @@ def _by_monte_carlo(
         lines.append(replace(line, variance=variance, sensitivity=variance**0.5 / line.u if line.u else 0.0))
     lines.append(joint_line(say("together"), u**2 - float(np.sum(alone))))
     statement = say(
-        "Each quantity's contribution is what it does alone, the others held at their estimates "
-        "(JCGM 101 annex B); “together” is what they add or take away jointly, by correlation or "
-        "nonlinearity."
+        "Each quantity's contribution is what it does alone, the others held at their estimates (JCGM 101 annex B); "
+        "“together” is what they add or take away jointly, by correlation or nonlinearity."
     )
     unit, coverage = labels.unit(name), drawn.coverage
     budget = Budget(Verbatim(name), lines, value, unit, coverage, effective_dof=inf, statement=statement)
@@ -383,5 +376,5 @@ def one_at_a_time(model: MeasurementModel, seed: int = 0) -> Floats:
         if np.any(np.asarray(given.u) > 0):
             with suppress(CmmUqError):
                 alone = MeasurementModel(model.function, {**held, name: given}, model.outputs)
-                variances[:, k] = simulate(alone, _TRIALS_FOR_SENSITIVITY, seed=seed).u ** 2
+                variances[:, k] = monte_carlo.simulate(alone, _TRIALS_FOR_SENSITIVITY, seed=seed).u ** 2
     return variances

@@ -17,13 +17,8 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.uncertainty.measurement_model import (
-    Derivatives,
-    MeasurementModel,
-    complex_step,
-    derivatives,
-    hessian_along,
-)
+from cmm_uq.maths.uncertainty import measurement_model
+from cmm_uq.maths.uncertainty.measurement_model import Derivatives, MeasurementModel
 from cmm_uq.maths.uncertainty.type_a import coverage_factor, effective_dof
 
 
@@ -57,9 +52,9 @@ def first_order(model: MeasurementModel) -> Propagated:
     """Propagate by the first derivatives; :class:`CmmUqError` where they or the model are not finite at the estimates."""
     u = [np.asarray(given.u) for given in model.inputs.values()]
     if model.differentiation == "complex_step":
-        found = complex_step(model, model.means, [np.maximum(v, np.finfo(float).tiny) for v in u])
+        found = measurement_model.complex_step(model, model.means, [np.maximum(v, np.finfo(float).tiny) for v in u])
     else:
-        found = derivatives(model, model.means)
+        found = measurement_model.derivatives(model, model.means)
     return _first_order(model, found, u)
 
 
@@ -69,7 +64,7 @@ def second_order(model: MeasurementModel) -> Propagated:
         fix = "Write the model with NumPy's elementary functions, or use Monte Carlo"
         raise CmmUqError("second derivatives by complex steps are not exact", fix=fix)
     u = [np.asarray(given.u) for given in model.inputs.values()]
-    found = derivatives(model, model.means, order=2)
+    found = measurement_model.derivatives(model, model.means, order=2)
     linear, correlation = _first_order(model, found, u), model.correlation_matrix
     with np.errstate(all="ignore"):  # what is not finite is refused below
         spread = np.stack(np.broadcast_arrays(*u, found.value[0])[:-1])
@@ -97,7 +92,7 @@ def second_order(model: MeasurementModel) -> Propagated:
 def _cubic(model: MeasurementModel, linear: Propagated, spread: Floats, row: int) -> Floats:
     """Σ (V g)ᵢ ∂ᵢ tr(H V): covariance (p, ...) of the linear term of one output with the cubic terms of all."""
     towards = np.einsum("ij,j...->i...", linear.correlation, linear.contribution[row]) * spread
-    turning = hessian_along(model, model.means, list(towards)) * spread[:, None] * spread[None, :]
+    turning = measurement_model.hessian_along(model, model.means, list(towards)) * spread[:, None] * spread[None, :]
     return np.asarray(np.einsum("pij...,ij->p...", turning, linear.correlation))
 
 

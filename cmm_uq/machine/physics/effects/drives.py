@@ -15,13 +15,7 @@ from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, REFERENCE_TEMPERATURE, unit
 from cmm_uq.machine.physics.effect import (
-    AXIS,
     FURTHER,
-    OTHER,
-    SECOND,
-    SIDE,
-    SIZE,
-    Amount,
     Effect,
     Family,
     Harmonic,
@@ -30,9 +24,9 @@ from cmm_uq.machine.physics.effect import (
     Parameter,
     Shape,
     along,
-    filled,
 )
 from cmm_uq.machine.physics.effects.rigid_body import bow, turned
+from cmm_uq.machine.physics.words import AXIS, OTHER, SECOND, SIDE, SIZE, Amount, filled
 from cmm_uq.maths.uncertainty.air.refractivity import harris_2004
 
 _MILLISECOND = 1e-3  # 1 ms in s

@@ -15,10 +15,11 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.machine.physics.effect import FURTHER, SENSE, SIZE, Effect, Harmonic, Parameter
+from cmm_uq.machine.physics.effect import FURTHER, Effect, Harmonic, Parameter
 from cmm_uq.machine.physics.effects.drives import travel
 from cmm_uq.machine.physics.effects.rigid_body import tip_offsets
 from cmm_uq.machine.physics.kinematics import euler_313
+from cmm_uq.machine.physics.words import SENSE, SIZE
 
 NORMAL = ("nx", "ny", "nz")
 TIP = tuple(f"tip_{a}_mm" for a in AXES)

@@ -16,21 +16,9 @@ import numpy as np
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, REFERENCE_TEMPERATURE, unit
-from cmm_uq.machine.physics.effect import (
-    AXIS,
-    CONTRACT,
-    FURTHER,
-    OTHER,
-    SECOND,
-    SENSE,
-    SIDE,
-    SIZE,
-    Effect,
-    OfAxis,
-    Parameter,
-    Shape,
-)
+from cmm_uq.machine.physics.effect import CONTRACT, FURTHER, Effect, OfAxis, Parameter, Shape
 from cmm_uq.machine.physics.effects.rigid_body import LEANING, Lean, turned
+from cmm_uq.machine.physics.words import AXIS, OTHER, SECOND, SENSE, SIDE, SIZE
 
 # coefficient of thermal expansion; glass 8, steel 11.5, aluminium 23 ppm/K bound what is possible.
 EXPANSION = Parameter("cte_per_k", unit("1/K"), 12e-6, say("expansion"))

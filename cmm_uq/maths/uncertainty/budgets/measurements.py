@@ -25,18 +25,12 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, foreign, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE, unit
-from cmm_uq.maths.uncertainty.budget import (
-    CERTIFICATE,
-    JUDGEMENT,
-    REPEATS,
-    SPECIFICATION,
-    Budget,
-    BudgetLine,
-    joint_line,
-)
+from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, REPEATS, Budget, BudgetLine, joint_line
 from cmm_uq.maths.uncertainty.correlation import Correlations
 from cmm_uq.maths.uncertainty.distributions import Distribution, constant
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+
+SPECIFICATION = say("specification")  # where a figure comes from
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,10 +122,9 @@ def harris_uncompensated(scale_um: Sequence[float] = (12.0, 18.0, 6.0)) -> Budge
 
 
 _PRINTED = say(
-    "As printed. It takes a specification and largest errors for standard uncertainties, the rms "
-    "residual of a fit to thousands of points for the uncertainty of its centre, counts one ball "
-    "of the two in section 6.4.1, and divides what all positions share by the root of their "
-    "number."
+    "As printed. It takes a specification and largest errors for standard uncertainties, the rms residual of a fit to "
+    "thousands of points for the uncertainty of its centre, counts one ball of the two in section 6.4.1, and divides what "
+    "all positions share by the root of their number."
 )
 
 
@@ -207,13 +200,9 @@ def sphere_budgets(
 
 
 UNITS: Mapping[str, str] = {
-    "indicated_mm": "mm",
-    "reference_mm": "mm",
-    "workpiece_c": "degC",
-    "workpiece_cte_per_k": "1/K",
-    "scale_c": "degC",
-    "scale_cte_per_k": "1/K",
-    "length": "mm",
+    **dict.fromkeys(("indicated_mm", "reference_mm", "length"), "mm"),
+    **dict.fromkeys(("workpiece_c", "scale_c"), "degC"),
+    **dict.fromkeys(("workpiece_cte_per_k", "scale_cte_per_k"), "1/K"),
     "scale_error": "1",
 }
 
@@ -234,18 +223,13 @@ def length_at_20(
 
     ``correlation``: such as that of the two temperatures, which one thermometer may have measured.
     """
-    inputs = {
-        "indicated_mm": indicated_mm,
-        "workpiece_c": workpiece_c,
-        "workpiece_cte_per_k": workpiece_cte_per_k,
-        "scale_c": scale_c or constant(REFERENCE_TEMPERATURE),
-        "scale_cte_per_k": scale_cte_per_k or constant(0.0),
-    }
+    names = ("indicated_mm", "workpiece_c", "workpiece_cte_per_k", "scale_c", "scale_cte_per_k")
+    scale = scale_c or constant(REFERENCE_TEMPERATURE), scale_cte_per_k or constant(0.0)
+    inputs = dict(zip(names, (indicated_mm, workpiece_c, workpiece_cte_per_k, *scale), strict=True))
 
-    def length(
-        indicated_mm: Any, workpiece_c: Any, workpiece_cte_per_k: Any, scale_c: Any, scale_cte_per_k: Any
-    ) -> Any:
-        return indicated_mm * _stretch(scale_cte_per_k, scale_c) / _stretch(workpiece_cte_per_k, workpiece_c)
+    def length(**q: Any) -> Any:
+        stretched = q["indicated_mm"] * _stretch(q["scale_cte_per_k"], q["scale_c"])
+        return stretched / _stretch(q["workpiece_cte_per_k"], q["workpiece_c"])
 
     return MeasurementModel(length, inputs, ("length",), correlation or {})
 
@@ -258,14 +242,10 @@ def scale_error(
     correlation: Correlations | None = None,
 ) -> MeasurementModel:
     """Relative scale error s, true = indicated · (1 + s), from a reference length calibrated at 20 °C."""
-    inputs = {
-        "indicated_mm": indicated_mm,
-        "reference_mm": reference_mm,
-        "workpiece_c": workpiece_c,
-        "workpiece_cte_per_k": workpiece_cte_per_k,
-    }
+    names = ("indicated_mm", "reference_mm", "workpiece_c", "workpiece_cte_per_k")
+    inputs = dict(zip(names, (indicated_mm, reference_mm, workpiece_c, workpiece_cte_per_k), strict=True))
 
-    def error(indicated_mm: Any, reference_mm: Any, workpiece_c: Any, workpiece_cte_per_k: Any) -> Any:
-        return reference_mm * _stretch(workpiece_cte_per_k, workpiece_c) / indicated_mm - 1.0
+    def error(**q: Any) -> Any:
+        return q["reference_mm"] * _stretch(q["workpiece_cte_per_k"], q["workpiece_c"]) / q["indicated_mm"] - 1.0
 
     return MeasurementModel(error, inputs, ("scale_error",), correlation or {})

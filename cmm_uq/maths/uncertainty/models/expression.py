@@ -13,6 +13,7 @@ import unicodedata
 import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from operator import pow as power
 from typing import Any, Literal
 
 import numpy as np
@@ -21,40 +22,18 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.limits import NUMERAL, TEXT
 
 FUNCTIONS: Mapping[str, np.ufunc] = {
-    "sqrt": np.sqrt,
-    "exp": np.exp,
-    "log": np.log,
-    "log10": np.log10,
-    "sin": np.sin,
-    "cos": np.cos,
-    "tan": np.tan,
-    "asin": np.arcsin,
-    "acos": np.arccos,
-    "atan": np.arctan,
-    "atan2": np.arctan2,
+    **{name: getattr(np, name) for name in ("sqrt", "exp", "log", "log10", "sin", "cos", "tan")},
+    **{f"a{name}": getattr(np, f"arc{name}") for name in ("sin", "cos", "tan", "tan2")},
     "abs": np.absolute,
 }
 CONSTANTS: Mapping[str, float] = {"pi": np.pi}
 
-_OPERATORS: Mapping[type[ast.AST], str] = {
-    ast.Add: "+",
-    ast.Sub: "-",
-    ast.Mult: "*",
-    ast.Div: "/",
-    ast.Pow: "**",
-    ast.USub: "negative",
-    ast.UAdd: "positive",
-}
-_CALLS: Mapping[str, Callable[..., Any]] = {
-    "+": np.add,
-    "-": np.subtract,
-    "*": np.multiply,
-    "/": np.divide,
-    "**": lambda base, exponent: base**exponent,
-    "negative": np.negative,
-    "positive": np.positive,
-    **FUNCTIONS,
-}
+_SIGNS = ("+", "-", "*", "/", "**", "negative", "positive")
+_NODES = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd)
+_OPERATORS: Mapping[type[ast.AST], str] = dict(zip(_NODES, _SIGNS, strict=True))
+# the operator of a power, for it knows squares and square roots
+_APPLIED = (np.add, np.subtract, np.multiply, np.divide, power, np.negative, np.positive)
+_CALLS: Mapping[str, Callable[..., Any]] = {**dict(zip(_SIGNS, _APPLIED, strict=True)), **FUNCTIONS}
 
 LONGEST = TEXT.most
 _LONG_NUMERAL = re.compile(rf"\w{{{NUMERAL.most + 1}}}")

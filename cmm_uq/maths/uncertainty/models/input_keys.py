@@ -292,14 +292,11 @@ def _angle(a: Any, b: Any) -> Any:
 
 
 _RULES: Mapping[str, Callable[..., Any]] = {
-    "+": _sum,
-    "-": _sum,
+    **dict.fromkeys(("+", "-"), _sum),
     "*": lambda a, b: _plain(a) * _plain(b),
     "/": lambda a, b: _plain(a) / _plain(b),
     "**": _power,
-    "negative": lambda a: a,
-    "positive": lambda a: a,
-    "abs": lambda a: a,
+    **dict.fromkeys(("negative", "positive", "abs"), lambda a: a),
     "sqrt": lambda a: _plain(a) ** 0.5,
     "atan2": _angle,
 }

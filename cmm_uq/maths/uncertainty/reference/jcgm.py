@@ -253,10 +253,9 @@ CASES = (
         "Mass calibration",
         "JCGM 101:2008 9.3, recomputed",
         figures(
-            "Monte Carlo value: 1.2340 ± 0.0005; Monte Carlo u: 0.075480 ± 0.0005; Monte Carlo low: 1.08443 ± 0.001; "
-            "Monte Carlo high: 1.38357 ± 0.001; first order u: 0.0539 ± 5e-5; first order low: 1.1285 ± 5e-5; "
-            "first order high: 1.3395 ± 5e-5; second order u: 0.07496 ± 5e-6; second order low: 1.0871 ± 5e-5; "
-            "second order high: 1.3809 ± 5e-5"
+            "Monte Carlo value: 1.2340 ± 0.0005; Monte Carlo u: 0.075480 ± 0.0005; Monte Carlo low: 1.08443 ± 0.001; Monte "
+            "Carlo high: 1.38357 ± 0.001; first order u: 0.0539 ± 5e-5; first order low: 1.1285 ± 5e-5; first order high: "
+            "1.3395 ± 5e-5; second order u: 0.07496 ± 5e-6; second order low: 1.0871 ± 5e-5; second order high: 1.3809 ± 5e-5"
         ),
         _mass,
     ),
@@ -274,9 +273,8 @@ CASES = (
             f"Comparison loss, x1 = {x1:g}, in 10⁻⁶",
             "JCGM 101:2008 9.4, recomputed",
             figures(
-                f"value: {value} ± {delta}; u: {u} ± {delta}; low: {low} ± {delta}; high: {high} ± {2 * delta}; "
-                f"u by first order: {1e6 * 2 * x1 * 0.005} ± 1e-9; value by second order: {value} ± 1e-6; "
-                f"u by second order: {u} ± 0.05"
+                f"value: {value} ± {delta}; u: {u} ± {delta}; low: {low} ± {delta}; high: {high} ± {2 * delta}; u by first "
+                f"order: {1e6 * 2 * x1 * 0.005} ± 1e-9; value by second order: {value} ± 1e-6; u by second order: {u} ± 0.05"
             ),
             partial(_loss, x1),
         )
