@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from asn1crypto import crl, ocsp, x509
+from asn1crypto import cms, crl, ocsp, x509
 from cryptography import x509 as certificates
 from cryptography.exceptions import InvalidSignature
+from pyhanko.sign.validation.generic_cms import validate_tst_signed_data
 from pyhanko_certvalidator import CertificateValidator, ValidationContext
-from pyhanko_certvalidator.errors import PathBuildingError, PathValidationError, RevokedError
+from pyhanko_certvalidator.errors import InvalidCertificateError, PathBuildingError, PathValidationError, RevokedError
 
 from cmm_uq.base.messages import Text, Verbatim, day, say
 from cmm_uq.certificate.sign.found import NOBODY, Revocation, Trust, ran
@@ -106,6 +107,8 @@ def _path(
         validate("require")
     except RevokedError:
         return False, "revoked", REVOKED
+    except InvalidCertificateError:  # signed by itself, and not trusted
+        return False, "not known", UNTRUSTED
     except (PathBuildingError, PathValidationError):
         pass
     else:  # a certificate that is trusted itself has nobody above it who could revoke it
@@ -144,3 +147,14 @@ def _listed(certificate: x509.Certificate, evidence: Evidence, trust: Trust) -> 
         if one.issuer == certificate.issuer
         for revoked in one["tbs_cert_list"]["revoked_certificates"].native or ()
     )
+
+
+def stamped_time(
+    token: cms.SignedData, imprint: Callable[[str], bytes], evidence: Evidence, trust: Trust
+) -> tuple[dt.datetime | None, bool]:
+    """Time of a time stamp, where that fits what it is to be of, and whether somebody trusted made it."""
+    at = token["encap_content_info"]["content"].parsed["gen_time"].native
+    status = ran(validate_tst_signed_data(token, context(evidence, trust, at), imprint))
+    if not (status["intact"] and status["valid"]):
+        return None, False
+    return at, bool(status.get("trust_problem_indic") is None and status.get("validation_path") is not None)

@@ -89,6 +89,7 @@ class Trust:
 
 WEAK = say("the signature is made with an algorithm that is weak or unknown")
 BROKEN = say("the signature does not fit the file: one of them was changed")
+STAMP_BROKEN = say("the time stamp does not fit the signature")
 NOBODY = say("nobody is trusted: name the certificates that you trust")
 
 

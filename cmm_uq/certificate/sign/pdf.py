@@ -9,14 +9,14 @@ from __future__ import annotations
 import datetime as dt
 import io
 import os
-from collections.abc import Callable
+import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import SIGNED_BYTES
 from cmm_uq.base.messages import Text, Verbatim, commas, plural, say
-from cmm_uq.certificate.sign.found import BROKEN, WEAK, FileSignature, Trust, appending, installed, ran
+from cmm_uq.certificate.sign.found import BROKEN, STAMP_BROKEN, WEAK, FileSignature, Trust, appending, installed, ran
 from cmm_uq.certificate.sign.signer import ONE_DIGEST, Signer
 
 if TYPE_CHECKING:
@@ -141,8 +141,9 @@ DIGESTS = frozenset({"sha256", "sha384", "sha512"})
 MECHANISMS = frozenset({"rsassa_pkcs1v15", "rsassa_pss", "ecdsa"})
 PADES = "/ETSI.CAdES.detached"
 UNREADABLE = say("the signature cannot be read")
-STAMP_BROKEN = say("the time stamp does not fit the signature")
 NO_PADES = say("the signature is no PAdES signature")
+BEHIND = say("bytes stand behind it that belong to no revision of the file")
+_END = re.compile(rb"startxref\s+\d+\s+%%EOF")
 _TOLD = 6  # kinds of objects that a message names
 
 
@@ -265,7 +266,12 @@ def _whole(file: _File, embedded: EmbeddedPdfSignature) -> tuple[bool, list[Text
     # whether another signature covers what was appended after this one
     later = any(other.signed_revision > embedded.signed_revision for other in file.embedded)
     most = ModificationLevel.FORM_FILLING if later else ModificationLevel.LTA_UPDATES
-    if isinstance(result, DiffResult) and result.modification_level <= most:
+    revisions = range(embedded.signed_revision + 1, file.reader.total_revisions)
+    *ends, rest = _END.split(file.data[int(embedded.byte_range[2]) + int(embedded.byte_range[3]) :])
+    if rest.strip() or len(ends) != len(revisions):
+        return False, [BEHIND]
+    empty = [one for one in revisions if not file.reader.xrefs.explicit_refs_in_revision(one)]
+    if isinstance(result, DiffResult) and result.modification_level <= most and not empty:
         return True, []
     count = file.reader.total_revisions - 1 - embedded.signed_revision
     changed = commas([Verbatim(name) for name in _changed(file.reader, embedded.signed_revision)])
@@ -303,25 +309,12 @@ def _stamp_of_signature(
     """Time of the signature's time stamp, where that fits, and whether somebody trusted made it."""
     from pyhanko.sign.validation.generic_cms import message_imprint_checker
 
+    from cmm_uq.certificate.sign.chain import stamped_time
+
     token = _token(embedded)
     if token is None:
         return None, False
-    return _stamp(token, message_imprint_checker(embedded.signer_info), evidence, trust)
-
-
-def _stamp(
-    token: Any, imprint: Callable[[str], bytes], evidence: Evidence, trust: Trust
-) -> tuple[dt.datetime | None, bool]:  # fmt: skip
-    """Time of a time stamp, where it fits what it is to be of, and whether somebody trusted made it."""
-    from pyhanko.sign.validation.generic_cms import validate_tst_signed_data
-
-    from cmm_uq.certificate.sign.chain import context
-
-    at = token["encap_content_info"]["content"].parsed["gen_time"].native
-    status = ran(validate_tst_signed_data(token, context(evidence, trust, at), imprint))
-    if not (status["intact"] and status["valid"]):
-        return None, False
-    return at, bool(status.get("trust_problem_indic") is None and status.get("validation_path") is not None)
+    return stamped_time(token, message_imprint_checker(embedded.signer_info), evidence, trust)
 
 
 def _evidence(reader: PdfFileReader) -> Evidence:
@@ -345,11 +338,13 @@ def _evidence(reader: PdfFileReader) -> Evidence:
 
 def _level(file: _File, embedded: EmbeddedPdfSignature, stamped: dt.datetime | None, *, known: bool) -> str:
     """B, T, LT or LTA (ETSI EN 319 142-1), as far as it holds."""
+    from cmm_uq.certificate.sign.chain import stamped_time
+
     if stamped is None:
         return "B"
     if not known or not (file.evidence.revocations or file.evidence.answers):
         return "T"
     later = [one for one in file.embedded if one.sig_object.get("/Type") == "/DocTimeStamp"
              and one.signed_revision > embedded.signed_revision]  # fmt: skip
-    archived = any(_stamp(one.signed_data, one.compute_digest, file.evidence, file.trust)[1] for one in later)
+    archived = any(stamped_time(one.signed_data, one.compute_digest, file.evidence, file.trust)[1] for one in later)
     return "LTA" if archived else "LT"

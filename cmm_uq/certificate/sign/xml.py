@@ -1,6 +1,7 @@
 """XML signed by XAdES B-B, over the whole root, enveloped, as a DCC's last element, and the signatures in an XML file.
 
-The same file, key and time give the same bytes.
+The same file, key and time give the same bytes. Of a signature every element is accounted for: signed, or of the form below,
+with nothing in it but what is verified.
 """
 
 from __future__ import annotations
@@ -9,18 +10,25 @@ import base64
 import binascii
 import datetime as dt
 import hashlib
-from typing import TYPE_CHECKING, Any
+import re
+from collections.abc import Callable, Iterator
+from functools import partial
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import SIGNED_BYTES
-from cmm_uq.base.messages import Text, say
-from cmm_uq.certificate.sign.found import BROKEN, WEAK, FileSignature, Trust, installed
+from cmm_uq.base.messages import Text, Verbatim, commas, say
+from cmm_uq.certificate.sign.found import BROKEN, STAMP_BROKEN, WEAK, FileSignature, Trust, installed
 from cmm_uq.certificate.sign.signer import Signer
 
 if TYPE_CHECKING:
     from asn1crypto import x509
     from lxml.etree import _Element
 
+    from cmm_uq.certificate.sign.chain import Evidence
+
+T = TypeVar("T")
 DS, XADES = "{http://www.w3.org/2000/09/xmldsig#}", "{http://uri.etsi.org/01903/v1.3.2#}"
 SIGNATURE = f"{DS}Signature"
 
@@ -125,15 +133,46 @@ DIGESTS = frozenset({"http://www.w3.org/2001/04/xmlenc#sha256", "http://www.w3.o
 METHODS = frozenset(f"http://www.w3.org/2001/04/xmldsig-more#{key}-sha{bits}" for key in ("rsa", "ecdsa")
                     for bits in (256, 384, 512))  # fmt: skip
 
-LEVEL = "XAdES B-B"
 QUALIFYING = f"{DS}Object/{XADES}QualifyingProperties"
 PROPERTIES = f"{QUALIFYING}/{XADES}SignedProperties"
+UNSIGNED = f"{QUALIFYING}/{XADES}UnsignedProperties/{XADES}UnsignedSignatureProperties"
+STAMP = f"{UNSIGNED}/{XADES}SignatureTimeStamp"
 OF_ANOTHER = say("the signed properties are not those of this signature")
 NO_XADES = say("the signature has no signed properties, as XAdES asks for")
 ELSEWHERE = say("the signature does not stand as the last element of the root")
 PARTIAL = say("the signature covers a part of the file, or more than the file: only one over the whole root counts")
 NO_CERTIFICATE = say("the signature has no certificate that can be read")
+NO_EVIDENCE = say("what was added to the signature about certificates cannot be read")
 SEVERAL = say("the file has several signatures, and one covers the other")
+_BASE64 = r"[A-Za-z0-9+/=\s]*"
+_FORMS = MappingProxyType(
+    {
+        SIGNATURE: ("SignedInfo SignatureValue KeyInfo Object", "Id", r"\s*"),
+        f"{DS}SignatureValue": ("", "Id", _BASE64),
+        f"{DS}KeyInfo": ("X509Data", "Id", r"\s*"),
+        f"{DS}X509Data": ("X509Certificate( X509Certificate)*", "", r"\s*"),
+        f"{DS}X509Certificate": ("", "", _BASE64),
+        f"{DS}Object": ("QualifyingProperties", "", r"\s*"),
+        f"{XADES}QualifyingProperties": ("SignedProperties( UnsignedProperties)?", "Target Id", r"\s*"),
+        f"{XADES}UnsignedProperties": ("UnsignedSignatureProperties", "Id", r"\s*"),
+        f"{XADES}UnsignedSignatureProperties": (
+            "SignatureTimeStamp( CertificateValues)?( RevocationValues)?",
+            "Id",
+            r"\s*",
+        ),
+        f"{XADES}SignatureTimeStamp": ("(CanonicalizationMethod )?EncapsulatedTimeStamp", "Id", r"\s*"),
+        f"{DS}CanonicalizationMethod": ("", "Algorithm", r"\s*"),
+        f"{XADES}EncapsulatedTimeStamp": ("", "Id", _BASE64),
+        f"{XADES}CertificateValues": ("EncapsulatedX509Certificate( EncapsulatedX509Certificate)*", "Id", r"\s*"),
+        f"{XADES}EncapsulatedX509Certificate": ("", "Id", _BASE64),
+        f"{XADES}RevocationValues": ("CRLValues|OCSPValues|CRLValues OCSPValues", "Id", r"\s*"),
+        f"{XADES}CRLValues": ("EncapsulatedCRLValue( EncapsulatedCRLValue)*", "Id", r"\s*"),
+        f"{XADES}OCSPValues": ("EncapsulatedOCSPValue( EncapsulatedOCSPValue)*", "Id", r"\s*"),
+        f"{XADES}EncapsulatedCRLValue": ("", "Id", _BASE64),
+        f"{XADES}EncapsulatedOCSPValue": ("", "Id", _BASE64),
+    }
+)
+"""Of what no signature covers, each element's children, attributes and text (XML Signature 1.1, 4; EN 319 132-1, 5)."""
 
 
 def signatures_of_xml(data: bytes, trust: Trust, *, where: str = "the XML file") -> tuple[FileSignature, ...]:
@@ -152,17 +191,48 @@ def _found(data: bytes, element: _Element, *, several: bool, trust: Trust) -> Fi
         problems.append(SEVERAL)
     if not certificates:
         problems.append(NO_CERTIFICATE)
-    if problems:  # nothing is computed of what could not count
+    added = _evidence(element)
+    if added is None:
+        problems.append(NO_EVIDENCE)
+    if problems or added is None:  # nothing is computed of what could not count
         return FileSignature.of_nobody("XML", problems)
     signer = certificates[0]
     references = [str(one.get("URI")) for one in element.iterfind(f"{DS}SignedInfo/{DS}Reference")]
     content = _verified(data, signer, references)
-    at = _time(element)
-    judged = standing(signer, Evidence(tuple(certificates[1:])), trust, at, proven=False)
+    evidence = Evidence((*certificates[1:], *added.certificates), added.revocations, added.answers)
+    stamped, proven = _stamp_of_signature(element, evidence, trust)
+    at = stamped if proven else _time(element)
+    problems = [] if content else [BROKEN]
+    if stamped is None and element.find(STAMP) is not None:
+        problems.append(STAMP_BROKEN)
+    judged = standing(signer, evidence, trust, at, proven=proven)
+    known = judged.revocation == "good" and bool(added.revocations or added.answers)
+    level = "B" if stamped is None else "LT" if known else "T"
     return FileSignature.of_signer(
-        signer, judged, LEVEL, at, proven=False, intact=bool(content), whole=True, problems=() if content else (BROKEN,),
+        signer, judged, f"XAdES B-{level}", at, proven=proven, intact=bool(content), whole=True, problems=problems,
         content=content,
     )  # fmt: skip
+
+
+def _further(part: _Element, signed: set[str]) -> Iterator[str]:
+    """Names of what stands in a part of a signature, though nothing covers it and the forms do not have it."""
+    if part.tag == f"{DS}SignedInfo" or part.get("Id") in signed:
+        return
+    name, children = _name(part), [_name(child) for child in part]
+    form, attributes, text = _FORMS.get(str(part.tag), (None, "", ""))
+    words = (part.text or "", *((child.tail or "").strip() for child in part))
+    if form is None or not re.fullmatch(form, " ".join(children)):
+        known = re.findall(r"\w+", form or "")
+        yield from [child for child in children if form is not None and child not in known] or [name]
+    elif set(part.attrib) - set(attributes.split()) or not re.fullmatch(text, words[0]) or any(words[1:]):
+        yield name
+    else:
+        for child in part:
+            yield from _further(child, signed)
+
+
+def _name(element: _Element) -> str:
+    return str(element.tag).rpartition("}")[2]
 
 
 def _shape(element: _Element) -> list[Text]:
@@ -184,6 +254,10 @@ def _shape(element: _Element) -> list[Text]:
     methods = [str(one.get("Algorithm")) for one in element.iterfind(f"{DS}SignedInfo/{DS}SignatureMethod")]
     if not digests <= DIGESTS or len(methods) != 1 or methods[0] not in METHODS:
         found.append(WEAK)
+    further = dict.fromkeys(_further(element, {str(one.get("URI"))[1:] for one in references if one.get("URI")}))
+    if further and ELSEWHERE not in found:
+        what = commas([Verbatim(name) for name in further])
+        found.append(say("the signature holds what nothing covers or verifies: {what}", what=what))
     return found
 
 
@@ -216,19 +290,61 @@ def _own(element: _Element, references: list[_Element]) -> bool:
     )  # fmt: skip
 
 
+def _values(element: _Element, path: str, load: Callable[[bytes], T]) -> list[T] | None:
+    """What base64 of elements gives; ``None`` where one cannot be read."""
+    found: list[T] = []
+    try:
+        for one in element.iterfind(path):
+            value = load(base64.b64decode(one.text or "", validate=False))
+            value.native  # type: ignore[attr-defined]  # noqa: B018 - parsed when it is first asked for
+            found.append(value)
+    except (ValueError, TypeError, KeyError, binascii.Error):
+        return None
+    return found
+
+
 def _certificates(element: _Element) -> list[x509.Certificate]:
     """That the signature carries, the signer's first; none where one cannot be read."""
     from asn1crypto import x509
 
-    found = []
-    try:
-        for one in element.iterfind(f"{DS}KeyInfo/{DS}X509Data/{DS}X509Certificate"):
-            certificate = x509.Certificate.load(base64.b64decode(one.text or ""), strict=True)
-            certificate.native  # noqa: B018 - parsed when it is first asked for
-            found.append(certificate)
-    except (ValueError, TypeError, KeyError, binascii.Error):
-        return []
-    return found
+    load: Callable[[bytes], x509.Certificate] = partial(x509.Certificate.load, strict=True)
+    return _values(element, f"{DS}KeyInfo/{DS}X509Data/{DS}X509Certificate", load) or []
+
+
+def _evidence(element: _Element) -> Evidence | None:
+    """What was added about certificates and their revocation (EN 319 132-1, 5.4); ``None`` where it cannot be read."""
+    from asn1crypto import crl, ocsp, x509
+
+    from cmm_uq.certificate.sign.chain import Evidence
+
+    places = {
+        f"{XADES}CertificateValues/{XADES}EncapsulatedX509Certificate": x509.Certificate,
+        f"{XADES}RevocationValues/{XADES}CRLValues/{XADES}EncapsulatedCRLValue": crl.CertificateList,
+        f"{XADES}RevocationValues/{XADES}OCSPValues/{XADES}EncapsulatedOCSPValue": ocsp.OCSPResponse,
+    }
+    found: list[Any] = [
+        _values(element, f"{UNSIGNED}/{place}", partial(sort.load, strict=True)) for place, sort in places.items()
+    ]
+    return None if None in found else Evidence(*(tuple(each) for each in found))
+
+
+def _stamp_of_signature(element: _Element, evidence: Evidence, trust: Trust) -> tuple[dt.datetime | None, bool]:
+    """Time of a time stamp over the canonical SignatureValue (EN 319 132-1, 5.3), and whether somebody trusted made it."""
+    from asn1crypto import cms
+    from lxml import etree
+
+    from cmm_uq.certificate.sign.chain import stamped_time
+
+    tokens = _values(element, f"{STAMP}/{XADES}EncapsulatedTimeStamp", partial(cms.ContentInfo.load, strict=True))
+    if not tokens:
+        return None, False
+    method = element.find(f"{STAMP}/{DS}CanonicalizationMethod")
+    algorithm = CANONICAL[0] if method is None else str(method.get("Algorithm"))
+    if algorithm not in CANONICAL:
+        return None, False
+    value = etree.tostring(element.find(f"{DS}SignatureValue"), method="c14n", exclusive=algorithm == CANONICAL[2],
+                           with_tail=False)  # fmt: skip
+    return stamped_time(tokens[0]["content"], lambda digest: hashlib.new(digest, value).digest(), evidence, trust)
 
 
 def _verified(data: bytes, signer: x509.Certificate, references: list[str]) -> bytes:

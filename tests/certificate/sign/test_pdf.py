@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import datetime as dt
 import io
+import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pikepdf
@@ -168,6 +170,30 @@ def test_a_revision_that_changes_a_page_is_named(signed: bytes, trust: Trust) ->
     assert "1 revision was appended after it, and changes" in found.problems[0]
     assert "Page" in found.problems[0]
     assert found.content == signed
+
+
+NOTHING = "bytes stand behind it that belong to no revision of the file"
+
+
+def empty_revision(signed: bytes) -> bytes:
+    root, size = (re.findall(rf"/{key} (\d+(?: 0 R)?)".encode(), signed)[-1] for key in ("Root", "Size"))
+    place = re.findall(rb"startxref\s+(\d+)", signed)[-1]
+    return b"\nxref\n0 0\ntrailer\n<</Size %s/Root %s/Prev %s>>\nstartxref\n%d\n%%%%EOF\n" % (
+        size, root, place, len(signed) + 1)  # fmt: skip
+
+
+@pytest.mark.parametrize(("behind", "problem"), [
+    (lambda _: b"U = 0.1", NOTHING), (lambda _: b"U = 0.1 %%EOF\n", NOTHING),
+    (lambda signed: b"U = 0.1\nstartxref\n%s\n%%%%EOF" % re.findall(rb"startxref\s+(\d+)", signed)[-1], NOTHING),
+    (empty_revision, "1 revision was appended after it, and changes Trailer"),
+])  # fmt: skip
+def test_what_follows_a_signature_and_changes_nothing_is_named_too(
+    behind: Callable[[bytes], bytes], problem: str, signed: bytes, trust: Trust
+) -> None:
+    found = only(signatures_of_pdf(signed + behind(signed), trust))
+    assert (found.intact, found.covers_whole_file, found.good) == (True, False, False)
+    assert found.problems == (problem,)
+    assert only(signatures_of_pdf(signed + b"\n", trust)).good
 
 
 def also(writer: object, change: str) -> None:

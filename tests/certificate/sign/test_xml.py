@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import base64
 import datetime as dt
 import shutil
 import subprocess
 from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
 from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+from cryptography.x509 import ExtendedKeyUsage
+from cryptography.x509.oid import ExtendedKeyUsageOID
 from hypothesis import given, settings, strategies as st
 from lxml import etree
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.sign import FileSignature, Trust, sign_xml, signatures_of_xml
 from tests.certificate.sign.authority import FIRST, LAST, SIGNED, Held, curve_key, issued, root, usage
+from tests.certificate.sign.responders import revocations, stamps
 from tests.conftest import ROOT
 
 DS = "{http://www.w3.org/2000/09/xmldsig#}"
@@ -216,6 +221,109 @@ def test_a_signature_that_covers_something_else_does_not_count(
     assert all(one.problems for one in found)
 
 
+def with_further(place: str, further: str) -> Callable[[etree._Element], None]:
+    def add(signature: etree._Element) -> None:
+        (signature.find(place) if place else signature).append(etree.fromstring(further))
+
+    return add
+
+
+def with_text(place: str, text: str, *, tail: bool = False) -> Callable[[etree._Element], None]:
+    return lambda signature: setattr(signature.find(place), "tail" if tail else "text", text)
+
+
+def with_attribute(signature: etree._Element) -> None:
+    signature.find(f"{DS}SignatureValue").set("U", "0.1 µm")
+
+
+OBJECT = f'<Object xmlns="{DS[1:-1]}">U = 0.1 µm</Object>'
+PROPERTIES = f"{DS}Object/{XADES}QualifyingProperties"
+UNSIGNED = f'<UnsignedProperties xmlns="{XADES[1:-1]}"/>'
+STAMPLESS = UNSIGNED.replace("/>", "><UnsignedSignatureProperties><SignatureTimeStamp/></UnsignedSignatureProperties>")
+
+
+@pytest.mark.parametrize(("change", "what"), [
+    (with_further("", OBJECT), "Signature"), (with_further("", "<note>U = 0.1 µm</note>"), "note"),
+    (with_further(f"{DS}KeyInfo/{DS}X509Data", "<note/>"), None), (with_further(f"{DS}Object", OBJECT), "Object"),
+    (with_further(PROPERTIES, UNSIGNED), "UnsignedProperties"), (with_further(PROPERTIES, "<U>0.1</U>"), "U"),
+    (with_further(PROPERTIES, f"{STAMPLESS}</UnsignedProperties>"), "SignatureTimeStamp"),
+    (with_text(f"{DS}Object", "U = 0.1 µm"), "Object"), (with_attribute, "SignatureValue"),
+    (with_text(f"{DS}SignatureValue", "U = 0.1 µm", tail=True), "Signature"),
+])  # fmt: skip
+def test_what_a_signature_holds_besides_its_own_form_is_named(
+    change: Callable[[etree._Element], None], what: str | None, signed: bytes, trust: Trust
+) -> None:
+    """``None``: in what the signature covers, so that it breaks it."""
+    root = etree.fromstring(signed)
+    change(root[-1])
+    found = only(signatures_of_xml(etree.tostring(root), trust))
+    assert not found.good
+    assert found.problems == (
+        (f"the signature holds what nothing covers or verifies: {what}",) if what else found.problems[:1]
+    )
+
+
+def stamped(signed: bytes, held: Held, of: bytes | None = None) -> etree._Element:
+    """With a time stamp over the canonical signature value, by another program (RFC 3161; EN 319 132-1, 5.3)."""
+    from asn1crypto import algos, tsp
+
+    root = etree.fromstring(signed)
+    value = of or etree.tostring(root[-1].find(f"{DS}SignatureValue"), method="c14n", with_tail=False)
+    imprint = {
+        "hash_algorithm": algos.DigestAlgorithm({"algorithm": "sha256"}),
+        "hashed_message": sha256(value).digest(),
+    }
+    _, _, answer = stamps(held, STAMPED)(
+        tsp.TimeStampReq({"version": 1, "message_imprint": imprint, "cert_req": True}).dump()
+    )
+    token = base64.b64encode(tsp.TimeStampResp.load(answer)["time_stamp_token"].dump()).decode()
+    inside = f"<SignatureTimeStamp><EncapsulatedTimeStamp>{token}</EncapsulatedTimeStamp></SignatureTimeStamp>"
+    root[-1].find(PROPERTIES).append(etree.fromstring(
+        f'<UnsignedProperties xmlns="{XADES[1:-1]}"><UnsignedSignatureProperties>{inside}'
+        "</UnsignedSignatureProperties></UnsignedProperties>"
+    ))  # fmt: skip
+    return root
+
+
+STAMPED = SIGNED + dt.timedelta(seconds=7)
+
+
+@pytest.fixture(scope="module")
+def stamper(anchor: Held, rsa_key: rsa.RSAPrivateKey) -> Held:
+    return issued("Time", rsa_key, anchor, key_usage=usage(digital_signature=True),
+                  further=((ExtendedKeyUsage([ExtendedKeyUsageOID.TIME_STAMPING]), True),))  # fmt: skip
+
+
+def test_a_time_stamp_that_fits_proves_the_time_and_one_of_another_signature_is_named(
+    signed: bytes, stamper: Held, anchor: Held, trust: Trust
+) -> None:
+    found = only(signatures_of_xml(etree.tostring(stamped(signed, stamper)), trust))
+    assert found.good
+    assert (found.level, found.time, found.time_proven) == ("XAdES B-T", STAMPED, True)
+    other = only(signatures_of_xml(etree.tostring(stamped(signed, stamper, b"another value")), trust))
+    assert (other.good, other.level) == (False, "XAdES B-B")
+    assert other.problems == ("the time stamp does not fit the signature",)
+
+
+@pytest.mark.parametrize(("listed", "good", "revocation", "level"), [
+    ("nobody", True, "good", "XAdES B-LT"), ("the signer", False, "revoked", "XAdES B-T"),
+    ("U = 0.1 µm", False, "not known", "XML"),
+])  # fmt: skip
+def test_a_list_of_revocations_beside_a_time_stamp_counts(
+    listed: str, good: bool, revocation: str, level: str, xml: bytes, stamper: Held, curve_held: Held, anchor: Held,
+    trust: Trust,
+) -> None:  # fmt: skip
+    root = stamped(sign_xml(xml, curve_held.signer, at=SIGNED), stamper)
+    entry = (curve_held.certificate.serial_number, SIGNED - dt.timedelta(hours=1))
+    data = {"nobody": revocations(anchor), "the signer": revocations(anchor, entry)}.get(listed, listed.encode())
+    root[-1].find(f"{PROPERTIES}/{XADES}UnsignedProperties/{XADES}UnsignedSignatureProperties").append(etree.fromstring(
+        f'<RevocationValues xmlns="{XADES[1:-1]}"><CRLValues><EncapsulatedCRLValue>{base64.b64encode(data).decode()}'
+        "</EncapsulatedCRLValue></CRLValues></RevocationValues>"
+    ))  # fmt: skip
+    found = only(signatures_of_xml(etree.tostring(root), trust))
+    assert (found.good, found.revocation, found.level) == (good, revocation, level)
+
+
 def test_nothing_counts_but_what_covers_the_whole_root(xml: bytes, held: Held, trust: Trust) -> None:
     """A valid signature over one element, by signxml itself."""
     from signxml.xades import XAdESSigner
@@ -298,6 +406,16 @@ def test_a_certificate_must_be_in_date_when_it_was_signed(
     assert found.intact
     assert found.problems[0].startswith(f"the certificate was not valid on {at.date()}")
     assert not found.good
+
+
+@pytest.mark.parametrize("authority", [False, True])
+def test_a_certificate_that_signed_itself_leads_to_nobody_but_itself(authority: bool, xml: bytes, trust: Trust) -> None:
+    alone = issued("C. Wolf", curve_key(), authority=authority)
+    signed = sign_xml(xml, alone.signer, at=SIGNED)
+    found = only(signatures_of_xml(signed, trust))
+    assert (found.intact, found.trusted) == (True, False)
+    assert found.problems == ("no chain of certificates leads from the signer to anybody who is trusted",)
+    assert only(signatures_of_xml(signed, Trust((alone.certificate.public_bytes(Encoding.DER),)))).good
 
 
 def test_a_web_servers_certificate_does_not_count(xml: bytes, anchor: Held, trust: Trust) -> None:
