@@ -157,8 +157,7 @@ def laboratory(job: Job, texts: Languages) -> dcc.CalibrationLaboratory:
     facts = job.facts.laboratory
     if not certifies(job):
         return dcc.CalibrationLaboratory(contact=_contact(_NOBODY, "", texts))
-    contact = _contact(facts.name, facts.address, texts)
-    return texts("CalibrationLaboratory", code=facts.accreditation, contact=contact)
+    return texts("CalibrationLaboratory", code=facts.accreditation, contact=_contact(facts.name, facts.address, texts))
 
 
 def persons(job: Job, texts: Languages) -> tuple[dcc.Person, ...]:

@@ -100,22 +100,14 @@ def _figures(path: tuple[str, ...], entry: Mapping[str, Any], figures: plain.Dig
     """The value with its uncertainty, its limit, the acceptance limit of the rule, and probabilities."""
 
     def quantity(
-        keys: str,
-        name: Text,
-        value: Decimal,
-        ref_type: str,
-        unit: str = _MICROMETRE,
-        stated: dcc.Expanded | None = None,
+        keys: str, name: Text, value: Decimal, ref_type: str, unit: str = _MICROMETRE, stated: Any = None
     ) -> dcc.DccQuantity:
         real, id_ = dcc.Real(value=value, unit=unit, uncertainty=stated), figures.id_of((*path, *keys.split(".")))
         return figures.texts("DccQuantity", id=id_, name=name, value=real, ref_type=ref_type)
 
     u, limit, guard = plain.decimal(entry["u_um"]), plain.decimal(entry["limit_um"]), entry["guard_band_um"]
-    stated = (
-        dcc.Expanded(uncertainty=2 * u, factor=Decimal(2), probability=_P_TWICE, distribution="normal")
-        if u > 0
-        else None
-    )
+    twice = {"factor": Decimal(2), "probability": _P_TWICE, "distribution": "normal"}
+    stated = dcc.Expanded(uncertainty=2 * u, **twice) if u > 0 else None
     named = say("Value that is least favourable")
     yield quantity("value_um", named, plain.decimal(entry["value_um"]), "basic_measuredValue", stated=stated)
     yield quantity("limit_um", say("Limit"), limit, "cmm_toleranceLimit")

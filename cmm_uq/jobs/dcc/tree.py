@@ -133,8 +133,7 @@ def _spelled(name: str, prefix: str = "o") -> tuple[str, dict[str, str]]:
     if name.startswith("{"):
         space, _, local = name[1:].rpartition("}")
         return f"{prefix}:{local}", {f"xmlns:{prefix}": space}
-    known = name.partition(":")[0]
-    return name, {"xmlns:ds": NAMESPACES["ds"]} if known == "ds" else {}
+    return name, {"xmlns:ds": NAMESPACES["ds"]} if name.startswith("ds:") else {}
 
 
 def _escaped(text: str) -> str:

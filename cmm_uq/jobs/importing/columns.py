@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -33,31 +32,6 @@ Written = Mapping[str, Sequence[tuple[Floats, WrittenUnit | None, int]]]
 """Values of each column as written, with its unit and its index."""
 
 
-def _lengths_unit(
-    sheet: Sheet,
-    keys: ImportKeys,
-    named: Mapping[str, WrittenUnit],
-    written: Written,
-    where: str,
-    reach_mm: float | None,
-) -> tuple[WrittenUnit, Fact]:
-    """The unit of the coordinates, and of every length whose unit is not named."""
-    headings = {unit.name: heading for heading, unit in reversed(list(named.items()))}
-    if len(headings) > 1:
-        (first, of_first), (second, of_second) = list(headings.items())[:2]
-        raise CmmUqError(f"{of_first!r} is in {first} and {of_second!r} in {second}: the coordinates mix units", where=where,
-                         fix="Export all coordinates in one unit")  # fmt: skip
-    stated = [(named[each], say("in the heading {heading}", heading=Verbatim(each))) for each in headings.values()]
-    for name, origin in ((sheet.unit, say("in the file")), (keys.unit, say("by the key unit"))):
-        if name is not None and (unit := length_named(name)):
-            stated.append((unit, origin))
-    if len({unit.name for unit, _ in stated}) > 1:
-        each = " and ".join(f"{unit.name} {how}" for unit, how in stated)
-        raise CmmUqError(f"the unit is {each}", where=where, fix="Mend the file, or leave out unit")
-    unit, how = stated[0] if stated else _by_extent(written, where, reach_mm)
-    return unit, Fact("unit", say("Unit of lengths"), say("{unit}, {how}", unit=Verbatim(unit.name), how=how))
-
-
 def _by_extent(written: Written, where: str, reach_mm: float | None) -> tuple[WrittenUnit, Text]:
     """Millimetres, where inches would lead out of the machine."""
     lengths = [name for name in COORDINATES if name in written] or [name for name in written if name.endswith("_mm")]
@@ -71,14 +45,8 @@ def _by_extent(written: Written, where: str, reach_mm: float | None) -> tuple[Wr
                      fix='Say unit = "mm" or unit = "inch"')  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Columns:
-    """Columns of a recording by name, each (n,), with the line of each point in the file and each column's headings."""
-
-    values: dict[str, Floats]
-    lines: Ints
-    sources: dict[str, str]
-    facts: tuple[Fact, ...]
+Columns = tuple[dict[str, Floats], Ints, dict[str, str], tuple[Fact, ...]]
+"""Columns of a recording by name, each (n,), with the line of each point in the file, each column's headings, and facts."""
 
 
 def columns_of(
@@ -92,7 +60,7 @@ def columns_of(
         [table.cells[i] for i in numeric], lambda i, row: table.place(numeric[i], row), keys.decimal
     )
     written = {name: table.written(name, sign) for name in plain}
-    unit, of_unit = _lengths_unit(sheet, keys, table.named_units(written), written, where, reach_mm)
+    unit, of_unit = table.lengths_unit(keys, written, reach_mm)
     values = {name: table.in_units(name, parts, unit) for name, parts in written.items() if parts}
     numbers, facts = table.numbers(sign)
     lines = np.repeat(np.array([sheet.lines[i] for i in table.rows], dtype=np.int64), header.points)
@@ -106,7 +74,7 @@ def columns_of(
     facts = [of_unit, Fact("decimal", say("Decimal sign"), SIGNS[sign]), *table.facts(left_out), *facts]
     taken = (*(name for name in NUMBERS if name in header.columns), *values)
     sources = {name: ", ".join(header.headings[i] for i in header.columns[name]) for name in taken}
-    return Columns({**numbers, **values}, lines, sources, tuple(facts))
+    return {**numbers, **values}, lines, sources, tuple(facts)
 
 
 class _Table:
@@ -176,6 +144,24 @@ class _Table:
                 if problem:
                     raise CmmUqError(problem, where=self.start, fix=fix)
         return named
+
+    def lengths_unit(self, keys: ImportKeys, written: Written, reach_mm: float | None) -> tuple[WrittenUnit, Fact]:
+        """The unit of the coordinates, and of every length whose unit is not named."""
+        named = self.named_units(written)
+        headings = {unit.name: heading for heading, unit in reversed(list(named.items()))}
+        if len(headings) > 1:
+            (first, of_first), (second, of_second) = list(headings.items())[:2]
+            mixed = f"{of_first!r} is in {first} and {of_second!r} in {second}: the coordinates mix units"
+            raise CmmUqError(mixed, where=self.where, fix="Export all coordinates in one unit")
+        stated = [(named[each], say("in the heading {heading}", heading=Verbatim(each))) for each in headings.values()]
+        for name, origin in ((self.sheet.unit, say("in the file")), (keys.unit, say("by the key unit"))):
+            if name is not None and (unit := length_named(name)):
+                stated.append((unit, origin))
+        if len({unit.name for unit, _ in stated}) > 1:
+            each = " and ".join(f"{unit.name} {how}" for unit, how in stated)
+            raise CmmUqError(f"the unit is {each}", where=self.where, fix="Mend the file, or leave out unit")
+        unit, how = stated[0] if stated else _by_extent(written, self.where, reach_mm)
+        return unit, Fact("unit", say("Unit of lengths"), say("{unit}, {how}", unit=Verbatim(unit.name), how=how))
 
     def in_units(
         self, name: str, parts: Sequence[tuple[Floats, WrittenUnit | None, int]], length: WrittenUnit

@@ -188,11 +188,10 @@ def _imported(
         if match and (unit := length_named(match[1].strip("[]().,;"))):
             sheet = replace(sheet, unit=unit.name)
             break
-    columns = columns_of(sheet, header, keys, where, reach_mm=reach_mm, points=wanted is POINTS)
+    values, lines, sources, facts = columns_of(sheet, header, keys, where, reach_mm=reach_mm, points=wanted is POINTS)
     named = (Fact("sheet", say("Sheet"), Verbatim(sheet.name)),) if sheet.name else ()
-    recognised = Recognition(PurePath(where).name, form.name, form.title, (*named, *sheet.facts, *columns.facts),
-                             columns.sources, len(columns.lines))  # fmt: skip
-    return ImportedTable(columns.values, columns.lines, recognised)
+    facts, file = (*named, *sheet.facts, *facts), PurePath(where).name
+    return ImportedTable(values, lines, Recognition(file, form.name, form.title, facts, sources, len(lines)))
 
 
 def _chosen(

@@ -39,8 +39,7 @@ class FormFacts(JobTable):
     def problems(self) -> Iterator[str]:
         for name in self.harmonics_um:
             if not _COUNT.fullmatch(name) or int(name) < FEWEST_UNDULATIONS:
-                least = FEWEST_UNDULATIONS
-                yield f"harmonics_um has {name!r}: give numbers of lobes from {least}, as {{ 3 = 0.5 }}"
+                yield f"harmonics_um has {name!r}: give numbers of lobes from {FEWEST_UNDULATIONS}, as {{ 3 = 0.5 }}"
 
 
 SCANNED = (

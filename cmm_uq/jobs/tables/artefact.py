@@ -43,7 +43,7 @@ class CertifiedValue:
 LENGTH_WORDS = ("length", "distance", "länge", "abstand", "longueur", "長さ", "距離")
 DIAMETER_WORDS = ("diameter", "durchmesser", "diamètre", "直径")
 # in English, German, French and Japanese
-FORM_WORDS = (
+FORM_WORDS = [
     "form dev",
     "form error",
     "formabweichung",
@@ -52,7 +52,7 @@ FORM_WORDS = (
     "rundheit",
     "circularité",
     "真球度",
-)
+]
 LENGTH = CertifiedValue("length_mm", "u_um", LENGTH_WORDS)
 DIAMETER = CertifiedValue("length_mm", "u_um", DIAMETER_WORDS)
 
