@@ -246,14 +246,23 @@ def _check_pdf(inquiry: Inquiry, name: str, pdf: PdfFile, *, deeper: bool) -> No
 
 def _check_manifest(inquiry: Inquiry, given: Given, manifest: Manifest) -> None:
     contents = {name: content for name, content in given.contents.items() if name != MANIFEST}
+    stands = strict_json(given.contents[MANIFEST], MANIFEST)
     inquiry.looked("files", len(manifest.files))
     for name, digest in manifest.files.items():
         if name not in contents:
             inquiry.wrong("files", MANIFEST, f"files.{name}", "names a file that is not there")
-        elif (stands := sha256(contents[name]).hexdigest()) != digest:
-            inquiry.wrong("files", name, "", f"is not the file whose hash {MANIFEST} has", stands, digest)
+        elif (hashed := sha256(contents[name]).hexdigest()) != digest:
+            inquiry.wrong("files", name, "", f"is not the file whose hash {MANIFEST} has", hashed, digest)
+        elif stands["files"][name] != (should := {"sha256": digest, "bytes": len(contents[name])}):
+            inquiry.wrong(
+                "files", MANIFEST, f"files.{name}", "is not what the file gives", stands["files"][name], should
+            )
     for name in contents.keys() - manifest.files.keys():
         inquiry.wrong("files", MANIFEST, "files", f"does not name {name}")
+    own = json.loads(manifest.as_json(dict.fromkeys(manifest.files, 0)))
+    same = ("program", "files")
+    for key in stands.keys() ^ own.keys() or {key for key in own if key not in same and own[key] != stands[key]}:
+        inquiry.wrong("files", MANIFEST, key, "says otherwise than cmm-uq writes it", stands.get(key), own.get(key))
 
 
 def language_of(data: Mapping[str, Any]) -> Code:

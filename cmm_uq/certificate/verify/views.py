@@ -7,6 +7,7 @@ goes on over pages, signs of lists. White space tells nothing: lines break elsew
 
 from __future__ import annotations
 
+import datetime as dt
 import html
 import io
 import json
@@ -322,6 +323,9 @@ def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> Non
         inquiry.left("electronic signatures", f"{error.problem}. {error.fix}")
 
 
+AHEAD = dt.timedelta(minutes=10)  # by which clocks may differ
+
+
 def _check_signed(inquiry: Inquiry, name: str, signed: Sequence[FileSignature], trust: Trust | None) -> None:
     from cmm_uq.certificate.sign import TEST_NOTE
     from cmm_uq.certificate.sign.found import NOBODY
@@ -337,6 +341,9 @@ def _check_signed(inquiry: Inquiry, name: str, signed: Sequence[FileSignature], 
             f"{name}: {one.level} by {one.name or 'nobody'}, {at}{'' if one.time_proven else ' by the signer himself'}"
         )
         inquiry.notes.append(f"{who}; revocation: {one.revocation}.")
+        if one.time is not None and one.time > (now := dt.datetime.now(dt.UTC)) + AHEAD:
+            why = f"it says {one.time:%Y-%m-%d %H:%M} UTC, and the clock of this computer {now:%Y-%m-%d %H:%M} UTC"
+            inquiry.left(f"when {name} was signed", why)
         holds = one.problems or (one.intact and one.covers_whole_file and (one.trusted or trust is None))
         for problem in one.problems if holds else ("does not hold",):
             if problem == NOBODY and trust is None:

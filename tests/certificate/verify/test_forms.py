@@ -8,6 +8,7 @@ import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pikepdf
 import pytest
@@ -168,6 +169,22 @@ def test_a_folder_whose_manifest_has_other_hashes_is_named(made: Path, tmp_path:
     assert checked(folder, again).inquiry.word == "VERIFIED"
     spoil(folder / "posterior.npz", lambda content: content + b"\0")
     assert "whose hash manifest.json has" in told(checked(folder, again))
+
+
+@pytest.mark.parametrize(("change", "where"), [
+    (lambda data: data["files"]["results.json"].update(bytes=1), "files.results.json"),
+    (lambda data: data["files"]["results.json"].update(U="0.1 µm"), "files.results.json"),
+    (lambda data: data.update(U="0.1 µm"), "U"), (lambda data: data["job"].update(U="0.1 µm"), "job"),
+])  # fmt: skip
+def test_a_manifest_that_says_otherwise_than_its_files_is_named(
+    change: Callable[[dict[str, Any]], None], where: str, made: Path, tmp_path: Path, again: Again
+) -> None:
+    folder = Path(shutil.copytree(made, tmp_path / "report"))
+    data = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    change(data)
+    (folder / "manifest.json").write_text(json.dumps(data), encoding="utf-8")
+    (finding,) = checked(folder, again).inquiry.findings
+    assert (finding.file, finding.place) == ("manifest.json", where)
 
 
 @pytest.mark.parametrize(("by", "said"), [

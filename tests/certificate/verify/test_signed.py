@@ -60,6 +60,26 @@ def test_without_an_anchor_it_is_said_that_nobody_is_known(signed: Path, again: 
     assert {one.what for one in found.unchecked} == {"who signed certificate.pdf", "who signed certificate.xml"}
 
 
+@pytest.mark.parametrize(("ahead", "word"), [
+    (dt.timedelta(days=60), "NOT WHOLLY CHECKED"), (dt.timedelta(minutes=9), "VERIFIED"),
+])  # fmt: skip
+def test_a_signature_of_the_future_is_neither_verified_nor_altered(
+    ahead: dt.timedelta, word: str, certificate: Path, made: Path, again: Again, anchor: Held, trusted: list[Path]
+) -> None:
+    """More than ten minutes after the clock of this computer; a few minutes are the clocks'."""
+    at = (dt.datetime.now(dt.UTC) + ahead).replace(microsecond=0)
+    signer = issued("A. Huber", curve_key(), anchor, first=at - dt.timedelta(1), last=at + dt.timedelta(1)).signer
+    pdf, xml = certificate / "certificate.pdf", certificate / "certificate.xml"
+    pdf.write_bytes(sign_pdf(pdf.read_bytes(), signer, seal=None, at=at))
+    xml.write_bytes(sign_xml((made / "certificate.xml").read_bytes(), signer, at=at))
+    found = inquiry(certificate, again, trusted)
+    assert (found.word, found.findings) == (word, [])
+    early = [
+        one.what for one in found.unchecked if one.why.startswith(f"it says {at:%Y-%m-%d %H:%M} UTC, and the clock")
+    ]
+    assert early == [f"when {path.name} was signed" for path in (pdf, xml) if word != "VERIFIED"]
+
+
 def test_a_stripped_signature_is_missed(signed: Path, made: Path, again: Again, trusted: list[Path]) -> None:
     """The PDF as it was before it was signed is sound in itself."""
     (signed / "certificate.pdf").write_bytes((made / "certificate.pdf").read_bytes())
