@@ -39,8 +39,6 @@ class AttitudePose:
 
 @dataclass(frozen=True, eq=False)
 class DigitizerFigures:
-    """All of these of a result."""
-
     result: Result
 
     @property

@@ -41,8 +41,6 @@ class Periodic:
 
 @dataclass(frozen=True, eq=False)
 class GaugeLine:
-    """One measurement of a gauge."""
-
     measurement: int  # its number
     direction: Floats  # (3,) unit vector, in the sense of growing distances
     middle: Floats  # (3,) in the recorded frame, mm

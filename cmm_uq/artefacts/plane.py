@@ -42,8 +42,6 @@ _ON_A_LINE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class ProbedPlane:
-    """One plane of a recording."""
-
     measurement: int  # its number
     count: int  # points of contact
     flatness: float | None  # range of the distances from the plane, mm; ``None`` of three points, which have none

@@ -122,8 +122,6 @@ PLANES: Mapping[str, tuple[int, int]] = MappingProxyType({"XY": (0, 1), "YZ": (1
 
 @dataclass(frozen=True)
 class Placing:
-    """One placing."""
-
     title: Text  # in words
     plane: str  # key of :data:`PLANES`
     place: tuple[float, float, float]  # where along the room that the machine has for it, 0 … 1 for X, Y, Z

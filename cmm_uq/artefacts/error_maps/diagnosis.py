@@ -58,8 +58,6 @@ class Difference:
 
 @dataclass(frozen=True, eq=False)
 class MapsDiagnosis:
-    """See the module's docstring."""
-
     verdict: str  # ``consistent``, ``explained``, ``partial`` or ``unexplained``
     p_value: float  # p_value, alpha: of "the maps differ by noise alone", and the rate of false alarms asked for
     alpha: float
@@ -181,8 +179,6 @@ def _noise(comparisons: Sequence[ColumnComparison], alpha: float, *, rotations: 
 
 @dataclass(frozen=True, eq=False)
 class MapsDiagnosed:
-    """A job of error maps with its diagnosis."""
-
     job: Job  # what was read
     maps: tuple[ErrorMap, ...]  # its error maps, in the order in which it names them
     findings: tuple[Finding, ...]  # what is odd among the maps' figures
@@ -222,16 +218,12 @@ def refuse_unfit(job: Job) -> None:
 
 def squareness_data(maps: Sequence[ErrorMap]) -> list[dict[str, float]]:
     """Of each map for ``results.json``, ″; empty where no map states any."""
-    if not _stated(maps):
-        return []
-    return [{"temperature_c": m.temperature, **m.squareness_arcsec} for m in _by_temperature(maps)]
+    return [{"temperature_c": m.temperature, **m.squareness_arcsec} for m in _stated(maps)]
 
 
 def squareness_findings(maps: Sequence[ErrorMap]) -> list[Finding]:
-    if not _stated(maps):
-        return []
     same: dict[tuple[float, ...], list[float]] = {}
-    for m in _by_temperature(maps):
+    for m in _stated(maps):
         same.setdefault(tuple(m.squareness.tolist()), []).append(m.temperature)
     return [Finding("copied", (), (), _same_squareness(some)) for some in same.values() if len(some) > 1]
 
@@ -245,9 +237,8 @@ def _same_squareness(temperatures: Sequence[float]) -> Text:
 
 
 def squareness_sections(maps: Sequence[ErrorMap]) -> tuple[Section, ...]:
-    if not _stated(maps):
+    if not (ordered := _stated(maps)):
         return ()
-    ordered = _by_temperature(maps)
     figures = np.array([m.squareness for m in ordered]) / ARCSECOND
     rows: list[tuple[Text, ...]] = [
         (say("{temperature:g}\u00a0°C", temperature=m.temperature), *(signed(value, ".5g") for value in row))
@@ -263,9 +254,6 @@ def squareness_sections(maps: Sequence[ErrorMap]) -> tuple[Section, ...]:
     return (Section(say("Squareness of the axes"), (Table(say("Squareness"), heads, tuple(rows), (note,)),)),)
 
 
-def _stated(maps: Sequence[ErrorMap]) -> bool:
-    return any(m.squareness.any() for m in maps)
-
-
-def _by_temperature(maps: Sequence[ErrorMap]) -> list[ErrorMap]:
-    return sorted(maps, key=lambda m: m.temperature)
+def _stated(maps: Sequence[ErrorMap]) -> list[ErrorMap]:
+    """By temperature; none where no map states a squareness."""
+    return sorted(maps, key=lambda m: m.temperature) if any(m.squareness.any() for m in maps) else []

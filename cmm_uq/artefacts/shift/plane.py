@@ -36,8 +36,6 @@ _LEAST_LEFT = 6  # coordinates beyond balls and placings that must be left to te
 
 @dataclass(frozen=True, eq=False)
 class PlaneEstimate(shared.Estimated):
-    """All that the placings say."""
-
     plate: PlacedPlate  # plate, known: what it was made from
     known: KnownSpan | None
     model: PlaneModel  # linear model about its start

@@ -147,8 +147,6 @@ class Estimated(ABC):
 
 @dataclass(frozen=True, eq=False)
 class ShiftFound(ABC):
-    """What was found."""
-
     job: Job  # what was analysed
     estimate: Estimated  # of the machine and the artefact, with its posterior
 

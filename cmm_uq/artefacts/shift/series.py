@@ -282,7 +282,6 @@ class Means:
 
 
 def means_over_repeats(points: Points, where: str = "") -> Means:
-    """Means of a recording."""
     ratio = points.columns.get(NOISE_RATIO, np.ones(len(points)))
     if (ratio <= 0).any():
         problem = "noise_ratio must be positive"

@@ -179,8 +179,6 @@ _ALONG = 0.99  # cosine from which on an axis of an artefact is one of the machi
 
 @dataclass(frozen=True, eq=False)
 class Placings:
-    """Points by their placing."""
-
     index: Ints  # (n,) placing of each point, 0 … q − 1
     numbers: Ints  # (q,) the ``measurement`` that each placing is
 

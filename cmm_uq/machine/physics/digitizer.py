@@ -177,8 +177,6 @@ class Digitizer:
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """One pose of the digitizer, aligned."""
-
     alpha: float  # alpha, beta, gamma: Euler angles 3-1-3, rad
     beta: float
     gamma: float

@@ -33,8 +33,6 @@ FINE_UM, STEP_UM = 0.5, 0.01  # A map with no displacement above the one and som
 
 @dataclass(frozen=True, eq=False)
 class AxisErrors:
-    """Errors of one carriage."""
-
     positions: Floats  # (m,) scale readings, mm, increasing
     errors: Floats  # (m, 6) displacements along x, y, z in mm and rotations about x, y, z in rad
 
@@ -165,8 +163,6 @@ _ORDER = {"x": "xyzyzx", "y": "yzxxzy", "z": "zxyxyz"}
 
 @dataclass
 class _Reading:
-    """What has been read so far."""
-
     axis: str = ""
     columns: dict[str, str] = field(default_factory=lambda: dict(_ORDER))
     rows: dict[str, list[tuple[list[float], str]]] = field(default_factory=lambda: {axis: [] for axis in AXES})

@@ -25,8 +25,6 @@ TEMPERATURE_MARGIN = 1.0  # up to this far beyond the calibrated temperatures, K
 
 @dataclass(frozen=True, eq=False)
 class LookedUp:
-    """Errors at n points."""
-
     errors: Floats  # (n, 3, 6) of carriages x, y, z, mm and rad
     squareness: Floats  # (3,) or (n, 3), rad
     extrapolated: NDArray[np.bool_]  # (n,) whether a point lies beyond the mapped positions or temperatures

@@ -43,8 +43,6 @@ class About:
 
 @dataclass(frozen=True, eq=False)
 class Superposition:
-    """Effects that act together."""
-
     effects: tuple[Effect, ...]  # in the order of their coefficients
     shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)  # nonlinear parameters by the effect's name
 

@@ -204,8 +204,6 @@ _CRITERIA: Mapping[Association, Callable[[Placed, Floats], Extreme]] = {
 
 @dataclass(frozen=True, eq=False)
 class Associated:
-    """A feature associated with n points."""
-
     feature: FeatureKind
     association: Association
     # (d,) centre; or where the axis pierces the plane across the least-squares axis through the least-squares point; of a

@@ -84,8 +84,6 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class Components:
-    """The components that a recording could show."""
-
     turn: sparse.csr_array  # (m, m) T, orthonormal
     shares: Floats  # (m, 6) of each variance in that of each turned observation
     slow: Floats  # (m, 3·…) columns S of the unturned observations, (m, 0) where no time is recorded

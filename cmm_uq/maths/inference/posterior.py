@@ -35,8 +35,6 @@ _BURN_IN = 30  # steps left out where what is proposed knows which components ar
 
 @dataclass(frozen=True, eq=False)
 class Posterior(Convergence):
-    """Draws from a posterior."""
-
     unknowns: tuple[Unknown, ...]  # k parameters
     draws: Floats  # (N, k) in the parameters' units
     sigma: Floats  # (N,) standard uncertainty of one coordinate, mm; constant when it was stated

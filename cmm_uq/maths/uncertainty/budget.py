@@ -42,8 +42,6 @@ NAMES: Mapping[Method, Text] = {
 
 @dataclass(frozen=True, eq=False)
 class BudgetLine:
-    """One source of uncertainty."""
-
     name: Text  # the quantity
     u: float | None  # its standard uncertainty, in ``unit``; None for a line that is no quantity (a correlation)
     origin: Text  # where the figure comes from

@@ -8,7 +8,7 @@ until every comparison is clear of it by two standard errors, or the error is be
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import astuple, dataclass, field, replace
 from html import escape
@@ -32,6 +32,7 @@ from cmm_uq.maths.uncertainty.quantity import figure, rounded
 from cmm_uq.maths.uncertainty.type_a import check_coverage, coverage_factor
 
 METHODS = (*NAMES, "auto")
+_ORDERS: Mapping[Method, Callable[[MeasurementModel], Propagated]] = {"first": first_order, "second": second_order}
 _OF_TOLERANCE = 5.0  # δ over the error of Monte Carlo that leaves any comparison as it is
 _ROUNDING = 4e-16
 _TRIALS_FOR_SENSITIVITY = 100_000
@@ -104,10 +105,9 @@ def _by_propagation(model: MeasurementModel) -> Ways:
     """First and second order, as far as they are possible."""
     orders: dict[Method, Propagated] = {}
     problems: dict[Method, Text] = {}
-    for method in NAMES:
+    for method, propagate in _ORDERS.items():
         try:
-            if method != "monte_carlo":
-                orders[method] = first_order(model) if method == "first" else second_order(model)
+            orders[method] = propagate(model)
         except CmmUqError as error:
             problems[method] = foreign(error.problem)
     return Ways(orders.get("first"), orders.get("second"), None, problems)
@@ -171,13 +171,13 @@ def _choose(model: MeasurementModel, ways: Ways, row: int, digits: int) -> tuple
     if ways.simulated is None:
         return _without_monte_carlo(ways, row, digits)
     findings: list[Text] = []
-    for method in NAMES:
-        if method == "monte_carlo":
-            break
+    for method in _ORDERS:
         confirmed, finding = _finding(model, ways, ways.simulated, method, row, digits)
         findings.append(say("{names} {finding}", names=NAMES[method], finding=finding))
         if confirmed:
             break
+    else:
+        method = "monte_carlo"
     reason = say("{said:capital} (JCGM 101 clause 8).", said=semicolons(findings))
     return method, after(reason, stability(ways, row, digits))
 

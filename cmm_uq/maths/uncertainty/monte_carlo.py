@@ -57,7 +57,6 @@ class Simulated:
 
 
 def simulate(model: MeasurementModel | Source, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
-    """Make a given number of trials."""
     check_coverage(coverage)
     if trials < (fewest := int(np.ceil(2 / (1 - coverage)))):
         problem = f"{trials} trials cannot give a {coverage:.4g} coverage interval"

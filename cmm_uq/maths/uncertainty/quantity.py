@@ -33,8 +33,6 @@ def expanded_of(draws: Floats, value: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity with its uncertainty."""
-
     value: float  # estimate, in ``unit``
     u: float  # standard uncertainty, in ``unit``
     interval95: tuple[float, float]  # probabilistically symmetric 95 % coverage interval

@@ -52,7 +52,7 @@ class Body:
     @property
     def extent(self) -> float:
         """Largest distance of a place from the middle of all, mm."""
-        return float(np.linalg.norm(self.places - self.places.mean(axis=0), axis=1).max())
+        return float(np.linalg.norm(self.about_middle(), axis=1).max())
 
     def nodes(self, points: Points) -> Ints:
         """(n,) which place each point is; −1 for one that the body does not have."""
@@ -89,7 +89,7 @@ def _poses(body: Body, points: Points) -> Poses:
     own = body.places[node]
     _, index = np.unique(points.measurement, return_inverse=True)
     index = index.ravel()
-    middle, own_middle = _means(points.xyz, index), _means(own, index)
+    middle, own_middle = means_of(points.xyz, index), means_of(own, index)
     moments = _sums(np.einsum("ni,nj->nij", points.xyz - middle, own - own_middle), index)
     rotation = nearest_rotations(moments)[index]
     return Poses(node, rotation, middle - np.einsum("nij,nj->ni", rotation, own_middle))
@@ -101,7 +101,8 @@ def _sums(values: Floats, index: Ints) -> Floats:
     return total
 
 
-def _means(values: Floats, index: Ints) -> Floats:
+def means_of(values: Floats, index: Ints) -> Floats:
+    """(n, …) mean of those of one ``index`` (n,), given back to each."""
     return np.asarray((_sums(values, index) / np.bincount(index)[:, None])[index], dtype=np.float64)
 
 

@@ -11,7 +11,7 @@ from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.physics.effect import CommonSize, Effect, Harmonic, Parameter
-from cmm_uq.machine.physics.effects.own_errors import FaultyArtefact, OwnFault
+from cmm_uq.machine.physics.effects.own_errors import FaultyArtefact, OwnFault, means_of
 from cmm_uq.maths.geometry.feature import frame_about, upward
 
 KELVIN = Parameter("k", unit("K"), 1.0)
@@ -194,10 +194,7 @@ def _harmonic(degree: int, order: int, polar: Floats, azimuth: Floats) -> Floats
 def _about_set_up(points: Points) -> Floats:
     """(n, 3) places about the middle of each set-up, mm."""
     _, index = np.unique(points.measurement, return_inverse=True)
-    index = index.ravel()
-    total = np.zeros((int(index.max()) + 1, 3))
-    np.add.at(total, index, points.xyz)
-    return np.asarray(points.xyz - (total / np.bincount(index)[:, None])[index], dtype=np.float64)
+    return np.asarray(points.xyz - means_of(points.xyz, index.ravel()), dtype=np.float64)
 
 
 def _flat(owner: FaultyArtefact, points: Points) -> tuple[Floats, Floats]:

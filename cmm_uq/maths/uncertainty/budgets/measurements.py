@@ -35,8 +35,6 @@ SPECIFICATION = say("specification")  # where a figure comes from
 
 @dataclass(frozen=True, eq=False)
 class BallbarPosition:
-    """One position of a ballbar."""
-
     length_mm: float  # distance of the centres
     direction: Floats  # (3,) unit vector along the bar
     centre_covariance_mm2: Floats  # (3, 3) of one fitted centre, from the scatter of its points

@@ -153,8 +153,6 @@ def _stated(budget: Budget) -> OutputResult:
 
 
 def read_ready_budget(content: bytes, path: Path) -> ReadyBudget:
-    """Read and check a file with a ready budget."""
-
     def table_of(data: dict[str, Any]) -> type[_BudgetFile]:
         table = data[KEY]
         method = str(table.get("method", "")) if isinstance(table, dict) else ""
