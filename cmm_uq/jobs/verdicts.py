@@ -131,10 +131,7 @@ def _of_part(characteristics: Any) -> Iterator[Verdict]:
             value, limits = one.get("value"), one.get("limits") or {}
             ends = [end for end in (limits.get("lower"), limits.get("upper")) if end is not None]
             # the limit that the value is nearest to, or farthest beyond
-            limit = (
-                ends[-1]
-                if len(ends) == 2 and value is not None and value - ends[0] >= ends[1] - value
-                else (*ends, None)[0]
-            )
+            far = len(ends) == 2 and value is not None and value - ends[0] >= ends[1] - value
+            limit = ends[1] if far else next(iter(ends), None)
             yield Verdict(str(one["name"]), str(one["decision"]["outcome"]), value, one.get("U"), limit,
                           Verbatim(one.get("unit") or ""))  # fmt: skip

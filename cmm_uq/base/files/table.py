@@ -84,14 +84,16 @@ def _plain_column(name: str) -> str:
 Position = Annotated[float, Field(ge=-LONGEST_MM, le=LONGEST_MM)]  # A coordinate, or a shift, mm
 Length = Annotated[float, Field(gt=0, le=LONGEST_MM), at_least(1e-6)]  # A length, mm
 
-# A limit, or a standard uncertainty that cannot be 0, µm
+Positive = Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)]  # a time or a ratio that cannot be 0
+Divisor = Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)]  # K of A + L/K
+# a limit, or a standard uncertainty that cannot be 0, µm
 Limit = Annotated[float, Field(gt=0, le=LARGEST_UM), at_least(SMALLEST_UM)]
-# A standard uncertainty, µm, or 0 where it does not count
+# a standard uncertainty, µm, or 0 where it does not count
 Uncertainty = Annotated[float, Field(ge=0, le=LARGEST_UM), AfterValidator(_zero_or_more_than_nothing)]
 Temperature = Annotated[float, Field(ge=-273.15, le=1000)]  # °C
 Number = Annotated[int, Field(ge=-1_000_000_000, le=1_000_000_000)]  # of a measurement or point
 
-# A number in a unit that only its name knows: as large as in a recording
+# a number in a unit that only its name knows: as large as in a recording
 AnyFloat = Annotated[float, Field(ge=-1e15, le=1e15)]
 Column = Annotated[str, AfterValidator(_plain_column)]  # name of a recorded column
 Range = Annotated[list[Position], Field(min_length=2, max_length=2)]

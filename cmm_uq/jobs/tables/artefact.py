@@ -43,16 +43,9 @@ class CertifiedValue:
 LENGTH_WORDS = ("length", "distance", "länge", "abstand", "longueur", "長さ", "距離")
 DIAMETER_WORDS = ("diameter", "durchmesser", "diamètre", "直径")
 # in English, German, French and Japanese
-FORM_WORDS = [
-    "form dev",
-    "form error",
-    "formabweichung",
-    "roundness",
-    "sphericity",
-    "rundheit",
-    "circularité",
-    "真球度",
-]
+FORM_WORDS = (
+    "form dev", "form error", "formabweichung", "roundness", "sphericity", "rundheit", "circularité", "真球度",
+)  # fmt: skip
 LENGTH = CertifiedValue("length_mm", "u_um", LENGTH_WORDS)
 DIAMETER = CertifiedValue("length_mm", "u_um", DIAMETER_WORDS)
 

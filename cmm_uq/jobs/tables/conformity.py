@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Protocol, Self
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.table import LARGEST_UM, JobTable, Limit, Uncertainty, at_least, key, required
+from cmm_uq.base.files.table import LARGEST_UM, Divisor, JobTable, Limit, Positive, Uncertainty, at_least, key, required
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.circumstances import TEST_KEYS, ClausesForm, TestUncertainty
@@ -21,8 +21,7 @@ class MaximumPermissibleError(JobTable):
     """``mpe`` in one of three forms: A + L/K, min(A + L/K, B), or B; L in mm, A, B and the result in µm."""
 
     a_um: Uncertainty | None = key(None, "A of A + L/K.")
-    k: Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)] | None = None
-    """K of A + L/K, with L in mm and the result in µm."""
+    k: Divisor | None = key(None, "K of A + L/K, with L in mm and the result in µm.")
     b_um: Limit | None = key(None, "Limit that does not grow with the length, or at which A + L/K stops growing.")
 
     def problems(self) -> Iterator[str]:
@@ -81,8 +80,7 @@ class Prior(JobTable):
     """``prior``: what is known of the tested errors beforehand, a normal distribution (JCGM 106:2012, 7.2)."""
 
     sd_um: Limit | None = key(None, "Standard deviation of the errors of such machines.")
-    share_of_limit: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
-    """The same over the limit of each error."""
+    share_of_limit: Positive | None = key(None, "The same over the limit of each error.")
     mean_um: Annotated[float, Field(ge=-LARGEST_UM, le=LARGEST_UM)] = key(0.0, "Mean of the errors of such machines.")
 
     def problems(self) -> Iterator[str]:

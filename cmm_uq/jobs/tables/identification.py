@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from cmm_uq.base.files.table import JobTable, Limit, at_least, key, required
+from cmm_uq.base.files.table import Divisor, JobTable, Limit, key, required
 from cmm_uq.base.languages.translation import ENGLISH, Code
 from cmm_uq.jobs.source import device_name
 
@@ -116,7 +116,7 @@ class LengthCapability(JobTable):
     """U = A + L/K of a length, L in mm and U in µm; without ``k`` the same for every length."""
 
     a_um: Limit = required("A of U = A + L/K.")
-    k: Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)] | None = None
+    k: Divisor | None = None
     """K of U = A + L/K, with L in mm and U in µm; without it U is the same for every length."""
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED, MAPS
-from cmm_uq.base.files.table import Column, JobTable, Number, Range, Temperature, Triple, at_least, key, required
+from cmm_uq.base.files.table import Column, JobTable, Number, Positive, Range, Temperature, Triple, key, required
 
 Method = Literal["fixed", "A3", "S2", "staircase", "control chart", "drift"]
 Months = Annotated[int, Field(ge=1, le=600)]
@@ -114,8 +114,7 @@ class TemperatureLogFile(JobTable):
     start: dt.datetime | None = key(None, "Moment at which the recording's `time_s` was 0, for a log that gives dates.")
     columns: ScaleColumns | None = None
     """Columns of the thermocouples on each scale, where their names do not say so."""
-    max_gap_s: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
-    """Longest interval of the log that is interpolated over."""
+    max_gap_s: Positive | None = key(None, "Longest interval of the log that is interpolated over.")
 
 
 class Pose(JobTable):
