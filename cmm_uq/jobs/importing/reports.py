@@ -199,6 +199,8 @@ def _located(content: str, line: int) -> _Place | None:
 
 def _measured(content: str, ends: dict[str, int], place: str) -> str:
     """The figure below MEAS, which differs from that below NOMINAL by that below DEV where these are printed."""
+    if not ends:
+        raise CmmUqError("figures stand ahead of any heading line AX … MEAS", where=place, fix="Print the report again")
     below: dict[str, str] = {}
     for figure in _NUMBER.finditer(content):
         below.setdefault(min(ends, key=lambda word: abs(ends[word] - figure.end())), figure[0])

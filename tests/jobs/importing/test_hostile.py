@@ -57,6 +57,9 @@ REFUSED = {
     "a thousand columns": ((HEAD.strip() + ",a" * 1000 + "\n").encode(), r"line 1: has 1005 cells, 200 are the most"),
     "a huge cell": ((HEAD + "1,1," + "3" * 600 + ",2,3\n").encode(), r"line 2: has a cell of 600 characters"),
     "an unclosed quotation": ((HEAD + '1,1,"1,2,3\n' + "1,2,1,2,3\n" * 100).encode(), "close every quotation mark"),
+    "a heading with a control character": (
+        b"DIM A= LOCATION OF SPHERE A UNITS=MM\nAX NOM\x0bINAL MEAS DEV\nX 1.0 1.1 0.1\nDIM B= LOCATION OF SPHERE B UNITS=MM\n"
+        b"AX NOMINAL MEAS DEV\nX 1.0 1.1 0.1\n", r"line 4: figures stand ahead of any heading line"),
     "a statement without end": (b"FILNAM/'A'\n" + b"x$\n" * 200_000, "the statement goes on for more than 100000 characters"),
     "a report in one line": (b"DIM A= B UNITS=MM\nAX MEAS\n" + b"= OF A " * 20_000, "line 3: the line has 140000 characters"),
     "a report of empty lines": (b"UNITS=MM" + b"\n" * 60_000 + b"AX MEAS", "reports 0 dimensions and no place"),
