@@ -40,69 +40,9 @@ LENGTHS = PrintedUnits(unit("mm"), unit("µm"), 1.0, MICROMETRE)
 ANGLES = PrintedUnits(unit("°"), unit("″"), float(np.pi / 180), ARCSECOND)
 
 
-class PrintedFigures:
-    """How figures of one characteristic are printed: to the place of its U, in its units."""
-
-    @property
-    def scale(self) -> PrintedUnits:
-        raise NotImplementedError
-
-    @property
-    def expanded(self) -> float:
-        """Half of the shortest 95 % interval of the errors, mm or rad."""
-        raise NotImplementedError
-
-    @property
-    def one_sided(self) -> bool:
-        """Whether it is a measured width, which has no side below zero: it is stated by its interval."""
-        raise NotImplementedError
-
-    def with_factor(self, k: float) -> tuple[Text, Text]:
-        """U and k; dashes of what is stated by its interval."""
-        return (DASH, DASH) if self.one_sided else (self.small(self.expanded), self.factor_of(k))
-
-    def small(self, size: float) -> Number:
-        """An uncertainty, two digits of it, in µm or ″."""
-        return significant(size / self.scale.per_small)
-
-    def at(self, value: float) -> Number:
-        """A value to the place of its U, in mm or °."""
-        return rounded(value / self.scale.per_value, self.expanded / self.scale.per_value)[0]
-
-    def error(self, value: float) -> Number:
-        """A difference to the place of U, in µm or ″."""
-        return rounded(value / self.scale.per_small, self.expanded / self.scale.per_small)[0]
-
-    def limit(self, value: float | None) -> Text:
-        """A limit or a nominal value as it was given, in mm or °."""
-        if value is None:
-            return DASH
-        return signed(float(f"{value / self.scale.per_value:.10g}"), ".10g")
-
-    def factor_of(self, k: float) -> Text:
-        """U over u; a dash where there is no u."""
-        return number(k, ".2f") if np.isfinite(k) else DASH
-
-    def interval_of(self, interval: tuple[float, float], *, measured: bool) -> Text:
-        """Of the value, mm or °; where nothing was measured, of value less indication, µm or ″."""
-        show = self.at if measured else self.error
-        return say("{low} to {high}", low=show(interval[0]), high=show(interval[1]))
-
-    def accepted_of(self, accepted: tuple[float | None, float | None] | None) -> Text:
-        """Which values a rule accepts, mm or °."""
-        if accepted is None:
-            return say("none")
-        low, high = accepted
-        if low is not None and high is not None:
-            return say("{low} to {high}", low=self.at(low), high=self.at(high))
-        if high is not None:
-            return say("up to {limit}", limit=self.at(high))
-        return DASH if low is None else say("from {limit}", limit=self.at(low))
-
-
 @dataclass(frozen=True, eq=False)
-class CharacteristicFigures(PrintedFigures):
-    """One characteristic in figures."""
+class CharacteristicFigures:
+    """One characteristic in figures, printed to the place of its U, in its units."""
 
     place: int  # among those of the part, from 0
     found: PartMeasurement
@@ -163,10 +103,12 @@ class CharacteristicFigures(PrintedFigures):
 
     @property
     def expanded(self) -> float:
+        """Half of the shortest 95 % interval of the errors, mm or rad."""
         return self.stated.U
 
     @cached_property
     def one_sided(self) -> bool:
+        """Whether it is a measured width, which has no side below zero: it is stated by its interval."""
         return self.stated.value is not None and bool(never_negative(self.found.plan)[self.place])
 
     @property
@@ -206,6 +148,48 @@ class CharacteristicFigures(PrintedFigures):
         if self.stated.value is None:
             return U
         return say("{value} {unit}, {U}", value=self.at(self.stated.value), unit=self.scale.value, U=U)
+
+    def with_factor(self, k: float) -> tuple[Text, Text]:
+        """U and k; dashes of what is stated by its interval."""
+        return (DASH, DASH) if self.one_sided else (self.small(self.expanded), self.factor_of(k))
+
+    def small(self, size: float) -> Number:
+        """An uncertainty, two digits of it, in µm or ″."""
+        return significant(size / self.scale.per_small)
+
+    def at(self, value: float) -> Number:
+        """A value to the place of its U, in mm or °."""
+        return rounded(value / self.scale.per_value, self.expanded / self.scale.per_value)[0]
+
+    def error(self, value: float) -> Number:
+        """A difference to the place of U, in µm or ″."""
+        return rounded(value / self.scale.per_small, self.expanded / self.scale.per_small)[0]
+
+    def limit(self, value: float | None) -> Text:
+        """A limit or a nominal value as it was given, in mm or °."""
+        if value is None:
+            return DASH
+        return signed(float(f"{value / self.scale.per_value:.10g}"), ".10g")
+
+    def factor_of(self, k: float) -> Text:
+        """U over u; a dash where there is no u."""
+        return number(k, ".2f") if np.isfinite(k) else DASH
+
+    def interval_of(self, interval: tuple[float, float], *, measured: bool) -> Text:
+        """Of the value, mm or °; where nothing was measured, of value less indication, µm or ″."""
+        show = self.at if measured else self.error
+        return say("{low} to {high}", low=show(interval[0]), high=show(interval[1]))
+
+    def accepted_of(self, accepted: tuple[float | None, float | None] | None) -> Text:
+        """Which values a rule accepts, mm or °."""
+        if accepted is None:
+            return say("none")
+        low, high = accepted
+        if low is not None and high is not None:
+            return say("{low} to {high}", low=self.at(low), high=self.at(high))
+        if high is not None:
+            return say("up to {limit}", limit=self.at(high))
+        return DASH if low is None else say("from {limit}", limit=self.at(low))
 
 
 def figures_of(found: PartMeasurement) -> list[CharacteristicFigures]:

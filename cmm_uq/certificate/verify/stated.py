@@ -1,29 +1,20 @@
 """Whether a document states the figures of its ``results.json``, each in its row, rounded as the package rounds, in its unit.
 
 Whatever the language, a quantity is a row with its value, U and k in cells side by side; rows of one table follow each other
-as the quantities do in the file; names of rows are compared between the views. Of a part's report the text is searched for
-each row of its tables: page and PDF have the cells of a row one after the other.
+as the quantities do in the file; names of rows are compared between the views.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from hashlib import sha256
-from math import nan
 from typing import Any
 
-from cmm_uq.base.languages.translation import translated as said_in
-from cmm_uq.base.messages import Text
 from cmm_uq.base.units import UNITS
-from cmm_uq.certificate.part.figures import ANGLES, LENGTHS, PrintedFigures, PrintedUnits
-from cmm_uq.certificate.part.page import verdict_words
 from cmm_uq.certificate.verify.figures import quantities
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.html_page import HtmlPage, HtmlTable
-from cmm_uq.certificate.verify.views import squashed
-from cmm_uq.certificate.wording import OUTCOME_WORDS, probability
 from cmm_uq.laboratory.records.content import unit_of
 from cmm_uq.maths.uncertainty.quantity import Quantity, limit_in_full, rounded
 
@@ -168,86 +159,3 @@ def _measured(entry: Mapping[str, Any], k: int) -> str:
     if entry["u_um"] > 0:
         return " ± ".join(rounded(entry["value_um"], k * entry["u_um"]))
     return f"{entry['value_um']:.4g}"
-
-
-@dataclass(frozen=True, eq=False)
-class _One(PrintedFigures):
-    """A characteristic of results.json."""
-
-    data: Mapping[str, Any]
-
-    @property
-    def scale(self) -> PrintedUnits:
-        return ANGLES if self.angular else LENGTHS
-
-    @property
-    def angular(self) -> bool:
-        return bool(self.data["unit"] == "°")
-
-    @property
-    def expanded(self) -> float:
-        return self.inside("U")
-
-    @property
-    def one_sided(self) -> bool:
-        return self.data.get("stated_by") == "interval"
-
-    def inside(self, key: str) -> float:
-        """A value in mm or rad."""
-        return float(self.data[key]) * self.scale.per_value
-
-    def pair(self, ends: Sequence[float | None]) -> tuple[float | None, float | None]:
-        """Two ends in mm or rad."""
-        low, high = (None if end is None else end * self.scale.per_value for end in ends)
-        return low, high
-
-    def results(self, *, measured: bool) -> list[Text]:
-        """Cells of its row of results."""
-        low, high = (end * self.scale.per_value for end in self.data["interval95"])
-        value = [self.at(self.inside("value"))] if measured else []
-        error = [] if measured else [self.error(self.inside("mean_error"))]
-        k = nan if self.data["k"] is None else self.data["k"]
-        before = () if "stated_by" in self.data else (self.small(self.inside("u")),)  # before 0.15.0 a page had u, too
-        return [*value, *before, *self.with_factor(k),
-                self.interval_of((low, high), measured=measured), *error]  # fmt: skip
-
-    def decision(self) -> list[Text]:
-        """Cells of its row of decisions behind the nominal value."""
-        limits, said = self.data["limits"], self.data["decision"]
-        low, high = self.pair((limits["lower"], limits["upper"]))
-        accepted = None if limits["accepted"] is None else self.pair(limits["accepted"])
-        decided: list[Text] = []
-        if said is not None:
-            decided = [OUTCOME_WORDS[said["outcome"]], probability(said["probability_conforming"])]
-        return [self.limit(low), self.limit(high),
-                self.accepted_of(accepted), *decided]  # fmt: skip
-
-
-def check_part_stated(inquiry: Inquiry, data: Mapping[str, Any], text: str, *, files: tuple[str, str]) -> None:
-    """Keep every result, limit and decision that a text states otherwise, or not in its place."""
-    name, source = files
-    language = data["job"].get("language", "en")
-    whole, at = squashed(text), 0
-    for place, words in _expected(data):
-        inquiry.looked("figures")
-        said = [str.__str__(said_in(word, language)) for word in words]
-        wanted = squashed("".join(said))
-        found = whole.find(wanted, at)
-        at = at if found < 0 else found + len(wanted)
-        if found < 0:
-            problem = f"does not state the figures of {source} in their place"
-            inquiry.wrong("figures", name, place, problem, "", " ".join(said))
-
-
-def _expected(data: Mapping[str, Any]) -> Iterator[tuple[str, list[Text]]]:
-    """What follows each other on the page: the verdict, results, then decisions; lengths before angles."""
-    every = [_One(one) for one in data["characteristics"]]
-    measured = any(one.data["value"] is not None for one in every)
-    outcomes = [one.data["decision"]["outcome"] for one in every if one.data["decision"] is not None]
-    yield "verdict", [verdict_words(outcomes, measured=measured)]
-    ordered = [one for one in every if not one.angular] + [one for one in every if one.angular]
-    for one in ordered:
-        yield f"results of {one.data['name']}", one.results(measured=measured)
-    for one in ordered:
-        if one.data["limits"] is not None:
-            yield f"decision on {one.data['name']}", one.decision()

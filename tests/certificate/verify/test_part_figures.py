@@ -10,9 +10,6 @@ import pytest
 from cmm_uq.certificate.verify.again import beyond_sampling, differences
 from cmm_uq.certificate.verify.decisions import check_part_decisions
 from cmm_uq.certificate.verify.figures import check_part_figures, check_verdicts
-from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.certificate.verify.html_page import read_html
-from cmm_uq.certificate.verify.stated import check_part_stated
 from tests.certificate.verify import test_figures
 from tests.certificate.verify.test_figures import places
 from tests.part_reports import plate_report
@@ -84,24 +81,6 @@ def test_a_probability_that_no_distribution_with_this_u_has_is_named() -> None:
     assert margin > 2
     one["decision"] |= {"probability_conforming": 0.5, "probability_beyond": 0.5}
     assert "characteristics[4].decision.probability_beyond" in places(check_part_decisions, found)
-
-
-@pytest.mark.parametrize(("path", "value", "place"), [
-    ("characteristics.0.U", lambda U: 1.2 * U, "results of 1"),
-    ("characteristics.0.value", lambda value: value + 0.05, "results of 1"),
-    ("characteristics.0.limits.upper", lambda limit: limit + 0.01, "decision on 1"),
-    ("characteristics.0.decision.outcome", "fail", "decision on 1"),
-])  # fmt: skip
-def test_a_page_that_states_another_figure_is_named(path: str, value: Any, place: str) -> None:
-    text = read_html(plate_report()["part-simulated.html"], "page").text
-
-    def stated(found: dict[str, Any]) -> list[str]:
-        inquiry = Inquiry()
-        check_part_stated(inquiry, found, text, files=("page", "results.json"))
-        return [one.place for one in inquiry.findings]
-
-    assert not stated(data())
-    assert place in stated(changed(path, value))
 
 
 def test_figures_of_other_kernels_are_held_to_what_draws_and_digits_allow() -> None:

@@ -195,12 +195,13 @@ def verify_given(
         inquiry.left(AGAIN, NOT_ASKED)
     elif again is not None:
         alike = again.compute()
-    if given.pdf is not None and given.html is not None and not alike:
-        views.compare_views(inquiry, given.pdf[1], given.html[1], files=(given.pdf[0], given.html[0]))
-    if given.of_part and given.pdf is not None and given.html is None and not alike:
+    forms = [form[0] for form in (given.pdf, given.html) if form is not None]
+    if given.of_part and forms and not alike:
         inquiry.left(
-            f"words of {given.pdf[0]} beside its figures and decisions", "no HTML is given to compare them with"
+            f"texts and layout of {' and '.join(forms)}", "they are compared where they are made again to the byte"
         )
+    elif given.pdf is not None and given.html is not None and not alike:
+        views.compare_views(inquiry, given.pdf[1], given.html[1], files=(given.pdf[0], given.html[0]))
     if given.html is not None and not alike and _version(given) == __version__:
         views.check_style(inquiry, given.html[1], given.html[0])
     stage("Done", 1.0)

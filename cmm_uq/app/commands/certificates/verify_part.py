@@ -28,8 +28,6 @@ from cmm_uq.certificate.verify.decisions import check_part_decisions
 from cmm_uq.certificate.verify.figures import check_part_figures, check_verdicts
 from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Inquiry, VerificationFinding
 from cmm_uq.certificate.verify.given import RESULTS, Given, language_of
-from cmm_uq.certificate.verify.stated import check_part_stated
-from cmm_uq.certificate.verify.views import squashed, without_foot
 from cmm_uq.jobs.part.job import PartJob, part_of
 from cmm_uq.jobs.source import sha256
 
@@ -56,7 +54,6 @@ def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable
         check_part_figures(inquiry, data, name)
         check_part_decisions(inquiry, data, name)
         check_verdicts(inquiry, data, name)
-        _check_stated(inquiry, given, data, name)
     if (job := job_of_inputs(inquiry, given, part_job, "the machine's certificate")) is None:
         return None
     try:
@@ -66,17 +63,6 @@ def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable
         inquiry.wrong("inputs", name, "", f"has not the parts that cmm-uq writes ({type(error).__name__}: {error})")
         return None
     return job
-
-
-def _check_stated(inquiry: Inquiry, given: Given, data: Mapping[str, Any], name: str) -> None:
-    """What page and PDF state; their words are compared with each other besides, where both are there."""
-    if given.html is not None:
-        check_part_stated(inquiry, data, given.html[1].text, files=(given.html[0], name))
-    if given.pdf is not None:
-        pdf = given.pdf[1]
-        title, pages = squashed(pdf.information.get("/Title", "")), enumerate(pdf.pages, 1)
-        text = "".join(without_foot(squashed(text), title, number, len(pdf.pages))[0] for number, text in pages)
-        check_part_stated(inquiry, data, text, files=(given.pdf[0], name))
 
 
 def part_job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> PartJob:
