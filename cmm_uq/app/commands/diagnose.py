@@ -70,12 +70,12 @@ def _diagnose(job: Job, *, seed: int, alpha: float, progress: Progress | None = 
     refuse_planned(job)
     kind_of(job).observing("diagnosed as a recording of an artefact")
     simulation = job.facts.simulation
-    if simulation is None:
+    against = None if simulation is None else against_simulation(job, simulation)
+    if against is None:
         model, findings = screened_model(job)
-        return diagnose_model(job, model, findings, seed=seed, alpha=alpha, progress=progress, show=True)
-    against = against_simulation(job, simulation)
-    model, outliers = without_outliers(against.model)
-    findings = (*against.findings, *outliers)
+    else:
+        model, outliers = without_outliers(against.model)
+        findings = (*against.findings, *outliers)
     return diagnose_model(job, model, findings, seed=seed, alpha=alpha, progress=progress, show=True, against=against)
 
 
@@ -100,15 +100,13 @@ def diagnose_model(
     observe = kind.observing("diagnosed") if against is None else against.observe
     stated_um = facts.recording.u_coordinate_um if against is None else against.stated_um
     artefact_at = partial(observe, facts.artefact, where=job.recording_path)
-    diagnosis = diagnose(
-        model, stated_um=stated_um, alpha=alpha, seed=seed, progress=progress, known=known, observe=artefact_at
-    )
+    search = partial(diagnose, model, stated_um=stated_um, alpha=alpha, seed=seed, observe=artefact_at)
+    diagnosis = search(progress=progress, known=known)
     unseen = smallest_effects(diagnosis.search, alpha, diagnosis.after)
     goals = detection_goals(job, diagnosis, unseen) if show else ()
     plan = next_plan(diagnosis, facts.artefact, observe, kind.offers("plan", Planning), facts.plan, goals)
-    found = JobDiagnosis(
-        job, findings, diagnosis, suggestions(plan, model.artefact.title), unseen=unseen, next_plan=plan
-    )
+    suggested = suggestions(plan, model.artefact.title)
+    found = JobDiagnosis(job, findings, diagnosis, suggested, unseen=unseen, next_plan=plan)
     if against is not None:
         return replace(found, simulated=against.simulated)
     outside = OutsideReadings.of(job.points, findings, artefact_at)
@@ -158,10 +156,8 @@ def diagnosis_outcome(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, s
     """Diagnose a job that was read and compose the page; nothing is written."""
     readings = f": {len(job.points)} readings" if job.facts.artefact.with_recording else ""
     stage(f"Searching for what was left out{readings}", 0.0)
-    found = diagnose_read(
-        job, seed=seed, alpha=alpha,
-        progress=lambda part: stage(f"Sampling: {part:.0%} of the draws", 0.7 + 0.2 * part),
-    )  # fmt: skip
+    found = diagnose_read(job, seed=seed, alpha=alpha,
+                          progress=lambda part: stage(f"Sampling: {part:.0%} of the draws", 0.7 + 0.2 * part))  # fmt: skip
     stage("Composing the page", 0.9)
     return outcome_of(found, seed)
 
@@ -182,7 +178,5 @@ def write_diagnosis(
         read = compared_with(read, against)
     if told is not None:
         told(read)
-    return DIAGNOSE.write(
-        read, lambda: diagnosis_outcome(read, seed=seed, alpha=alpha, stage=tell), out, force=force, stage=tell,
-        records=records,
-    )  # fmt: skip
+    outcome = partial(diagnosis_outcome, read, seed=seed, alpha=alpha, stage=tell)
+    return DIAGNOSE.write(read, outcome, out, force=force, stage=tell, records=records)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf
 from pathlib import Path
 
@@ -106,13 +107,8 @@ def prove_job(
 
 
 def _records(
-    job: Job,
-    design: Design,
-    cases: tuple[Case, ...],
-    options: ProofOptions,
-    answers: AnswersFolder | None,
-    stage: Stage,
-) -> dict[int, Record]:
+    job: Job, design: Design,     cases: tuple[Case, ...], options: ProofOptions, answers: AnswersFolder | None, stage: Stage,
+) -> dict[int, Record]:  # fmt: skip
     records = {} if answers is None else answers.records
     if answers is not None and any(REFUSED not in one and not one.keys() >= ANSWER for one in records.values()):
         raise CmmUqError("holds an answer that none of these processes gave", where=str(answers.folder / RECORDS),
@@ -162,11 +158,9 @@ def design_of(job: Job) -> tuple[Job, Design]:
         design = Design(model, used.estimate().about, _recorded_noise(used), cte, dates)
         return replace(job, points=model.artefact.points), design
     if facts.recording.u_coordinate_um is None and facts.plan.noise_from is None:
-        raise CmmUqError(
-            "nothing is measured and no noise is stated, so that there is nothing to draw cases with",
-            where="job.toml [recording] u_coordinate_um",
-            fix="State the standard uncertainty of a coordinate, or name an earlier recording in [plan] noise_from",
-        )
+        what = "nothing is measured and no noise is stated, so that there is nothing to draw cases with"
+        fix = "State the standard uncertainty of a coordinate, or name an earlier recording in [plan] noise_from"
+        raise CmmUqError(what, where="job.toml [recording] u_coordinate_um", fix=fix)
     points = job.points
     if not len(points):
         from cmm_uq.app.commands.plans.planning import make_plan
@@ -195,13 +189,11 @@ def _recorded_noise(model: RecordingModel) -> Noise:
 
 
 def true_values(design: Design) -> dict[str, float]:
-    values, first = dict[str, float](), 0
+    values, left = dict[str, float](), list(design.coefficients)
     for effect in design.model.effects:
-        own = design.coefficients[first : first + len(effect.coefficients)]
-        first += len(own)
-        values |= {
-            f"{effect.name}.{name}": float(value) for name, value in effect.to_reported(own, np.zeros(0)).items()
-        }
+        own = np.array([left.pop(0) for _ in effect.coefficients])
+        reported = effect.to_reported(own, np.zeros(0))
+        values |= {f"{effect.name}.{name}": float(value) for name, value in reported.items()}
     return values
 
 
@@ -239,11 +231,9 @@ def write_proof(
     read = in_language(read_job(job, recorded=False), language)
     folder = (out or REPORTS / read.facts.job.id / PROVE.below) / UNFINISHED
     kept: list[AnswersFolder] = []
+    outcome = partial(prove_outcome, read, options, stage=tell, folder=folder, sealed=sealed, kept=kept)
     try:
-        written = PROVE.write(
-            read, lambda: prove_outcome(read, options, stage=tell, folder=folder, sealed=sealed, kept=kept), out,
-            force=force, stage=tell,
-        )  # fmt: skip
+        written = PROVE.write(read, outcome, out, force=force, stage=tell)
     except BaseException:
         for answers in kept:
             answers.close()

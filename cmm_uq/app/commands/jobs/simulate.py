@@ -91,17 +91,17 @@ def write_simulation(
     kind_of(read).observing("simulated")
     content = content_of(truth, JOB_BYTES, _TRUTH_GIVES)
     checked(content, truth, Truth)
-    owner = Owner("simulate", read.facts.job.id, read.origin)
-    with staged(out, owner, inputs=(*read.paths, truth), force=force, expected=(*read.inputs, TRUTH)) as place:
+    owner, expected = Owner("simulate", read.facts.job.id, read.origin), (*read.inputs, TRUTH)
+    with staged(out, owner, inputs=(*read.paths, truth), force=force, expected=expected) as place:
         return place.write(_files(read, content, truth, seed))
 
 
 def simulated_job(job: Job, truth: Path | Mapping[str, Any], *, seed: int | None = None) -> Job:
     """The job that :func:`write_simulation` writes, in memory."""
     kind_of(job).observing("simulated")
-    if isinstance(truth, Path):
-        return job_of(_files(job, content_of(truth, JOB_BYTES, _TRUTH_GIVES), truth, seed))
-    return job_of(_files(job, as_toml(truth, TRUTH), Path(TRUTH), seed))
+    path = truth if isinstance(truth, Path) else Path(TRUTH)
+    content = content_of(path, JOB_BYTES, _TRUTH_GIVES) if isinstance(truth, Path) else as_toml(truth, TRUTH)
+    return job_of(_files(job, content, path, seed))
 
 
 def _files(job: Job, content: bytes, truth: Path, seed: int | None) -> dict[str, bytes]:

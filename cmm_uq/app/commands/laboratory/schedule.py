@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,14 +104,9 @@ def send_trial(found: Schedule, clock: RunClock = CLOCK) -> list[Tried]:
 
 def write_schedule(path: Path) -> None:
     """Write a new ``schedule.toml`` with every key explained; never over anything."""
-    schema = json.loads(shipped("schedule"))
-    head = (
-        "# What cmm-uq report --scheduled goes by. What stands behind # is the default, or what may be said besides.\n"
-    )
-    write_new(path, f"{head}\n{commented(schema, _BEGUN)}".encode())
-
-
-_BEGUN: Mapping[str, Any] = {"run": {"out": "reports"}, "log": {"file": "schedule.log"}}
+    head = "# What cmm-uq report --scheduled goes by. What stands behind # is the default, or what may be said besides."
+    begun = {"run": {"out": "reports"}, "log": {"file": "schedule.log"}}
+    write_new(path, f"{head}\n\n{commented(json.loads(shipped('schedule')), begun)}".encode())
 
 
 def ready_files(
@@ -123,14 +119,20 @@ def ready_files(
     for folder in folders:
         if not folder.is_dir():
             raise CmmUqError("no such folder", where=str(folder), fix="Name the folder that holds the job folders")
-    found = schedule_of(folders, schedule)
-    hour, minute = _time_of(at)
+    found, named = schedule_of(folders, schedule), [day.strip().upper() for day in days.split(",") if day.strip()]
+    try:
+        time_of_day = dt.datetime.strptime(at, "%H:%M")
+    except ValueError:
+        raise CmmUqError(f"{at!r} is no time of day", where="--at", fix="Write it as 06:15") from None
+    if unknown := next((day for day in named if day not in DAYS), None):
+        raise CmmUqError(f"{unknown!r} is no day of the week", where="--days", fix=f"Known: {', '.join(DAYS)}")
     home = (found.home if found.path is not None else Path()).resolve()
     path = None if schedule is None else schedule.resolve()
     program, user = (sys.executable, "-m", "cmm_uq"), getpass.getuser() if system != "win32" else ""
-    whole = tuple(folder.resolve() for folder in folders)
-    call = ScheduledCall(program, whole, path, home, hour, minute, _days_of(days), user)
-    return READY[scheduler](call)
+    whole, chosen = tuple(folder.resolve() for folder in folders), tuple(day for day in DAYS if day in named)
+    return READY[scheduler](
+        ScheduledCall(program, whole, path, home, time_of_day.hour, time_of_day.minute, chosen, user)
+    )
 
 
 def write_ready(files: Mapping[str, str], folder: Path) -> list[Path]:
@@ -138,22 +140,6 @@ def write_ready(files: Mapping[str, str], folder: Path) -> list[Path]:
     for name, text in files.items():
         write_new(folder / name, encoded(name, text))
     return [folder / name for name in files]
-
-
-def _time_of(text: str) -> tuple[int, int]:
-    try:
-        found = dt.datetime.strptime(text, "%H:%M")
-    except ValueError:
-        raise CmmUqError(f"{text!r} is no time of day", where="--at", fix="Write it as 06:15") from None
-    return found.hour, found.minute
-
-
-def _days_of(text: str) -> tuple[str, ...]:
-    given = [day.strip().upper() for day in text.split(",") if day.strip()]
-    for day in given:
-        if day not in DAYS:
-            raise CmmUqError(f"{day!r} is no day of the week", where="--days", fix=f"Known: {', '.join(DAYS)}")
-    return tuple(day for day in DAYS if day in given)
 
 
 _AHEAD = dt.timedelta(days=1)
@@ -177,11 +163,12 @@ def opened(place: str | Path | None, *, dry: bool) -> Iterator[Records | None]:
 
 def due_notices(records: Records | None, on: dt.date, within: dt.timedelta) -> Iterable[notices.Notice]:
     """What is to be calibrated soon, or should have been."""
-    if records is None:
+    if records is None or not (last := records.head()[0]):
         return
-    _check_clock(records, on)
-    if not records.head()[0]:
-        return
+    newest = dt.datetime.fromisoformat(next(records.entries(last)).at).date()
+    if newest > on + _AHEAD:
+        what = f"the newest entry is of {newest}, and the clock says {on}: what is due is not said"
+        raise CmmUqError(what, where="records", fix="Set the clock")
     for one in due_in(records, (), on):
         if one.due is not None and one.due <= on + within:
             yield notices.of_due(one.item, one.serial, one.due, on, one.why, beyond=one.beyond)
@@ -193,23 +180,12 @@ def drift_notices(records: Records | None, job: str, on: dt.date) -> Iterable[no
     if records is None or not newest:
         return
     machine = records.machine(newest[-1].machine)
-    history = machine_history(
-        machine, records.certificates(machine.serial, values=False), records.series(machine.serial), on
-    )
+    certificates = records.certificates(machine.serial, values=False)
+    history = machine_history(machine, certificates, records.series(machine.serial), on)
     changed = [Verbatim(one.series.quantity) for one in history.values if history.significant(one)
                and int(one.series.entry[-1]) == newest[-1].entry]  # fmt: skip
     if changed:
         yield notices.of_drift(machine.serial, changed, newest[-1].entry)
-
-
-def _check_clock(records: Records, on: dt.date) -> None:
-    number, _ = records.head()
-    if not number:
-        return
-    newest = dt.datetime.fromisoformat(next(records.entries(number)).at).date()
-    if newest > on + _AHEAD:
-        raise CmmUqError(f"the newest entry is of {newest}, and the clock says {on}: what is due is not said", where="records",
-                         fix="Set the clock")  # fmt: skip
 
 
 Tell = Callable[[dict[str, Any]], None]
@@ -255,39 +231,27 @@ def run_scheduled(asked: ScheduledOptions, tell: Tell = lambda told: None, clock
                         lambda job: drift_notices(records, job.id, clock.now().date()))  # fmt: skip
             within = dt.timedelta(days=facts.run.due_within_days)
             roots = [folder.absolute() for folder in asked.folders]
-            run = ScheduledRun(
-                roots,
-                facts.run,
-                work,
-                outbox,
-                lambda on: due_notices(records, on, within),
-                tell,
-                log.write,
-                clock,
-                asked.dry,
-            )
-            with keeping(lambda: _kept(run)):
+            due = partial(due_notices, records, within=within)
+            run = ScheduledRun(roots, facts.run, work, outbox, due, tell, log.write, clock, asked.dry)
+
+            def kept() -> str:
+                count = run.counted.get(REPORTED, 0)
+                many = say("{count} reports were written", count=count)
+                return str(plural(count, one=say("1 report was written"), many=many))
+
+            with keeping(kept):
                 return run.through()
     except CmmUqError as error:  # of the records: without them nothing is made, and somebody has to hear of that too
         if not asked.dry:
-            _send_alone(error, notices.Outbox(reports, ways, FolderState(reports), clock.moment), log, clock)
+            log.write(f"{clock.moment()} nothing was done: {error}")
+            notice = notices.of_error(error, _RUN, Problems(reports).since(_RUN, str(error), clock.moment()))
+            outbox = notices.Outbox(reports, ways, FolderState(reports), clock.moment)
+            try:
+                outbox.add([notice])
+                outbox.deliver(patience_s=0.0)
+            except OutputError:
+                outbox.sent_at_once([notice])
         raise
-
-
-def _kept(run: ScheduledRun) -> str:
-    count = run.counted.get(REPORTED, 0)
-    return str(plural(count, one=say("1 report was written"), many=say("{count} reports were written", count=count)))
-
-
-def _send_alone(error: CmmUqError, outbox: notices.Outbox, log: Log, clock: RunClock) -> None:
-    """Tell of an error that ended the whole run."""
-    log.write(f"{clock.moment()} nothing was done: {error}")
-    notice = notices.of_error(error, _RUN, Problems(outbox.out).since(_RUN, str(error), clock.moment()))
-    try:
-        outbox.add([notice])
-        outbox.deliver(patience_s=0.0)
-    except OutputError:
-        outbox.sent_at_once([notice])
 
 
 def _reported(job: JobFolder, out: Path, seed: int, records: str | Path) -> bytes:
