@@ -47,8 +47,9 @@ def model_of(job: Job, artefact: Artefact) -> RecordingModel:
     if (count := Freedoms.of(artefact.placing(artefact.points.xyz)).count) > FREEDOMS.most:
         raise CmmUqError(
             f"the placings have {count} freedoms together, more than are estimated beside the machine's errors at once",
-            where=job.recording_path, fix=f"{FREEDOMS.most} are the most: split the recording",
-        )  # fmt: skip
+            where=job.recording_path,
+            fix=f"{FREEDOMS.most} are the most: split the recording",
+        )
     stated, aside = job.facts.recording.u_coordinate_um, job.facts.recording.measurements_aside
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",

@@ -145,8 +145,9 @@ def design_of(job: Job) -> tuple[Job, Design]:
     if kind.observe is None or (offered is not None and offered.diagnose is not None):
         raise CmmUqError(
             f"a job of kind {facts.artefact.kind!r} has an analysis of its own, which is not proved by cases of effects",
-            where="job.toml [artefact] kind", fix="Prove a job whose recording is explained by effects",
-        )  # fmt: skip
+            where="job.toml [artefact] kind",
+            fix="Prove a job whose recording is explained by effects",
+        )
     if facts.simulation is not None:
         raise CmmUqError("the diagnosis against a simulation is not proved: cases are drawn by the job's own model",
                          where=f"job.toml {KEY}", fix="Leave the simulation out")  # fmt: skip

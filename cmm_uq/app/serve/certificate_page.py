@@ -53,17 +53,18 @@ def certificate_page(view: SiteView, request: WebRequest) -> p.WebPage:
     values = [(value.quantity, value.unit, value) for value in one.values]
     diagnosis = results_of(files, folder).get("diagnosis")
     return p.WebPage(
-        title, "/certificates", lead=lead, above=(Cell(say("Certificates"), "/certificates"), machine_cell(one.machine)),
+        title,
+        "/certificates",
+        lead=lead,
+        above=(Cell(say("Certificates"), "/certificates"), machine_cell(one.machine)),
         blocks=(*_notices(one), _facts(view, one, entry)),
         sections=(
-            (
-                say("Values"), (values_table(say("Values as stated"), values, say("It states no value."), heard=True),)
-            ),
+            (say("Values"), (values_table(say("Values as stated"), values, say("It states no value."), heard=True),)),
             *(diagnosis_section(diagnosis) if isinstance(diagnosis, Mapping) else ()),
             *_signatures(view, one),
             (say("Files"), (_files(one, files),)),
         ),
-    )  # fmt: skip
+    )
 
 
 def recorded_file(view: SiteView, request: WebRequest) -> WebResponse:

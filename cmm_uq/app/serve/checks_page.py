@@ -173,9 +173,10 @@ def integrity_page(view: SiteView, request: WebRequest) -> WebPage:
         (say("Records"), Cell(Verbatim(shown_place(view.records.place)))),
     )
     forms: tuple[Block, ...] = (
-        PageParagraph(_WHAT), p.Press("/integrity/chain", say("Compare entries and tables")),
+        PageParagraph(_WHAT),
+        p.Press("/integrity/chain", say("Compare entries and tables")),
         p.Press("/integrity/files", say("Compare entries, tables and all files")),
-    )  # fmt: skip
+    )
     if (since := view.checking.since) is not None:
         under_way = say("A comparison is under way since {moment}.", moment=p.moment(since))
         forms = (PageParagraph(under_way), p.Links((Cell(say("Look again"), "/integrity"),)))

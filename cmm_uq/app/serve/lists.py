@@ -72,8 +72,9 @@ def certificates_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
         _field(request, "text", say("Number, job or machine")),
         _field(request, "state", say("State"), _ANY, *_options(p.STATES)),
         _field(request, "decision", say("Decision"), _ANY, *_options(p.DECISIONS)),
-        _field(request, "origin", say("Recording"), *p.ORIGINS.items(), usual=origin), *dates,
-    )  # fmt: skip
+        _field(request, "origin", say("Recording"), *p.ORIGINS.items(), usual=origin),
+        *dates,
+    )
     none = say("No certificate of a measurement is recorded yet.")
     lead = say("Newest first.")
     if machine:

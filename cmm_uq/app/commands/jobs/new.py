@@ -264,8 +264,9 @@ def check_empty(folder: Path, but: str = "") -> None:
     except FileNotFoundError:
         return
     except OSError as error:
-        raise CmmUqError(f"cannot be a new folder: {error.strerror}", where=str(folder),
-                         fix="Name another one") from None  # fmt: skip
+        raise CmmUqError(
+            f"cannot be a new folder: {error.strerror}", where=str(folder), fix="Name another one"
+        ) from None
     if there:
         raise CmmUqError(f"is not empty: {there[0]!r} lies in it", where=str(folder),
                          fix="Name a folder that does not exist yet; nothing is overwritten")  # fmt: skip

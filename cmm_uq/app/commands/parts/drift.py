@@ -94,8 +94,9 @@ def known_of(content: bytes) -> KnownChanges:
         values = {str(one["name"]): (series(one), one["adjusted_after"]) for one in said["values"]}
         return KnownChanges(tuple(map(dt.date.fromisoformat, said["adjusted"])), values)
     except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
-        raise CmmUqError("is no history of a machine", where=FILE,
-                         fix="Evaluate the part again, with --records") from error  # fmt: skip
+        raise CmmUqError(
+            "is no history of a machine", where=FILE, fix="Evaluate the part again, with --records"
+        ) from error
 
 
 @dataclass(frozen=True, eq=False)

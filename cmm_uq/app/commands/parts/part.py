@@ -116,8 +116,9 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
     stage("What to measure on the machine", 0.8)
     unseen = tuple(  # what the calibration left free or did not see, by characteristic, the largest share first
         UnseenError(name, line, effect := line.partition(": ")[2], effect_title(effect), share, why)
-        for name in shares.characteristics for line, share, why in shares.told(name, virtual.named, MATTERS)
-    )  # fmt: skip
+        for name in shares.characteristics
+        for line, share, why in shares.told(name, virtual.named, MATTERS)
+    )
     further = further_of(machine.job, unseen)
 
     # values, limits, decisions (JCGM 106)

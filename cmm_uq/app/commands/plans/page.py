@@ -183,8 +183,9 @@ def worth(plan: MeasurementPlan) -> tuple[Block, ...]:
         cells.append((named(unknown), *figures, unit_of(unknown)))
     note = say(
         "Expected u of each parameter with the {count} placings of the plan; in brackets with one more, which tells as "
-        "much as they do on average. An offset of a set-up is shared by its repeats.", count=found.placings,
-    )  # fmt: skip
+        "much as they do on average. An offset of a set-up is shared by its repeats.",
+        count=found.placings,
+    )
     enough, most, repeats = found.enough, found.rows[-1].repeats, plan.setting.plan.repeats
     if enough is None:
         advice = say(
