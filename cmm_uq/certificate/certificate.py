@@ -4,38 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, signed, without_keys
 from cmm_uq.base.units import unit
-from cmm_uq.certificate import clauses
+from cmm_uq.certificate import clauses, origin as origins
 from cmm_uq.certificate.clauses import claimed, traceability
 from cmm_uq.certificate.diagnosis.page import diagnosis_sections
 from cmm_uq.certificate.document import Document, Facts, Overview, Section, Signature, with_each_text
-from cmm_uq.certificate.origin import (
-    CERTIFICATE,
-    DIGITAL,
-    came_about,
-    file_name,
-    posterior_file,
-    posterior_name,
-    program,
-)
 from cmm_uq.certificate.result import Outcome, Page, Result, StatedUncertainty
 from cmm_uq.certificate.results.contents import results
 from cmm_uq.certificate.results.provenance import COMPARED, FILE as PROVENANCE, NOT_COMPARED
+from cmm_uq.certificate.sections import results as of_result
 from cmm_uq.certificate.sections.conformity import conformity_section
 from cmm_uq.certificate.sections.method import method, posterior_section, warnings
-from cmm_uq.certificate.sections.results import (
-    as_found_data,
-    as_found_section,
-    error_factors,
-    overview_of,
-    performance,
-    quantities_left,
-    summary,
-    tolerance_sections,
-    with_first,
-)
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.tables.identification import Identification, Laboratory
@@ -72,33 +54,34 @@ def certificate_of(
     """Sections and warnings between what every certificate has; ``files`` are attached beside job and recording."""
     facts = job.facts
     name, date = Verbatim(facts.machine.name), day(facts.job.date)
-    return in_words(Document(
-        title=CERTIFICATE,
-        number=Verbatim(facts.job.number or facts.job.id),
-        subject=say("{name}, {came_about} {date}", name=name, came_about=came_about(job), date=date),
-        issuer=issuer_of(facts.laboratory),
-        particulars=_particulars(job),
-        warnings=(*warnings, *clauses.formal_warnings(job)),
+    return formal_document(
+        facts.job, facts.laboratory, job.inputs,
+        (Verbatim(origins.file_name(origins.DIGITAL, job.origin)), *files), draft=clauses.draft(job),
+        title=origins.CERTIFICATE,
+        subject=say("{name}, {came_about} {date}", name=name, came_about=origins.came_about(job), date=date),
+        particulars=_particulars(job), warnings=(*warnings, *clauses.formal_warnings(job)), overview=overview, decides=True,
         sections=tuple(sorted((one for one in sections if one.blocks), key=lambda one: (not one.first, one.opinion))),
-        statements=statements_of(facts.job),
-        signatures=signatures_of(facts.laboratory),
-        attachments=(
-            *names(job.inputs), Verbatim("results.json"), Verbatim(file_name(DIGITAL, job.origin)), *files,
-            Verbatim(PROVENANCE),
-        ),
         produced_by=produced_by,
-        date=facts.job.issued or facts.job.date,
-        banner=clauses.DRAFT if clauses.draft(job) else NOTHING,
-        draft=clauses.draft(job),
-        logo=logo_of(facts.laboratory, job.inputs),
-        overview=overview,
-        decides=True,
-    ))  # fmt: skip
+    )  # fmt: skip
 
 
-def in_words(document: Document) -> Document:
-    """The document without keys of the job, which the laboratory reads from ``check``, the terminal and results.json."""
-    found: Document = with_each_text(document, without_keys)
+def formal_document(
+    job: Identification, laboratory: Laboratory, inputs: Mapping[str, bytes], files: tuple[Text, ...] = (), *, draft: bool,
+    authorised: bool = True, **stated: Any,
+) -> Document:  # fmt: skip
+    """A document that the laboratory answers for, and signs where it is ``authorised``; ``stated``: see :class:`Document`.
+
+    It is without keys of the job, which the laboratory reads from ``check``, the terminal and results.json.
+    """
+    statements = (*clauses.STATEMENTS, *((clauses.NOT_OURS,) if job.from_customer else ()))
+    signature = Signature(Verbatim(laboratory.signatory), Verbatim(laboratory.signatory_role))
+    found: Document = with_each_text(Document(
+        number=Verbatim(job.number or job.id), date=job.issued or job.date, logo=logo_of(laboratory, inputs),
+        issuer=tuple(Verbatim(line) for line in (laboratory.name, *laboratory.address.splitlines()) if line),
+        statements=statements if authorised else (), signatures=(signature,) if authorised and laboratory.signatory else (),
+        attachments=(*names(inputs), Verbatim("results.json"), *files, Verbatim(PROVENANCE)),
+        banner=clauses.DRAFT if draft else NOTHING, draft=draft, **stated,
+    ), without_keys)  # fmt: skip
     return found
 
 
@@ -161,20 +144,6 @@ def performed(job: Identification) -> tuple[Row, ...]:
     )
 
 
-def issuer_of(laboratory: Laboratory) -> tuple[Text, ...]:
-    return tuple(Verbatim(line) for line in (laboratory.name, *laboratory.address.splitlines()) if line)
-
-
-def signatures_of(laboratory: Laboratory) -> tuple[Signature, ...]:
-    if not laboratory.signatory:
-        return ()
-    return (Signature(Verbatim(laboratory.signatory), Verbatim(laboratory.signatory_role)),)
-
-
-def statements_of(job: Identification) -> tuple[Text, ...]:
-    return (*clauses.STATEMENTS, clauses.NOT_OURS) if job.from_customer else clauses.STATEMENTS
-
-
 def _replacement(job: Identification) -> tuple[tuple[Text, str], ...]:
     """Which certificate this one replaces, why, and what changed (7.8.8)."""
     replaced = job.replaces
@@ -208,13 +177,14 @@ def certified(result: Result, page: Page) -> Outcome:
     result, stating = with_capability(result)
     own = (*warnings(result), *stating.warnings())
     warned = (*own, *clauses.formal_warnings(result.job))
-    draws = posterior_file(result.draws, result.job.origin) if len(result.draws) else None
-    data = results(result) | as_found_data(result.job) | clauses.clauses_data(result.job) | stating.data()
+    draws = origins.posterior_file(result.draws, result.job.origin) if len(result.draws) else None
+    data = results(result) | of_result.as_found_data(result.job) | clauses.clauses_data(result.job) | stating.data()
     if draws is not None:
         data["posterior"] = draws.entry
     return Outcome(
-        result, lambda: _certificate(result, page, own), page.with_further(result, data), summary(result, warned), warned,
-        {draws.name: draws.content} if draws else {}, draws=result.draws, verdicts=result.verdicts,
+        result, lambda: _certificate(result, page, own), page.with_further(result, data),
+        of_result.summary(result, warned), warned, {draws.name: draws.content} if draws else {}, draws=result.draws,
+        verdicts=result.verdicts,
         in_order=result.diagnosed.diagnosis.verdict == "consistent",
     )  # fmt: skip
 
@@ -223,19 +193,24 @@ def _certificate(result: Result, page: Page, warned: tuple[Text, ...]) -> Docume
     job, posterior = result.job, result.posterior
     diagnosis = diagnosis_sections(result.diagnosed) if job.facts.job.diagnosis_on_certificate else ()
     sections = [
-        *with_first(result, [*_ordered(result, page.sections(result)), *tolerance_sections(result)]), method(result),
+        *of_result.with_first(result, [*_ordered(result, page.sections(result)), *of_result.tolerance_sections(result)]),
+        method(result),
         *(replace(section, opinion=True) for section in (*diagnosis, posterior_section(result))),
     ]  # fmt: skip
-    produced_by = say("{program}, {sampler}, seed {seed}", program=program(job), sampler=Verbatim(posterior.sampler),
+    produced_by = say("{program}, {sampler}, seed {seed}", program=origins.program(job), sampler=Verbatim(posterior.sampler),
                       seed=posterior.seed)  # fmt: skip
-    files = (Verbatim(posterior_name(job.origin)),) if len(result.draws) else ()
-    return certificate_of(job, sections, warned, produced_by, files, overview_of(result))
+    files = (Verbatim(origins.posterior_name(job.origin)),) if len(result.draws) else ()
+    return certificate_of(job, sections, warned, produced_by, files, of_result.overview_of(result))
 
 
 def _ordered(result: Result, own: list[Section]) -> list[Section]:
     """Results first (figures of lengths, else error factors, else the first of ``own``), then decisions and their basis."""
-    figures, factors, decided = performance(result), error_factors(result), conformity_section(result.statements)
-    before = as_found_section(result.job, quantities_left(result), result.verdicts)
+    figures, factors, decided = (
+        of_result.performance(result),
+        of_result.error_factors(result),
+        conformity_section(result.statements),
+    )
+    before = of_result.as_found_section(result.job, of_result.quantities_left(result), result.verdicts)
     rests_on = traceability(result)
     if figures.blocks:
         return [figures, decided, before, factors, rests_on, *own]

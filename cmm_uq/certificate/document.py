@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from functools import cache
 from typing import Any, ClassVar, Literal
 
+from cmm_uq import __version__
 from cmm_uq.base.languages.translation import ENGLISH, Code, code_of, translated as said_in
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.jobs.job import JobFile
@@ -346,3 +347,14 @@ def working_page(
         sections=tuple(section for section in sections if section.blocks),
         attachments=attachments, produced_by=produced_by, end=end, overview=overview,
     )  # fmt: skip
+
+
+def program_page(
+    title: Text, number: Text, subject: Text, sections: Iterable[Section], *files: str, seed: int | None = None, **further: Any
+) -> Document:  # fmt: skip
+    """A document about no job, by the program alone, with the files that belong to it; see :class:`Document`."""
+    by: Text = say("cmm-uq {version}", version=Verbatim(__version__))
+    if seed is not None:
+        by = say("cmm-uq {version}, seed {seed}", version=Verbatim(__version__), seed=seed)
+    return Document(title=title, number=number, subject=subject, sections=tuple(sections), produced_by=by,
+                    attachments=tuple(map(Verbatim, files)), **further)  # fmt: skip

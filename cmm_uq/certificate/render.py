@@ -24,18 +24,8 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code, code_of, translated as said_in
 from cmm_uq.base.messages import Message, Plural, Text, Verbatim, commas, say, sentences
-from cmm_uq.certificate.document import (
-    WORDS,
-    Document,
-    Facts,
-    Paragraph,
-    Plot,
-    Section,
-    Table,
-    attachment_title,
-    letters,
-    view_words,
-)
+from cmm_uq.certificate import document as doc
+from cmm_uq.certificate.document import WORDS, Document, Facts, Plot, Section, Table, letters
 from cmm_uq.certificate.plots.style import COLOURS, JAPANESE, fonts_of
 from cmm_uq.certificate.sign import TEST_NOTE, Seal, Signer
 
@@ -53,7 +43,7 @@ def template_folder() -> Path:
 
 
 def render_html(document: Document) -> str:
-    shown, words = fitted(document), view_words(code_of(document.language))
+    shown, words = fitted(document), doc.view_words(code_of(document.language))
     return _environment().get_template("document.html").render(
         document=shown.as_data(), words=words, colour=COLOURS, picture=picture_share(shown), tight=tightness(shown)
     )  # fmt: skip
@@ -63,7 +53,7 @@ def style_sheet(heading: str, banner: str, language: str) -> str:
     """The style sheet of a page, which says what stands at head and foot of its printed pages."""
     title, _, number = heading.partition(" ")
     document = {"title": title, "number": number, "banner": banner, "language": language}
-    words = view_words(code_of(language))
+    words = doc.view_words(code_of(language))
     return _environment().get_template("document.css").render(document=document, words=words, colour=COLOURS)
 
 
@@ -162,7 +152,7 @@ def _warnings_behind(document: Document) -> Document:
         for texts in alike.values()
     ]  # fmt: skip
     words = WORDS["warning"] if len(document.warnings) == 1 else WORDS["warnings"]
-    behind = Section(_said(document, words), tuple(Paragraph(text) for text in document.warnings))
+    behind = Section(_said(document, words), tuple(doc.Paragraph(text) for text in document.warnings))
     first, *others = _around(document)
     return replace(document, warnings=(*named, _said(document, _IN_FULL)), sections=(*first, behind, *chain(*others)))
 
@@ -263,7 +253,7 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
     content = {
         "document": fitted(document).as_data(),
         "smallest": SMALLEST,
-        "words": view_words(language),
+        "words": doc.view_words(language),
         "fonts": [FACE, JAPANESE] if language == "ja" else [FACE],
         "colour": COLOURS,
         "date": document.date.isoformat() if document.date else EPOCH,
@@ -293,7 +283,7 @@ def _attachment(name: str, data: bytes, language: Code) -> dict[str, Any]:
         "data": body,
         "relationship": "data" if outcome else "source",
         "type": _TYPES.get(suffix, "application/octet-stream"),
-        "description": str.__str__(said_in(attachment_title(name, outcome=outcome), language)),
+        "description": str.__str__(said_in(doc.attachment_title(name, outcome=outcome), language)),
     }
 
 

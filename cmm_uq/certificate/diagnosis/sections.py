@@ -9,20 +9,8 @@ from cmm_uq.analysis.diagnosis.model_average import Rival
 from cmm_uq.analysis.diagnosis.power import ALLOWED
 from cmm_uq.analysis.diagnosis.smallest import PLACES, POWER, PeriodRange, SmallestEffect
 from cmm_uq.analysis.planning.set_up import ODDS, NextPlan, odds_words, rounded
-from cmm_uq.base.messages import (
-    DASH,
-    NOTHING,
-    Text,
-    Verbatim,
-    after,
-    commas,
-    listed,
-    number,
-    plural,
-    say,
-    semicolons,
-    together,
-)
+from cmm_uq.base import messages
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, plural, say
 from cmm_uq.base.units import Unit
 from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
 from cmm_uq.certificate.plots.plans import placing_pictures
@@ -71,7 +59,7 @@ def next_sentence(result: JobDiagnosis) -> Text:
     plan = result.next_plan
     if plan is None:
         return NOTHING
-    ends = semicolons(say("{ends} mm", ends=placing.ends) for placing in plan.placings)
+    ends = messages.semicolons(say("{ends} mm", ends=placing.ends) for placing in plan.placings)
     told = say(
         "Measure next: {what} First and last point in scale readings: {ends}.", what=_what(result, plan), ends=ends
     )
@@ -107,7 +95,11 @@ def _what(result: JobDiagnosis, plan: NextPlan) -> Text:
 
 def _partings(plan: NextPlan) -> Table | None:
     rows = (
-        (together(map(effect_title, one.effects)), odds_words(one.before), say("{odds} : 1", odds=rounded(one.after)))
+        (
+            messages.together(map(effect_title, one.effects)),
+            odds_words(one.before),
+            say("{odds} : 1", odds=rounded(one.after)),
+        )
         for one in plan.partings
     )
     heads = (say("Cannot be told apart"), Column(say("Odds now, first over second")), Column(say("Odds expected then")))
@@ -157,14 +149,14 @@ def costs_section(result: JobDiagnosis) -> Section:
         say("What follows from each explanation that remains"),
         (say("Quantity"), *heads, Column(say("Averaged")), say("Unit")),
         _cost_rows(result) if rivals else (),  # none as against a simulation, where no effect of the job takes part
-        note, after(left if more else NOTHING, share),
+        note, messages.after(left if more else NOTHING, share),
     )  # fmt: skip
     return section(say("What the choice of an explanation costs"), follows)
 
 
 def explanation(rival: Rival) -> Text:
     words = (*titles(rival.effects), *rival.functions)
-    return commas(words) if words else say("nothing missing")
+    return messages.commas(words) if words else say("nothing missing")
 
 
 def _cost_rows(result: JobDiagnosis) -> Iterator[tuple[Text, ...]]:
@@ -182,7 +174,7 @@ def _cost_rows(result: JobDiagnosis) -> Iterator[tuple[Text, ...]]:
         yield (
             say("{standard}, {quantity}", standard=Verbatim(first.facts.standard), quantity=first.quantity),
             *(OUTCOME_WORDS[cost.statements[i].outcome] for cost in costs.each[:_SHOWN]),
-            commas(
+            messages.commas(
                 say("{outcome} {probability}", outcome=OUTCOME_WORDS[outcome], probability=probability(p))
                 for outcome, p in costs.decisions[i].items()
             ),
@@ -207,7 +199,9 @@ def without_power(result: JobDiagnosis) -> Text:
     ]  # fmt: skip
     if (more := len(words) - _NAMED) > 1:
         words = [*words[:_NAMED], say("{more} more", more=more)]
-    return say("But this recording could not have shown: {effects}.", effects=listed(words)) if words else NOTHING
+    return (
+        say("But this recording could not have shown: {effects}.", effects=messages.listed(words)) if words else NOTHING
+    )
 
 
 def unseen_section(result: JobDiagnosis) -> Section:
@@ -241,7 +235,7 @@ def _size(value: float, unit: Unit) -> Text:
 
 
 def _why(row: SmallestEffect) -> Text:
-    takers = listed([*map(_taker, row.taken_up)])
+    takers = messages.listed([*map(_taker, row.taken_up)])
     said: list[Text] = []
     if row.taken_up:
         said.append(say("taken up by {effects}", effects=takers) if row.share < 1e-3 else
@@ -252,7 +246,7 @@ def _why(row: SmallestEffect) -> Text:
         said.append(say("it would take {size}", size=_size(row.detected, row.unit)))
     if row.periods is not None:
         said.append(_periods(row.periods, row))
-    return commas(said) if said else DASH
+    return messages.commas(said) if said else messages.DASH
 
 
 def _taker(name: str) -> Text:
@@ -277,4 +271,6 @@ def _periods(periods: PeriodRange, row: SmallestEffect) -> Text:
     ]
     if len(ranges) > _RANGES:
         ranges = [*ranges[:_RANGES], say("{more} more ranges", more=len(ranges) - _RANGES)]
-    return say("{worst}; not resolved: {ranges}\u00a0{unit}", worst=worst, ranges=listed(ranges), unit=periods.unit)
+    return say(
+        "{worst}; not resolved: {ranges}\u00a0{unit}", worst=worst, ranges=messages.listed(ranges), unit=periods.unit
+    )

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cmm_uq import __version__
 from cmm_uq.base.messages import Text, Verbatim, commas, foreign, say
-from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, program_page
 from cmm_uq.certificate.plots.residuals import budget_bars
 from cmm_uq.maths.uncertainty.budget import HEADINGS, Budget
 from cmm_uq.maths.uncertainty.budget_results import COMPARISON, SUMMARY, comparison_rows, statement, summary_rows
@@ -35,16 +34,11 @@ def budget_document(file: ModelFile | ReadyBudget, evaluation: Evaluation, name:
         Section(say("Budget of {output}", output=Verbatim(output)), _budget(evaluation, output, stated))
         for output, stated in evaluation.stated.items()
     ]
-    return Document(
-        title=say("Uncertainty budget"),
-        number=Verbatim(file.title),
-        subject=say("Evaluated {how} from {name}", how=file.how, name=Verbatim(name)),
+    return program_page(
+        say("Uncertainty budget"), Verbatim(file.title), say("Evaluated {how} from {name}", how=file.how, name=Verbatim(name)),
+        sections, name, "results.json", seed=asked.seed, end=say("End of budget"),
         particulars=(Facts(((say("File"), Verbatim(name)), (say("SHA-256"), Verbatim(file.sha256)))),),
-        sections=tuple(sections),
-        attachments=(Verbatim(name), Verbatim("results.json")),
-        produced_by=say("cmm-uq {version}, seed {seed}", version=Verbatim(__version__), seed=asked.seed),
-        end=say("End of budget"),
-    )
+    )  # fmt: skip
 
 
 def _budget(evaluation: Evaluation, output: str, stated: Stated) -> tuple[Block, ...]:

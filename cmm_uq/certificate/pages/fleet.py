@@ -8,14 +8,13 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq import __version__
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, plural, say, semicolons, sentences
 from cmm_uq.base.points import Ints
 from cmm_uq.base.units import unit_as_written
 from cmm_uq.certificate import document as doc
 from cmm_uq.certificate.document import Column, Document, Overview, Paragraph, Plot, Section, Standing, Table, columns
 from cmm_uq.certificate.pages import fleet_summary as words
-from cmm_uq.certificate.plots.style import ACCENT, INK, dots, drawn, picture, strokes
+from cmm_uq.certificate.plots.style import ACCENT, INK, dots, drawn, named_rows, picture, strokes
 from cmm_uq.laboratory.due.drift import PARTS
 from cmm_uq.laboratory.due.due import DueItem, State
 from cmm_uq.laboratory.due.fleet import FALSE_DISCOVERIES, FleetResult, FleetValue, UsualRate
@@ -35,16 +34,10 @@ def due_document(items: Sequence[DueItem], on: dt.date, within: dt.timedelta) ->
     looked_at = say("{machines} and {artefacts}", machines=words.counted(len(machines)), artefacts=counted_artefacts)
     out_of_date = ((say("Artefact out of date"), words.counted(blocked)),) if blocked else ()
     overview = Overview(*counts(items, on, within), ((say("Looked at"), looked_at), *out_of_date))
-    return Document(
-        title=say("What is due for calibration"),
-        number=day(on),
-        subject=say("on {on}, and within {days} days", on=day(on), days=within.days),
-        sections=sections or (Section(say("Machines"), (Paragraph(say("Nothing is due.")),)),),
-        attachments=(Verbatim("due.json"),),
-        produced_by=say("cmm-uq {version}", version=Verbatim(__version__)),
-        end=say("End of list"),
-        overview=overview,
-    )
+    subject = say("on {on}, and within {days} days", on=day(on), days=within.days)
+    nothing = Section(say("Machines"), (Paragraph(say("Nothing is due.")),))
+    return doc.program_page(say("What is due for calibration"), day(on), subject, sections or (nothing,), "due.json",
+                            end=say("End of list"), overview=overview)  # fmt: skip
 
 
 def counts(items: Iterable[DueItem], on: dt.date, within: dt.timedelta) -> tuple[Text, Standing]:
@@ -101,11 +94,8 @@ def fleet_plot(
         ax.axvline(0, color=INK, lw=0.7, zorder=1)
         strokes(ax, low, high, at, at, lw=1.6, color=ACCENT, solid_capstyle="butt", zorder=2)
         dots(ax, rate, at, 4.0, ACCENT)
-        ax.set_yticks(at, names)
+        named_rows(ax, at, names)
         ax.set(xlabel=axis)
-        ax.invert_yaxis()
-        ax.tick_params(left=False)
-        ax.spines["left"].set_visible(False)
         return drawn(figure, caption, alternative)
 
 
@@ -261,20 +251,13 @@ def spreads_table(of: FleetValue) -> Table:
 
 def fleet_document(found: FleetResult) -> Document:
     values = plural(len(found.values), one=say("one value"), many=say("{count} values", count=len(found.values)))
-    return Document(
-        title=say("Drift of a fleet"),
-        number=words.date_of(found.newest),
-        subject=say("{machines}, {values}", machines=words.counted(len(words.machines_of(found))), values=values),
-        warnings=words.fleet_warnings(found),
-        sections=(
-            Section(say("All values"), (all_values(found),)),
-            *(Section(words.called(of), _blocks(of)) for of in found.values),
-        ),
-        attachments=(Verbatim("fleet.json"), Verbatim("fleet.csv")),
-        produced_by=say("cmm-uq {version}, seed {seed}", version=Verbatim(__version__), seed=found.seed),
-        end=say("End of page"),
-        overview=words.fleet_overview(found),
-    )
+    subject = say("{machines}, {values}", machines=words.counted(len(words.machines_of(found))), values=values)
+    each = (Section(words.called(of), _blocks(of)) for of in found.values)
+    return doc.program_page(
+        say("Drift of a fleet"), words.date_of(found.newest), subject,
+        (Section(say("All values"), (all_values(found),)), *each), "fleet.json", "fleet.csv", seed=found.seed,
+        warnings=words.fleet_warnings(found), end=say("End of page"), overview=words.fleet_overview(found),
+    )  # fmt: skip
 
 
 def _blocks(of: FleetValue) -> tuple[doc.Block, ...]:

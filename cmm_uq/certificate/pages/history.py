@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmm_uq import __version__
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, plural, say, semicolons
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import unit_as_written
@@ -267,18 +266,12 @@ def history_document(history: MachineHistory) -> doc.Document:
         doc.section(say("Over time"), *(trend_plot(history, one) for one in history.values)),
         doc.section(say("Certificates and interim checks"), _certificates(history)),
     )
-    return doc.Document(
-        title=say("History of a machine"),
-        number=Verbatim(machine.serial),
-        subject=say("{name}, up to {on}", name=Verbatim(machine.name), on=day(history.on)),
-        particulars=(doc.Facts(tuple(particulars)),),
-        warnings=history.remarks,
-        sections=tuple(section for section in sections if section.blocks),
-        attachments=(Verbatim("history.json"),),
-        produced_by=say("cmm-uq {version}", version=Verbatim(__version__)),
-        end=say("End of history"),
+    subject = say("{name}, up to {on}", name=Verbatim(machine.name), on=day(history.on))
+    return doc.program_page(
+        say("History of a machine"), Verbatim(machine.serial), subject, (one for one in sections if one.blocks),
+        "history.json", particulars=(doc.Facts(tuple(particulars)),), warnings=history.remarks, end=say("End of history"),
         overview=overview_of(history),
-    )
+    )  # fmt: skip
 
 
 def overview_of(history: MachineHistory) -> doc.Overview:

@@ -11,7 +11,7 @@ from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, after, commas, number, plural, say, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
 from cmm_uq.certificate.part.figures import CharacteristicFigures, by_margin, critical, figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement, UnseenError
 from cmm_uq.certificate.part.plots import shares_plots
@@ -32,18 +32,16 @@ def line_words(line: str) -> Text:
 
 def budget_section(found: PartMeasurement) -> Section:
     """Shares of the variance: a picture of all characteristics, and lines of those of least margin."""
-    budget, every = found.budget, figures_of(found)
-    if not budget.causes:
-        return Section(say("What the uncertainty is made of"), ())
+    title, every = say("What the uncertainty is made of"), figures_of(found)
+    if not found.budget.causes:
+        return section(title)
     families, shares = by_family(found)
     causes = [FAMILIES.get(family, Verbatim(family)) for family in families]
-    blocks: list[Block] = [Paragraph(say("{sentence}", sentence=largest_words(critical(found))))]
-    blocks += shares_plots([one.titled for one in every], causes, shares)
     detailed = sorted(by_margin(found)[:DETAILED], key=lambda one: one.place)
-    blocks.append(_lines(detailed, len(every)))
-    if (within := _factors(detailed)).rows:
-        blocks.append(within)
-    return Section(say("What the uncertainty is made of"), tuple(blocks))
+    return section(
+        title, Paragraph(say("{sentence}", sentence=largest_words(critical(found)))),
+        *shares_plots([one.titled for one in every], causes, shares), _lines(detailed, len(every)), _factors(detailed),
+    )  # fmt: skip
 
 
 def by_family(found: PartMeasurement) -> tuple[list[str], Floats]:
@@ -72,12 +70,9 @@ def _percent(share: float) -> Number:
     return signed(100 * share, ".0f") if abs(share) >= 0.1 else signed(100 * share, ".2g")
 
 
-def _lines(detailed: list[CharacteristicFigures], count: int) -> Table:
-    rows = [row for one in detailed for row in _budget(one)]
-    columns = (
-        Column(say("No.")), Column(say("Characteristic"), numeric=False), Column(say("Cause"), numeric=False),
-        Column(say("First order"), unit("%")), Column(say("Total"), unit("%")),
-    )  # fmt: skip
+def _lines(detailed: list[CharacteristicFigures], count: int) -> Table | None:
+    heads = (Column(say("No.")), say("Characteristic"), say("Cause"), Column(say("First order"), unit("%")),
+             Column(say("Total"), unit("%")))  # fmt: skip
     notes: list[Text] = [
         say(
             "Shares of the variance (Sobol): first order is what knowing this cause alone would take away, total what would "
@@ -87,7 +82,7 @@ def _lines(detailed: list[CharacteristicFigures], count: int) -> Table:
     ]
     if len(detailed) < count:
         notes.append(after(_chosen(detailed), say("results.json has all.")))
-    return Table(say("Budget by cause"), columns, tuple(rows), tuple(notes))
+    return table(say("Budget by cause"), heads, (row for one in detailed for row in _budget(one)), *notes)
 
 
 def _chosen(shown: list[CharacteristicFigures]) -> Text:
@@ -119,10 +114,9 @@ def _above(shares: Floats) -> float:
     return float((np.floor(top / place) + 1) * place)
 
 
-def _factors(detailed: list[CharacteristicFigures]) -> Table:
+def _factors(detailed: list[CharacteristicFigures]) -> Table | None:
     """Within the machine, what hangs together by its calibration."""
-    budget = detailed[0].found.budget
-    rows: list[tuple[Text, ...]] = []
+    budget, rows = detailed[0].found.budget, list[tuple[Text, ...]]()
     for one in detailed:
         within = budget.within[:, one.place]
         order = np.argsort(-np.abs(within), kind="stable").tolist()
@@ -131,37 +125,29 @@ def _factors(detailed: list[CharacteristicFigures]) -> Table:
             (one.number, NOTHING if i else one.beside, line_words(budget.factors[f]), _percent(within[f]))
             for i, f in enumerate(kept)
         ]
-    columns = (
-        Column(say("No.")), Column(say("Characteristic"), numeric=False), Column(say("Error"), numeric=False),
-        Column(say("Share"), unit("%")),
-    )  # fmt: skip
-    note = say(
+    heads = (Column(say("No.")), say("Characteristic"), say("Error"), Column(say("Share"), unit("%")))
+    return table(say("Errors that are known together, by name"), heads, rows, say(
         "The calibration ties these errors together. Each share is what knowing this error alone would take away, with what "
         "it tells of the others, so that together they may be more than 100 % or less."
-    )
-    return Table(say("Errors that are known together, by name"), columns, tuple(rows), (note,))
+    ))  # fmt: skip
 
 
 def unseen_section(found: PartMeasurement) -> Section:
     """What the calibration left free or did not see, named, with its share and what to measure."""
+    title, further = say("What the calibration did not see"), found.further
     if not found.unseen:
-        return Section(say("What the calibration did not see"), ())
-    told = _by_effect(found.unseen)
-    blocks: list[Block] = [Paragraph(unseen_words(found), "warning")]
-    columns = (
-        Column(say("Error"), numeric=False), Column(say("Largest share"), unit("%")), Column(say("Of"), numeric=False),
-        Column(say("Why"), numeric=False),
-    )  # fmt: skip
-    rows = tuple(
+        return section(title)
+    heads = (say("Error"), Column(say("Largest share"), unit("%")), say("Of"), say("Why"))
+    rows = (
         (own[0].title, _percent(max(one.share for one in own)), _whose(own), say("{why:capital}", why=own[0].why))
-        for own in told
+        for own in _by_effect(found.unseen)
     )
-    blocks.append(Table(say("Errors that are drawn as large as they may be"), columns, rows))
-    if found.further is not None:
-        blocks.append(Paragraph(found.further.text))
-        if command := found.further.command:
-            blocks.append(Paragraph(say("The set-ups are planned by: {command}", command=Verbatim(command))))
-    return Section(say("What the calibration did not see"), tuple(blocks))
+    planned = (further.text, *((say("The set-ups are planned by: {command}", command=Verbatim(further.command)),)
+                               if further.command else ())) if further else ()  # fmt: skip
+    return section(
+        title, Paragraph(unseen_words(found), "warning"),
+        table(say("Errors that are drawn as large as they may be"), heads, rows), *map(Paragraph, planned),
+    )  # fmt: skip
 
 
 def _by_effect(unseen: Iterable[UnseenError]) -> list[list[UnseenError]]:
@@ -194,26 +180,25 @@ def unseen_words(found: PartMeasurement) -> Text:
 
 def ways_section(found: PartMeasurement) -> Section:
     """What would make the uncertainties smaller, each way alone."""
-    if len(found.ways) < 2:
-        return Section(say("What would reduce it"), ())
+    title, ways = say("What would reduce it"), found.ways
+    if len(ways) < 2:
+        return section(title)
     shown = sorted(by_margin(found)[:_WAYS], key=lambda one: one.place)
-    columns = (
-        Column(say("Way"), numeric=False),
-        *(Column(say("u of No. {number}", number=one.number), one.scale.small) for one in shown),
+    each = (Column(say("u of No. {number}", number=one.number), one.scale.small) for one in shown)
+    heads: tuple[Text | Column, ...] = (say("Way"), *each)
+    rows = (
+        (say("{way:capital}", way=way.name), *(one.small(float(way.u[one.place])) for one in shown)) for way in ways
     )
-    rows = tuple((say("{way:capital}", way=way.name), *(one.small(float(way.u[one.place])) for one in shown))
-                 for way in found.ways)  # fmt: skip
-    known = number(100 * found.ways[-1].known(inferred=False), ".1g")
+    known, zones = (number(100 * ways[-1].known(inferred=inferred), ".1g") for inferred in (False, True))
     notes: list[Text] = [
         say("Each way alone, by virtual measurements of its own; u is known to {known} %.", known=known)
     ]
     if found.measured is not None and np.any(never_negative(found.plan)[[one.place for one in shown]]):
-        zones = number(100 * found.ways[-1].known(inferred=True), ".1g")
         notes.append(say("u of form, orientation, location and runout is known to {known} %.", known=zones))
     if len(shown) < len(found.stated):
         notes.append(_chosen(shown))
-    told = [Paragraph(words)] if (words := best_words(critical(found))) else []
-    return Section(say("What would reduce it"), (*told, Table(say("Ways to measure"), columns, rows, tuple(notes))))
+    words = best_words(critical(found))
+    return section(title, Paragraph(words) if words else None, table(say("Ways to measure"), heads, rows, *notes))
 
 
 def best_words(one: CharacteristicFigures) -> Text:

@@ -12,33 +12,13 @@ from typing import Any
 
 from cmm_uq import __version__
 from cmm_uq.analysis.parts.budget import FAMILIES, family_of
-from cmm_uq.analysis.parts.methods.method import (
-    ComparedCharacteristic,
-    Method,
-    MethodComparison,
-    MethodFigure,
-    MethodResult,
-    Seen,
-)
+from cmm_uq.analysis.parts.methods import method as other_methods
 from cmm_uq.analysis.parts.methods.of_job import METHODS
 from cmm_uq.analysis.parts.virtual import AGREES, CHECKED
-from cmm_uq.base.messages import (
-    DASH,
-    NOTHING,
-    Number,
-    Text,
-    Verbatim,
-    commas,
-    listed,
-    names,
-    number,
-    plural,
-    say,
-    sentences,
-    signed,
-)
+from cmm_uq.base import messages
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, number, plural, say
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.document import Block, Column, Facts, Paragraph, Section, Table
+from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.origin import NAME
 from cmm_uq.certificate.part.figures import ANGLES, LENGTHS, figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement
@@ -96,13 +76,15 @@ _STANDARDS = (
 
 def _drawn(found: PartMeasurement) -> Text:
     families = dict.fromkeys(family_of(line) for line in found.budget.causes)
-    return commas(say("{cause:small}", cause=FAMILIES.get(one, Verbatim(one))) for one in families)
+    return messages.commas(say("{cause:small}", cause=FAMILIES.get(one, Verbatim(one))) for one in families)
 
 
 def _temperatures(found: PartMeasurement) -> Text:
     given = found.job.facts.environment
-    x, y, z = (signed(each, "g") for each in given.scales_c)
-    told = say("part {part} °C, scales of x, y, z {x}, {y}, {z} °C", part=signed(given.part_c, "g"), x=x, y=y, z=z)
+    x, y, z = (messages.signed(each, "g") for each in given.scales_c)
+    told = say(
+        "part {part} °C, scales of x, y, z {x}, {y}, {z} °C", part=messages.signed(given.part_c, "g"), x=x, y=y, z=z
+    )
     if given.compensated:
         return say("{told}; lengths are computed at 20 °C", told=told)
     return say("{told}; lengths are not corrected to 20 °C", told=told)
@@ -143,34 +125,24 @@ def again(found: PartMeasurement) -> Text:
 
 def not_covered_section(found: PartMeasurement) -> Section:
     """What must not be read out of the figures: left out of this job, then of every one."""
-    facts, told = found.job.facts, list[Text]()
-    if facts.part.not_measured:
-        told.append(
-            say("Of the drawing, these are not measured here: {names}.", names=commas(names(facts.part.not_measured)))
-        )
-    if found.virtual.places[0].lacking:
-        told.append(say("Of the machine's errors, these could not be drawn, for lack of what they depend on: {names}.",
-                        names=commas(titles(sorted(found.virtual.places[0].lacking)))))  # fmt: skip
-    if unstated := _unstated(found):
-        told.append(
-            say("Not stated in the job, and so taken to be without uncertainty: {what}.", what=listed(unstated))
-        )
-    if any(one.stated.u == 0 for one in figures_of(found)):
-        told.append(say("A characteristic with u = 0 is one to which nothing that is stated contributes."))
-    told.append(
-        say(
+    left, lacking, unstated = found.job.facts.part.not_measured, found.virtual.places[0].lacking, _unstated(found)
+    told = (
+        (left, say("Of the drawing, these are not measured here: {names}.", names=messages.commas(messages.names(left)))),
+        (lacking, say("Of the machine's errors, these could not be drawn, for lack of what they depend on: {names}.",
+                      names=messages.commas(titles(sorted(lacking))))),
+        (unstated, say("Not stated in the job, and so taken to be without uncertainty: {what}.",
+                       what=messages.listed(unstated))),
+        (any(one.stated.u == 0 for one in figures_of(found)),
+         say("A characteristic with u = 0 is one to which nothing that is stated contributes.")),
+        (True, say(
             "The noise of a reading is that of the calibration's points; a point that is probed in another way scatters "
             "otherwise. Scanning and its filters, parts that bend when they are held or probed, material conditions and "
-            "profiles of surfaces are not modelled."
-        )
-    )
-    told.append(
-        say(
+            "profiles of surfaces are not modelled.")),
+        (True, say(
             "Tried on simulated machines whose scales err as much as physics allows, by any period: 95 % intervals hold the "
-            "truth in 94 to 96 of 100 cases."
-        )
-    )
-    return Section(say("What is not covered"), tuple(Paragraph(text) for text in told))
+            "truth in 94 to 96 of 100 cases.")),
+    )  # fmt: skip
+    return section(say("What is not covered"), *(Paragraph(text) for holds, text in told if holds))
 
 
 def _unstated(found: PartMeasurement) -> list[Text]:
@@ -190,7 +162,7 @@ _NOTHING = 5e-4  # share of a variance that is printed as none
 # characteristics for which is told why methods differ, and whose budgets are listed: those that differ most
 EXPLAINED = 6
 
-FOLLOWED: Mapping[Method, Text] = {
+FOLLOWED: Mapping[other_methods.Method, Text] = {
     "calibrated_part": say(
         "Calibrated part: by public descriptions of ISO 15530-3:2011, U = k √(u_cal² + u_p² + u_b² + u_w²) with k = 2; an "
         "error that is not corrected is added (ISO/TS 15530-3:2004). The text of the standard was not at hand. The "
@@ -204,36 +176,29 @@ FOLLOWED: Mapping[Method, Text] = {
     ),
 }
 
-SEEN: Mapping[Seen, Text] = {
+SEEN: Mapping[other_methods.Seen, Text] = {
     "drawn": say("as known of it"), "varied": say("as scatter"), "systematic": say("as a systematic error"),
     "corrected": say("corrected by a standard"), "stated": say("as stated"), "unseen": say("not"),
 }  # fmt: skip
 
 
-def methods_section(comparison: MethodComparison | None) -> Section:
+def methods_section(comparison: other_methods.MethodComparison | None) -> Section:
     """All of it; a section of no blocks where the job has no other method."""
     title = say("Other methods beside it")
     if comparison is None or not comparison.characteristics:
-        return Section(title, ())
-    told = _most_apart(comparison)
-    blocks: list[Block] = [Paragraph(_APART)]
-    for angle in (False, True):
-        own = [one for one in comparison.characteristics if _angle(comparison, one) == angle]
-        if own:
-            blocks.append(_figures(own, angle=angle))
-    blocks += [
-        Paragraph(say("Characteristic {name}: {why}", name=Verbatim(one.name), why=sentences(one.why)))
-        for one in told
-        if one.why
-    ]
-    if len(told) < len(comparison.characteristics):
-        count = len(told)
-        blocks.append(Paragraph(plural(count, one=say("Told is of the characteristic whose methods differ most."), many=say(
-            "Told is of the {count} characteristics whose methods differ most.", count=count)), "note"))  # fmt: skip
-    blocks += [_seen(comparison.methods), _conditions(comparison.methods)]
-    blocks += [_budgets(method, [one.name for one in told]) for method in comparison.methods]
-    blocks += [Paragraph(FOLLOWED[method.method], "note") for method in comparison.methods]
-    return Section(title, tuple(blocks))
+        return section(title)
+    told, methods, every = _most_apart(comparison), comparison.methods, comparison.characteristics
+    by_angle = ([one for one in every if _angle(comparison, one) == angle] for angle in (False, True))
+    of_most = plural(len(told), one=say("Told is of the characteristic whose methods differ most."), many=say(
+        "Told is of the {count} characteristics whose methods differ most.", count=len(told)))  # fmt: skip
+    return section(
+        title, Paragraph(_APART), *(_figures(own, angle=bool(angle)) for angle, own in enumerate(by_angle) if own),
+        *(Paragraph(say("Characteristic {name}: {why}", name=Verbatim(one.name), why=messages.sentences(one.why)))
+          for one in told if one.why),
+        Paragraph(of_most, "note") if len(told) < len(every) else None, _seen(methods), _conditions(methods),
+        *(_budgets(method, [one.name for one in told]) for method in methods),
+        *(Paragraph(FOLLOWED[method.method], "note") for method in methods),
+    )  # fmt: skip
 
 
 _APART = say(
@@ -243,14 +208,14 @@ _APART = say(
 )
 
 
-def _angle(comparison: MethodComparison, one: ComparedCharacteristic) -> bool:
+def _angle(comparison: other_methods.MethodComparison, one: other_methods.ComparedCharacteristic) -> bool:
     return any(found.angle for method in comparison.methods if (found := method.of(one.name)) is not None)
 
 
-def _most_apart(comparison: MethodComparison) -> list[ComparedCharacteristic]:
+def _most_apart(comparison: other_methods.MethodComparison) -> list[other_methods.ComparedCharacteristic]:
     """Those whose uncertainties differ by the largest factor, in the order of the plan."""
 
-    def factor(one: ComparedCharacteristic) -> float:
+    def factor(one: other_methods.ComparedCharacteristic) -> float:
         positive = [stated.u for stated in one.stated if stated.u > 0]
         return log(max(positive) / min(positive)) if positive else 0.0
 
@@ -259,12 +224,10 @@ def _most_apart(comparison: MethodComparison) -> list[ComparedCharacteristic]:
     return [one for one in every if one in kept]
 
 
-def _figures(own: Sequence[ComparedCharacteristic], *, angle: bool) -> Table:
+def _figures(own: Sequence[other_methods.ComparedCharacteristic], *, angle: bool) -> Table | None:
     scale = ANGLES if angle else LENGTHS
-    columns = (
-        Column(say("Characteristic"), numeric=False), Column(say("Method"), numeric=False), Column(say("Value"), scale.value),
-        Column(say("u"), scale.small), Column(say("U"), scale.small), Column(say("Eₙ")),
-    )  # fmt: skip
+    heads = (say("Characteristic"), say("Method"), Column(say("Value"), scale.value), Column(say("u"), scale.small),
+             Column(say("U"), scale.small), Column(say("Eₙ")))  # fmt: skip
     rows = []
     for one in own:
         normalised = {pair.other: pair.normalised for pair in one.pairs if pair.one == "virtual"}
@@ -272,59 +235,47 @@ def _figures(own: Sequence[ComparedCharacteristic], *, angle: bool) -> Table:
             value: Text = DASH
             if stated.value is not None:
                 value = rounded(stated.value / scale.per_value, stated.U / scale.per_value)[0]
-            apart = signed(normalised[stated.method], ".2f") if stated.method in normalised else DASH
-            name = say("{method:capital}", method=METHODS[stated.method])
-            rows.append((Verbatim(one.name), name, value, significant(stated.u / scale.per_small),
+            apart = messages.signed(normalised[stated.method], ".2f") if stated.method in normalised else DASH
+            rows.append((Verbatim(one.name), _named(stated.method), value, significant(stated.u / scale.per_small),
                          significant(stated.U / scale.per_small), apart))  # fmt: skip
     note = say(
         "Eₙ: difference of the virtual measurement's value from this one over √(U₁² + U₂²) (ISO/IEC 17043); beyond 1 the "
         "methods contradict each other. Values that come from the same measured points have most of their error in "
         "common, so that theirs is small."
     )
-    return Table(
-        say("Angles by each method") if angle else say("Lengths by each method"), columns, tuple(rows), (note,)
-    )
+    return table(say("Angles by each method") if angle else say("Lengths by each method"), heads, rows, note)
 
 
-def _seen(methods: Sequence[MethodResult]) -> Table:
-    columns = (
-        Column(say("Cause"), numeric=False), Column(say("{method:capital}", method=METHODS["virtual"]), numeric=False),
-        *(Column(say("{method:capital}", method=METHODS[one.method]), numeric=False) for one in methods),
-    )  # fmt: skip
-    rows = tuple(
+def _named(method: other_methods.Method) -> Text:
+    return say("{method:capital}", method=METHODS[method])
+
+
+def _seen(methods: Sequence[other_methods.MethodResult]) -> Table | None:
+    heads = (say("Cause"), _named("virtual"), *(_named(one.method) for one in methods))
+    rows = (
         (words, SEEN["drawn"], *(SEEN[one.seen.get(family, "unseen")] for one in methods))
         for family, words in FAMILIES.items()
     )
-    return Table(say("How each method takes hold of a cause"), columns, rows)
+    return table(say("How each method takes hold of a cause"), heads, rows)
 
 
-def _conditions(methods: Sequence[MethodResult]) -> Table:
+def _conditions(methods: Sequence[other_methods.MethodResult]) -> Table:
     met = {True: say("met"), False: say("not met"), None: say("not stated")}
-    columns = (
-        Column(say("Method"), numeric=False),
-        Column(say("What it asks for"), numeric=False),
-        Column(say("This test"), numeric=False),
-    )
-    rows = tuple(
-        (say("{method:capital}", method=METHODS[one.method]), condition.text, met[condition.met])
-        for one in methods
-        for condition in one.conditions
-    )
-    return Table(say("Conditions of the tests"), columns, rows)
+    rows = tuple((_named(one.method), each.text, met[each.met]) for one in methods for each in one.conditions)
+    heads = columns((say("Method"), say("What it asks for"), say("This test")))
+    return Table(say("Conditions of the tests"), heads, rows)
 
 
-def _budgets(method: MethodResult, told: Sequence[str]) -> Table:
+def _budgets(method: other_methods.MethodResult, told: Sequence[str]) -> Table:
     """Budgets of some characteristics line by line."""
-    columns = (
-        Column(say("Characteristic"), numeric=False), Column(say("Contribution"), numeric=False),
-        Column(say("u, its part"), numeric=False), Column(say("ν")), Column(say("Share"), unit("%")),
-    )  # fmt: skip
-    rows = [row for name in told if (one := method.of(name)) is not None for row in _lines(one)]
+    heads = columns((say("Characteristic"), say("Contribution"), say("u, its part"), Column(say("ν")),
+                     Column(say("Share"), unit("%"))))  # fmt: skip
+    rows = tuple(row for name in told if (one := method.of(name)) is not None for row in _lines(one))
     caption = say("Budgets by {method}", method=METHODS[method.method])
-    return Table(caption, columns, tuple(rows), tuple(_notes(method, told)))
+    return Table(caption, heads, rows, tuple(_notes(method, told)))
 
 
-def _lines(one: MethodFigure) -> list[tuple[Text, ...]]:
+def _lines(one: other_methods.MethodFigure) -> list[tuple[Text, ...]]:
     scale = ANGLES if one.angle else LENGTHS
     rows: list[tuple[Text, ...]] = []
     for depth, line, share in one.budget.flat():
@@ -339,10 +290,10 @@ def _lines(one: MethodFigure) -> list[tuple[Text, ...]]:
 
 
 def _freedom(dof: float) -> Text:
-    return figure(dof, 3) if isfinite(dof) else Number("∞")
+    return figure(dof, 3) if isfinite(dof) else messages.Number("∞")
 
 
-def _notes(method: MethodResult, told: Sequence[str]) -> list[Text]:
+def _notes(method: other_methods.MethodResult, told: Sequence[str]) -> list[Text]:
     """Systematic errors that were found, and what became of them."""
     notes: list[Text] = []
     for one in (found for name in told if (found := method.of(name)) is not None):
@@ -358,7 +309,7 @@ def _notes(method: MethodResult, told: Sequence[str]) -> list[Text]:
     return notes
 
 
-def methods_data(comparison: MethodComparison | None) -> dict[str, Any] | None:
+def methods_data(comparison: other_methods.MethodComparison | None) -> dict[str, Any] | None:
     """All of it; ``None`` where the job has no other method."""
     if comparison is None:
         return None
@@ -377,7 +328,7 @@ def methods_data(comparison: MethodComparison | None) -> dict[str, Any] | None:
     return {"methods": methods, "compared": compared}
 
 
-def _figure(one: MethodFigure) -> dict[str, Any]:
+def _figure(one: other_methods.MethodFigure) -> dict[str, Any]:
     def given(value: float | None) -> float | None:
         return degrees(value) if one.angle and value is not None else value
 

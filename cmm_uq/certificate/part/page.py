@@ -10,52 +10,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from cmm_uq.analysis.conformity.decision import Outcome
-from cmm_uq.base.messages import (
-    NOTHING,
-    Text,
-    Verbatim,
-    commas,
-    day,
-    names,
-    number,
-    plural,
-    say,
-    semicolons,
-    sentences,
-    signed,
-)
-from cmm_uq.certificate.certificate import (
-    grouped,
-    identified,
-    in_words,
-    issuer_of,
-    performed,
-    signatures_of,
-    statements_of,
-)
-from cmm_uq.certificate.clauses import DRAFT, Requirement, asked, not_stated, of_every_report
+from cmm_uq.base import messages
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, plural, say
+from cmm_uq.certificate import certificate
+from cmm_uq.certificate.clauses import Requirement, asked, not_stated, of_every_report
 from cmm_uq.certificate.document import Document, Facts, Overview, Paragraph, Section
-from cmm_uq.certificate.part.budget_section import (
-    best_words,
-    budget_section,
-    largest_words,
-    unseen_section,
-    unseen_words,
-    ways_section,
-)
+from cmm_uq.certificate.part import budget_section as causes, results_section as results
 from cmm_uq.certificate.part.figures import CharacteristicFigures, critical, figures_of
 from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, Source
 from cmm_uq.certificate.part.method import method_section, methods_section, not_covered_section, program_words
-from cmm_uq.certificate.part.results_section import (
-    conformity_section,
-    correlation_section,
-    errors_section,
-    part_section,
-    results_section,
-)
-from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.certificate.wording import probability
-from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.jobs.verdicts import gravest, standing_of
 
@@ -68,9 +32,9 @@ def overview_of(found: PartMeasurement) -> Overview:
         (say("Decision rule"), found.judged_by if any(found.judged) else NOTHING),
         (say("Least margin") if found.nearest is not None else say("Tightest"), _least(one)),
         (say("Probability"), _together(found)),
-        (say("Uncertainty"), largest_words(one) if found.budget.causes and one.stated.u else NOTHING),
-        (say("To reduce it"), best_words(one) if len(found.ways) > 1 else NOTHING),
-        (say("Not seen"), unseen_words(found) if found.unseen else NOTHING),
+        (say("Uncertainty"), causes.largest_words(one) if found.budget.causes and one.stated.u else NOTHING),
+        (say("To reduce it"), causes.best_words(one) if len(found.ways) > 1 else NOTHING),
+        (say("Not seen"), causes.unseen_words(found) if found.unseen else NOTHING),
         (say("Not covered"), _not_covered(found)),
     )
     return Overview(
@@ -126,13 +90,13 @@ def _least(one: CharacteristicFigures) -> Text:
     told = say("{what}: {result}; allowed {allowed}", what=one.titled, result=one.result, allowed=one.allowed)
     margin = float(one.found.margins[one.place])
     if one.found.nearest is not None:
-        inside = say("{told}, {times} u inside of the limit", told=told, times=number(margin, ".1f"))
+        inside = say("{told}, {times} u inside of the limit", told=told, times=messages.number(margin, ".1f"))
         return inside if margin >= 0 else say("{told}, {times} u outside of the limit", told=told,
-                                              times=number(-margin, ".1f"))  # fmt: skip
+                                              times=messages.number(-margin, ".1f"))  # fmt: skip
     if not one.width > 0:
         return told
     return say("{told}; the 95 % interval takes {share} % of it", told=told,
-               share=signed(200 * one.expanded / one.width, ".0f"))  # fmt: skip
+               share=messages.signed(200 * one.expanded / one.width, ".0f"))  # fmt: skip
 
 
 def _together(found: PartMeasurement) -> Text:
@@ -146,11 +110,11 @@ def _not_covered(found: PartMeasurement) -> Text:
     told: list[Text] = []
     left = found.job.facts.part.not_measured
     if left:
-        told.append(say("Not measured: {names}.", names=commas(names(left))))
+        told.append(say("Not measured: {names}.", names=commas(messages.names(left))))
     free = [one.titled for one in figures_of(found) if one.judged is None]
     if free and len(free) < len(found.judged):
-        told.append(say("Without limits: {names}.", names=semicolons(free)))
-    return sentences(told)
+        told.append(say("Without limits: {names}.", names=messages.semicolons(free)))
+    return messages.sentences(told)
 
 
 _SOURCES: Mapping[Source, Text] = {
@@ -166,7 +130,7 @@ def machine_section(found: PartMeasurement) -> Section:
     rows = (
         (say("Taken from"), _SOURCES[standing.source]),
         *certificate_rows(standing),
-        (say("Files"), commas(names(standing.files))),
+        (say("Files"), commas(messages.names(standing.files))),
         (say("Verified"), verified_words(standing)),
         (say("Signatures"), say("by trusted certificates") if standing.trusted else say("not asked for")),
         (say("Temperature of the scales at the calibration"), _celsius(standing.temperature_c)),
@@ -190,12 +154,12 @@ def certificate_rows(standing: CertificateStatus) -> tuple[tuple[Text, Text], ..
         (say("Certificate of the machine"), number_of),
         (say("Issued by"), Verbatim(standing.laboratory)),
         (say("Calibrated on"), _calibrated(standing)),
-        (say("Valid until"), day(standing.valid_until) if standing.valid_until else NOTHING),
+        (say("Valid until"), messages.day(standing.valid_until) if standing.valid_until else NOTHING),
     )
 
 
 def _calibrated(standing: CertificateStatus) -> Text:
-    days, date = standing.age.days, day(standing.date)
+    days, date = standing.age.days, messages.day(standing.date)
     if not days:
         return say("{date}, the day of the measurement", date=date)
     age = plural(days, one=say("one day"), many=say("{count} days", count=days))
@@ -216,15 +180,15 @@ def verified_words(standing: CertificateStatus) -> Text:
 
 
 def _celsius(value: float | None) -> Text:
-    return NOTHING if value is None else say("{value} °C", value=number(value, ".2f"))
+    return NOTHING if value is None else say("{value} °C", value=messages.number(value, ".2f"))
 
 
 def _noise(found: PartMeasurement) -> Text:
     usual = found.given.machine.noise.usual_mm * 1e3
     if not usual.any():
         return NOTHING
-    return say("{x}, {y}, {z} µm along x, y, z", x=number(usual[0], ".2g"), y=number(usual[1], ".2g"),
-               z=number(usual[2], ".2g"))  # fmt: skip
+    return say("{x}, {y}, {z} µm along x, y, z", x=messages.number(usual[0], ".2g"), y=messages.number(usual[1], ".2g"),
+               z=messages.number(usual[2], ".2g"))  # fmt: skip
 
 
 TITLE = say("Measurement report")
@@ -237,40 +201,29 @@ def part_document(found: PartMeasurement) -> Document:
     measured = found.measured is not None
     lacking = lacking_of(found)
     sections = (
-        results_section(found),
-        conformity_section(found),
-        part_section(found),
-        errors_section(found),
-        budget_section(found),
-        unseen_section(found),
-        ways_section(found),
+        results.results_section(found),
+        results.conformity_section(found),
+        results.part_section(found),
+        results.errors_section(found),
+        causes.budget_section(found),
+        causes.unseen_section(found),
+        causes.ways_section(found),
         methods_section(found.methods),
-        correlation_section(found),
+        results.correlation_section(found),
         machine_section(found),
         method_section(found),
         not_covered_section(found),
     )
-    date = day(facts.job.date)
+    date = messages.day(facts.job.date)
     came = say("measured on {date}", date=date) if measured else say("planned for {date}", date=date)
-    return in_words(Document(
-        title=TITLE if measured else PLANNED,
-        number=Verbatim(facts.job.number or facts.job.id),
-        subject=say("{part}, {came}", part=part_words(found), came=came),
-        issuer=issuer_of(facts.laboratory),
-        logo=logo_of(facts.laboratory, found.job.inputs),
-        particulars=_particulars(found),
-        warnings=(*found.warnings, *not_stated(lacking)),
+    return certificate.formal_document(
+        facts.job, facts.laboratory, found.job.inputs, draft=bool(lacking), authorised=measured,
+        title=TITLE if measured else PLANNED, subject=say("{part}, {came}", part=part_words(found), came=came),
+        particulars=_particulars(found), warnings=(*found.warnings, *not_stated(lacking)),
         sections=tuple(section for section in sections if section.blocks),
-        statements=statements_of(facts.job) if measured else (),
-        signatures=signatures_of(facts.laboratory) if measured else (),
-        attachments=(*names(found.job.inputs), Verbatim("results.json"), Verbatim(PROVENANCE)),
-        produced_by=say("{program}, seed {seed}", program=program_words(), seed=found.seed),
-        date=facts.job.issued or facts.job.date,
-        end=say("End of report"),
-        banner=DRAFT if lacking else NOTHING,
+        produced_by=say("{program}, seed {seed}", program=program_words(), seed=found.seed), end=say("End of report"),
         overview=overview_of(found),
-        draft=bool(lacking),
-    ))  # fmt: skip
+    )  # fmt: skip
 
 
 def lacking_of(found: PartMeasurement) -> tuple[Requirement, ...]:
@@ -294,8 +247,8 @@ def _particulars(found: PartMeasurement) -> tuple[Facts, ...]:
         expansion = say("{cte:g} × 10⁻⁶ /K", cte=part.cte_per_k * 1e6)
     if part.cte_per_k and part.u_cte_per_k:
         expansion = say("{expansion}, u = {u:g} × 10⁻⁶ /K", expansion=expansion, u=part.u_cte_per_k * 1e6)
-    return grouped(
-        identified(job, facts.laboratory, job.origin, say("Report number")),
+    return certificate.grouped(
+        certificate.identified(job, facts.laboratory, job.origin, say("Report number")),
         (
             (say("Part"), part.name),
             (say("Drawing"), part.drawing),
@@ -306,5 +259,5 @@ def _particulars(found: PartMeasurement) -> tuple[Facts, ...]:
             (say("Place"), job.place),
         ),
         certificate_rows(found.standing),
-        (*performed(job), (say("Conditions"), job.conditions)),
+        (*certificate.performed(job), (say("Conditions"), job.conditions)),
     )

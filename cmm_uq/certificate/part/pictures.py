@@ -23,7 +23,7 @@ from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.plots import style
 from cmm_uq.certificate.plots.plans import DEPTH
 from cmm_uq.certificate.plots.residuals import shown, told
-from cmm_uq.certificate.plots.vectors import round_length
+from cmm_uq.certificate.plots.vectors import arrows, scale_bar
 from cmm_uq.maths.uncertainty.quantity import significant
 
 if TYPE_CHECKING:
@@ -130,9 +130,8 @@ def draw_outlines(ax: Axes, view: View, plan: Plan) -> None:
 
 def segments(ax: Axes, start: Floats, end: Floats, colour: str, width: float, zorder: float = 3) -> None:
     """Lines from (n, 2) to (n, 2), as one path."""
-    gaps = np.full((len(start), 1), np.nan)
-    across, up = (np.hstack([start[:, i : i + 1], end[:, i : i + 1], gaps]).ravel() for i in (0, 1))
-    ax.plot(across, up, lw=width, color=colour, solid_capstyle="round", zorder=zorder)
+    style.strokes(ax, start[:, 0], end[:, 0], start[:, 1], end[:, 1], lw=width, color=colour, solid_capstyle="round",
+                  zorder=zorder)  # fmt: skip
 
 
 # mm from its anchor where a label is tried, in this order
@@ -239,9 +238,11 @@ def errors_picture(plan: Plan, errors: PointErrors) -> Plot:
             at, tips = view.of(plan.points[rows]), view.of(ends[rows])
             _ellipses(ax, tips, factor**2 * view.spread(covariance[rows]))
             long = size[rows] > _SEEN * longest
-            _arrows(ax, at[long], (tips - at)[long])
+            if long.any():
+                arrows(ax, at[long], (tips - at)[long], style.DIVERGING[-1], units="dots", width=1.4, headwidth=4,
+                             headlength=5, headaxislength=4.5, zorder=4)  # fmt: skip
             style.dots(ax, at[:, 0], at[:, 1], 1.6, style.MUTED, zorder=2)
-        _key(figure, seen[0][1], factor, longest)
+        scale_bar(figure, seen[0][1], 13.0, 2.6, factor, longest, style.INK)
         caption = told(
             sentences((
                 say("Errors of the points as they are expected: arrows are mean errors, ellipses their standard uncertainty, "
@@ -279,7 +280,7 @@ def form_picture(plan: Plan, deviations: Floats) -> Plot:
                 at = view.of(end[chosen])
                 segments(ax, view.of(start[chosen]), at, colour, 1.0)
                 style.dots(ax, at[:, 0], at[:, 1], 2.2, colour, hollow=colour != style.ACCENT, zorder=4)
-        _key(figure, seen[0][1], factor, longest)
+        scale_bar(figure, seen[0][1], 13.0, 2.6, factor, longest, style.INK)
         caption = told(
             say("The form as it was measured: distances of the points from their associated features, magnified {times} "
                 "times; full dots out of the material, hollow dots into it.", times=times),
@@ -310,31 +311,3 @@ def _ellipses(ax: Axes, centres: Floats, covariance: Floats) -> None:
     drawn_rings = centres[:, None, :] + np.einsum("sk,nik->nsi", ring, half)
     joined = np.concatenate([drawn_rings, np.full((len(centres), 1, 2), np.nan)], axis=1).reshape(-1, 2)
     ax.plot(joined[:, 0], joined[:, 1], lw=0.6, color=style.ACCENT, zorder=3)
-
-
-def _arrows(ax: Axes, place: Floats, way: Floats) -> None:
-    if len(place):
-        ax.quiver(*place.T, *way.T, angles="xy", scale_units="xy", scale=1, color=style.DIVERGING[-1], units="dots", width=1.4,
-                  headwidth=4, headlength=5, headaxislength=4.5, zorder=4)  # fmt: skip
-
-
-def _key(figure: Figure, ax: Axes, factor: float, longest: float) -> None:
-    """A round length to scale."""
-    from matplotlib.lines import Line2D
-
-    x0, x1 = ax.get_xlim()
-    per_mm = ax.get_position().width / (x1 - x0)
-    length = round_length(longest)
-    height_mm = float(figure.get_size_inches()[1]) * 25.4
-    start, y = 13.0 / style.WIDTH_MM, 2.6 / height_mm
-    end = start + length * factor * per_mm
-    figure.add_artist(Line2D([start, end], [y, y], color=style.INK, lw=1.8, solid_capstyle="butt"))
-    figure.text(
-        end + 0.008,
-        y,
-        say("{length:g} µm", length=length),
-        ha="left",
-        va="center",
-        fontsize=style.TINY,
-        color=style.INK,
-    )

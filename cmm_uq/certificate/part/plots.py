@@ -59,48 +59,33 @@ class Margin:
 
 
 _COLOURS = {"pass": style.ACCENT, "conditional pass": style.ACCENT, "fail": style.BAD, "conditional fail": style.BAD}
-_RULED = (0.0, 1.0)
 
 
 def margin_plots(rows: Sequence[Margin]) -> list[Plot]:
     """The rows in order, forty a picture; none without rows."""
     parts = [rows[i : i + A_PAGE] for i in range(0, len(rows), A_PAGE)]
-    return [margin_plot(part, _number(i, len(parts))) for i, part in enumerate(parts)]
-
-
-def _number(place: int, count: int) -> tuple[int, int] | None:
-    return (place + 1, count) if count > 1 else None
+    several = len(parts) > 1
+    return [margin_plot(part, (i + 1, len(parts)) if several else None) for i, part in enumerate(parts)]
 
 
 def margin_plot(rows: Sequence[Margin], part: tuple[int, int] | None = None) -> Plot:
     """One picture."""
     height = 17.0 + 5.2 * len(rows)
-    measured = any(row.outcome is not None for row in rows)
-    with style.house_style():
-        figure = style.new_figure(height)
-        ax = figure.subplots()
-        figure.subplots_adjust(left=0.34, right=0.985, bottom=12 / height, top=1 - 1.5 / height)
+    means = say("bar: 95 % interval about the middle, since nothing was measured; dark: what is accepted")
+    caption = say("How much of the tolerance the uncertainty takes.")
+    if measured := any(row.outcome is not None for row in rows):
+        means = say("full dot: conforms, cross: does not, hollow dot: undecided; dark: what is accepted")
+        caption = say("The characteristics between their limits, with their 95 % intervals.")
+    if part:
+        caption = say("{caption} Part {number} of {count}.", caption=caption, number=part[0], count=part[1])
+    with style.picture(height, left=0.34, right=0.985, bottom=12 / height, top=1 - 1.5 / height) as (figure, ax):
         for place, row in enumerate(rows):
             _band(ax, place, row)
             _interval(ax, place, row)
-        ax.set_yticks(np.arange(len(rows)), style.told_apart([row.name for row in rows], style.NAMES_MM))
+        style.named_rows(ax, np.arange(len(rows)), style.told_apart([row.name for row in rows], style.NAMES_MM))
         ax.set_xticks([0.0, 0.5, 1.0], [say("lower limit"), say("middle"), say("upper limit")])
         ax.set(xlim=(-_FARTHEST, 1 + _FARTHEST), ylim=(len(rows) - 0.4, -0.6))
-        ax.tick_params(left=False)
-        ax.spines["left"].set_visible(False)
-        ax.set_xlabel(
-            say("full dot: conforms, cross: does not, hollow dot: undecided; dark: what is accepted")
-            if measured
-            else say("bar: 95 % interval about the middle, since nothing was measured; dark: what is accepted"),
-            loc="right",  # towards the names: in some languages it is longer than the axis
-        )
-        caption = (
-            say("The characteristics between their limits, with their 95 % intervals.")
-            if measured
-            else say("How much of the tolerance the uncertainty takes.")
-        )
-        if part:
-            caption = say("{caption} Part {number} of {count}.", caption=caption, number=part[0], count=part[1])
+        ax.set_xlabel(means, loc="right")  # towards the names: in some languages it is longer than the axis
         return style.drawn(figure, caption, _told(rows, measured=measured))
 
 
@@ -122,7 +107,7 @@ def _band(ax: Axes, place: int, row: Margin) -> None:
     if row.accepted is not None:
         low, high = (end if given is None else row.of(given) for given, end in zip(row.accepted, ends, strict=True))
         ax.barh(place, max(high - low, 0.0), 0.72, left=low, color=style.BAND, lw=0, zorder=1)
-    for limit, at in zip((row.lower, row.upper), _RULED, strict=True):
+    for limit, at in zip((row.lower, row.upper), (0.0, 1.0), strict=True):
         if limit is not None:
             ax.plot([at, at], [place - 0.36, place + 0.36], color=style.MUTED, lw=1.0, zorder=2)
     ax.axhline(place + 0.5, color=style.RULE, lw=0.3, zorder=0)
@@ -179,18 +164,14 @@ def _bars(names: Sequence[Text], causes: Sequence[Text], shares: Floats) -> Plot
                 ax.text(before[row] + 0.5 * shares[g, row], row, number(100 * shares[g, row], ".0f"), fontsize=style.TINY,
                         color="white" if shade in _DARK else style.INK, ha="center", va="center_baseline")  # fmt: skip
             before = before + shares[g]
-        ax.set_yticks(rows, style.told_apart(names, style.NAMES_MM))
+        style.named_rows(ax, rows, style.told_apart(names, style.NAMES_MM))
         ax.set(xlim=(0, 1), ylim=(len(names) - 0.4, -0.6), xticks=[])
-        ax.tick_params(left=False)
-        for side in ("bottom", "left"):
-            ax.spines[side].set_visible(False)
+        ax.spines["bottom"].set_visible(False)
         for line, members in enumerate(lines):
             y = 1 - (2.6 + 4.6 * line) / height
             for g, left in members:
                 figure.text(left / style.WIDTH_MM, y, "■", fontsize=8, color=_SHADES[g % len(_SHADES)], va="center")
-                figure.text(
-                    (left + 3.6) / style.WIDTH_MM, y, causes[g], fontsize=style.TINY, color=style.INK, va="center"
-                )
+                figure.text((left + 3.6) / style.WIDTH_MM, y, causes[g], fontsize=style.TINY, va="center")
         return style.drawn(
             figure,
             say("What the variance of each characteristic is made of, %, by cause: total shares over their sum."),
@@ -251,8 +232,7 @@ def correlation_plot(numbers: Sequence[Text], correlation: Floats) -> Plot:
         ax.set_xticks(range(count), numbers, fontsize=style.TINY, rotation=turned)
         ax.set_yticks(range(count), numbers, fontsize=style.TINY)
         ax.tick_params(length=0, labelcolor=style.INK)
-        for name in ("left", "bottom"):
-            ax.spines[name].set_color(style.RULE)
+        ax.spines[["left", "bottom"]].set_color(style.RULE)
         return style.drawn(
             figure,
             say("Correlations between the characteristics, by their numbers: full dots positive, hollow dots negative, the "

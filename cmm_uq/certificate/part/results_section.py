@@ -13,7 +13,7 @@ from cmm_uq.analysis.parts.result import deviations_of
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, in_a_row, names, number, say, semicolons, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Column, Facts, Paragraph, Section, Table
+from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.part.figures import CharacteristicFigures, figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.pictures import errors_picture, form_picture, part_picture
@@ -26,8 +26,9 @@ FEW = 8  # characteristics up to which their correlations are a table
 
 def results_section(found: PartMeasurement) -> Section:
     """Every characteristic with its value, if anything was measured, and its uncertainty."""
-    tables = [_table(part, measured=found.measured is not None) for part in _parts(figures_of(found))]
-    return Section(say("Results"), (*([] if found.measured is not None else [Paragraph(_UNMEASURED)]), *tables))
+    measured = found.measured is not None
+    tables = (_table(part, measured=measured) for part in _parts(figures_of(found)))
+    return section(say("Results"), None if measured else Paragraph(_UNMEASURED), *tables)
 
 
 def _parts(every: Sequence[CharacteristicFigures]) -> list[list[CharacteristicFigures]]:
@@ -41,55 +42,44 @@ _UNMEASURED = say(
 )
 
 
-def _table(every: Sequence[CharacteristicFigures], *, measured: bool) -> Table:
+def _table(every: Sequence[CharacteristicFigures], *, measured: bool) -> Table | None:
     scale = every[0].scale
-    columns = (
-        Column(say("No.")), Column(say("Characteristic"), numeric=False),
-        *((Column(say("Value"), scale.value),) if measured else ()),
+    heads = (
+        Column(say("No.")), say("Characteristic"), *((Column(say("Value"), scale.value),) if measured else ()),
         Column(say("U"), scale.small), Column(say("k")),
         Column(say("95 % interval"), scale.value if measured else scale.small, numeric=False),
         *(() if measured else (Column(say("Mean error"), scale.small),)),
     )  # fmt: skip
-    rows = tuple(
+    rows = (
         (one.number, one.beside, *(() if one.stated.value is None else (one.at(one.stated.value),)),
          *one.with_factor(one.stated.k), one.interval, *(() if measured else (one.error(one.stated.error),)))
         for one in every
     )  # fmt: skip
-    return Table(say("Angles") if every[0].angular else say("Lengths, forms and places"), columns, rows, _notes(every))
-
-
-def _notes(every: Sequence[CharacteristicFigures]) -> tuple[Text, ...]:
-    notes: list[Text] = [
-        say(
+    notes = (
+        (True, say(
             "95 % interval: the shortest that holds 95 % of the virtual measurements. U = k · u is half of it, u the standard "
-            "uncertainty; the value lies in the middle only where errors to both sides are alike."
-        )
-    ]
-    if any(one.one_sided for one in every):
-        notes.append(
-            say(
-                "A measured form, orientation or location has one side and is stated by its interval, which is never below "
-                "zero and as likely to hold a small width as a large one (Feldman and Cousins, 1998); its value is the median."
-            )
-        )
-    if every[0].stated.value is None:
-        notes.append(say("The interval is that of the true value less the indicated one."))
-        return tuple(notes)
-    notes.append(say("All other values are stated less the mean of their errors."))
-    return tuple(notes)
+            "uncertainty; the value lies in the middle only where errors to both sides are alike.")),
+        (any(one.one_sided for one in every), say(
+            "A measured form, orientation or location has one side and is stated by its interval, which is never below "
+            "zero and as likely to hold a small width as a large one (Feldman and Cousins, 1998); its value is the median.")),
+        (True, say("All other values are stated less the mean of their errors.") if every[0].stated.value is not None else
+         say("The interval is that of the true value less the indicated one.")),
+    )  # fmt: skip
+    caption = say("Angles") if every[0].angular else say("Lengths, forms and places")
+    return table(caption, heads, rows, *(text for holds, text in notes if holds))
 
 
 def conformity_section(found: PartMeasurement) -> Section:
     """Limits, what the rule accepts, decisions, and their picture; nothing where the drawing has no limits."""
     limited = [one for one in figures_of(found) if one.judged is not None]
     if not limited:
-        return Section(say("Conformity"), ())
-    blocks: list[Block] = [Paragraph(_rule(found, limited))]
-    blocks += margin_plots([_margin(one) for one in limited if found.measured is not None or one.width > 0])
-    nominal = characteristics_of(found.plan, found.plan.points)
-    measured = found.measured is not None
-    blocks += [_decisions(part, nominal.tolist(), measured=measured) for part in _parts(limited)]
-    return Section(say("Conformity with the drawing"), tuple(blocks))
+        return section(say("Conformity"))
+    nominal, measured = characteristics_of(found.plan, found.plan.points).tolist(), found.measured is not None
+    return section(
+        say("Conformity with the drawing"), Paragraph(_rule(found, limited)),
+        *margin_plots([_margin(one) for one in limited if measured or one.width > 0]),
+        *(_decisions(part, nominal, measured=measured) for part in _parts(limited)),
+    )  # fmt: skip
 
 
 def _rule(found: PartMeasurement, limited: Sequence[CharacteristicFigures]) -> Text:
@@ -102,38 +92,36 @@ def _rule(found: PartMeasurement, limited: Sequence[CharacteristicFigures]) -> T
     )  # fmt: skip
 
 
-def _decisions(every: Sequence[CharacteristicFigures], nominal: Sequence[float], *, measured: bool) -> Table:
-    scale = every[0].scale
-    columns = (
-        Column(say("No.")), Column(say("Characteristic"), numeric=False), Column(say("Nominal"), scale.value),
-        Column(say("Lower limit"), scale.value), Column(say("Upper limit"), scale.value),
-        Column(say("Accepted"), scale.value, numeric=False),
-        *((Column(say("Decision"), numeric=False), Column(say("P"), numeric=False)) if measured else ()),
+def _decisions(every: Sequence[CharacteristicFigures], nominal: Sequence[float], *, measured: bool) -> Table | None:
+    value = every[0].scale.value
+    heads = (
+        Column(say("No.")), say("Characteristic"), Column(say("Nominal"), value), Column(say("Lower limit"), value),
+        Column(say("Upper limit"), value), Column(say("Accepted"), value, numeric=False),
+        *((say("Decision"), say("P")) if measured else ()),
     )  # fmt: skip
-    rows = tuple(_decision(one, nominal[one.place], measured=measured) for one in every)
-    notes: list[Text] = [say("Accepted: values that the rule accepts with this uncertainty.")]
-    if measured:
-        notes.append(say("P: probability that the true value is within its limits, by the virtual measurements."))
-    if any(one.judged is not None and one.judged.accepted is None for one in every):
-        notes.append(say("None: the uncertainty is too large for any value to be accepted."))
+    notes = (
+        (True, say("Accepted: values that the rule accepts with this uncertainty.")),
+        (measured, say("P: probability that the true value is within its limits, by the virtual measurements.")),
+        (any(one.judged is not None and one.judged.accepted is None for one in every),
+         say("None: the uncertainty is too large for any value to be accepted.")),
+    )  # fmt: skip
     if measured:
         caption = say("Decisions on angles") if every[0].angular else say("Decisions")
     else:
         caption = say("Angles that the rule will accept") if every[0].angular else say("What the rule will accept")
-    return Table(caption, columns, rows, tuple(notes))
+    rows = (_decision(one, nominal[one.place], measured=measured) for one in every)
+    return table(caption, heads, rows, *(text for holds, text in notes if holds))
 
 
 def _decision(one: CharacteristicFigures, nominal: float, *, measured: bool) -> tuple[Text, ...]:
-    judged, (low, high) = one.judged, one.limits
-    decided: tuple[Text, ...] = ()
+    judged, (low, high), decided = one.judged, one.limits, tuple[Text, ...]()
     if measured and judged is not None:
         decided = (
             DASH if judged.outcome is None else OUTCOME_WORDS[judged.outcome],
             DASH if judged.probability is None else probability(judged.probability),
         )
-    accepted = one.accepted_of(None if judged is None else judged.accepted)
-    return (one.number, one.beside, DASH if one.zone else one.limit(nominal), one.limit(low), one.limit(high), accepted,
-            *decided)  # fmt: skip
+    return (one.number, one.beside, DASH if one.zone else one.limit(nominal), one.limit(low), one.limit(high),
+            one.accepted_of(None if judged is None else judged.accepted), *decided)  # fmt: skip
 
 
 def _margin(one: CharacteristicFigures) -> Margin:
@@ -148,24 +136,22 @@ def _margin(one: CharacteristicFigures) -> Margin:
 
 def correlation_section(found: PartMeasurement) -> Section:
     """What characteristics have in common: a table of few, a picture of many; nothing of one."""
-    every = figures_of(found)
+    every, title = figures_of(found), say("Correlations")
     if len(every) < 2:
-        return Section(say("Correlations"), ())
+        return section(title)
     told = Paragraph(
         say("Errors that several characteristics have in common make them correlated; what is computed from several of them "
             "needs this. results.json has all figures."), "note",
     )  # fmt: skip
     if len(every) > FEW:
-        return Section(say("Correlations"), (told, correlation_plot([one.number for one in every], found.correlation)))
-    rows = tuple(
+        return section(title, told, correlation_plot([one.number for one in every], found.correlation))
+    rows = (
         (one.number, one.beside, *(_r(float(found.correlation[one.place, j]), one.place, j) for j in range(len(every))))
         for one in every
     )
-    columns = (
-        Column(say("No.")), Column(say("Characteristic"), numeric=False),
-        *(Column(say("No. {number}", number=one.number)) for one in every),
-    )  # fmt: skip
-    return Section(say("Correlations"), (told, Table(say("Correlations between the characteristics"), columns, rows)))
+    numbers = (Column(say("No. {number}", number=one.number)) for one in every)
+    heads: tuple[Text | Column, ...] = (Column(say("No.")), say("Characteristic"), *numbers)
+    return section(title, told, table(say("Correlations between the characteristics"), heads, rows))
 
 
 def _r(value: float, row: int, column: int) -> Text:
@@ -187,29 +173,22 @@ def lettered_names(plan: Plan) -> list[Text]:
 
 def part_section(found: PartMeasurement) -> Section:
     """What is probed, with which styli, and where the part lies."""
-    plan = found.plan
-    several = len(plan.styli) > 1
-    columns = (
-        Column(say("No.")), Column(say("Feature"), numeric=False), Column(say("Kind"), numeric=False),
-        Column(say("Points")), *((Column(say("Stylus"), numeric=False),) if several else ()),
-        Column(say("Association"), numeric=False),
+    plan, several = found.plan, len(found.plan.styli) > 1
+    heads: tuple[Text | Column, ...] = (
+        Column(say("No.")), say("Feature"), say("Kind"), Column(say("Points")), *((say("Stylus"),) if several else ()),
+        say("Association"),
     )  # fmt: skip
-    rows = tuple(
+    rows = (
         (number(i + 1), Verbatim(feature.name), KINDS[feature.kind], number(len(feature.points)),
          *((Verbatim(feature.stylus),) if several else ()),
          ASSOCIATIONS[feature.association] if len(feature.points) > 1 else DASH)
         for i, feature in enumerate(plan.features)
     )  # fmt: skip
-    blocks: tuple[Block, ...] = (
-        part_picture(plan, found.given.poses[0], lettered_names(plan)),
-        Table(say("Features"), columns, rows, (_FEATURES,)),
-        Facts(tuple(row for row in _lies(found) if row[1])),
-    )
-    return Section(say("The part as it is probed"), blocks)
-
-
-_UM = unit("µm")
-_FEATURES = say("Association: how a feature is made of its points, where a characteristic says nothing else.")
+    note = say("Association: how a feature is made of its points, where a characteristic says nothing else.")
+    return section(
+        say("The part as it is probed"), part_picture(plan, found.given.poses[0], lettered_names(plan)),
+        table(say("Features"), heads, rows, note), Facts(tuple(row for row in _lies(found) if row[1])),
+    )  # fmt: skip
 
 
 def _lies(found: PartMeasurement) -> list[tuple[Text, Text]]:
@@ -241,26 +220,23 @@ def _three(values: Sequence[float]) -> Text:
 
 def errors_section(found: PartMeasurement) -> Section:
     """The errors of the points, and the form that was measured."""
-    blocks: list[Block] = [errors_picture(found.plan, found.displaced)]
+    title, errors = say("Errors of the points"), errors_picture(found.plan, found.displaced)
     deviations = None if found.job.measured is None else deviations_of(found.plan, found.job.measured)
     if deviations is not None and np.isfinite(deviations).any():
-        blocks += [form_picture(found.plan, deviations), _forms(found.plan, deviations)]
-    elif found.measured is not None:
-        blocks.append(Paragraph(say("No feature has more points than determine it: no form was measured."), "note"))
-    return Section(say("Errors of the points"), tuple(blocks))
+        return section(title, errors, form_picture(found.plan, deviations), _forms(found.plan, deviations))
+    none = Paragraph(say("No feature has more points than determine it: no form was measured."), "note")
+    return section(title, errors, none if found.measured is not None else None)
 
 
 def _forms(plan: Plan, deviations: Floats) -> Table:
     """Range of the measured deviations of each feature that has some."""
-    columns = (
-        Column(say("No.")), Column(say("Feature"), numeric=False), Column(say("From"), _UM), Column(say("To"), _UM),
-        Column(say("Root mean square"), _UM),
-    )  # fmt: skip
+    figures = (Column(head, unit("µm")) for head in (say("From"), say("To"), say("Root mean square")))
     rows = []
     for i, feature in enumerate(plan.features):
         own = deviations[plan.rows[feature.name]] / MICROMETRE
         if np.isfinite(own).all():
-            figures = (float(own.min()), float(own.max()), float(np.sqrt(np.mean(own**2))))
-            rows.append((number(i + 1), Verbatim(feature.name), *(signed(each, ".1f") for each in figures)))
+            ends = (float(own.min()), float(own.max()), float(np.sqrt(np.mean(own**2))))
+            rows.append((number(i + 1), Verbatim(feature.name), *(signed(each, ".1f") for each in ends)))
     note = say("Noise of the machine and its errors are in these distances too; no form is stated here.")
-    return Table(say("Distances of the points from their features"), columns, tuple(rows), (note,))
+    heads = columns((Column(say("No.")), say("Feature"), *figures))
+    return Table(say("Distances of the points from their features"), heads, tuple(rows), (note,))

@@ -14,20 +14,7 @@ from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.plots import style
-from cmm_uq.certificate.plots.style import (
-    ACCENT,
-    BAND,
-    DIVERGING,
-    INK,
-    MUTED,
-    NAMES_MM,
-    RULE,
-    SMALL,
-    TINY,
-    WIDTH_MM,
-    folded,
-    width_mm,
-)
+from cmm_uq.certificate.plots.style import ACCENT, BAND, DIVERGING, INK, MUTED, RULE, WIDTH_MM
 from cmm_uq.certificate.result import Result
 from cmm_uq.maths.uncertainty.quantity import alike
 
@@ -40,43 +27,25 @@ _PANELS = ((0, 1), (0, 2), (1, 2))
 
 
 def length_plot(
-    position: ArrayLike, before_um: ArrayLike, after_um: ArrayLike, *, expanded_before_um: ArrayLike | float,
-    expanded_after_um: ArrayLike | float, reference: Text, reference_expanded_um: float = 0.0,
+    position: ArrayLike, before_um: ArrayLike, after_um: ArrayLike | None = None, *, expanded_before_um: ArrayLike | float,
+    expanded_after_um: ArrayLike | float = 0.0, reference: Text, reference_expanded_um: float = 0.0,
     flagged: ArrayLike | None = None, position_label: Text = say("Position of the bar"),
     before_label: Text = say("Before the model"), after_label: Text = say("After the fitted model"), caption: Text,
     alternative: Text,
 ) -> Plot:  # fmt: skip
-    """Bar lengths by position, before and after the fitted model, as deviations from a reference length.
+    """Deviations from a reference with their U by position, such as bar lengths before and after the fitted model.
 
     ``position``: (n,) number of each position; repeats carry the same number and are drawn side by side; ``before_um,
-    after_um``: (n,) length minus reference, µm; ``expanded_before_um, expanded_after_um``: (n,) or one for all,
-    expanded uncertainty of each length, µm; ``reference``: what zero is, with its figure, such as "certified length
-    404.2357 mm"; ``reference_expanded_um``: expanded uncertainty of the reference, µm: the half width of the band about
-    zero; ``flagged``: (n,) true where screening flagged the position.
+    after_um``: (n,) length minus reference, µm, a panel each; ``expanded_before_um, expanded_after_um``: (n,) or one for
+    all, µm; ``reference``: what zero is, with its figure, such as "certified length 404.2357 mm";
+    ``reference_expanded_um``: its U, µm: the half width of the band about zero; ``flagged``: (n,) true where screening
+    flagged the position.
     """
-    before = before_label, before_um, expanded_before_um, MUTED
-    after = after_label, after_um, expanded_after_um, ACCENT
-    zero = reference, reference_expanded_um
-    return _panels(position, (before, after), zero, flagged, position_label, caption, alternative)
-
-
-def residual_plot(
-    position: ArrayLike, residual_um: ArrayLike, *, expanded_um: ArrayLike | float, reference: Text,
-    flagged: ArrayLike | None = None, position_label: Text, label: Text, caption: Text, alternative: Text,
-) -> Plot:  # fmt: skip
-    """The same in one panel, of what is not compared with anything."""
-    series = ((label, residual_um, expanded_um, ACCENT),)
-    return _panels(position, series, (reference, 0.0), flagged, position_label, caption, alternative)
-
-
-def _panels(
-    position: ArrayLike, given: Sequence[tuple[Text, ArrayLike, ArrayLike | float, str]], zero: tuple[Text, float],
-    flagged: ArrayLike | None, position_label: Text, caption: Text, alternative: Text,
-) -> Plot:  # fmt: skip
-    """Deviations with their expanded uncertainties by position, a panel a series."""
     from matplotlib.ticker import MaxNLocator, MultipleLocator
 
-    reference, reference_expanded_um = zero
+    given = [(before_label, before_um, expanded_before_um, ACCENT if after_um is None else MUTED)]
+    if after_um is not None:
+        given.append((after_label, after_um, expanded_after_um, ACCENT))
     count, two = np.asarray(given[0][1]).shape[0], len(given) == 2
     x = _side_by_side(style.finite("position", position, (count,)))
     series = [(label, style.finite("deviation", values, (count,)), U, colour) for label, values, U, colour in given]
@@ -113,7 +82,7 @@ def _panels(
             zero_is = say("zero: {reference}, band: its U = {U:.2g} µm", reference=reference, U=reference_expanded_um)
         marks = say("bars: U, rings: flagged by screening") if marked.any() else say("bars: U")
         legend = semicolons((zero_is, marks))
-        if width_mm(style.lettered(legend), TINY) > _NOTE_MM:
+        if style.width_mm(style.lettered(legend), style.TINY) > _NOTE_MM:
             figure.subplots_adjust(top=0.905 if two else 0.86)  # the note has a line of its own
         style.note(figure, legend, 0.995, 0.985)
         return style.drawn(figure, caption, alternative)
@@ -239,7 +208,7 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
 
     order = np.argsort(-share, kind="stable")
     rows = np.arange(len(order))
-    names = [folded(sources[index], NAMES_MM) for index in order]
+    names = [style.folded(sources[index], style.NAMES_MM) for index in order]
     height = 10 + (7.0 if any(len(lines) > 1 for lines in names) else 6.0) * len(order)
     with style.picture(height, left=0.34, right=0.93, bottom=1.5 / height, top=1 - 1.5 / height) as (figure, ax):
         colours = [ACCENT if value >= 0 else MUTED for value in share[order]]
@@ -248,16 +217,14 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
         for row, value in zip(rows, share[order], strict=True):
             text = say("{share} %", share=signed(100 * value, ".1f"))
             ax.annotate(text, (max(value, 0), row), (4, 0), textcoords="offset points", va="center", color=INK)
-        ax.set_yticks(rows, [lines[0] if len(lines) == 1 else NOTHING for lines in names])
+        style.named_rows(ax, rows, [lines[0] if len(lines) == 1 else NOTHING for lines in names])
         ax.set(xlim=(min(share.min() * 1.15, 0), max(share.max(), 1e-9) * 1.02), xticks=[])
-        ax.invert_yaxis()
-        ax.tick_params(left=False)
         left = -rcParams["ytick.major.pad"] - rcParams["ytick.major.size"]
         for place, lines in enumerate(names):
             for line, up in zip(lines, (0.6, -0.6), strict=True) if len(lines) > 1 else ():
-                ax.annotate(line, (0, place), (left, up * SMALL), xycoords=("axes fraction", "data"),
-                            textcoords="offset points", ha="right", va="center", fontsize=SMALL, color=INK)  # fmt: skip
-        ax.spines[["bottom", "left"]].set_visible(False)
+                ax.annotate(line, (0, place), (left, up * style.SMALL), xycoords=("axes fraction", "data"),
+                            textcoords="offset points", ha="right", va="center", fontsize=style.SMALL, color=INK)  # fmt: skip
+        ax.spines["bottom"].set_visible(False)
         return style.drawn(figure, caption, alternative)
 
 
@@ -347,12 +314,9 @@ def tolerance_plot(
             side = np.sign(value[row])
             ax.annotate(f"{value[row]:+.1f}".replace("-", "−"), (side * reach, row), (-6 * side, 4),
                         textcoords="offset points", ha="right" if side > 0 else "left", color=MUTED)  # fmt: skip
-        ax.set_yticks(rows, names)
+        style.named_rows(ax, rows, names)
         label = say("Parameter over its tolerance (band: inside; cross: outside beyond doubt)")
         ax.set(xlim=(-1.02 * reach, 1.02 * reach), xlabel=label)
-        ax.invert_yaxis()
-        ax.tick_params(left=False)
-        ax.spines["left"].set_visible(False)
         return style.drawn(figure, caption, alternative)
 
 

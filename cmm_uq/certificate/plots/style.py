@@ -301,6 +301,14 @@ def band(ax: Axes, x: Floats, y: Floats, half: Floats, **style: Any) -> None:
     ax.fill(np.append(x, x[::-1]), np.append(y - half, (y + half)[::-1]), color=ACCENT, lw=0, **style)
 
 
+def named_rows(ax: Axes, rows: ArrayLike, names: Sequence[Text]) -> None:
+    """Rows from above, each with its name beside it in place of an axis."""
+    ax.set_yticks(rows, names)
+    ax.invert_yaxis()
+    ax.tick_params(left=False)
+    ax.spines["left"].set_visible(False)
+
+
 def panel_title(ax: Axes, text: Text, colour: str) -> None:
     ax.set_title(text, loc="left", fontsize=8, color=colour, fontweight="bold", pad=4)
 

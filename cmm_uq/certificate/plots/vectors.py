@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_ROUND = (1.0, 2.0, 5.0)
 _PLANES = ((0, 1), (0, 2), (1, 2))
 _AXES = "XYZ"
 _TITLE = 56.0  # mm that the title of a column needs
@@ -50,7 +49,7 @@ def vector_plot(
         for ax, (title, _), values, colour in zip(axes, series, vectors, colours, strict=False):
             style.dots(ax, place[:, 0], place[:, 1], 2.0, RULE)
             tips = place + factor * values
-            ax.quiver(*place.T, *(tips - place).T, angles="xy", scale_units="xy", scale=1, color=colour, width=0.006)
+            arrows(ax, place, tips - place, colour, width=0.006)
             style.panel_title(ax, title, colour)
             ax.set_aspect("equal")
             ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
@@ -69,10 +68,40 @@ def _longest(vectors: Sequence[Floats]) -> float:
     return max(float(np.linalg.norm(values, axis=1).max(initial=0.0)) for values in vectors) or 1.0
 
 
+def arrows(ax: Axes, place: Floats, way: Floats, colour: str, **looks: Any) -> None:
+    """Arrows of (n, 2) in the units of the axes."""
+    ax.quiver(*place.T, *way.T, angles="xy", scale_units="xy", scale=1, color=colour, **looks)
+
+
+def scale_bar(
+    figure: Figure, ax: Axes, left_mm: float, up_mm: float, factor: float, longest: float, colour: str
+) -> float:
+    """A round length of vectors to scale, drawn by ``factor`` mm for one µm; where it ends, part of the figure's width."""
+    length = round_length(longest)
+    start, up = left_mm / WIDTH_MM, up_mm / (float(figure.get_size_inches()[1]) * 25.4)
+    return bar(figure, start, up, length * factor * mm_of(ax), 1.8, colour, say("{length:g} µm", length=length))
+
+
+def mm_of(ax: Axes) -> float:
+    """Part of the figure's width that a millimetre of the axes takes."""
+    x0, x1 = ax.get_xlim()
+    return float(ax.get_position().width / (x1 - x0))
+
+
+def bar(figure: Figure, left: float, up: float, length: float, width: float, colour: str, text: Text) -> float:
+    """A line of a key with what it means behind its end."""
+    from matplotlib.lines import Line2D
+
+    end = left + length
+    figure.add_artist(Line2D([left, end], [up, up], color=colour, lw=width, solid_capstyle="butt"))
+    figure.text(end + 0.008, up, text, ha="left", va="center", fontsize=TINY, color=INK)
+    return end
+
+
 def round_length(longest: float) -> float:
     """The largest of 1, 2, 5 times a power of ten that is not longer than the longest vector."""
     power = 10.0 ** np.floor(np.log10(longest))
-    return float(max(step * power for step in _ROUND if step * power <= longest))
+    return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= longest))
 
 
 def residual_field_plot(
@@ -157,31 +186,19 @@ def _vectors(ax: Axes, place: Floats, way: Floats, beyond: NDArray[np.bool_], co
     (x0, y0), (x1, y1) = place[~beyond].T, (place + way)[~beyond].T
     style.strokes(ax, x0, x1, y0, y1, color=MUTED, lw=0.5, solid_capstyle="round", zorder=2)
     if beyond.any():
-        ax.quiver(*place[beyond].T, *way[beyond].T, angles="xy", scale_units="xy", scale=1, color=colour, units="width",
-                  width=0.006, headwidth=4, headlength=5, zorder=3)  # fmt: skip
+        arrows(ax, place[beyond], way[beyond], colour, units="width", width=0.006, headwidth=4, headlength=5, zorder=3)
 
 
 def _key(figure: Figure, ax: Axes, factor: float, longest: float, limit: float, colour: str) -> None:
     """A round length to scale, and the expanded uncertainty to the same scale."""
-    from matplotlib.lines import Line2D
-
-    x0, x1 = ax.get_xlim()
-    per_mm = ax.get_position().width / (x1 - x0)  # of the figure's width, a millimetre of the machine
-    unit = round_length(longest)
-    y, left = 3.2 / (float(figure.get_size_inches()[1]) * 25.4), 14.0 / WIDTH_MM
-
-    def bar(start: float, length: float, width: float, shade: str, text: Text) -> float:
-        end = start + length * factor * per_mm
-        figure.add_artist(Line2D([start, end], [y, y], color=shade, lw=width, solid_capstyle="butt"))
-        figure.text(end + 0.008, y, text, ha="left", va="center", fontsize=TINY, color=INK)
-        return end
-
-    end = bar(left, unit, 1.8, colour, say("{length:g} µm", length=unit))
-    if limit * factor * per_mm < 0.3:
-        bar(end + 0.14, limit, 0.8, MUTED, say("U = {limit:.2g} µm; within it a thin line without a head", limit=limit))
+    end = scale_bar(figure, ax, 14.0, 3.2, factor, longest, colour)
+    left, up, length = end + 0.14, 3.2 / (float(figure.get_size_inches()[1]) * 25.4), limit * factor * mm_of(ax)
+    if length < 0.3:
+        text = say("U = {limit:.2g} µm; within it a thin line without a head", limit=limit)
+        bar(figure, left, up, length, 0.8, MUTED, text)
     else:
         text = say("U = {limit:.2g} µm, longer than any vector", limit=limit)
-        figure.text(end + 0.14, y, text, va="center", fontsize=TINY, color=INK)
+        figure.text(left, up, text, va="center", fontsize=TINY, color=INK)
 
 
 def profile_plot(

@@ -6,20 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from cmm_uq.analysis.conformity.statement import Decided, Statement, least_favourable
-from cmm_uq.base.messages import (
-    DASH,
-    NOTHING,
-    Text,
-    Verbatim,
-    after,
-    commas,
-    in_a_row,
-    number,
-    plural,
-    say,
-    sentences,
-    signed,
-)
+from cmm_uq.base import messages
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, number, plural, say
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, DecisionBlock, Plot, Section, Table, columns
 from cmm_uq.certificate.plots.residuals import trumpet
@@ -37,12 +25,12 @@ def budget_table(measurand: Text, budget: Budget) -> Table:
     several = len(there) > 1
     rows = (
         (line.name, *(_turned(line, scale) if turned else ()), significant(scale * line.contribution),
-         *((say("{share} %", share=signed(100 * share, ".1f")),) if several else ()), line.origin)
+         *((say("{share} %", share=messages.signed(100 * share, ".1f")),) if several else ()), line.origin)
         for line, share in there
     )  # fmt: skip
     notes = [say("Combined: u = {u} µm.", u=significant(scale * budget.u))] if several else []
     if absent := [line.name for line in budget.lines if not line.part]:
-        notes.append(say("Without a contribution, or not stated: {absent}.", absent=commas(absent)))
+        notes.append(say("Without a contribution, or not stated: {absent}.", absent=messages.commas(absent)))
     heads = columns((
         say("Cause"), *((say("Standard uncertainty"), say("Sensitivity")) if turned else ()),
         Column(say("Contribution"), unit("µm")), *((Column(say("Share")),) if several else ()), say("Origin"),
@@ -82,7 +70,7 @@ def decision_block(statement: Statement) -> DecisionBlock:
     """One statement: what was compared with what, by which rule, and what follows."""
     value = stated_value(statement.value_um, 2 * statement.u_um, signed=statement.signed)
     measured = say("{value} µm (k = 2)", value=value) if statement.u_um > 0 else say("{value} µm", value=value)
-    told = sentences((*_what_follows(statement), *statement.remarks))
+    told = messages.sentences((*_what_follows(statement), *statement.remarks))
     return DecisionBlock(named(statement), statement.quantity, measured, _limit(statement), statement.decision.rule,
                          statement.outcome, told, statement.missing)  # fmt: skip
 
@@ -161,7 +149,7 @@ def picture(statement: Statement) -> Plot:
         limit_um=[limit for limit, _ in bands],
         acceptance_um=[None if band is None else max(0.0, limit - band) for limit, band in bands],
         expanded_um=[2 * item.u_um for item in items], outside=outside, quantity=say("Error / µm"),
-        caption=after(caption, beyond if far else NOTHING),
+        caption=messages.after(caption, beyond if far else NOTHING),
         alternative=say("{count} errors over length between the limits; {outside} of them are not accepted.",
                         count=len(items), outside=sum(outside)),
     )  # fmt: skip
@@ -204,7 +192,9 @@ def _row(row: Sequence[Decided], *, lengths: bool, known: bool, signed_values: b
     chance, standing = worst.decision.probability_conforming, _STANDING[row[0].standing]
     if worst.set_aside and not standing:
         standing = say("set aside by the screening")
-    values = in_a_row(signed(item.error_um, "+.2f") if signed_values else number(item.error_um, ".2f") for item in row)
+    values = messages.in_a_row(
+        messages.signed(item.error_um, "+.2f") if signed_values else number(item.error_um, ".2f") for item in row
+    )
     decision = OUTCOME_WORDS[worst.outcome]
     return (
         DASH if worst.measurement is None else number(worst.measurement),

@@ -11,34 +11,11 @@ from cmm_uq.analysis.conformity.decision import rule_words
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, listed, names, number, plural, say, semicolons
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.document import (
-    Block,
-    Column,
-    Overview,
-    Paragraph,
-    Plot,
-    Section,
-    Table,
-    columns,
-    section,
-    table,
-)
+from cmm_uq.certificate import document as doc, wording
+from cmm_uq.certificate.document import Block, Plot, Section, Table, section
 from cmm_uq.certificate.plots.residuals import tolerance_plot
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.sections.conformity import has_picture, named, picture
-from cmm_uq.certificate.wording import (
-    CERTAIN,
-    OUTCOME_WORDS,
-    Headline,
-    Summary,
-    expanded,
-    figure_row,
-    measured,
-    probability,
-    stated_row,
-    stated_value,
-    title_of,
-)
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.verdicts import GRAVEST, NONE, Verdict, gravest, standing_of
 from cmm_uq.maths.uncertainty.quantity import Quantity, limit_in_full, rounded, significant
@@ -55,8 +32,10 @@ def stated_table(
     caption: Text, named: Iterable[tuple[Text, Quantity]], notes: tuple[Text, ...] = (), *, what: Text = say("Quantity"),
     value: Text = say("Value"),
 ) -> Table:  # fmt: skip
-    heads = (what, Column(value), Column(say("U")), Column(say("k")), say("Unit"))
-    return Table(caption, columns(heads), tuple((name, *expanded(one), one.unit) for name, one in named), notes)
+    heads = (what, doc.Column(value), doc.Column(say("U")), doc.Column(say("k")), say("Unit"))
+    return Table(
+        caption, doc.columns(heads), tuple((name, *wording.expanded(one), one.unit) for name, one in named), notes
+    )
 
 
 def performance(result: Result) -> Section:
@@ -79,13 +58,13 @@ def error_factors(result: Result) -> Section:
     for key, quantity in reported(result):
         if key in result.not_given:
             why = say("not given") if key in contradicted else say("not determined")
-            rows.append((title_of(key, result), why, NOTHING, NOTHING, NOTHING, quantity.unit))
+            rows.append((wording.title_of(key, result), why, NOTHING, NOTHING, NOTHING, quantity.unit))
             continue
         least = rounded(float(fitted[key]), quantity.expanded)[0] if key in fitted else NOTHING
-        rows.append((title_of(key, result), *expanded(quantity), least, quantity.unit))
+        rows.append((wording.title_of(key, result), *wording.expanded(quantity), least, quantity.unit))
     least_squares = say("Least squares, named model") if result.averaged else say("Least squares")
-    figures = (Column(head) for head in (say("Estimate"), say("U"), say("k"), least_squares))
-    factors = table(
+    figures = (doc.Column(head) for head in (say("Estimate"), say("U"), say("k"), least_squares))
+    factors = doc.table(
         say("Error factors of the machine"), (say("Error factor"), *figures, say("Unit")), rows, SIGN, UNCERTAINTY
     )
     free = (block for combination in result.undetermined for block in _free_combination(result, combination))
@@ -100,13 +79,14 @@ def reported(result: Result) -> Iterator[tuple[tuple[str, str], Quantity]]:
 
 def _free_combination(result: Result, combination: tuple[tuple[str, str], ...]) -> list[Block]:
     """A combination that no such recording determines, and the differences inside it that this one does."""
-    words = Paragraph(say(
+    words = doc.Paragraph(say(
         "{titles} can change together without changing any observation: the recording does not "
         "determine their common part. A certified length of the artefact would.",
-        titles=listed([title_of(key, result) for key in combination]),
+        titles=listed([wording.title_of(key, result) for key in combination]),
     ))  # fmt: skip
     named = [
-        (say("{second} − {first}", second=title_of(one.second, result), first=title_of(one.first, result)), one.quantity)
+        (say("{second} − {first}", second=wording.title_of(one.second, result), first=wording.title_of(one.first, result)),
+         one.quantity)
         for one in result.differences(combination)
     ]  # fmt: skip
     caption = say("Differences that are determined")
@@ -129,18 +109,18 @@ def as_found_section(job: Job, left: Iterable[Left], verdicts: Iterable[Verdict]
         if (before := found.figure(group, name)) is not None:
             low, high = before.interval95
             then = Quantity(before.value, before.u, (low, high), now.unit)
-            rows.append((quantity, *expanded(then)[:2], *expanded(now)[:2], now.unit))
-    figures = (Column(head) for head in (say("As found"), say("U"), say("As left"), say("U")))
+            rows.append((quantity, *wording.expanded(then)[:2], *wording.expanded(now)[:2], now.unit))
+    figures = (doc.Column(head) for head in (say("As found"), say("U"), say("As left"), say("U")))
     note = say("U is the expanded uncertainty for a coverage probability of 95 %.")
     heads = (say("Statement"), say("As found"), say("As left"))
     decided = (
-        (subject_of(now), *(OUTCOME_WORDS.get(name, Verbatim(name)) for name in (before.outcome, now.outcome)))
+        (subject_of(now), *(wording.OUTCOME_WORDS.get(name, Verbatim(name)) for name in (before.outcome, now.outcome)))
         for now in verdicts for before in found.stated if (before.by, before.name) == (now.by, now.name)
     )  # fmt: skip
     return section(
-        title, Paragraph(told),
-        table(say("The machine as found and as left"), (say("Quantity"), *figures, say("Unit")), rows, note),
-        table(say("Statements of conformity as found and as left"), heads, decided),
+        title, doc.Paragraph(told),
+        doc.table(say("The machine as found and as left"), (say("Quantity"), *figures, say("Unit")), rows, note),
+        doc.table(say("Statements of conformity as found and as left"), heads, decided),
     )  # fmt: skip
 
 
@@ -148,7 +128,7 @@ def quantities_left(result: Result) -> list[Left]:
     """Of a result: the figures of the lengths, and the error factors that it determines."""
     left: list[Left] = [("accuracy", name, TITLES[name], quantity) for name, quantity in result.accuracy.items()]
     left += [
-        (effect, name, title_of((effect, name), result), quantity)
+        (effect, name, wording.title_of((effect, name), result), quantity)
         for effect, found in result.parameters.items() if effect not in result.free for name, quantity in found.items()
     ]  # fmt: skip
     return left
@@ -173,16 +153,16 @@ def tolerance_sections(result: Result) -> list[Section]:
     unknown = say("Not determined by this recording, so not judged: {left_out}.", left_out=listed(names(left_out)))
     judged = [one for one in toleranced if one.value is not None]
     if not judged:
-        return [section(title, Paragraph(unknown))] if left_out else []
+        return [section(title, doc.Paragraph(unknown))] if left_out else []
     rows, ratios = [], []
     for one in judged:
         effect, _, parameter = one.name.partition(".")
         quantity, tolerance = result.parameters[effect][parameter], result.job.facts.model.tolerances[effect]
-        value, U, _ = expanded(quantity)
+        value, U, _ = wording.expanded(quantity)
         rows.append((one.title, value, U, number(tolerance, "g"), one.unit, _INSIDE[one.outcome]))
         part = quantity.times(1 / tolerance, unit("1"))
         ratios.append((part.value, *part.interval95))
-    figures = (Column(head) for head in (say("Estimate"), say("U"), say("Tolerance")))
+    figures = (doc.Column(head) for head in (say("Estimate"), say("U"), say("Tolerance")))
     notes = (say("In or out: the whole 95 % interval is; otherwise open."), *((unknown,) if left_out else ()))
     out = [one.title for one in judged if one.outcome == "fail"]
     plot = tolerance_plot(
@@ -190,26 +170,29 @@ def tolerance_sections(result: Result) -> list[Section]:
         caption=say("Each parameter over its tolerance, with its 95 % interval."),
         alternative=say("Out of tolerance: {out}.", out=listed(out)) if out else say("No parameter is out of tolerance."),
     )  # fmt: skip
-    heads: tuple[Text | Column, ...] = (say("Parameter"), *figures, say("Unit"), say("Verdict"))
-    return [section(title, plot, Table(say("Parameters and tolerances"), columns(heads), tuple(rows), notes))]
+    heads: tuple[Text | doc.Column, ...] = (say("Parameter"), *figures, say("Unit"), say("Verdict"))
+    return [section(title, plot, Table(say("Parameters and tolerances"), doc.columns(heads), tuple(rows), notes))]
 
 
-def summary(result: Result, warnings: Iterable[Text]) -> Summary:
+def summary(result: Result, warnings: Iterable[Text]) -> wording.Summary:
     facts, artefact = result.job.facts, result.artefact
     machine = Verbatim(facts.machine.name)
     subject = say("{machine}, {artefact:small}, {count} observations",
                   machine=machine, artefact=artefact.title, count=len(result.residuals))  # fmt: skip
-    figures = [figure_row(TITLES[name], quantity) for name, quantity in result.accuracy.items()]
-    figures += [figure_row(size.title, result.sizes[size.name]) for size in artefact.sizes if size.role == "sought"]
+    figures = [wording.figure_row(TITLES[name], quantity) for name, quantity in result.accuracy.items()]
     figures += [
-        figure_row(title_of(key, result), one, known=key not in result.not_given) for key, one in reported(result)
+        wording.figure_row(size.title, result.sizes[size.name]) for size in artefact.sizes if size.role == "sought"
+    ]
+    figures += [
+        wording.figure_row(wording.title_of(key, result), one, known=key not in result.not_given)
+        for key, one in reported(result)
     ]
     remarks = (*map(_remarks, result.statements), *map(_tolerance_remarks, tolerances_of(result)))
     decided = tuple(
-        Headline(one.outcome.upper(), one.standing, subject_of(one), tuple(told))
+        wording.Headline(one.outcome.upper(), one.standing, subject_of(one), tuple(told))
         for one, told in zip(result.verdicts, remarks, strict=True)
     )
-    return Summary(subject, day(facts.job.date), decided, tuple(figures), warnings=tuple(warnings))
+    return wording.Summary(subject, day(facts.job.date), decided, tuple(figures), warnings=tuple(warnings))
 
 
 def subject_of(one: Verdict) -> Text:
@@ -233,7 +216,7 @@ def _tolerance_remarks(one: Verdict) -> list[Text]:
 
 def _remarks(statement: Statement) -> list[Text]:
     """Value, limit, uncertainty and probability of a statement; what its test lacks."""
-    value, _ = measured(statement)
+    value, _ = wording.measured(statement)
     chance = statement.decision.probability_conforming
     told: list[Text] = [say("{value} µm against {limit} µm", value=value, limit=limit_in_full(statement.limit_um))]
     if statement.u_um > 0:
@@ -248,11 +231,11 @@ def _remarks(statement: Statement) -> list[Text]:
 
 
 def _chance(p: float) -> Text:
-    if p < CERTAIN:
-        return say("less than\u00a0{p}\u00a0%", p=number(100 * CERTAIN, "g"))
-    if p > 1 - CERTAIN:
-        return say("more than\u00a0{p}\u00a0%", p=number(100 * (1 - CERTAIN), "g"))
-    return probability(p)
+    if p < wording.CERTAIN:
+        return say("less than\u00a0{p}\u00a0%", p=number(100 * wording.CERTAIN, "g"))
+    if p > 1 - wording.CERTAIN:
+        return say("more than\u00a0{p}\u00a0%", p=number(100 * (1 - wording.CERTAIN), "g"))
+    return wording.probability(p)
 
 
 _MOST = 8  # statements in the box; of more the gravest, all are behind the page
@@ -268,7 +251,7 @@ _WORDS: Mapping[str, Text] = {
 }
 
 
-def overview_of(result: Result) -> Overview | None:
+def overview_of(result: Result) -> doc.Overview | None:
     """The verdict on the whole and each statement behind it; nothing where nothing is stated."""
     verdicts = result.verdicts
     if verdicts.overall == NONE:
@@ -289,7 +272,7 @@ def overview_of(result: Result) -> Overview | None:
     if len(verdicts) > len(result.statements):
         rules.append(say("tolerances: the whole 95 % interval must lie within"))
     rows.append((say("Decision rule"), semicolons(dict.fromkeys(rules))))
-    return Overview(_verdict(verdicts), standing_of(verdicts.overall), tuple(rows))
+    return doc.Overview(_verdict(verdicts), standing_of(verdicts.overall), tuple(rows))
 
 
 def _gravity(outcome: str) -> int:
@@ -301,7 +284,7 @@ def _verdict(verdicts: Sequence[Verdict]) -> Text:
     if overall == "pass":
         many = say("Conforms: all {count} statements of conformity", count=count)
         return plural(count, one=say("Conforms"), many=many)
-    words = _WORDS.get(overall, OUTCOME_WORDS.get(overall, say("Not decided")))
+    words = _WORDS.get(overall, wording.OUTCOME_WORDS.get(overall, say("Not decided")))
     if count == 1:
         return words
     alike = sum(one.outcome == overall for one in verdicts)
@@ -310,10 +293,10 @@ def _verdict(verdicts: Sequence[Verdict]) -> Text:
 
 def _row(one: Verdict, *, signed: bool) -> Text:
     if one.value is None:
-        outcome = OUTCOME_WORDS.get(one.outcome, say("undecided"))
+        outcome = wording.OUTCOME_WORDS.get(one.outcome, say("undecided"))
         return say("{outcome}: not determined by this recording", outcome=outcome)
-    value = stated_value(one.value, one.U, signed=signed)
-    return stated_row(one.outcome, value, one.unit, one.limit if one.by else None)
+    value = wording.stated_value(one.value, one.U, signed=signed)
+    return wording.stated_row(one.outcome, value, one.unit, one.limit if one.by else None)
 
 
 def with_first(result: Result, sections: Sequence[Section]) -> list[Section]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from asn1crypto import cms, crl, ocsp, x509
 from cryptography import x509 as certificates
@@ -14,7 +14,7 @@ from pyhanko_certvalidator import CertificateValidator, ValidationContext
 from pyhanko_certvalidator.errors import InvalidCertificateError, PathBuildingError, PathValidationError, RevokedError
 
 from cmm_uq.base.messages import Text, Verbatim, day, say
-from cmm_uq.certificate.sign.found import NOBODY, Revocation, Trust, ran
+from cmm_uq.certificate.sign.found import NOBODY, FileSignature, Revocation, Trust, ran
 from cmm_uq.certificate.sign.signer import is_test, unfit
 
 NO_TIME = say("the signature says no time, so that nobody knows whether its certificate was in date")
@@ -33,41 +33,38 @@ class Evidence:
     answers: tuple[ocsp.OCSPResponse, ...] = ()
 
 
-@dataclass(frozen=True)
-class Standing:
-    """What holds of a signer."""
-
-    trusted: bool  # somebody trusted vouches for them
-    revocation: Revocation  # of their certificate
-    test_key: bool  # for trying
-    problems: tuple[Text, ...]  # why it does not count
-
-
-def standing(
-    certificate: x509.Certificate, evidence: Evidence, trust: Trust, at: dt.datetime | None, *, proven: bool
-) -> Standing:
+def judged(
+    signature: FileSignature, certificate: x509.Certificate, evidence: Evidence, trust: Trust
+) -> FileSignature:  # fmt: skip
+    """A signature with whom its certificate names, and what holds of them when it was made; its own problems stand first."""
+    subject, at, found = certificate.subject, signature.time, list(signature.problems)
+    signature = replace(
+        signature, subject=subject.human_friendly, issuer=certificate.issuer.human_friendly,
+        name=str(subject.native.get("common_name", subject.human_friendly)),
+    )  # fmt: skip
     try:
         signer = certificates.load_der_x509_certificate(certificate.dump())
         reasons, test = unfit(signer), is_test(signer)
     except ValueError:
-        return Standing(trusted=False, revocation="not known", test_key=False, problems=(UNREADABLE,))
-    found: list[Text] = [Verbatim(why) for why in reasons]
+        return replace(signature, problems=(*found, UNREADABLE))
+    found += map(Verbatim, reasons)
     if _spoilt(evidence, trust):
         found.append(SPOILT)
     if at is None:
-        return Standing(trusted=False, revocation="not known", test_key=test, problems=(*found, NO_TIME))
+        return replace(signature, test_key=test, problems=(*found, NO_TIME))
     if not signer.not_valid_before_utc <= at <= signer.not_valid_after_utc:
         first, last = day(signer.not_valid_before_utc.date()), day(signer.not_valid_after_utc.date())
         found.append(say("the certificate was not valid on {day}: it is from {first} to {last}", day=day(at.date()),
                          first=first, last=last))  # fmt: skip
     trusted, revocation, why = _path(certificate, evidence, trust, at)
-    if revocation != "revoked" and not proven and _listed(certificate, evidence, trust):
+    if revocation != "revoked" and not signature.time_proven and _listed(certificate, evidence, trust):
         revocation = "revoked"
     if not trusted:
         found.append(why)
     if revocation == "revoked" and REVOKED not in found:
         found.append(REVOKED)
-    return Standing(trusted and revocation != "revoked", revocation, test, tuple(found))
+    return replace(signature, trusted=trusted and revocation != "revoked", revocation=revocation, test_key=test,
+                   problems=tuple(found))  # fmt: skip
 
 
 def _spoilt(evidence: Evidence, trust: Trust) -> bool:

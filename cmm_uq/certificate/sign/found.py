@@ -20,10 +20,8 @@ from cmm_uq.base.files.limits import KEY_BYTES
 from cmm_uq.base.messages import Text, say
 
 if TYPE_CHECKING:
-    from asn1crypto import x509
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
 
-    from cmm_uq.certificate.sign.chain import Standing
 
 _T = TypeVar("_T")
 _SILENT = logging.NullHandler()
@@ -97,36 +95,19 @@ NOBODY = say("nobody is trusted: name the certificates that you trust")
 class FileSignature:
     """One signature, and what holds of it."""
 
-    subject: str  # whom the certificate names, whole
-    name: str  # its common name
-    issuer: str
     level: str  # ``PAdES B-B``, ``XAdES B-B``, …
-    time: dt.datetime | None  # of signing
-    time_proven: bool  # by a time stamp that is trusted; else the signer says so
-    intact: bool  # what was signed is there, and the key of the certificate signed it
-    covers_whole_file: bool  # but for time stamps, proofs of certificates, and further signatures
-    trusted: bool  # a chain leads to somebody trusted, in date when it was signed
-    revocation: Revocation  # of the certificate
-    test_key: bool  # for trying: TEST_NOTE is to be said
     problems: tuple[Text, ...]  # why it does not count
+    subject: str = ""  # whom the certificate names, whole
+    name: str = ""  # its common name
+    issuer: str = ""
+    time: dt.datetime | None = None  # of signing
+    time_proven: bool = False  # by a time stamp that is trusted; else the signer says so
+    intact: bool = False  # what was signed is there, and the key of the certificate signed it
+    covers_whole_file: bool = False  # but for time stamps, proofs of certificates, and further signatures
+    trusted: bool = False  # a chain leads to somebody trusted, in date when it was signed
+    revocation: Revocation = "not known"  # of the certificate
+    test_key: bool = False  # for trying: TEST_NOTE is to be said
     content: bytes = field(default=b"", repr=False)  # verified: the signed revision of a PDF, or the XML without it
-
-    @classmethod
-    def of_nobody(cls, level: str, problems: Sequence[Text]) -> FileSignature:
-        """One that counts for nothing."""
-        return cls("", "", "", level, None, time_proven=False, intact=False, covers_whole_file=False, trusted=False,
-                   revocation="not known", test_key=False, problems=tuple(problems))  # fmt: skip
-
-    @classmethod
-    def of_signer(cls, signer: x509.Certificate, judged: Standing, level: str, at: dt.datetime | None, *, proven: bool,
-                  intact: bool, whole: bool, problems: Sequence[Text], content: bytes) -> FileSignature:  # fmt: skip
-        """One of a certificate, judged at a time; ``problems`` of the signature stand before those of the certificate."""
-        name = str(signer.subject.native.get("common_name", signer.subject.human_friendly))
-        return cls(
-            signer.subject.human_friendly, name, signer.issuer.human_friendly, level, at, time_proven=proven, intact=intact,
-            covers_whole_file=intact and whole, trusted=judged.trusted, revocation=judged.revocation,
-            test_key=judged.test_key, problems=(*problems, *judged.problems), content=content if intact else b"",
-        )  # fmt: skip
 
     @property
     def good(self) -> bool:

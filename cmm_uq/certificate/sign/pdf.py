@@ -10,7 +10,7 @@ import datetime as dt
 import io
 import os
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from cmm_uq.base.errors import CmmUqError
@@ -167,7 +167,7 @@ def signatures_of_pdf(data: bytes, trust: Trust, *, where: str = "the PDF") -> t
             try:
                 found.append(_judged(file, signature))
             except Exception:  # whatever a hostile file makes the library raise
-                found.append(FileSignature.of_nobody("PDF", [UNREADABLE]))
+                found.append(FileSignature("PDF", (UNREADABLE,)))
     return tuple(found)
 
 
@@ -181,9 +181,8 @@ class _File:
 
 
 def _judged(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
-    from cmm_uq.certificate.sign.chain import Evidence, standing
+    from cmm_uq.certificate.sign.chain import Evidence, judged
 
-    certificate = embedded.signer_cert
     evidence = Evidence(
         (*file.evidence.certificates, *embedded.other_embedded_certs), file.evidence.revocations, file.evidence.answers
     )
@@ -198,13 +197,12 @@ def _judged(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
     whole, appended = _whole(file, embedded)
     if embedded.sig_object.get("/SubFilter") != PADES:
         problems.append(NO_PADES)
-    judged = standing(certificate, evidence, file.trust, at, proven=proven)
-    level = _level(file, embedded, stamped, known=judged.revocation == "good")
-    signed = embedded.byte_range
-    return FileSignature.of_signer(
-        certificate, judged, f"PAdES B-{level}", at, proven=proven, intact=intact, whole=whole,
-        problems=(*problems, *appended), content=file.data[: int(signed[2]) + int(signed[3])],
-    )  # fmt: skip
+    signed = file.data[: int(embedded.byte_range[2]) + int(embedded.byte_range[3])]
+    found = judged(FileSignature(
+        "", (*problems, *appended), time=at, time_proven=proven, intact=intact, covers_whole_file=intact and whole,
+        content=signed if intact else b"",
+    ), embedded.signer_cert, evidence, file.trust)  # fmt: skip
+    return replace(found, level=f"PAdES B-{_level(file, embedded, stamped, known=found.revocation == 'good')}")
 
 
 def _intact(file: _File, embedded: EmbeddedPdfSignature) -> tuple[bool, list[Text]]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import datetime as dt
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -225,84 +226,60 @@ def place_of(uri: str) -> TokenPlace:
 
 
 def signer_of_token(uri: str, pin: str) -> Signer:
+    """The token is opened for every use, so that nobody finds it open; the private key stays where it is."""
     with installed():
         from cryptography.x509 import load_der_x509_certificate
-        from pkcs11 import Attribute, KeyType, ObjectClass
-    token = _Token(place_of(uri), pin, uri)
-    with token.opened() as session:
-        sort = token.key(session).key_type
+        from pkcs11 import Attribute, KeyType, Mechanism, ObjectClass
+        from pkcs11.util.ec import encode_ecdsa_signature
+    place = place_of(uri)
+    opened = partial(_opened, place, pin, uri)
+
+    def by_rsa(data: bytes) -> bytes:
+        with opened() as (_, key):
+            return bytes(key.sign(data, mechanism=Mechanism.SHA256_RSA_PKCS))
+
+    def by_ecdsa(data: bytes) -> bytes:
+        """Signature of an ECDSA key, which draws a number for each."""
+        with opened() as (_, key):
+            return bytes(encode_ecdsa_signature(key.sign(sha256(data).digest(), mechanism=Mechanism.ECDSA)))
+
+    with opened() as (session, key):
+        sort = key.key_type
         kept = [(str(one[Attribute.LABEL]), load_der_x509_certificate(bytes(one[Attribute.VALUE])))
                 for one in session.get_objects({Attribute.CLASS: ObjectClass.CERTIFICATE})]  # fmt: skip
-    certificate = next((one for label, one in kept if label == token.place.key), None)
+    certificate = next((one for label, one in kept if label == place.key), None)
     if certificate is None:
-        raise CmmUqError(f"the token has no certificate {token.place.key!r}", where=uri,
+        raise CmmUqError(f"the token has no certificate {place.key!r}", where=uri,
                          fix="Put the certificate of the key beside it, under the same label")  # fmt: skip
-    chain = _above(certificate, [one for _, one in kept])
+    chain = [certificate]  # nearest first
+    while issuer := next((one for _, one in kept if one.subject == chain[-1].issuer and one not in chain), None):
+        chain.append(issuer)
     if sort == KeyType.RSA:
-        return Signer(certificate, chain, "rsa", token.by_rsa, where=uri)
+        return Signer(certificate, tuple(chain[1:]), "rsa", by_rsa, where=uri)
     if sort == KeyType.EC:
-        return Signer(certificate, chain, "ecdsa", token.by_ecdsa, where=uri)
+        return Signer(certificate, tuple(chain[1:]), "ecdsa", by_ecdsa, where=uri)
     raise CmmUqError("the key is neither RSA nor ECDSA", where=uri, fix="Sign with an RSA or ECDSA key")
 
 
-def _above(certificate: Certificate, others: Sequence[Certificate]) -> tuple[Certificate, ...]:
-    """Certificates above another, nearest first."""
-    found = [certificate]
-    while len(found) <= len(others):
-        issuer = next((one for one in others if one.subject == found[-1].issuer and one not in found), None)
-        if issuer is None:
-            break
-        found.append(issuer)
-    return tuple(found[1:])
+@contextlib.contextmanager
+def _opened(place: TokenPlace, pin: str, uri: str) -> Iterator[tuple[Any, Any]]:
+    """A session and its private key; whatever goes wrong in it in one line."""
+    import pkcs11
+    from pkcs11 import exceptions
 
+    def refused(problem: str, fix: str) -> CmmUqError:
+        return CmmUqError(problem, where=uri, fix=fix)
 
-class _Token:
-    """A token that is opened for every use, so that nobody finds it open."""
-
-    def __init__(self, place: TokenPlace, pin: str, uri: str) -> None:
-        self.place, self._pin, self._uri = place, pin, uri
-
-    @contextlib.contextmanager
-    def opened(self) -> Iterator[Any]:
-        """A session; whatever goes wrong in it in one line."""
-        import pkcs11
-        from pkcs11 import exceptions
-
-        try:
-            token = pkcs11.lib(self.place.module).get_token(token_label=self.place.token)
-            with token.open(user_pin=self._pin) as session:
-                yield session
-        except exceptions.PinIncorrect:
-            raise self._refused("the PIN does not open the token", "Mind how often it may be wrong") from None
-        except (exceptions.NoSuchToken, exceptions.TokenNotPresent):
-            raise self._refused(f"no token {self.place.token!r} is there", "Put it in") from None
-        except exceptions.NoSuchKey:
-            raise self._refused(f"the token has no key {self.place.key!r}", "Name the label of its key") from None
-        except (exceptions.PKCS11Error, OSError, RuntimeError, ValueError) as error:
-            why = str(error) or type(error).__name__
-            fix = "Check module, token and the use of its key"
-            raise self._refused(f"the token cannot be used: {why}", fix) from None
-
-    def _refused(self, problem: str, fix: str) -> CmmUqError:
-        return CmmUqError(problem, where=self._uri, fix=fix)
-
-    def key(self, session: Any) -> Any:
-        """The private key, which stays where it is."""
-        from pkcs11 import ObjectClass
-
-        return session.get_key(object_class=ObjectClass.PRIVATE_KEY, label=self.place.key)
-
-    def by_rsa(self, data: bytes) -> bytes:
-        from pkcs11 import Mechanism
-
-        with self.opened() as session:
-            return bytes(self.key(session).sign(data, mechanism=Mechanism.SHA256_RSA_PKCS))
-
-    def by_ecdsa(self, data: bytes) -> bytes:
-        """Signature of an ECDSA key, which draws a number for each."""
-        from pkcs11 import Mechanism
-        from pkcs11.util.ec import encode_ecdsa_signature
-
-        with self.opened() as session:
-            raw = self.key(session).sign(sha256(data).digest(), mechanism=Mechanism.ECDSA)
-            return bytes(encode_ecdsa_signature(raw))
+    try:
+        token = pkcs11.lib(place.module).get_token(token_label=place.token)
+        with token.open(user_pin=pin) as session:
+            yield session, session.get_key(object_class=pkcs11.ObjectClass.PRIVATE_KEY, label=place.key)
+    except exceptions.PinIncorrect:
+        raise refused("the PIN does not open the token", "Mind how often it may be wrong") from None
+    except (exceptions.NoSuchToken, exceptions.TokenNotPresent):
+        raise refused(f"no token {place.token!r} is there", "Put it in") from None
+    except exceptions.NoSuchKey:
+        raise refused(f"the token has no key {place.key!r}", "Name the label of its key") from None
+    except (exceptions.PKCS11Error, OSError, RuntimeError, ValueError) as error:
+        problem = f"the token cannot be used: {str(error) or type(error).__name__}"
+        raise refused(problem, "Check module, token and the use of its key") from None

@@ -12,6 +12,7 @@ import datetime as dt
 import hashlib
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -184,7 +185,7 @@ def signatures_of_xml(data: bytes, trust: Trust, *, where: str = "the XML file")
 
 def _found(data: bytes, element: _Element, *, several: bool, trust: Trust) -> FileSignature:
     with installed():
-        from cmm_uq.certificate.sign.chain import Evidence, standing
+        from cmm_uq.certificate.sign.chain import Evidence, judged
     problems = _shape(element)
     certificates = _certificates(element)
     if several:
@@ -195,23 +196,22 @@ def _found(data: bytes, element: _Element, *, several: bool, trust: Trust) -> Fi
     if added is None:
         problems.append(NO_EVIDENCE)
     if problems or added is None:  # nothing is computed of what could not count
-        return FileSignature.of_nobody("XML", problems)
+        return FileSignature("XML", tuple(problems))
     signer = certificates[0]
     references = [str(one.get("URI")) for one in element.iterfind(f"{DS}SignedInfo/{DS}Reference")]
     content = _verified(data, signer, references)
     evidence = Evidence((*certificates[1:], *added.certificates), added.revocations, added.answers)
     stamped, proven = _stamp_of_signature(element, evidence, trust)
-    at = stamped if proven else _time(element)
     problems = [] if content else [BROKEN]
     if stamped is None and element.find(STAMP) is not None:
         problems.append(STAMP_BROKEN)
-    judged = standing(signer, evidence, trust, at, proven=proven)
-    known = judged.revocation == "good" and bool(added.revocations or added.answers)
-    level = "B" if stamped is None else "LT" if known else "T"
-    return FileSignature.of_signer(
-        signer, judged, f"XAdES B-{level}", at, proven=proven, intact=bool(content), whole=True, problems=problems,
-        content=content,
+    found = FileSignature(
+        "", tuple(problems), time=stamped if proven else _time(element), time_proven=proven, intact=bool(content),
+        covers_whole_file=bool(content), content=content,
     )  # fmt: skip
+    found = judged(found, signer, evidence, trust)
+    known = found.revocation == "good" and bool(added.revocations or added.answers)
+    return replace(found, level=f"XAdES B-{'B' if stamped is None else 'LT' if known else 'T'}")
 
 
 def _further(part: _Element, signed: set[str]) -> Iterator[str]:
