@@ -66,9 +66,7 @@ AtLeast = Callable[..., tuple[float, float]]
 """U and k of a figure as a certificate states them; see :meth:`StatedUncertainty.raised_to`."""
 
 
-def as_evaluated(
-    name: str, expanded: float, factor: float, unit: str, length_mm: float | None = None
-) -> tuple[float, float]:
+def as_evaluated(name: str, expanded: float, factor: float, *length: Any, **further: Any) -> tuple[float, float]:
     return expanded, factor
 
 
@@ -91,8 +89,7 @@ class StatedUncertainty:
         return cls(job.facts.laboratory.cmc, length_mm or longest)
 
     def stated(self, name: str, quantity: Quantity) -> Quantity:
-        least = self._raised(name, quantity.expanded, quantity.unit, self.length_mm)
-        return quantity.at_least(least)
+        return quantity.at_least(self._raised(name, quantity.expanded, quantity.unit, self.length_mm))
 
     def _raised(self, name: str, expanded: float, unit: str, length_mm: float) -> float:
         """The least U of a unit at a length, which is noted where that is more than was evaluated."""
@@ -217,13 +214,9 @@ class Result:
     doubt: Doubt = field(default_factory=lambda: Doubt(()))
     contradictions: tuple[Contradiction, ...] = ()  # what denies averaged estimates, which are then not given
 
-    def at_least(
-        self, name: str, expanded: float, factor: float, unit: str, length_mm: float | None = None
-    ) -> tuple[float, float]:
-        """U and k as a certificate states them; see :meth:`StatedUncertainty.raised_to`."""
-        if self.stating is None:
-            return expanded, factor
-        return self.stating.raised_to(name, expanded, factor, unit, length_mm)
+    @property
+    def at_least(self) -> AtLeast:
+        return as_evaluated if self.stating is None else self.stating.raised_to
 
     def quantities(self) -> Iterator[tuple[str, Quantity]]:
         """Every quantity that is reported, with its name."""

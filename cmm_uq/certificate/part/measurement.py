@@ -129,7 +129,6 @@ class PartMeasurement:
 
     @property
     def characteristics(self) -> list[CharacteristicFacts]:
-        """As the job has them, in order."""
         return list(self.job.facts.characteristic)
 
     @cached_property
@@ -169,7 +168,6 @@ class PartMeasurement:
 
     @property
     def judged_by(self) -> Text:
-        """The decision rule, in words."""
         return rule_words(self.job.facts.decision.rule)
 
     @property

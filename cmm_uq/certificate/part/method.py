@@ -111,7 +111,6 @@ def _stable(found: PartMeasurement) -> Text:
 
 
 def program_words() -> Text:
-    """Name and version."""
     return say("{package} {version}", package=Verbatim(NAME), version=Verbatim(__version__))
 
 

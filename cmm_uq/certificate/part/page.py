@@ -14,7 +14,7 @@ from cmm_uq.base import messages
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, plural, say
 from cmm_uq.certificate import certificate
 from cmm_uq.certificate.clauses import Requirement, asked, not_stated, of_every_report
-from cmm_uq.certificate.document import Document, Facts, Overview, Paragraph, Section
+from cmm_uq.certificate.document import Document, Facts, Overview, Paragraph, Section, section
 from cmm_uq.certificate.part import budget_section as causes, results_section as results
 from cmm_uq.certificate.part.figures import CharacteristicFigures, critical, figures_of
 from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, Source
@@ -25,7 +25,6 @@ from cmm_uq.jobs.verdicts import gravest, standing_of
 
 
 def overview_of(found: PartMeasurement) -> Overview:
-    """The first thing on the page."""
     one = critical(found)
     rows = (
         (say("Part"), part_words(found)),
@@ -76,7 +75,6 @@ _UNMEASURED = say("Uncertainty of a planned measurement: nothing was measured")
 
 
 def part_words(found: PartMeasurement) -> Text:
-    """Name, drawing, serial number."""
     part = found.job.facts.part
     drawing = say("drawing {number}", number=Verbatim(part.drawing)) if part.drawing else NOTHING
     serial = say("serial number {number}", number=Verbatim(part.serial)) if part.serial else NOTHING
@@ -88,15 +86,13 @@ def _least(one: CharacteristicFigures) -> Text:
     if not one.allowed:
         return NOTHING
     told = say("{what}: {result}; allowed {allowed}", what=one.titled, result=one.result, allowed=one.allowed)
-    margin = float(one.found.margins[one.place])
     if one.found.nearest is not None:
-        inside = say("{told}, {times} u inside of the limit", told=told, times=messages.number(margin, ".1f"))
-        return inside if margin >= 0 else say("{told}, {times} u outside of the limit", told=told,
-                                              times=messages.number(-margin, ".1f"))  # fmt: skip
-    if not one.width > 0:
-        return told
-    return say("{told}; the 95 % interval takes {share} % of it", told=told,
-               share=messages.signed(200 * one.expanded / one.width, ".0f"))  # fmt: skip
+        margin = float(one.found.margins[one.place])
+        times = messages.number(abs(margin), ".1f")
+        return (say("{told}, {times} u inside of the limit", told=told, times=times) if margin >= 0 else
+                say("{told}, {times} u outside of the limit", told=told, times=times))  # fmt: skip
+    share = messages.signed(200 * one.expanded / one.width, ".0f") if one.width > 0 else NOTHING
+    return say("{told}; the 95 % interval takes {share} % of it", told=told, share=share) if share else told
 
 
 def _together(found: PartMeasurement) -> Text:
@@ -107,14 +103,12 @@ def _together(found: PartMeasurement) -> Text:
 
 
 def _not_covered(found: PartMeasurement) -> Text:
-    told: list[Text] = []
-    left = found.job.facts.part.not_measured
-    if left:
-        told.append(say("Not measured: {names}.", names=commas(messages.names(left))))
-    free = [one.titled for one in figures_of(found) if one.judged is None]
-    if free and len(free) < len(found.judged):
-        told.append(say("Without limits: {names}.", names=messages.semicolons(free)))
-    return messages.sentences(told)
+    left, free = found.job.facts.part.not_measured, [one.titled for one in figures_of(found) if one.judged is None]
+    told = (
+        (left, say("Not measured: {names}.", names=commas(messages.names(left)))),
+        (0 < len(free) < len(found.judged), say("Without limits: {names}.", names=messages.semicolons(free))),
+    )
+    return messages.sentences([text for holds, text in told if holds])
 
 
 _SOURCES: Mapping[Source, Text] = {
@@ -126,21 +120,23 @@ _SOURCES: Mapping[Source, Text] = {
 
 def machine_section(found: PartMeasurement) -> Section:
     """What states the machine, and what of it was verified."""
-    standing = found.standing
+    standing, celsius = found.standing, NOTHING
+    if standing.temperature_c is not None:
+        celsius = say("{value} °C", value=messages.number(standing.temperature_c, ".2f"))
     rows = (
         (say("Taken from"), _SOURCES[standing.source]),
         *certificate_rows(standing),
         (say("Files"), commas(messages.names(standing.files))),
         (say("Verified"), verified_words(standing)),
         (say("Signatures"), say("by trusted certificates") if standing.trusted else say("not asked for")),
-        (say("Temperature of the scales at the calibration"), _celsius(standing.temperature_c)),
+        (
+            say("Temperature of the scales at the calibration"),
+            celsius,
+        ),
         (say("Noise of a coordinate"), _noise(found)),
     )
-    told = (standing.path, standing.drift)
-    return Section(
-        say("The machine and its certificate"),
-        (Facts(tuple(row for row in rows if row[1])), *(Paragraph(text) for text in told if text)),
-    )
+    told = (Paragraph(text) for text in (standing.path, standing.drift) if text)
+    return section(say("The machine and its certificate"), Facts(tuple(row for row in rows if row[1])), *told)
 
 
 def certificate_rows(standing: CertificateStatus) -> tuple[tuple[Text, Text], ...]:
@@ -160,10 +156,12 @@ def certificate_rows(standing: CertificateStatus) -> tuple[tuple[Text, Text], ..
 
 def _calibrated(standing: CertificateStatus) -> Text:
     days, date = standing.age.days, messages.day(standing.date)
-    if not days:
-        return say("{date}, the day of the measurement", date=date)
     age = plural(days, one=say("one day"), many=say("{count} days", count=days))
-    return say("{date}, {age} before", date=date, age=age)
+    return (
+        say("{date}, {age} before", date=date, age=age)
+        if days
+        else say("{date}, the day of the measurement", date=date)
+    )
 
 
 def verified_words(standing: CertificateStatus) -> Text:
@@ -171,16 +169,11 @@ def verified_words(standing: CertificateStatus) -> Text:
     done = [one for one in standing.checked if one.count]
     if not done:
         return say("no: analysed anew") if standing.source == "job" else say("no")
-    told = say(
+    again = say("computed again from its inputs") if standing.again else say("not computed again")
+    return say("{told}; {again}", again=again, told=say(
         "{count} comparisons of {sorts} sorts between its documents, figures, decisions and inputs, none of which failed",
         count=sum(one.count for one in done), sorts=len(done),
-    )  # fmt: skip
-    again = say("computed again from its inputs") if standing.again else say("not computed again")
-    return say("{told}; {again}", told=told, again=again)
-
-
-def _celsius(value: float | None) -> Text:
-    return NOTHING if value is None else say("{value} °C", value=messages.number(value, ".2f"))
+    ))  # fmt: skip
 
 
 def _noise(found: PartMeasurement) -> Text:
@@ -196,24 +189,13 @@ PLANNED = say("Measurement uncertainty")
 
 
 def part_document(found: PartMeasurement) -> Document:
-    """Its page."""
-    facts = found.job.facts
-    measured = found.measured is not None
-    lacking = lacking_of(found)
+    facts, measured, lacking = found.job.facts, found.measured is not None, lacking_of(found)
     sections = (
-        results.results_section(found),
-        results.conformity_section(found),
-        results.part_section(found),
-        results.errors_section(found),
-        causes.budget_section(found),
-        causes.unseen_section(found),
-        causes.ways_section(found),
-        methods_section(found.methods),
-        results.correlation_section(found),
-        machine_section(found),
-        method_section(found),
-        not_covered_section(found),
-    )
+        results.results_section(found), results.conformity_section(found), results.part_section(found),
+        results.errors_section(found), causes.budget_section(found), causes.unseen_section(found),
+        causes.ways_section(found), methods_section(found.methods), results.correlation_section(found),
+        machine_section(found), method_section(found), not_covered_section(found),
+    )  # fmt: skip
     date = messages.day(facts.job.date)
     came = say("measured on {date}", date=date) if measured else say("planned for {date}", date=date)
     return certificate.formal_document(
@@ -242,22 +224,14 @@ def lacking_of(found: PartMeasurement) -> tuple[Requirement, ...]:
 def _particulars(found: PartMeasurement) -> tuple[Facts, ...]:
     facts = found.job.facts
     job, part = facts.job, facts.part
-    expansion: Text = NOTHING
-    if part.cte_per_k:
-        expansion = say("{cte:g} × 10⁻⁶ /K", cte=part.cte_per_k * 1e6)
-    if part.cte_per_k and part.u_cte_per_k:
+    expansion = say("{cte:g} × 10⁻⁶ /K", cte=part.cte_per_k * 1e6) if part.cte_per_k else NOTHING
+    if expansion and part.u_cte_per_k:
         expansion = say("{expansion}, u = {u:g} × 10⁻⁶ /K", expansion=expansion, u=part.u_cte_per_k * 1e6)
     return certificate.grouped(
         certificate.identified(job, facts.laboratory, job.origin, say("Report number")),
-        (
-            (say("Part"), part.name),
-            (say("Drawing"), part.drawing),
-            (say("Serial number"), part.serial),
-            (say("Owner"), part.owner),
-            (say("Material"), part.material),
-            (say("Thermal expansion"), expansion),
-            (say("Place"), job.place),
-        ),
+        ((say("Part"), part.name), (say("Drawing"), part.drawing), (say("Serial number"), part.serial),
+         (say("Owner"), part.owner), (say("Material"), part.material), (say("Thermal expansion"), expansion),
+         (say("Place"), job.place)),
         certificate_rows(found.standing),
         (*certificate.performed(job), (say("Conditions"), job.conditions)),
-    )
+    )  # fmt: skip

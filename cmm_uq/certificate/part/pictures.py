@@ -41,8 +41,6 @@ _OUTLINE = "#a9b4ba"
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One of them."""
-
     name: Text  # of the view, above its panel
     matrix: Floats  # (2, 3) from the part to the panel
     axes: tuple[int, int] | None  # numbers of the axes that it shows along x and y; none of the oblique one

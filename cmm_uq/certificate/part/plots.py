@@ -28,8 +28,6 @@ A_PAGE = 40  # rows of one picture
 
 @dataclass(frozen=True)
 class Margin:
-    """One characteristic."""
-
     name: Text
     value: float  # measured, in any unit; the middle of what is allowed where nothing was measured
     interval: tuple[float, float]  # of the value, same unit
@@ -69,7 +67,6 @@ def margin_plots(rows: Sequence[Margin]) -> list[Plot]:
 
 
 def margin_plot(rows: Sequence[Margin], part: tuple[int, int] | None = None) -> Plot:
-    """One picture."""
     height = 17.0 + 5.2 * len(rows)
     means = say("bar: 95 % interval about the middle, since nothing was measured; dark: what is accepted")
     caption = say("How much of the tolerance the uncertainty takes.")

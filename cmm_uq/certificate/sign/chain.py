@@ -33,9 +33,7 @@ class Evidence:
     answers: tuple[ocsp.OCSPResponse, ...] = ()
 
 
-def judged(
-    signature: FileSignature, certificate: x509.Certificate, evidence: Evidence, trust: Trust
-) -> FileSignature:  # fmt: skip
+def judged(signature: FileSignature, certificate: x509.Certificate, evidence: Evidence, trust: Trust) -> FileSignature:
     """A signature with whom its certificate names, and what holds of them when it was made; its own problems stand first."""
     subject, at, found = certificate.subject, signature.time, list(signature.problems)
     signature = replace(
@@ -91,7 +89,7 @@ def _spoilt(evidence: Evidence, trust: Trust) -> bool:
 
 def _path(
     certificate: x509.Certificate, evidence: Evidence, trust: Trust, at: dt.datetime
-) -> tuple[bool, Revocation, Text]:  # fmt: skip
+) -> tuple[bool, Revocation, Text]:
     """Whether a chain holds at a time, what is known of revocation, and why it does not hold."""
     if not trust.anchors:
         return False, "not known", NOBODY

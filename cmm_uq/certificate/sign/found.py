@@ -93,8 +93,6 @@ NOBODY = say("nobody is trusted: name the certificates that you trust")
 
 @dataclass(frozen=True)
 class FileSignature:
-    """One signature, and what holds of it."""
-
     level: str  # ``PAdES B-B``, ``XAdES B-B``, …
     problems: tuple[Text, ...]  # why it does not count
     subject: str = ""  # whom the certificate names, whole

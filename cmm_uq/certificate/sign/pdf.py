@@ -84,43 +84,34 @@ def sign_pdf(
         field_name=name, md_algorithm=ONE_DIGEST, subfilter=fields.SigSeedSubFilter.PADES, name=signer.name,
         reason=reason or None,
     )  # fmt: skip
-    adapted, style = Adapted(signer), NoOpStampStyle()
-    if stamping is None or stamping.level == "B-B":
-        return ran(_signed(signers.PdfSigner(metadata, adapted, stamp_style=style), writer, at))
-    pdf_signer = signers.PdfSigner(metadata, adapted, timestamper=Server(stamping.server), stamp_style=style)
-    return ran(_stamped(pdf_signer, writer, signer, stamping, at))
+    server = None if stamping is None or stamping.level == "B-B" else Server(stamping.server)
+    pdf_signer = signers.PdfSigner(metadata, Adapted(signer), timestamper=server, stamp_style=NoOpStampStyle())
+    return ran(_signed(pdf_signer, writer, signer, stamping if server else None, at))
 
 
-async def _signed(pdf_signer: PdfSigner, writer: IncrementalPdfFileWriter, at: dt.datetime) -> bytes:
+async def _signed(
+    pdf_signer: PdfSigner, writer: IncrementalPdfFileWriter, signer: Signer, stamping: Stamping | None, at: dt.datetime
+) -> bytes:
+    """Signed with a time stamp, if any, and what else the level asks for, whose proof is fetched before."""
     from pyhanko.sign.signers.pdf_cms import PdfCMSSignedAttributes
 
+    from cmm_uq.certificate.sign.pdf_library import proof_of, stamped, with_proof
+
+    server, lasting = pdf_signer.default_timestamper, stamping is not None and stamping.level in ("B-LT", "B-LTA")
+    proof = await proof_of(signer, server, stamping.trust, at) if stamping and lasting else None
     session = pdf_signer.init_signing_session(writer)
     session.system_time = at
     room = await session.estimate_signature_container_size(None)
     document = session.prepare_tbs_document(None, room)
     digest, output = document.digest_tbs_document()
     await document.perform_signature(digest.document_digest, PdfCMSSignedAttributes(signing_time=at))
-    output.seek(0)
-    return bytes(output.read())
-
-
-async def _stamped(
-    pdf_signer: PdfSigner, writer: IncrementalPdfFileWriter, signer: Signer, stamping: Stamping, at: dt.datetime
-) -> bytes:  # fmt: skip
-    """Signed with a time stamp, and what else the level asks for."""
-    from cmm_uq.certificate.sign.pdf_library import Proof, stamped
-
-    server = pdf_signer.default_timestamper
-    if stamping.level == "B-T":
-        return await _signed(pdf_signer, writer, at)
-    proof = Proof(signer, server, stamping.trust, at)
-    await proof.gather()
-    kept = proof.kept(await _signed(pdf_signer, writer, at))
-    if stamping.level == "B-LTA":
-        return await stamped(kept, server)
-    output = io.BytesIO()
-    kept.write(output)
-    return output.getvalue()
+    if stamping and proof:
+        further = with_proof(output.getvalue(), *proof)
+        if stamping.level == "B-LTA":
+            return await stamped(further, server)
+        output = io.BytesIO()
+        further.write(output)
+    return bytes(output.getvalue())
 
 
 EPOCH = "SOURCE_DATE_EPOCH"
@@ -181,18 +172,21 @@ class _File:
 
 
 def _judged(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
-    from cmm_uq.certificate.sign.chain import Evidence, judged
+    from pyhanko.sign.validation.generic_cms import message_imprint_checker
+
+    from cmm_uq.certificate.sign.chain import Evidence, judged, stamped_time
 
     evidence = Evidence(
         (*file.evidence.certificates, *embedded.other_embedded_certs), file.evidence.revocations, file.evidence.answers
     )
-    stamped, proven = _stamp_of_signature(embedded, evidence, file.trust)
+    token, imprint = _token(embedded), message_imprint_checker(embedded.signer_info)
+    stamped, proven = (None, False) if token is None else stamped_time(token, imprint, evidence, file.trust)
     at = stamped
     if not proven:  # what the signer says; a time without its zone is none
         claimed = embedded.self_reported_timestamp
         at = claimed.astimezone(dt.UTC) if claimed is not None and claimed.tzinfo is not None else None
     intact, problems = _intact(file, embedded)
-    if stamped is None and _token(embedded) is not None:
+    if stamped is None and token is not None:
         problems.append(STAMP_BROKEN)
     whole, appended = _whole(file, embedded)
     if embedded.sig_object.get("/SubFilter") != PADES:
@@ -299,20 +293,6 @@ def _token(embedded: EmbeddedPdfSignature) -> Any:
         return next(extract_tst_data_iter(embedded.signer_info, signed=False), None)
     except KeyError:
         return None
-
-
-def _stamp_of_signature(
-    embedded: EmbeddedPdfSignature, evidence: Evidence, trust: Trust
-) -> tuple[dt.datetime | None, bool]:
-    """Time of the signature's time stamp, where that fits, and whether somebody trusted made it."""
-    from pyhanko.sign.validation.generic_cms import message_imprint_checker
-
-    from cmm_uq.certificate.sign.chain import stamped_time
-
-    token = _token(embedded)
-    if token is None:
-        return None, False
-    return stamped_time(token, message_imprint_checker(embedded.signer_info), evidence, trust)
 
 
 def _evidence(reader: PdfFileReader) -> Evidence:

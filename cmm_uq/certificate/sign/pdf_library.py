@@ -206,8 +206,6 @@ _FIX = "Try again, name another server, or sign at level B-B without one"
 
 
 class Server(TimeStamper):  # type: ignore[misc]
-    """Asks a server for time stamps."""
-
     def __init__(self, url: str) -> None:
         super().__init__()
         self.url = url
@@ -244,36 +242,31 @@ class Server(TimeStamper):  # type: ignore[misc]
 STAMP = "TimeStamp"  # name of the field of a document's time stamp, before its number
 
 
-class Proof:
-    """What proves the certificates of a signature at a time, fetched from those who issued them."""
+async def proof_of(
+    signer: Signer, server: Server, trust: Trust, at: dt.datetime
+) -> tuple[list[Any], ValidationContext]:
+    """What proves the certificates of a signature at a time, fetched from those who issued them, before anything is signed."""
+    context = ValidationContext(
+        trust_roots=[x509.Certificate.load(anchor) for anchor in trust.anchors],
+        other_certs=[translated(one) for one in signer.chain], allow_fetching=True, moment=at, revocation_mode="require",
+        retroactive_revinfo=True,
+    )  # fmt: skip
+    validator = CertificateValidator(translated(signer.certificate), validation_context=context)
+    try:
+        paths = [await validator.async_validate_path(), *[path async for path in server.validation_paths(context)]]
+    except (PathBuildingError, PathValidationError) as error:
+        raise CmmUqError(f"a certificate cannot be proven: {error}", where=signer.where,
+                         fix="Trust its root with --trust, or sign at level B-T") from None  # fmt: skip
+    finally:
+        await context.aclose()
+    return paths, context
 
-    def __init__(self, signer: Signer, server: Server, trust: Trust, at: dt.datetime) -> None:
-        self._signer, self._server = signer, server
-        self.context = ValidationContext(
-            trust_roots=[x509.Certificate.load(anchor) for anchor in trust.anchors],
-            other_certs=[translated(one) for one in signer.chain], allow_fetching=True, moment=at,
-            revocation_mode="require", retroactive_revinfo=True,
-        )  # fmt: skip
-        self.paths: list[Any] = []
 
-    async def gather(self) -> None:
-        """Fetch it, before anything is signed."""
-        signer = CertificateValidator(translated(self._signer.certificate), validation_context=self.context)
-        try:
-            self.paths.append(await signer.async_validate_path())
-            async for path in self._server.validation_paths(self.context):
-                self.paths.append(path)
-        except (PathBuildingError, PathValidationError) as error:
-            raise CmmUqError(f"a certificate cannot be proven: {error}", where=self._signer.where,
-                             fix="Trust its root with --trust, or sign at level B-T") from None  # fmt: skip
-        finally:
-            await self.context.aclose()
-
-    def kept(self, pdf: bytes) -> Any:
-        """A writer of a PDF with a further revision that holds it."""
-        writer = appending(pdf)
-        DocumentSecurityStore.supply_dss_in_writer(writer, None, paths=self.paths, validation_context=self.context)
-        return writer
+def with_proof(pdf: bytes, paths: list[Any], context: ValidationContext) -> IncrementalPdfFileWriter:
+    """A writer of a PDF with a further revision that holds the proof."""
+    writer = appending(pdf)
+    DocumentSecurityStore.supply_dss_in_writer(writer, None, paths=paths, validation_context=context)
+    return writer
 
 
 async def stamped(writer: Any, server: Server) -> bytes:

@@ -32,8 +32,6 @@ ONE_DIGEST = "sha256"  # digest of whatever is signed here
 
 @dataclass(frozen=True)
 class Signer:
-    """A key and its certificate."""
-
     certificate: Certificate
     chain: tuple[Certificate, ...]  # certificates above it, nearest first; without the root where nobody gave it
     algorithm: Literal["rsa", "ecdsa"]
@@ -48,7 +46,6 @@ class Signer:
 
     @property
     def test_key(self) -> bool:
-        """Whether it is for trying only."""
         return is_test(self.certificate)
 
     @property
@@ -125,7 +122,6 @@ LONGEST_NAME = 64 - len(f"{TEST_WORDS} – ")  # characters of a name (X.520, ub
 
 
 def signer_of_file(path: Path, passphrase: str) -> Signer:
-    """The key of a PKCS#12 file."""
     with installed():
         from cryptography.hazmat.primitives.serialization import pkcs12
     where = str(path)
@@ -146,8 +142,6 @@ def signer_of_file(path: Path, passphrase: str) -> Signer:
 
 @dataclass(frozen=True)
 class TrialKey:
-    """A key for trying."""
-
     key: bytes  # with its certificate, PKCS#12
     certificate: bytes  # PEM
     until: dt.date  # last day that it is valid
@@ -202,8 +196,6 @@ _EXAMPLE = f"{SCHEME}token=LABORATORY;object=KEY?module-path=/usr/lib/libsofthsm
 
 @dataclass(frozen=True)
 class TokenPlace:
-    """Where a key is."""
-
     module: str  # library of the token's maker
     token: str  # label
     key: str  # label of the key and its certificate

@@ -177,7 +177,6 @@ _FORMS = MappingProxyType(
 
 
 def signatures_of_xml(data: bytes, trust: Trust, *, where: str = "the XML file") -> tuple[FileSignature, ...]:
-    """Every signature in an XML file."""
     root = root_of(data, where)
     elements = list(root.iter(SIGNATURE))
     return tuple(_found(data, element, several=len(elements) > 1, trust=trust) for element in elements)
