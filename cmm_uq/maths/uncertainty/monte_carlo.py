@@ -110,6 +110,12 @@ def simulate_adaptively(
     return run.result(stable)
 
 
+def draw_outputs(model: MeasurementModel, trials: int, seed: int = 0) -> Floats:
+    """Draws (p, trials) of the outputs themselves, for regions and pictures; memory grows with the trials."""
+    source, rng = _source(model), np.random.default_rng(seed)
+    return np.concatenate([source.draw(rng, min(BLOCK, trials - k)) for k in range(0, trials, BLOCK)], axis=1)
+
+
 def numerical_tolerance(u: Floats, digits: int) -> Floats:
     """Δ of JCGM 101 7.9.2: half a unit of the last of ``digits`` significant digits of u; zero for u = 0."""
     tolerance = np.zeros_like(np.asarray(u, dtype=np.float64))
