@@ -53,13 +53,6 @@ class DriftState:
         node = np.exp(evidence - of_group[:, prior.group]) * each[prior.group]
         return np.asarray(node[..., None] * np.exp(self.log_weight - self.log_evidence[..., None]), dtype=np.float64)
 
-    def collapsed(self) -> tuple[Floats, Floats]:
-        """Mean (2 + q, N, K) and covariance (2 + q, 2 + q, N, K) over the tales."""
-        weight = np.exp(self.log_weight - self.log_evidence[..., None])
-        mean = (weight * self.mean).sum(axis=-1)
-        off = self.mean - mean[..., None]
-        return mean, (weight * (self.covariance + off[:, None] * off)).sum(axis=-1)
-
 
 def log_sum(values: Floats) -> Floats:
     """Logarithm of the sum of exponentials over the last axis."""

@@ -12,6 +12,7 @@ from scipy.stats import multivariate_normal
 
 from cmm_uq.base.points import Floats
 from cmm_uq.laboratory.due.drift import WRONG, WRONG_TIMES, YEAR, DriftHistory, DriftPrior
+from cmm_uq.laboratory.due.drift_filter import DriftState
 from cmm_uq.laboratory.records.facts import RecordedCertificate, RecordedMachine, RecordedValue, Series
 
 FIRST = 730_000.0
@@ -136,3 +137,11 @@ def series(
         np.broadcast_to(np.asarray(artefact), n), np.arange(1, n + 1), np.where(since > 0, since + start, 0),
         np.zeros(n, dtype=bool),
     )  # fmt: skip
+
+
+def over_tales(state: DriftState) -> tuple[Floats, Floats]:
+    """Mean (2 + q, N, K) and covariance (2 + q, 2 + q, N, K) over the tales."""
+    weight = np.exp(state.log_weight - state.log_evidence[..., None])
+    mean = (weight * state.mean).sum(axis=-1)
+    off = state.mean - mean[..., None]
+    return mean, (weight * (state.covariance + off[:, None] * off)).sum(axis=-1)

@@ -12,7 +12,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.due.crossing import DAYS, Crossing, crossing, crossings
 from cmm_uq.laboratory.due.drift import HORIZON, YEAR, history, side_by_side
 from cmm_uq.laboratory.due.drift_filter import filtered
-from tests.laboratory.due.histories import machine, one_node
+from tests.laboratory.due.histories import machine, one_node, over_tales
 
 EXACT = 1e-4
 """u of a certificate, sd of a rate: as good as nothing beside the walk."""
@@ -33,7 +33,7 @@ def test_between_two_limits_with_steps_and_an_uncertain_state_it_is_that_of_path
     of, prior = machine([0, 1, 2], [0.0, 1.2, 1.9], 0.6, 0.3), one_node(rate=0.5, rate_sd=0.8)
     found = crossing(of, 5.0, prior)
     arrays = side_by_side([of])
-    mean, covariance = filtered(arrays, prior, kept=500).collapsed()
+    mean, covariance = over_tales(filtered(arrays, prior, kept=500))
     random, n = np.random.default_rng(7), 20_000
     level, rate = random.multivariate_normal(mean[:2, 0, 0], covariance[:2, :2, 0, 0], n).T
     inside, parts = np.abs(level) <= 5.0, {}

@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 from cmm_uq.base.points import Floats
 from cmm_uq.laboratory.due.drift import YEAR, DriftHistory, DriftPrior, default_prior, side_by_side
 from cmm_uq.laboratory.due.drift_filter import change_since, filtered
-from tests.laboratory.due.histories import dense, machine, one_node
+from tests.laboratory.due.histories import dense, machine, one_node, over_tales
 
 HISTORIES = {
     "one certificate": machine([0], [2.0]),
@@ -28,7 +28,7 @@ HISTORIES = {
 
 def found(of: DriftHistory, prior: DriftPrior) -> tuple[float, Floats, Floats]:
     state = filtered(side_by_side([of]), prior, kept=10**6)
-    mean, covariance = state.collapsed()
+    mean, covariance = over_tales(state)
     return float(state.log_evidence[0, 0]), mean[:2, 0, 0], covariance[:2, :2, 0, 0]
 
 
@@ -47,13 +47,13 @@ def test_machines_side_by_side_are_what_they_are_alone() -> None:
     for i, of in enumerate(every):
         alone = filtered(side_by_side([of]), prior)
         np.testing.assert_allclose(together.log_evidence[i], alone.log_evidence[0], rtol=1e-12)
-        np.testing.assert_allclose(together.collapsed()[0][:2, i], alone.collapsed()[0][:2, 0], rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(over_tales(together)[0][:2, i], over_tales(alone)[0][:2, 0], rtol=1e-9, atol=1e-12)
 
 
 def test_the_likeliest_tales_carry_nearly_all_of_the_evidence() -> None:
     """Of 65 536 tales of eight certificates, a step among them, twelve kept give the rate to a fiftieth of its u."""
     of = machine(list(range(8)), [0.1, 0.4, 0.7, 1.3, 6.2, 6.6, 6.8, 7.3], 0.4, 0.2, "AAABBBBB")
-    few, many = (filtered(side_by_side([of]), one_node(), kept=kept).collapsed() for kept in (12, 2000))
+    few, many = (over_tales(filtered(side_by_side([of]), one_node(), kept=kept)) for kept in (12, 2000))
     u = np.sqrt(many[1][[0, 1], [0, 1], 0, 0])
     assert np.all(np.abs(few[0] - many[0])[:2, 0, 0] < u / 50)
 

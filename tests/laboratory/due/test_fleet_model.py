@@ -10,7 +10,7 @@ from cmm_uq.base.points import Floats
 from cmm_uq.laboratory.due import drift as drift_prior, drift_filter, fleet_model
 from cmm_uq.laboratory.due.drift import MEDIANS, NAMES, USUAL_RATE_SD, YEAR, learnt_prior, side_by_side
 from cmm_uq.laboratory.due.fleet_model import messages, others, shared_by, together
-from tests.laboratory.due.histories import machine
+from tests.laboratory.due.histories import machine, over_tales
 
 UNIT = 10.0
 MACHINES = [
@@ -79,7 +79,7 @@ def test_what_the_others_say_of_a_machine_is_the_conditional_of_one_normal_distr
     start = others(said, together(said, shared, THETA, UNIT), shared, THETA, UNIT)
     prior = learnt_prior(THETA, np.zeros(2), np.ones(2), UNIT)
     some = drift_filter.DriftStart(start.mean[..., prior.group], start.covariance[..., prior.group])
-    mean, covariance = drift_filter.filtered(arrays, prior, some).collapsed()
+    mean, covariance = over_tales(drift_filter.filtered(arrays, prior, some))
     of = np.concatenate([[i] * len(each.day) for i, each in enumerate(MACHINES)])
     for w, theta in enumerate(THETA):
         y, S, rates, cross = dense(theta)

@@ -111,13 +111,11 @@ class Client:
 
     def version(self) -> str | None:
         """Version of the specification that the server implements; ``None`` before 1.4, which does not know the question."""
-        found = self._known("GetDMEVersion()", "DMEVersion")
-        return None if found is None else str(found)
+        return self._known("GetDMEVersion()", "DMEVersion")
 
     def machine_class(self) -> str | None:
         """``CartCMM`` or another."""
-        found = self._known("GetMachineClass()", "GetMachineClass")
-        return None if found is None else str(found)
+        return self._known("GetMachineClass()", "GetMachineClass")
 
     def in_error(self) -> bool:
         """Whether the server waits for its errors to be cleared."""
@@ -168,8 +166,8 @@ class Client:
 
     def part_temperature(self) -> float | None:
         """Temperature of the part, °C, as section 9.6 of 1.4.3 announces it; ``None`` where the server has none."""
-        found = self._known("GetProp(Part.Temperature())", "Part.Temperature")
-        return None if found is None else float(str(found))
+        celsius = self._known("GetProp(Part.Temperature())", "Part.Temperature")
+        return None if celsius is None else float(celsius)
 
     def scale_temperatures(self) -> dict[str, float]:
         """Temperatures of the scales by axis, °C, as servers of VDMA 8722 (2.5) give them; empty where the server has none."""
@@ -213,9 +211,9 @@ class Client:
             return None
         return answer
 
-    def _known(self, command: str, name: str) -> ipp.Argument | None:
+    def _known(self, command: str, name: str) -> str | None:
         answer = self._unless_unknown(command)
-        return None if answer is None else _first(answer, name)
+        return None if answer is None else str(_first(answer, name))
 
 
 def _empty(names: Sequence[str]) -> str:

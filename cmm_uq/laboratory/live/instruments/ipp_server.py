@@ -206,9 +206,8 @@ class SimulatedIppServer:
         self.state.daemons[tag] = _names(tuple(rest), ("X", "Y", "Z"))
 
     def _do_stopdaemon(self, tag: str, method: ipp.Term) -> None:
-        if len(method.arguments) != 1 or str(method.arguments[0]) not in self.state.daemons:
+        if len(method.arguments) != 1 or self.state.daemons.pop(str(method.arguments[0]), None) is None:
             raise MethodError(513)
-        del self.state.daemons[str(method.arguments[0])]
 
     def _do_stopalldaemons(self, tag: str, method: ipp.Term) -> None:
         if not self.state.daemons:
@@ -216,8 +215,7 @@ class SimulatedIppServer:
         self.state.daemons.clear()
 
     def _do_goto(self, tag: str, method: ipp.Term) -> None:
-        place, _ = _target(method, self.state.position)
-        self._move(place)
+        self._move(_target(method, self.state.position)[0])
 
     def _do_ptmeas(self, tag: str, method: ipp.Term) -> list[str]:
         place, normal = _target(method, self.state.position)
