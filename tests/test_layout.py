@@ -25,11 +25,11 @@ SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
 MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.reference\.")
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
-    "": 140, "base": 2_750, "maths": 10_500, "jobs": 12_250, "machine": 5_800, "analysis": 15_800, "laboratory": 13_200,
-    "certificate": 16_000, "artefacts": 8_750, "app": 14_500,
+    "": 140, "base": 2_720, "maths": 10_200, "jobs": 11_400, "machine": 5_700, "analysis": 15_800, "laboratory": 13_200,
+    "certificate": 15_500, "artefacts": 8_700, "app": 13_900,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
-OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 249, 1509
+OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 235, 1501
 """Imports of the package within functions, and exemptions from the formatter: only falling."""
 LOADED_LATE = {
     "arviz", "asn1crypto", "contourpy", "cryptography", "ctypes", "defusedxml", "emcee", "fcntl",

@@ -95,7 +95,7 @@ def _decided_again(errors: list[Any], rule: Rule, prior: Any, *, unstated: bool)
             or not _same(error["probability_conforming"], again.decision.probability_conforming)
             or not _same(error["guard_band_um"], again.decision.guard_band, error["limit_um"])
             for error, again in zip(errors, decided, strict=True)
-        )  # fmt: skip
+        )
 
     both, wrong = decisions(signed=True)
     if any(error["error_um"] < 0 for error in errors) or wrong == 0:

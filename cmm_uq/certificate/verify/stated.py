@@ -142,7 +142,7 @@ def _check_decisions(inquiry: Inquiry, data: Mapping[str, Any], page: HtmlPage, 
             ("value", [_measured(entry, 2), _measured(entry, 1), *_from_zero(entry)]),
             ("limit", [str.__str__(limit_in_full(entry["limit_um"])), f"{entry['limit_um']:.4g}"]),
             ("standard", [entry["standard"].replace(",", ".")]),
-        ):  # fmt: skip
+        ):
             if not any(re.search(".{1,14}".join(map(re.escape, figure.split(" ± "))), text) for figure in figures):
                 problem = f"does not state the {what} of {source}"
                 inquiry.wrong("figures", name, place, problem, " ".join(shown.text.split()), figures[0])

@@ -80,7 +80,7 @@ def without_foot(text: str, title: str, number: int, pages: int) -> tuple[str, b
 
 def _differences(
     text: str, whole: str, at: int, heads: Sequence[str], *, replaced: bool
-) -> tuple[list[tuple[str, str]], int]:  # fmt: skip
+) -> tuple[list[tuple[str, str]], int]:
     """What stands on a page and what should, and the place in the whole up to which they were compared."""
     here, found = 0, list[tuple[str, str]]()
     while here < len(text):

@@ -108,7 +108,7 @@ def reissued(outcome: Outcome) -> Outcome:
     composed = outcome.composed
     return replace(
         outcome, results={**outcome.results, KEY: comparison.data}, composed=lambda: comparison.on(composed())
-    )  # fmt: skip
+    )
 
 
 def compared(number: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Reissue:
@@ -383,6 +383,6 @@ def _person(name: str) -> str:
 
 def _sign(
     records: Records, kind: str, certificate: RecordedCertificate, by: str, reason: str, **further: bool | int | str
-) -> None:  # fmt: skip
+) -> None:
     content = {"certificate": certificate.entry, "by": by, "reason": reason.strip(), **further}
     records.append(kind, content | {"results_sha256": certificate.results_sha256})

@@ -70,7 +70,7 @@ class Signing:
 
     def finished(
         self, laboratory: Mapping[str, Any], *, language: str = "en", said: Callable[[Text], Text] | None = None
-    ) -> Callable[[str, bytes], bytes]:  # fmt: skip
+    ) -> Callable[[str, bytes], bytes]:
         """Signs a document by its name: PDF and XML; others stay as they are."""
 
         def signed(name: str, data: bytes) -> bytes:
@@ -119,7 +119,7 @@ class Signed:
 
 def sign_files(
     paths: Sequence[Path], signing: Signing, *, out: Path | None = None, records: str | Path | None = None
-) -> Signed:  # fmt: skip
+) -> Signed:
     """Sign PDF and XML files of one folder in the set that they are of, or copies of them in the folder ``out``.
 
     ``records`` that are told of it where the certificate is recorded in them: file, URL, ``none``, or ``None`` for those
@@ -134,8 +134,7 @@ def sign_files(
     manifest = read_manifest(folder)
     for path in paths:
         if manifest is None or path.name not in manifest.files:
-            raise CmmUqError("is of no set that cmm-uq wrote", where=str(path),
-                             fix="Give --out DIR for a signed copy")  # fmt: skip
+            raise CmmUqError("is of no set that cmm-uq wrote", where=str(path), fix="Give --out DIR for a signed copy")
     assert manifest is not None  # noqa: S101 - there is at least one path
     with _opened(records, folder) as history:
         contents = {}

@@ -32,7 +32,7 @@ Compute = Callable[["Given", "Job"], "Again"]  # the second computation: of the 
 
 def compute_again(
     inquiry: Inquiry, given: Given, compute: Callable[[], Again | None], by_another: Callable[[str], str] | None = None
-) -> bool:  # fmt: skip
+) -> bool:
     """Compute everything from the inputs, by this version, and keep what differs: whether the documents are the same.
 
     ``by_another``: what is said of a certificate by another version.

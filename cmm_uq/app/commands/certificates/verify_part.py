@@ -141,7 +141,7 @@ def _merge(inquiry: Inquiry, inner: Inquiry, where: str) -> None:
 
 def part_again(
     inquiry: Inquiry, given: Given, job: PartJob, data: Mapping[str, Any], *, trust: Iterable[Path] | None, stage: Stage
-) -> Again | None:  # fmt: skip
+) -> Again | None:
     """What the inputs of a part's report give; ``None`` where that cannot be known, with the reason kept."""
     said, simulation = data["machine"], data["simulation"]
     held = bool(said["signatures_held_to_trusted"])
