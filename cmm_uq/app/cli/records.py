@@ -44,7 +44,7 @@ def verify(
     files: bool = flag(True, "--files/--no-files", "Compare the files of the reports too."),
     end: Ending = opt.ONLY_JSON,
 ) -> None:
-    """Find every entry that was altered, deleted or exchanged, every table and file that is not as it was recorded.
+    """Find every entry that was altered, deleted, exchanged or is out of time, every table, trigger and file that is another.
 
     Exit code 4 where something is wrong. Files that are gone are told; they may only have been moved.
     """

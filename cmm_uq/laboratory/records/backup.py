@@ -114,7 +114,7 @@ def _set_aside(target: Path) -> None:
 def _checked(path: Path) -> tuple[int, str]:
     with open_records(path, read_only=True) as records:
         with told(path), records.engine.connect() as connection:
-            found = indexing.chain(connection)
+            found = [one for one in indexing.chain(connection) if one.kind == "chain"]
         if found:
             fix = "cmm-uq records verify says all; a backup with a broken chain is none"
             raise CmmUqError(f"entry {found[0].entry}: {found[0].problem}", where=str(path), fix=fix)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
@@ -9,14 +10,28 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sqlalchemy import ColumnElement, Connection, Table, create_engine, delete, event, func, insert, select, update
+from sqlalchemy import (
+    Column,
+    ColumnElement,
+    Connection,
+    MetaData,
+    Table,
+    create_engine,
+    delete,
+    event,
+    func,
+    insert,
+    inspect,
+    select,
+    update,
+)
 from sqlalchemy.pool import StaticPool
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import read_manifest, sha256_of
 from cmm_uq.laboratory.records import facts, tables
 from cmm_uq.laboratory.records.facts import ChainFinding, Entry, called, spelled
-from cmm_uq.laboratory.records.tables import INDEX, artefacts, certificates, entries, machines
+from cmm_uq.laboratory.records.tables import INDEX, VERSIONS, artefacts, certificates, entries, machines
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
@@ -226,16 +241,21 @@ def verified(records: Records, head: str | None, *, files: bool) -> list[ChainFi
     """What is wrong; see :meth:`cmm_uq.laboratory.records.store.Records.verify`."""
     with records.reading() as connection:  # one transaction: one state, whoever writes meanwhile
         found = chain(connection, head)
-        if not found:
+        found += _schema(connection)
+        if not any(finding.kind in ("chain", "schema") for finding in found):
             found += _tables(connection)
         if files and not any(finding.kind == "chain" for finding in found):
             found += _files(connection, records.home)
     return found[:MOST]
 
 
+_CLOCKS = dt.timedelta(minutes=10)  # by which the clocks of several computers may differ
+
+
 def chain(connection: Connection, head: str | None = None) -> list[ChainFinding]:
-    """What is wrong with the entries by themselves."""
+    """What is wrong with the entries by themselves, and with the clock that they were written by."""
     found: list[ChainFinding] = []
+    latest: dt.datetime | None = None
     number, previous, met = 0, facts.BEGINNING, head is None
     for entry in in_blocks(partial(entry_block, connection)):
         if entry.number != number + 1:
@@ -246,6 +266,13 @@ def chain(connection: Connection, head: str | None = None) -> list[ChainFinding]
             found.append(ChainFinding("chain", "does not follow the entry before it", entry.number))
         if not entry.true:
             found.append(ChainFinding("chain", "was altered", entry.number))
+        elif (moment := _moment(entry.at)) is None:
+            found.append(ChainFinding("chain", f"is of no time: {entry.at!r}", entry.number))
+        elif latest is not None and moment < latest - _CLOCKS:
+            problem = f"is of {entry.at}, and an entry before it of {facts.moment_of(latest)}: a clock was wrong"
+            found.append(ChainFinding("clock", problem, entry.number))
+        else:
+            latest = moment if latest is None else max(latest, moment)
         number, previous, met = entry.number, entry.hash, met or entry.hash == head
         if len(found) >= MOST:
             return found
@@ -253,6 +280,49 @@ def chain(connection: Connection, head: str | None = None) -> list[ChainFinding]
         problem = f"no entry has the hash {head}: the last are missing, or all were written anew"
         found.append(ChainFinding("chain", problem))
     return found
+
+
+def _schema(connection: Connection) -> Iterator[ChainFinding]:
+    """Tables, columns, indexes and triggers that are not as records are made."""
+    inspector, sqlite = inspect(connection), connection.dialect.name == "sqlite"
+    made = {**tables.META.tables, VERSIONS: Table(VERSIONS, MetaData(), Column("version_num"))}
+    yield from _apart("table", set(inspector.get_table_names()), set(made))
+    for name, table in made.items():
+        if name not in inspector.get_table_names():
+            continue
+        columns = {str(column["name"]) for column in inspector.get_columns(name)}
+        yield from _apart(f"column of {name}", columns, set(table.columns.keys()))
+        indexes = {f"{one['name']} ({', '.join(map(str, one['column_names']))})" for one in inspector.get_indexes(name)
+                   if not one.get("duplicates_constraint")}  # fmt: skip
+        wanted = {f"{one.name} ({', '.join(one.columns.keys())})" for one in table.indexes}
+        yield from _apart(f"index of {name}", indexes, wanted)
+    if sqlite:
+        query = "SELECT sql FROM sqlite_master WHERE type IN ('trigger', 'view')"
+        yield from _apart(
+            "trigger or view", set(connection.exec_driver_sql(query).scalars()), set(tables.TRIGGERS["sqlite"])
+        )
+        return
+    query = ("SELECT t.tgname || ' ' || t.tgenabled::text || ' ' || p.proname || p.prosrc FROM pg_trigger t "
+             "JOIN pg_proc p ON p.oid = t.tgfoid WHERE t.tgrelid = 'entries'::regclass AND NOT t.tgisinternal")  # fmt: skip
+    refuses = "O entries_stay BEGIN RAISE EXCEPTION 'entries are never changed'; END "
+    triggers = {f"{name} {refuses}" for name in ("entries_no_change", "entries_no_truncate")}
+    yield from _apart("trigger", set(connection.exec_driver_sql(query).scalars()), triggers)
+
+
+def _apart(sort: str, there: set[str], made: set[str]) -> Iterator[ChainFinding]:
+    for name in sorted(made - there):
+        yield ChainFinding("schema", f"the {sort} {name} is missing")
+    for name in sorted(there - made):
+        yield ChainFinding("schema", f"the {sort} {name} is not of the records")
+
+
+def _moment(text: str) -> dt.datetime | None:
+    """A time of recording; ``None`` where the text is none, in UTC as they are written."""
+    try:
+        moment = dt.datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    return moment if moment.tzinfo else None
 
 
 def rebuild(connection: Connection) -> None:

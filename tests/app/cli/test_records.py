@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.laboratory.records.opening import REVISION
+from cmm_uq.laboratory.records.tables import TRIGGERS
 from tests.app.cli.laboratory import PLACE, kept, older
 from tests.app.cli.process import run
 from tests.laboratory.records.histories import certificate
@@ -19,9 +20,11 @@ GUARDS = "DROP TRIGGER entries_no_update; DROP TRIGGER entries_no_delete; DROP T
 
 
 def behind(place: Path, script: str) -> None:
-    """What somebody does with another program."""
+    """What somebody does with another program, who puts the triggers back afterwards."""
     with closing(sqlite3.connect(place)) as raw:
         raw.executescript(script)
+        for statement in TRIGGERS["sqlite"] if GUARDS in script else ():
+            raw.execute(statement)
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.records import open_records
-from cmm_uq.laboratory.records.facts import BEGINNING, KINDS, Entry, canonical, following
+from cmm_uq.laboratory.records.facts import BEGINNING, KINDS, Entry, canonical, following, hash_of
 from cmm_uq.laboratory.records.tables import TRIGGERS
 from tests.laboratory.records.histories import certificate, history, moment
 
@@ -39,6 +39,8 @@ def spoiled(whole: Path, folder: Path, spoil: Callable[[sqlite3.Connection], obj
         for (name,) in raw.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall():
             raw.execute(f"DROP TRIGGER {name}")
         spoil(raw)
+        for statement in TRIGGERS["sqlite"]:  # whoever is careful puts them back
+            raw.execute(statement)
     raw.close()
     source.close()
     return path
@@ -151,6 +153,52 @@ def test_the_database_refuses_to_change_entries(spoil: str, whole: Path) -> None
         raw.execute(spoil)
     raw.close()
     assert len(TRIGGERS["sqlite"]) == 3
+
+
+@pytest.mark.parametrize(("spoil", "problem"), [
+    ("DROP TRIGGER entries_no_update", "trigger or view CREATE TRIGGER entries_no_update BEFORE UPDATE ON entries "
+     "BEGIN SELECT RAISE(ABORT, 'entries are never changed'); END is missing"),
+    ("CREATE TRIGGER kept AFTER INSERT ON entries BEGIN UPDATE figures SET u = u / 2; END", "is not of the records"),
+    ("CREATE VIEW shown AS SELECT * FROM figures", "trigger or view CREATE VIEW shown AS SELECT * FROM figures is not of the"),
+    ("CREATE TABLE more (a)", "table more is not of the records"), ("DROP TABLE covariances", "table covariances is missing"),
+    ("ALTER TABLE figures ADD COLUMN k", "column of figures k is not of the records"),
+    ("DROP INDEX ix_certificates_job", "index of certificates ix_certificates_job (job) is missing"),
+])  # fmt: skip
+def test_tables_triggers_and_indexes_that_are_not_as_they_are_made_are_named(
+    spoil: str, problem: str, whole: Path, tmp_path: Path
+) -> None:
+    path = spoiled(whole, tmp_path, lambda raw: None)
+    with sqlite3.connect(path) as raw:
+        raw.execute(spoil)
+    raw.close()
+    with open_records(path, read_only=True) as records:
+        (finding,) = records.verify(files=False)
+    assert finding.kind == "schema"
+    assert problem in finding.problem
+
+
+def test_time_that_runs_backwards_is_named_but_for_what_clocks_differ_by(tmp_path: Path) -> None:
+    times = [dt.datetime(2026, 3, 2, 15, minute, tzinfo=dt.UTC) for minute in (30, 21)]
+    times += [dt.datetime(2025, 1, 26, 15, tzinfo=dt.UTC), dt.datetime(2026, 3, 2, 16, tzinfo=dt.UTC)]
+    with open_records(tmp_path / "r.db", create=True) as records:
+        records.append_all(("sent", {"a": number}, at) for number, at in enumerate(times))
+        (finding,) = records.verify()
+    assert (finding.kind, finding.entry) == ("clock", 3)
+    assert finding.problem.startswith("is of 2025-01-26T15:00:00")
+    assert "an entry before it of 2026-03-02T15:30:00" in finding.problem
+
+
+def test_an_entry_of_no_time_with_a_hash_of_its_own_is_found(tmp_path: Path) -> None:
+    entry = following(BEGINNING, 1, dt.datetime(2026, 3, 2, 15, tzinfo=dt.UTC), "sent", {"a": 1})
+    digest = hash_of(entry.previous, 1, "yesterday", "sent", entry.content)
+    with open_records(tmp_path / "r.db", create=True) as records:
+        with records.writing() as writing:
+            writing.connection.exec_driver_sql(
+                "INSERT INTO entries VALUES (1, 'yesterday', 'sent', ?, ?, ?)", (entry.content, entry.previous, digest)
+            )
+        assert [(one.kind, one.entry, one.problem) for one in records.verify()] == [
+            ("chain", 1, "is of no time: 'yesterday'")
+        ]
 
 
 def test_a_text_that_holds_numbers_or_quotes_is_the_same_when_read_back(tmp_path: Path) -> None:

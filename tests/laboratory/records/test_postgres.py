@@ -70,7 +70,28 @@ def test_the_server_refuses_to_change_entries_and_what_was_changed_is_found(url:
         with psycopg.connect(url) as raw:
             raw.execute("ALTER TABLE entries DISABLE TRIGGER USER")
             raw.execute("UPDATE entries SET content = replace(content, 'pass', 'fail') WHERE number = 2")
+            raw.execute("ALTER TABLE entries ENABLE TRIGGER USER")
         assert [(one.kind, one.entry) for one in records.verify(files=False)] == [("chain", 2)]
+
+
+@pytest.mark.parametrize(("change", "problem"), [
+    ("ALTER TABLE entries DISABLE TRIGGER entries_no_change", "the trigger entries_no_change O entries_stay BEGIN"),
+    ("CREATE OR REPLACE FUNCTION entries_stay() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN RETURN NEW; END $$",
+     "is missing"),
+    ("CREATE TABLE more (a integer)", "the table more is not of the records"),
+    ("DROP INDEX ix_certificates_job", "the index of certificates ix_certificates_job (job) is missing"),
+])  # fmt: skip
+def test_a_server_whose_tables_and_triggers_are_not_as_they_are_made_is_found(
+    url: str, change: str, problem: str
+) -> None:
+    with open_records(url, create=True) as records:
+        records.append_all(history(2, 2))
+        assert records.verify(files=False) == []
+        with psycopg.connect(url) as raw:
+            raw.execute(change)
+        found = records.verify(files=False)
+    assert {one.kind for one in found} == {"schema"}
+    assert problem in found[0].problem
 
 
 def test_writers_at_the_same_time_make_one_chain(url: str) -> None:
