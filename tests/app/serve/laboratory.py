@@ -57,6 +57,7 @@ def values(*figures: tuple[str, str, str, float, float, float | None]) -> list[l
 def opened_in(folder: Path) -> Path:
     place = folder / "records.db"
     with made(place, 4, 3, released=True) as records:
+        latest = moment(dt.date(1970, 1, 1))
 
         def add(serial: str, day: dt.date, number: str, state: str = "draft", **further: Any) -> int:
             there = files(number)
@@ -66,13 +67,15 @@ def opened_in(folder: Path) -> Path:
             known = hashes(there)
             content = certificate(serial, day, job=number, number=number, folder=number, files=known,
                                   results_sha256=known["results.json"], **further)  # fmt: skip
-            entry = records.append("report", content, at=moment(day)).number
+            nonlocal latest
+            at = latest = max(latest, moment(day))  # the clock of the records does not run backwards
+            entry = records.append("report", content, at=at).number
             if state != "draft":
                 signed = {"certificate": entry, "by": "A. Prüfer", "reason": "checked", "complete": True}
-                records.append("release", signed, at=moment(day))
+                records.append("release", signed, at=at)
             if state in ("withdrawal", "replacement"):
                 records.append(state, {"certificate": entry, "by": "B. Leiter", "reason": "artefact was damaged"},
-                               at=moment(day))  # fmt: skip
+                               at=at)  # fmt: skip
             return entry
 
         good = values(
@@ -93,7 +96,9 @@ def opened_in(folder: Path) -> Path:
             artefact={"serial": HOSTILE, "due": "2026-01-01"},
             values=[["x", HOSTILE, HOSTILE, 1.0, 0.1, 0.8, 1.2, 0.0, None]])  # fmt: skip
         records.append(
-            "machine", {"serial": "NEW", "name": "Just bought", "manufacturer": "M", "model": "P", "place": "Hall 2"}
+            "machine",
+            {"serial": "NEW", "name": "Just bought", "manufacturer": "M", "model": "P", "place": "Hall 2"},
+            at=latest,
         )
     return place
 
