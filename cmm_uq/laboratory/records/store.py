@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from sqlalchemy import Connection, Engine, delete, insert, select, text
+from sqlalchemy import Connection, Engine, delete, func, insert, select, text
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import MANIFEST, InDoubtError, finish_interrupted, is_pending, sha256_of
@@ -71,6 +71,13 @@ class Records(RecordQueries):
         """Number and hash of the last entry, to be filed elsewhere; 0 where there is none."""
         with self.reading() as connection:
             return last(connection)
+
+    @property
+    def last_moment(self) -> dt.datetime | None:
+        """Latest moment of any entry, whatever clock the last one was written by; ``None`` where there is none."""
+        with self.reading() as connection:
+            at = connection.execute(select(func.max(entries.c.at))).scalar()
+        return None if at is None else dt.datetime.fromisoformat(at)
 
     def entries(self, first: int = 1, kind: str | None = None) -> Iterator[Entry]:
         """Entries in their order, of one kind or all, read block by block."""

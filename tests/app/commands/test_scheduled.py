@@ -257,6 +257,9 @@ def test_what_is_due_is_told_and_with_a_clock_behind_the_records_nothing_is_due(
         assert len({notice.key for notices in told.values() for notice in notices}) == 3
         with pytest.raises(CmmUqError, match="the clock says 2027-04-20"):
             list(due_notices(records, dt.date(2027, 4, 20), dt.timedelta(days=60)))
+        records.append("sent", {}, at=dt.datetime(2026, 4, 20, tzinfo=dt.UTC))  # by the clock that is behind
+        with pytest.raises(CmmUqError, match="the newest entry is of 2027-05-01, and the clock says 2026-04-20"):
+            list(due_notices(records, dt.date(2026, 4, 20), dt.timedelta(days=60)))
     assert list(due_notices(None, dt.date(2027, 6, 1), dt.timedelta(days=30))) == []
 
 

@@ -163,11 +163,10 @@ def opened(place: str | Path | None, *, dry: bool) -> Iterator[Records | None]:
 
 def due_notices(records: Records | None, on: dt.date, within: dt.timedelta) -> Iterable[notices.Notice]:
     """What is to be calibrated soon, or should have been."""
-    if records is None or not (last := records.head()[0]):
+    if records is None or (latest := records.last_moment) is None:
         return
-    newest = dt.datetime.fromisoformat(next(records.entries(last)).at).date()
-    if newest > on + _AHEAD:
-        what = f"the newest entry is of {newest}, and the clock says {on}: what is due is not said"
+    if latest.date() > on + _AHEAD:
+        what = f"the newest entry is of {latest.date()}, and the clock says {on}: what is due is not said"
         raise CmmUqError(what, where="records", fix="Set the clock")
     for one in due_in(records, (), on):
         if one.due is not None and one.due <= on + within:
