@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.laboratory.live.instruments.instrument import Introduction
 from cmm_uq.laboratory.live.instruments.library import (
     ProfileDraft,
     drafted,
@@ -281,6 +282,19 @@ def test_a_message_is_what_stands_between_its_marks() -> None:
     assert [(one.body, one.whole) for one in Framer(FRAMES[0]).feed(b"0123456789\r\n0123456789a\r\n")] == [
         (b"0123456789", True), (b"0123456789a\r", False), (b"\n", False),
     ][:2]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [name for name in ready() if profile_named(name).protocol == "messages"])
+def test_a_long_line_of_blanks_ends_a_ready_parser_too(name: str) -> None:
+    """Repeats that share their blanks took a time that grows with the cube of the line: minutes for these."""
+    profile = profile_named(name)
+    for body in (b" " * 3000 + b"#", b"X=" + b" " * 3000 + b"#", b"P=" + b" " * 3000 + b"#"):
+        assert not Parser(profile).read(FramedMessage(body, body)).values
+    if profile.identify is not None:
+        heard = Introduction(profile.identify)
+        for line in ("PTB330 / 1", "PTU300 / 1", *[" " * 30] * 100):
+            heard.hear(FramedMessage(line.encode(), line.encode()))
+        assert heard.found is None
 
 
 @pytest.mark.parametrize("name", [name for name in ready() if profile_named(name).protocol == "messages"])
