@@ -107,12 +107,12 @@ READ = {
     "cmm_uq/laboratory/live": {"now"}, "cmm_uq/laboratory/live/instruments": {"now", "time_ns", "monotonic"},
     "cmm_uq/laboratory/records": {"now"}, "cmm_uq/app/cli": {"now"}, "cmm_uq/app/commands/laboratory": {"now"},
     "cmm_uq/laboratory/schedule": {"now", "time", "monotonic"}, "cmm_uq/certificate/sign": {"now"},
-    "cmm_uq/app/serve": {"now", "monotonic"},
+    "cmm_uq/app/serve": {"now", "monotonic"}, "cmm_uq/certificate/verify": {"now"},
 }  # fmt: skip
 """How long a command waits for another one's lock, or for what it is writing when it is interrupted; the date that a new job
 begins with, for its reader to change; when a reading came, and when a simulated instrument sends one; when something was
-recorded or sent, on which day something is due, when something was signed, and how long a job, a lock, a cluster or a browser
-is waited for. No certificate and no results.json has any of these."""
+recorded or sent, on which day something is due, when something was signed, or whether that lies ahead, and how long a job, a
+lock, a cluster or a browser is waited for. No certificate and no results.json has any of these."""
 
 
 def clocks(source: str) -> set[str]:

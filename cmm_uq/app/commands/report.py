@@ -8,9 +8,18 @@ from typing import TYPE_CHECKING
 
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.standards import statement
-from cmm_uq.app.commands import estimation as steps
 from cmm_uq.app.commands.certificates.release import reissued, with_replaced
 from cmm_uq.app.commands.diagnose import diagnose_model, screened_model
+from cmm_uq.app.commands.estimation import (
+    accuracy,
+    contradictions,
+    named_draws,
+    noise,
+    parameters,
+    sizes,
+    with_doubt,
+    with_noise,
+)
 from cmm_uq.app.commands.files import Form, Stage, Told, Written, silent
 from cmm_uq.app.commands.model import OVERFLOW_FIX, recipe_of
 from cmm_uq.app.commands.reading import in_language, read_job
@@ -51,14 +60,14 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
     screened, findings = screened_model(job)
 
     # estimate: least squares, a stated noise held against the residuals (χ²), then the posterior with the noise unknown
-    model, estimate, p_value = steps.with_noise(screened)
+    model, estimate, p_value = with_noise(screened)
     components = noise_of(model)
     draws = sample_with_noise(estimate.linear, components, estimate.least_squares, seed, progress)
     posterior = with_curvature(model, components, draws)
     causes = causes_of(model.artefact, job.circumstances)
 
     # figures of performance of the lengths as recorded, and decisions
-    figures = steps.accuracy(model, estimate, posterior, causes, seed)
+    figures = accuracy(model, estimate, posterior, causes, seed)
     outside = OutsideReadings.of(job.points, findings, observe)
     statements = tuple(
         statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested, None, job.circumstances, outside)
@@ -69,16 +78,14 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
     known = posterior if model.sigma == screened.sigma else None
     diagnosis = diagnose_model(job, screened, findings, seed=seed, known=known)
     averaged = diagnosis.diagnosis.remaining.draws
-    values, doubt = steps.with_doubt(
-        model, estimate, posterior, posterior.draws if averaged is None else averaged, causes
-    )
-    denied = () if averaged is None else steps.contradictions(model, estimate, posterior, averaged)
+    values, doubt = with_doubt(model, estimate, posterior, posterior.draws if averaged is None else averaged, causes)
+    denied = () if averaged is None else contradictions(model, estimate, posterior, averaged)
 
     result = Result(
         job, model, findings, estimate, posterior, values,
-        steps.named_draws(model, components, posterior, values, mixture=averaged is not None),
-        steps.parameters(model, values), steps.sizes(model, values),
-        steps.noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, statements,
+        named_draws(model, components, posterior, values, mixture=averaged is not None),
+        parameters(model, values), sizes(model, values),
+        noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, statements,
         diagnosis, causes=causes, doubt=doubt, contradictions=denied,
     )  # fmt: skip
     for name, quantity in result.quantities():

@@ -10,28 +10,15 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sqlalchemy import (
-    Column,
-    ColumnElement,
-    Connection,
-    MetaData,
-    Table,
-    create_engine,
-    delete,
-    event,
-    func,
-    insert,
-    inspect,
-    select,
-    update,
-)
+import sqlalchemy as sa
+from sqlalchemy import ColumnElement, Connection, Table, create_engine, delete, event, func, insert, select, update
 from sqlalchemy.pool import StaticPool
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import read_manifest, sha256_of
 from cmm_uq.laboratory.records import facts, tables
 from cmm_uq.laboratory.records.facts import ChainFinding, Entry, called, spelled
-from cmm_uq.laboratory.records.tables import INDEX, VERSIONS, artefacts, certificates, entries, machines
+from cmm_uq.laboratory.records.tables import INDEX, artefacts, certificates, entries, machines
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
@@ -284,8 +271,8 @@ def chain(connection: Connection, head: str | None = None) -> list[ChainFinding]
 
 def _schema(connection: Connection) -> Iterator[ChainFinding]:
     """Tables, columns, indexes and triggers that are not as records are made."""
-    inspector, sqlite = inspect(connection), connection.dialect.name == "sqlite"
-    made = {**tables.META.tables, VERSIONS: Table(VERSIONS, MetaData(), Column("version_num"))}
+    inspector, sqlite = sa.inspect(connection), connection.dialect.name == "sqlite"
+    made = {**tables.META.tables, tables.versions.name: tables.versions}
     yield from _apart("table", set(inspector.get_table_names()), set(made))
     for name, table in made.items():
         if name not in inspector.get_table_names():
@@ -298,9 +285,8 @@ def _schema(connection: Connection) -> Iterator[ChainFinding]:
         yield from _apart(f"index of {name}", indexes, wanted)
     if sqlite:
         query = "SELECT sql FROM sqlite_master WHERE type IN ('trigger', 'view')"
-        yield from _apart(
-            "trigger or view", set(connection.exec_driver_sql(query).scalars()), set(tables.TRIGGERS["sqlite"])
-        )
+        there = connection.exec_driver_sql(query).scalars()
+        yield from _apart("trigger or view", set(there), set(tables.TRIGGERS["sqlite"]))
         return
     query = ("SELECT t.tgname || ' ' || t.tgenabled::text || ' ' || p.proname || p.prosrc FROM pg_trigger t "
              "JOIN pg_proc p ON p.oid = t.tgfoid WHERE t.tgrelid = 'entries'::regclass AND NOT t.tgisinternal")  # fmt: skip

@@ -100,7 +100,7 @@ pending = sa.Table(
     *_stated(sa.Text, "content"),
 )  # fmt: skip
 
-VERSIONS = "alembic_version"  # holds the revision of the tables
+versions = sa.Table("alembic_version", sa.MetaData(), sa.Column("version_num", sa.String(32)))  # revision of the tables
 INDEX = (machines, adjustments, artefacts, certificates, quantities, figures, covariances, signatures)
 """Tables that follow from the entries, each after those that it refers to."""
 
