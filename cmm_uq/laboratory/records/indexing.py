@@ -279,8 +279,8 @@ def _schema(connection: Connection) -> Iterator[ChainFinding]:
             continue
         columns = {str(column["name"]) for column in inspector.get_columns(name)}
         yield from _apart(f"column of {name}", columns, set(table.columns.keys()))
-        indexes = {f"{one['name']} ({', '.join(map(str, one['column_names']))})" for one in inspector.get_indexes(name)
-                   if not one.get("duplicates_constraint")}  # fmt: skip
+        own = [one for one in inspector.get_indexes(name) if not one.get("duplicates_constraint")]
+        indexes = {f"{one['name']} ({', '.join(map(str, one['column_names']))})" for one in own}
         wanted = {f"{one.name} ({', '.join(one.columns.keys())})" for one in table.indexes}
         yield from _apart(f"index of {name}", indexes, wanted)
     if sqlite:
@@ -288,8 +288,10 @@ def _schema(connection: Connection) -> Iterator[ChainFinding]:
         there = connection.exec_driver_sql(query).scalars()
         yield from _apart("trigger or view", set(there), set(tables.TRIGGERS["sqlite"]))
         return
-    query = ("SELECT t.tgname || ' ' || t.tgenabled::text || ' ' || p.proname || p.prosrc FROM pg_trigger t "
-             "JOIN pg_proc p ON p.oid = t.tgfoid WHERE t.tgrelid = 'entries'::regclass AND NOT t.tgisinternal")  # fmt: skip
+    query = (
+        "SELECT t.tgname || ' ' || t.tgenabled::text || ' ' || p.proname || p.prosrc FROM pg_trigger t "
+        "JOIN pg_proc p ON p.oid = t.tgfoid WHERE t.tgrelid = 'entries'::regclass AND NOT t.tgisinternal"
+    )
     refuses = "O entries_stay BEGIN RAISE EXCEPTION 'entries are never changed'; END "
     triggers = {f"{name} {refuses}" for name in ("entries_no_change", "entries_no_truncate")}
     yield from _apart("trigger", set(connection.exec_driver_sql(query).scalars()), triggers)
