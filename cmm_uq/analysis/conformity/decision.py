@@ -13,7 +13,7 @@ from math import hypot, isfinite
 from typing import Literal
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.base.messages import Text, say
 from cmm_uq.jobs.tables import conformity
@@ -37,18 +37,18 @@ class PriorKnowledge:
         return PriorKnowledge(self.mean + weight * (value - self.mean), u * float(np.sqrt(weight)))
 
     def within(self, limit: float, *, signed: bool) -> float:
-        high = float(special.ndtr((limit - self.mean) / self.sd))
+        high = float(scipy.special.ndtr((limit - self.mean) / self.sd))
         if signed:
-            return max(0.0, high - float(special.ndtr((-limit - self.mean) / self.sd)))
-        below = float(special.ndtr(-self.mean / self.sd))
+            return max(0.0, high - float(scipy.special.ndtr((-limit - self.mean) / self.sd)))
+        below = float(scipy.special.ndtr(-self.mean / self.sd))
         return max(0.0, high - below) / (1.0 - below) if below < 1.0 else 1.0
 
     def beyond(self, limit: float, *, signed: bool) -> float:
         """The rest, which keeps its digits where it is small."""
-        high = float(special.ndtr((self.mean - limit) / self.sd))
+        high = float(scipy.special.ndtr((self.mean - limit) / self.sd))
         if signed:
-            return high + float(special.ndtr((-limit - self.mean) / self.sd))
-        above = float(special.ndtr(self.mean / self.sd))
+            return high + float(scipy.special.ndtr((-limit - self.mean) / self.sd))
+        above = float(scipy.special.ndtr(self.mean / self.sd))
         return high / above if above > 0.0 else 0.0
 
 
@@ -65,16 +65,16 @@ def global_risks(acceptance: float, limit: float, u: float, prior: PriorKnowledg
     """Of accepting values up to ``acceptance``, negative where none is accepted (JCGM 106:2012, 9.5.3 and 9.5.4)."""
     low = max(prior.mean - _REACH * prior.sd, -np.inf if signed else 0.0)
     high = max(prior.mean, 0.0) + _REACH * prior.sd
-    total = 1.0 if signed else float(special.ndtr(prior.mean / prior.sd))
+    total = 1.0 if signed else float(scipy.special.ndtr(prior.mean / prior.sd))
     bends = [-limit, limit, *(at + k * u for at in (-acceptance, acceptance) for k in range(-8, 9)),
              *(prior.mean + k * prior.sd for k in range(-9, 10))]  # fmt: skip
     edges = np.array(sorted({low, high, *np.clip(bends, low, high).tolist()}))
     half, middle = 0.5 * np.diff(edges)[:, None], 0.5 * (edges[1:] + edges[:-1])[:, None]
     values, weights = (middle + half * _NODES).ravel(), (half * _WEIGHTS).ravel()
     density = weights * np.exp(-0.5 * ((values - prior.mean) / prior.sd) ** 2) / (prior.sd * np.sqrt(2 * np.pi) * total)
-    accepted = special.ndtr((acceptance - values) / u)
+    accepted = scipy.special.ndtr((acceptance - values) / u)
     if signed:
-        accepted = np.maximum(0.0, accepted - special.ndtr((-acceptance - values) / u))
+        accepted = np.maximum(0.0, accepted - scipy.special.ndtr((-acceptance - values) / u))
     conforming = np.abs(values) <= limit
     wrongly, rejected = density[~conforming] @ accepted[~conforming], density[conforming] @ (1.0 - accepted[conforming])
     return Risks(float(wrongly), float(rejected))
@@ -149,9 +149,9 @@ def decide(
         return Decision("fail", None, None, 0.0, rule_words(rule))
     if u <= 0:
         return Decision("pass" if size <= limit else "fail", None, None, 0.0, rule_words(rule))
-    beyond, within = _beyond(size, u, limit, signed), float(special.ndtr((limit - size) / u))
+    beyond, within = _beyond(size, u, limit, signed), float(scipy.special.ndtr((limit - size) / u))
     if signed:
-        within = max(0.0, 1.0 - beyond) if size <= limit else within - float(special.ndtr((-limit - size) / u))
+        within = max(0.0, 1.0 - beyond) if size <= limit else within - float(scipy.special.ndtr((-limit - size) / u))
     if prior is None:
         outcome, band = _decided(size, u, limit, rule, signed, beyond, unstated)
     else:
@@ -170,7 +170,7 @@ def _decided(
     if (risk := largest_risk(rule)) is not None:
         # Beyond the nearer limit by the guard band: to lie anywhere else than between two limits is no proof, for u large.
         doubt = hypot(u, unstated) if isinstance(rule, str) else u
-        within = float(special.ndtr((limit - size) / doubt))
+        within = float(scipy.special.ndtr((limit - size) / doubt))
         return _by_probability(size, limit, within, beyond, risk), _guard_band(u, limit, risk, signed)
     width = guard_width(rule) * COVERAGE_FACTOR * u
     band = width if width <= limit else None
@@ -233,8 +233,8 @@ def rule_name(rule: Rule) -> str:
 
 
 def _beyond(size: float, u: float, limit: float, signed: bool) -> float:
-    nearer = float(special.ndtr((size - limit) / u))
-    return nearer + float(special.ndtr((-limit - size) / u)) if signed else nearer
+    nearer = float(scipy.special.ndtr((size - limit) / u))
+    return nearer + float(scipy.special.ndtr((-limit - size) / u)) if signed else nearer
 
 
 def _by_band(size: float, limit: float, band: float) -> Outcome:
@@ -258,7 +258,7 @@ def _by_probability(size: float, limit: float, within: float, beyond: float, ris
 
 def _guard_band(u: float, limit: float, risk: float, signed: bool) -> float | None:
     """Distance of the largest acceptable value from the limit; ``None`` when no value is acceptable."""
-    one_sided = max(0.0, -float(special.ndtri(risk))) * u
+    one_sided = max(0.0, -float(scipy.special.ndtri(risk))) * u
     if not signed or _beyond(limit - one_sided, u, limit, signed) <= risk * (1 + 1e-12):
         return one_sided
     if _beyond(0.0, u, limit, signed) > risk:

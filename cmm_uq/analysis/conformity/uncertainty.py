@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say, semicolons
@@ -383,7 +383,9 @@ def _averaged(value: Floats, limit: Floats, shared: Floats, slope: Floats, group
                 np.where(s == 0, beyond, end(axis=0)) for beyond, end in ((-np.inf, ends.min), (np.inf, ends.max))
             )
         outside = (s == 0) & ((moved > top) | (signed & (moved < -top)))
-        chance = special.ndtr(np.minimum.reduceat(upper, starts)) - special.ndtr(np.maximum.reduceat(lower, starts))
+        chance = scipy.special.ndtr(np.minimum.reduceat(upper, starts)) - scipy.special.ndtr(
+            np.maximum.reduceat(lower, starts)
+        )
         chance = np.maximum(0.0, chance)
         chance = np.where(np.logical_or.reduceat(outside, starts, axis=0), 0.0, chance)
         total += float(chance.prod(axis=0).sum())
@@ -396,4 +398,4 @@ def _normal(count: int, dimensions: int) -> Floats:
     for _ in range(40):
         ratio = (1 + ratio) ** (1 / (dimensions + 1))
     steps = ratio ** -np.arange(1, dimensions + 1)
-    return np.asarray(special.ndtri((0.5 + np.outer(np.arange(1, count + 1), steps)) % 1), dtype=np.float64)
+    return np.asarray(scipy.special.ndtri((0.5 + np.outer(np.arange(1, count + 1), steps)) % 1), dtype=np.float64)

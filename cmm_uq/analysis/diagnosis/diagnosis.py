@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.analysis.diagnosis import joint as jointly
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, withhold
@@ -219,7 +219,7 @@ def _noise(result: SearchResult, joint: JointPosterior, stated: float | None) ->
     likeliest = int(weight.argmax())  # quick noise is no other noise than a reading's for who states that
     squares = last.squares[likeliest] * last.kinds[likeliest].scatter ** 2
     # two-sided χ² test of the stated noise at 1 %
-    p = 0.5 if stated is None else float(special.chdtrc(last.degrees_of_freedom, squares / stated**2))
+    p = 0.5 if stated is None else float(scipy.special.chdtrc(last.degrees_of_freedom, squares / stated**2))
     heavy = probability_by_name(last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or has_heavy_tails(residuals)
     of_point, offset = (Quantity.of_draws(size / MICROMETRE, unit("µm")) for size in (sizes.coordinate, sizes.placing))
     return NoiseDiagnosis(of_point, offset, float(np.mean(sizes.slow > 0)) > _NOISE_KIND, heavy, min(p, 1 - p) < 0.005)

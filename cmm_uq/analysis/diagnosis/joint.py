@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key
 from cmm_uq.analysis.diagnosis.comparison.explanations import STEP, effect_of, even_scale, from_even_scale
@@ -54,7 +54,7 @@ def period_modes(result: SearchResult, index: int) -> tuple[Mode, ...]:
     given = [v for v in result.versions if v.explanation != index]
     member, evidence, before = result.first.comparison.of_versions(index, given)
     total = evidence + before
-    weight = np.exp(total - special.logsumexp(total))
+    weight = np.exp(total - scipy.special.logsumexp(total))
     frequency = even_scale(effect, np.array([explanation.members[m].shape[0] for m in member]))
     likely = np.flatnonzero(weight > _LIKELY * weight.max())
     likely = likely[np.argsort(frequency[likely])]
@@ -260,7 +260,7 @@ def _holds_zero(draws: Floats) -> bool:
         return bool(low <= 0 <= high)
     mean = draws.mean(axis=0)
     distance = float(mean @ np.linalg.solve(np.cov(draws, rowvar=False), mean))
-    return distance < 2 * float(special.gammaincinv(draws.shape[1] / 2, _COVERED))  # quantile of χ²
+    return distance < 2 * float(scipy.special.gammaincinv(draws.shape[1] / 2, _COVERED))  # quantile of χ²
 
 
 def _phase_known(draws: Floats) -> bool:
@@ -280,5 +280,5 @@ def _chance(result: SearchResult, joint: JointPosterior) -> dict[str, float]:
         others = [i for i, unknown in enumerate(linear.unknowns) if unknown.key[0] != name]
         count, rest = len(linear.unknowns) - len(others), solve(linear.only(others)).residuals
         ratio = max(float(rest @ rest) - left, 0.0) / count / max(left / dof, 1e-300)
-        chance[name] = float(special.fdtrc(count, dof, ratio))
+        chance[name] = float(scipy.special.fdtrc(count, dof, ratio))
     return chance

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from cmm_uq.analysis.diagnosis.comparison.conditional import Version
 from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN
@@ -140,7 +140,7 @@ class _Fit:
         covariance = np.linalg.inv(precision)
         mean = covariance @ (left.T @ comparison.left) / variance
         parts = [slice(int(a), int(b)) for a, b in pairwise(ends)]
-        return cls(mean, covariance, parts, left, float(special.stdtrit(degrees, 0.975)))
+        return cls(mean, covariance, parts, left, float(scipy.special.stdtrit(degrees, 0.975)))
 
     def function(self, number: int, x: Floats, values: Floats) -> tuple[Floats, Floats]:
         """One function and its standard uncertainty, mm, each (p,), from its values (p, r) for unit coefficients."""
@@ -161,7 +161,7 @@ def _jump(compared: ModelComparison, index: int, x: Floats, order: Ints) -> tupl
     member, evidence, _ = compared.comparison.of_versions(index)
     steps = np.array([members[m].columns.shape[1] == 1 for m in member])
     member, evidence = member[steps], evidence[steps]
-    probability = np.exp(evidence - special.logsumexp(evidence))
+    probability = np.exp(evidence - scipy.special.logsumexp(evidence))
     likely = np.argsort(-probability)
     likely = likely[: int(np.searchsorted(np.cumsum(probability[likely]), 0.95)) + 1]
     jumps = [int(np.flatnonzero(np.diff(members[m].values[order, 0]))[0]) for m in member[likely]]
@@ -195,7 +195,7 @@ class ResidualField:
     def expanded(self, noise: Quantity) -> Floats:
         """(q,) length that noise of this standard deviation of a coordinate exceeds in 5 % of cases, in its unit."""
         d, nu = np.maximum(self.dimensions, 1).astype(np.float64), max(noise.degrees_of_freedom, 1.0)
-        squares = special.chdtri(d, 0.05) if np.isinf(nu) else d * special.fdtri(d, nu, 0.95)
+        squares = scipy.special.chdtri(d, 0.05) if np.isinf(nu) else d * scipy.special.fdtri(d, nu, 0.95)
         return np.asarray(np.sqrt(squares) * self.scale * noise.value, dtype=np.float64)
 
 

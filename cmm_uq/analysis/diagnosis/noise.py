@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy import sparse, special
+import scipy
 
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.base.points import Floats
@@ -40,7 +40,7 @@ class NoiseKind:
 
     name: str
     # (m, m) sparse W; W times the part of such noise that is independent, over that of a reading, is white
-    whitening: sparse.csr_array
+    whitening: scipy.sparse.csr_array
     log_whitening: float  # logarithm of its determinant
     probability: float
     # (m, c) columns with standard normal coefficients that it has besides
@@ -56,7 +56,7 @@ class NoiseKind:
 
     def coloured(self, columns: Floats) -> Floats:
         """The inverse of W times columns (m, b)."""
-        return np.asarray(sparse.linalg.splu(self.whitening.tocsc()).solve(columns), dtype=np.float64)
+        return np.asarray(scipy.sparse.linalg.splu(self.whitening.tocsc()).solve(columns), dtype=np.float64)
 
     def noise(self, random: np.random.Generator, draws: int) -> Floats:
         """Noise (m, draws) of this shape, a reading's standard deviation being one."""
@@ -72,26 +72,26 @@ def shape_of(components: Components, sizes: Sizes, noise_scale: Floats, probabil
         variances, _ = components.variances(replace(sizes, slow=np.zeros(1)))
         columns = components.exact(sizes)
     v = (variances @ components.shares.T)[0]
-    whitening = sparse.diags_array(1 / np.sqrt(v)) @ components.turn @ sparse.diags_array(noise_scale)
+    whitening = scipy.sparse.diags_array(1 / np.sqrt(v)) @ components.turn @ scipy.sparse.diags_array(noise_scale)
     log = float(np.log(noise_scale).sum() - 0.5 * np.log(v).sum())
     columns = columns / noise_scale[:, None] if columns.size else columns
     fine = replace(components, display=0.0) if components.display else None
     unrounded = shape_of(fine, sizes, noise_scale, probability) if fine else None
-    return NoiseKind("components", sparse.csr_array(whitening), log, probability, columns, unrounded=unrounded)
+    return NoiseKind("components", scipy.sparse.csr_array(whitening), log, probability, columns, unrounded=unrounded)
 
 
 def heavy_tails(residual: Floats) -> NoiseKind:
     """Student's t, four degrees, by its tangent at residuals (m,): a normal density below it, so never overstated."""
     scale = 1.4826 * float(np.median(np.abs(residual)))
     precision, log_factor = _tangent(residual / max(scale, _NANOMETRE))
-    whitening = sparse.csr_array(sparse.diags_array(np.sqrt(precision)))
+    whitening = scipy.sparse.csr_array(scipy.sparse.diags_array(np.sqrt(precision)))
     return NoiseKind("tails", whitening, 0.5 * float(np.log(precision).sum()), TAILS, log_factor=log_factor)
 
 
 def with_tails(kind: NoiseKind, residual: Floats, probability: float) -> NoiseKind:
     """A kind of noise whose independent part is of Student's t, by its tangent at whitened residuals."""
     precision, log_factor = _tangent(residual)
-    whitening = sparse.csr_array(sparse.diags_array(np.sqrt(precision)) @ kind.whitening)
+    whitening = scipy.sparse.csr_array(scipy.sparse.diags_array(np.sqrt(precision)) @ kind.whitening)
     log = kind.log_whitening + 0.5 * float(np.log(precision).sum())
     return replace(kind, name="tails", whitening=whitening, log_whitening=log, probability=probability,
                    log_factor=kind.log_factor + log_factor, unrounded=None)  # fmt: skip
@@ -100,7 +100,11 @@ def with_tails(kind: NoiseKind, residual: Floats, probability: float) -> NoiseKi
 def _tangent(residual: Floats) -> tuple[Floats, float]:
     """Precisions (m,) of the tangent at residuals (m,), and the sum by which ln t exceeds the normal density there."""
     squares, precision = residual**2 / _SHRINK, tail_precision(residual)
-    log_t = special.gammaln((_TAILS_DOF + 1) / 2) - special.gammaln(_TAILS_DOF / 2) - 0.5 * np.log(np.pi * _TAILS_DOF)
+    log_t = (
+        scipy.special.gammaln((_TAILS_DOF + 1) / 2)
+        - scipy.special.gammaln(_TAILS_DOF / 2)
+        - 0.5 * np.log(np.pi * _TAILS_DOF)
+    )
     log_t = log_t - 0.5 * (_TAILS_DOF + 1) * np.log1p(squares / _TAILS_DOF) - 0.5 * np.log(_SHRINK)
     weight = precision * _SHRINK
     normal = -0.5 * np.log(2 * np.pi * _SHRINK / weight) - 0.5 * weight * squares
@@ -129,7 +133,9 @@ def _tails_over_normal(residuals: Floats) -> float:
         return 0.0
     z = residuals / np.sqrt(np.mean(residuals**2))
     t = np.outer(1 / _SCALES, z)
-    log_t = (special.gammaln(2.5) - special.gammaln(2) - 0.5 * np.log(4 * np.pi) - 2.5 * np.log1p(t**2 / 4)).sum(axis=1)
+    log_t = (
+        scipy.special.gammaln(2.5) - scipy.special.gammaln(2) - 0.5 * np.log(4 * np.pi) - 2.5 * np.log1p(t**2 / 4)
+    ).sum(axis=1)
     normal = -0.5 * len(z) * (np.log(2 * np.pi) + 1)
     return float((log_t - len(z) * np.log(_SCALES)).max() - normal)
 
@@ -222,7 +228,7 @@ def drawn_shapes(components: Components) -> Floats:
         for _ in range(30):
             root = (1 + root) ** (1 / d)
         steps = root ** -np.arange(1.0, d)
-        numbers = special.ndtri(np.clip((0.5 + np.outer(np.arange(SHAPES), steps)) % 1, 1e-6, 1 - 1e-6))
+        numbers = scipy.special.ndtri(np.clip((0.5 + np.outer(np.arange(SHAPES), steps)) % 1, 1e-6, 1 - 1e-6))
     return _latent(components, numbers)
 
 
@@ -251,7 +257,7 @@ class _Density:
     def share(self, shapes: Shapes) -> Floats:
         """(n,) probability of each shape, in place of all."""
         log = self.log_probability(shapes.latent) + np.log(len(shapes.weight) * shapes.weight)
-        return np.asarray(np.exp(log - special.logsumexp(log)))
+        return np.asarray(np.exp(log - scipy.special.logsumexp(log)))
 
     def __call__(self, numbers: Floats) -> Floats:
         """Log density (w,) of the standard normal numbers (w, d − 1) behind the ratios."""
@@ -281,7 +287,7 @@ def _more(shapes: Shapes, few: Sequence[_Density], densities: Sequence[_Density]
     numbers = np.vstack([shapes.latent[:, 1:], *drawn])
     prior = -0.5 * np.sum(numbers**2, axis=1) - 0.5 * (d - 1) * np.log(2 * np.pi)
     by_any = [prior + np.log(n), *(proposal.log_probability(numbers) + np.log(_MORE) for proposal in proposals)]
-    weight = np.exp(prior - special.logsumexp(by_any, axis=0))
+    weight = np.exp(prior - scipy.special.logsumexp(by_any, axis=0))
     return Shapes(_latent(components, numbers), weight / weight.sum())
 
 

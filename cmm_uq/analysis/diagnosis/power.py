@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.analysis.diagnosis.comparison.combinations import CombinationPrior
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
@@ -158,12 +158,12 @@ class Naming:
         weight = odds + self.priors[:, None]
         kinds = np.array([explanation.kind for explanation in self.explanations])
         nothing = np.full((1, odds.shape[1]), CombinationPrior(self.explanations).log([]))
-        none = special.logsumexp(np.vstack([nothing, weight[kinds == UNKNOWN]]), axis=0)
+        none = scipy.special.logsumexp(np.vstack([nothing, weight[kinds == UNKNOWN]]), axis=0)
         others = weight[(kinds == EFFECT) & (np.arange(len(kinds)) != true)]
         other = others.max(axis=0, initial=-np.inf)
         asserted = weight[true] - np.maximum(none, other)
         without_rival = np.minimum(asserted, weight[true] - other + np.log(NOT_TOLD_APART))
-        all_but_certain = weight[true] - special.logsumexp(np.vstack([none, others]), axis=0) - CERTAIN
+        all_but_certain = weight[true] - scipy.special.logsumexp(np.vstack([none, others]), axis=0) - CERTAIN
         return np.asarray(np.maximum(without_rival, all_but_certain))
 
 
@@ -204,7 +204,7 @@ class _Rule:
         if self.coloured is not None:
             drawn, along = self.coloured.draws(random, draws), self.comparison.rest(self.coloured.covariance(direction))
         white = self.comparison.rest(drawn)
-        even = special.ndtri((random.permutation(draws) + 0.5) / draws)
+        even = scipy.special.ndtri((random.permutation(draws) + 0.5) / draws)
         variance = float((direction.T @ along).item())
         white = white + along / variance * (np.sqrt(variance) * even - direction.T @ white)
         certified = self.comparison.certified
@@ -247,13 +247,13 @@ class Thresholds:
     def noises(self) -> Floats:
         """(q,) s/σ at evenly probable sizes of the residuals at right angles to the effect."""
         count = max(self.left - 1, 1)
-        squares = special.chdtri(count, 1 - (np.arange(_NOISES) + 0.5) / _NOISES)
+        squares = scipy.special.chdtri(count, 1 - (np.arange(_NOISES) + 0.5) / _NOISES)
         return np.asarray(np.sqrt((self.known + squares) / (self.known + count)))
 
     def detects(self, length: Floats) -> Floats:
         """Probability (d,) that the test rejects, for visible lengths (d,)."""
         gate = self.detected * self.noises[:, None]
-        return np.asarray((special.ndtr(length - gate) + special.ndtr(-length - gate)).mean(axis=0))
+        return np.asarray((scipy.special.ndtr(length - gate) + scipy.special.ndtr(-length - gate)).mean(axis=0))
 
     def names(self, length: Floats) -> Floats:
         """Probability (d,) that it is called by its name."""
@@ -266,7 +266,9 @@ class Thresholds:
             beside = 1 - cosine**2
             room = z**2 - beside * (named * noises) ** 2  # what is left of it for the rival's own z²
             rival, spread = np.sqrt(np.maximum(room, 0.0)), np.sqrt(beside)
-            below = special.ndtr((rival - cosine * z) / spread) - special.ndtr((-rival - cosine * z) / spread)
+            below = scipy.special.ndtr((rival - cosine * z) / spread) - scipy.special.ndtr(
+                (-rival - cosine * z) / spread
+            )
             passed *= np.where(room > 0, below, 0.0)
         density = np.exp(-0.5 * _Z**2)
         return np.asarray(passed.mean(axis=0) @ density / density.sum())

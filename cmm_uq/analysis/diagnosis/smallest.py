@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from math import comb, sqrt
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from cmm_uq.analysis.diagnosis.comparison.combinations import EFFECTS
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
@@ -159,7 +159,7 @@ def thresholds(view: Visibility, which: Sequence[int], columns: Floats, alpha: f
         pair = float(np.log(EFFECTS[2] / EFFECTS[0]) - np.log(comb(count, 2)) + np.log(NOTHING) + np.log(count - 1))
     for i, index in enumerate(which):
         each = _between(dof * np.log1p(sizes[i] ** 2 / dof), odds[:, i], dof * np.log1p(LENGTHS**2 / dof))
-        statistic = special.logsumexp(prior[:, None] + each, axis=0)
+        statistic = scipy.special.logsumexp(prior[:, None] + each, axis=0)
         if pair is not None:
             statistic = np.logaddexp(statistic, pair + each[index])
         (detected,) = _passes((statistic - gate)[None])
@@ -192,7 +192,7 @@ def _rivals(naming: Naming, odds: Floats, true: int) -> tuple[Floats, Floats]:
     kinds = np.array([explanation.kind for explanation in naming.explanations])
     weight = odds + naming.priors[:, None]
     known = (kinds == EFFECT) & (np.arange(len(kinds)) != true)
-    functions = special.logsumexp(weight[kinds == UNKNOWN], axis=0, keepdims=True)
+    functions = scipy.special.logsumexp(weight[kinds == UNKNOWN], axis=0, keepdims=True)
     others = np.vstack([weight[known] + CERTAIN, functions])
     lengths = _passes(weight[true] - others)
     closest = np.argsort(-lengths, kind="stable")[:_RIVALS]

@@ -8,8 +8,8 @@ from functools import partial
 from itertools import groupby
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg, special
 
 from cmm_uq.analysis.screening.columns import SENSORS, Finding, about_whole_column, column_findings, finding, span
 from cmm_uq.analysis.screening.damage import coordinate_findings, outside_travel
@@ -133,7 +133,7 @@ def gross_outliers(linear: LinearModel, measurement: NDArray[np.int64], least: f
     found: list[tuple[int, float]] = []
     scale = np.array([u.scale for u in linear.unknowns])
     for _ in range(max(1, len(keep) // 10)):
-        U, s, _ = linalg.svd(reduced.design[keep] * scale, full_matrices=False)
+        U, s, _ = scipy.linalg.svd(reduced.design[keep] * scale, full_matrices=False)
         U = U[:, s > 1e-9 * s[0]] if s.size else U
         dof = reduced.count - (~keep).sum() - U.shape[1] - 1
         if dof < 3:
@@ -144,7 +144,7 @@ def gross_outliers(linear: LinearModel, measurement: NDArray[np.int64], least: f
         with np.errstate(divide="ignore"):
             t = np.where(rest > 0, np.abs(residual) / np.sqrt(free * np.maximum(rest / dof, least**2)), 0.0)
         worst = int(np.argmax(t))
-        if 2 * special.stdtr(dof, -t[worst]) * len(measurement) > GROSS:
+        if 2 * scipy.special.stdtr(dof, -t[worst]) * len(measurement) > GROSS:
             break
         index = int(np.flatnonzero(keep)[worst])
         found.append((index, float(t[worst])))

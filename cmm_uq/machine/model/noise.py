@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
+import scipy
 
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.machine.model.measurement import RecordingModel
@@ -40,7 +40,7 @@ def noise_of(model: RecordingModel, used: np.ndarray | None = None, values: Floa
     turn, along = machine_axes(rows, sensitivity)
     block = repeated_quantity(model, chosen)
     helmert, count = _helmert(block)
-    turn = sparse.csr_array(helmert @ turn)
+    turn = scipy.sparse.csr_array(helmert @ turn)
     axes = np.asarray(abs(helmert).power(2) @ axis_variances(along, artefact.noise_scale[chosen]))
     reading = axes.sum(axis=1)
     length = growing_lengths(model, xyz)[chosen]
@@ -88,7 +88,7 @@ def sensitivities(model: RecordingModel, xyz: Floats) -> Floats:
     return found
 
 
-def machine_axes(rows: Ints, sensitivity: Floats) -> tuple[sparse.csr_array, Floats]:
+def machine_axes(rows: Ints, sensitivity: Floats) -> tuple[scipy.sparse.csr_array, Floats]:
     """Turns observations of one point among themselves so that each sees the noise of one axis, as nearly as that goes.
 
     Returns turn (m, m), and the sensitivities (m, slots, 3) afterwards.
@@ -96,7 +96,7 @@ def machine_axes(rows: Ints, sensitivity: Floats) -> tuple[sparse.csr_array, Flo
     m = len(rows)
     one = rows.shape[1] == 1 and len(np.unique(rows)) < m and np.any(sensitivity)
     if not one:
-        return sparse.eye_array(m, format="csr"), sensitivity
+        return scipy.sparse.eye_array(m, format="csr"), sensitivity
     order = np.argsort(rows[:, 0], kind="stable")
     _, starts, sizes = np.unique(rows[order, 0], return_index=True, return_counts=True)
     along, at, across, values = sensitivity.copy(), [], [], []
@@ -114,7 +114,7 @@ def machine_axes(rows: Ints, sensitivity: Floats) -> tuple[sparse.csr_array, Flo
         across.append(np.tile(groups, (1, size)).ravel())
         values.append(turned.reshape(len(groups), -1).ravel())
     where = np.concatenate(at), np.concatenate(across)
-    return sparse.csr_array((np.concatenate(values), where), shape=(m, m)), along
+    return scipy.sparse.csr_array((np.concatenate(values), where), shape=(m, m)), along
 
 
 def repeated_quantity(model: RecordingModel, chosen: np.ndarray) -> Ints:
@@ -131,7 +131,7 @@ def repeated_quantity(model: RecordingModel, chosen: np.ndarray) -> Ints:
     return np.asarray(found.ravel(), dtype=np.int64)
 
 
-def _helmert(block: Ints) -> tuple[sparse.csr_array, Floats]:
+def _helmert(block: Ints) -> tuple[scipy.sparse.csr_array, Floats]:
     """Turns repeats into their mean, times √n, and contrasts; and n (m,) for the former, 0 for the latter."""
     m = len(block)
     order = np.argsort(block, kind="stable")
@@ -145,25 +145,27 @@ def _helmert(block: Ints) -> tuple[sparse.csr_array, Floats]:
         values.append(np.tile(basis.data, len(groups)))
         count[groups[:, 0]] = n
     where = np.concatenate(at), np.concatenate(across)
-    return sparse.csr_array((np.concatenate(values), where), shape=(m, m)), count
+    return scipy.sparse.csr_array((np.concatenate(values), where), shape=(m, m)), count
 
 
-def mean_and_contrasts(n: int) -> sparse.csr_array:
+def mean_and_contrasts(n: int) -> scipy.sparse.csr_array:
     """An orthonormal matrix (n, n) whose first row is constant.
 
     Many repeats are taken in parts, and the means of the parts together, so that most of its values are zero.
     """
     if n <= _WHOLE:
-        return sparse.csr_array(np.vstack([np.full(n, 1 / np.sqrt(n)), _contrasts(n)]))
+        return scipy.sparse.csr_array(np.vstack([np.full(n, 1 / np.sqrt(n)), _contrasts(n)]))
     sizes = np.array([len(part) for part in np.array_split(np.arange(n), int(np.sqrt(n)))])
-    within = sparse.block_diag([np.vstack([np.full(k, 1 / np.sqrt(k)), _contrasts(k)]) for k in sizes], format="csr")
+    within = scipy.sparse.block_diag(
+        [np.vstack([np.full(k, 1 / np.sqrt(k)), _contrasts(k)]) for k in sizes], format="csr"
+    )
     # a reflection that turns the first axis into the direction of what all means have in common
     whole = np.sqrt(sizes / n)
     away = np.where(np.arange(len(sizes)) == 0, 1.0, 0.0) - whole
     among = np.eye(len(sizes)) - 2 * np.outer(away, away) / (away @ away)
     first = np.cumsum(sizes) - sizes
     others = np.setdiff1d(np.arange(n), first)
-    return sparse.csr_array(sparse.vstack([sparse.csr_array(among) @ within[first], within[others]]))
+    return scipy.sparse.csr_array(scipy.sparse.vstack([scipy.sparse.csr_array(among) @ within[first], within[others]]))
 
 
 def _contrasts(n: int) -> Floats:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
@@ -128,17 +128,17 @@ class Display:
         return cls(step, recorded - found.moved(residual[:, None])[:, :, 0], rows, sensitivity)
 
     @cached_property
-    def _all(self) -> sparse.csr_array:
+    def _all(self) -> scipy.sparse.csr_array:
         m, slots = self.rows.shape
         row = np.repeat(np.arange(m), 3 * slots)
         column = (3 * self.rows[:, :, None] + np.arange(3)).ravel()
-        return sparse.csr_array((self.sensitivity.ravel(), (row, column)), shape=(m, self.xyz.size))
+        return scipy.sparse.csr_array((self.sensitivity.ravel(), (row, column)), shape=(m, self.xyz.size))
 
     def moved(self, changed: Floats) -> Floats:
         """Least displacement of the points (n, 3, b) that changes the observations by (m, b), mm."""
         J = self._all
-        least = sparse.eye_array(J.shape[0]) * 1e-12
-        solved = sparse.linalg.splu(sparse.csc_array(J @ J.T + least)).solve(changed)
+        least = scipy.sparse.eye_array(J.shape[0]) * 1e-12
+        solved = scipy.sparse.linalg.splu(scipy.sparse.csc_array(J @ J.T + least)).solve(changed)
         return np.asarray((J.T @ solved).reshape(len(self.xyz), 3, -1), dtype=np.float64)
 
     def rounded(self, noise: Floats) -> Floats:

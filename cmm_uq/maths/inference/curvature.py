@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg, special
+import scipy
 
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.inference.ensembles import ENSEMBLES, Progress, run_ensembles
@@ -202,8 +202,8 @@ class _Density:
         every = np.hstack([reduced.design, *flat])
         every = every / np.maximum(np.linalg.norm(every, axis=0), 1e-300)
         if every.shape[1] > _MANY * len(every):  # of the same singular values, and vectors on the left
-            every = linalg.qr(every.T, mode="r", overwrite_a=True)[0][: len(every)].T
-        U, s, _ = linalg.svd(every, full_matrices=False)
+            every = scipy.linalg.qr(every.T, mode="r", overwrite_a=True)[0][: len(every)].T
+        U, s, _ = scipy.linalg.svd(every, full_matrices=False)
         Q = U[:, s > _NEGLIGIBLE * s[0]]
         self.design, self.observed, self.count = Q.T @ reduced.design, Q.T @ observed, reduced.count
         self.squares = float(observed @ observed)
@@ -288,7 +288,7 @@ class _Density:
     def unpacked(self, theta: Floats) -> tuple[Floats, Floats]:
         shapes = np.empty((len(theta), len(self.shaped)))
         for j, (t, distribution, _) in enumerate(self._quantiles):
-            shapes[:, j] = np.exp(np.interp(special.ndtr(theta[:, j]), distribution, t))
+            shapes[:, j] = np.exp(np.interp(scipy.special.ndtr(theta[:, j]), distribution, t))
         sigma = np.full(len(theta), self.model.sigma) if self.model.sigma is not None else np.exp(theta[:, -1])
         return shapes, sigma
 

@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import Floats, Ints
@@ -182,5 +182,7 @@ def uncertainty_of_sum(
     if not u:
         return 0.0, 0.0
     sd = np.maximum(sd, 1e-12 * u)
-    half = root(lambda t: float(special.ndtr(t * u / sd).mean()) - _COVERAGE, 0.0, float(sd.max() / u) * 2.0, 1e-9)
+    half = root(
+        lambda t: float(scipy.special.ndtr(t * u / sd).mean()) - _COVERAGE, 0.0, float(sd.max() / u) * 2.0, 1e-9
+    )
     return u, half * u

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.inference.proposals import LogDensity, Numbers
@@ -254,7 +254,7 @@ def normal_scores(values: Floats) -> Floats:
     for rank, column in zip(ranks.T, flat.T, strict=True):
         _, place, count = np.unique(column, return_inverse=True, return_counts=True)
         rank[:] = (np.cumsum(count) - 0.5 * (count - 1))[place]
-    return np.asarray(special.ndtri((ranks - 0.375) / (len(flat) + 0.25)), dtype=np.float64).reshape(values.shape)
+    return np.asarray(scipy.special.ndtri((ranks - 0.375) / (len(flat) + 0.25)), dtype=np.float64).reshape(values.shape)
 
 
 def _split_rhat(values: Floats) -> Floats:

@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg, sparse
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
@@ -64,7 +64,7 @@ class Freedoms:
         """Divided by the noise scale (m,) of the observations."""
         return Freedoms(self.columns / scale[:, None], self.index, self.blocks)
 
-    def turned(self, turn: sparse.csr_array) -> Freedoms:
+    def turned(self, turn: scipy.sparse.csr_array) -> Freedoms:
         """Of observations mixed by a matrix (m, m); one block where it mixes those of several."""
         among = turn.tocoo()
         whole = Freedoms.of(self.dense()) if np.any(self.index[among.row] != self.index[among.col]) else self
@@ -128,7 +128,7 @@ def reached(columns: Floats) -> Floats:
     """Orthonormal basis (m, r) of what columns (m, q) reach, by QR with pivoting."""
     if not columns.size:
         return np.zeros((len(columns), 0))
-    Q, R, _ = linalg.qr(columns, mode="economic", pivoting=True)
+    Q, R, _ = scipy.linalg.qr(columns, mode="economic", pivoting=True)
     diagonal = np.abs(np.diag(R))
     return np.asarray(Q[:, diagonal > _DEPENDENT * diagonal[0]], dtype=np.float64)
 
@@ -263,7 +263,7 @@ def solve(model: LinearModel, most: int | None = None) -> LeastSquares:
     value = model.prior_mean.copy()
     scale = model.scale[free]
     target = reduced.observed - reduced.design @ value
-    U, s, Vt = linalg.svd(reduced.design[:, free] * scale, full_matrices=False)
+    U, s, Vt = scipy.linalg.svd(reduced.design[:, free] * scale, full_matrices=False)
     rank = int(np.sum(s > RANK_TOLERANCE * s[0])) if s.size and s[0] > 0 else 0
     nothing = _NOTHING
     if most is not None and most < rank:
@@ -315,9 +315,9 @@ def _simplest(null_space: Floats, nothing: float) -> Floats:
     """The same space, each column with a one where no other has anything; parts up to ``nothing`` are zero."""
     if null_space.shape[1] == 0:
         return null_space
-    _, _, order = linalg.qr(null_space.T, mode="economic", pivoting=True)
+    _, _, order = scipy.linalg.qr(null_space.T, mode="economic", pivoting=True)
     pivots = order[: null_space.shape[1]]
-    columns = null_space @ linalg.inv(null_space[pivots])
+    columns = null_space @ scipy.linalg.inv(null_space[pivots])
     return np.where(np.abs(columns) < nothing, 0.0, columns)
 
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse, special
+import scipy
 
 from cmm_uq.base.points import Floats, Ints
 
@@ -84,7 +84,7 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class Components:
-    turn: sparse.csr_array  # (m, m) T, orthonormal
+    turn: scipy.sparse.csr_array  # (m, m) T, orthonormal
     shares: Floats  # (m, 6) of each variance in that of each turned observation
     slow: Floats  # (m, 3·…) columns S of the unturned observations, (m, 0) where no time is recorded
     frequency: Floats  # of each of those columns, in half turns over the recording; 0 is a constant
@@ -329,13 +329,13 @@ def display_shared(sigma: Floats, step: float) -> Floats:
 
 def _rate(latent: Floats) -> Floats:
     """Standard normal numbers as rates, in units of one over the duration: zero, or of uniform logarithm."""
-    part = (special.ndtr(latent) - WALK) / (1 - WALK)
+    part = (scipy.special.ndtr(latent) - WALK) / (1 - WALK)
     return np.where(part > 0, np.exp(part * np.log(FASTEST)), 0.0)
 
 
 def _present(latent: Floats, absent: float) -> Floats:
     """Standard normal numbers as probabilities within what is left when the component is absent, 0 where it is."""
-    return np.asarray(np.clip((special.ndtr(latent) - absent) / (1 - absent), 0.0, 1 - 1e-9))
+    return np.asarray(np.clip((scipy.special.ndtr(latent) - absent) / (1 - absent), 0.0, 1 - 1e-9))
 
 
 def _half_cauchy(latent: Floats, name: str) -> Floats:

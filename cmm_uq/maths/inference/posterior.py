@@ -14,8 +14,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
@@ -66,7 +66,7 @@ class Density:
     @cached_property
     def _factor(self) -> tuple[Floats, Floats, float, int]:
         reduced = self.model.reduced
-        Q, R = linalg.qr(reduced.design, mode="economic")
+        Q, R = scipy.linalg.qr(reduced.design, mode="economic")
         explained = Q.T @ reduced.observed
         rest = reduced.observed - Q @ explained
         return np.asarray(R, dtype=np.float64), explained, float(rest @ rest), reduced.count
@@ -100,10 +100,10 @@ class Density:
         sigma2 = np.exp(2 * log_sigma)
         precision = R.T @ R / sigma2 + np.diag(self._weight)
         scale = 1 / np.sqrt(np.diag(precision))
-        factor = linalg.cholesky(precision * np.outer(scale, scale), lower=True)
+        factor = scipy.linalg.cholesky(precision * np.outer(scale, scale), lower=True)
         right = (R.T @ explained / sigma2 + self._weight * self.model.prior_mean) * scale
-        mean = scale * linalg.cho_solve((factor, True), right)
-        covariance = np.outer(scale, scale) * linalg.cho_solve((factor, True), np.eye(len(scale)))
+        mean = scale * scipy.linalg.cho_solve((factor, True), right)
+        covariance = np.outer(scale, scale) * scipy.linalg.cho_solve((factor, True), np.eye(len(scale)))
         misfit = explained - R @ mean
         deviation = mean - self.model.prior_mean
         squares = (misfit @ misfit + rest) / sigma2 + deviation @ (self._weight * deviation)
@@ -150,7 +150,7 @@ class Density:
 
 def _lower(covariance: Floats) -> Floats:
     scale = np.sqrt(np.diag(covariance))
-    return np.asarray(scale[:, None] * linalg.cholesky(covariance / np.outer(scale, scale), lower=True))
+    return np.asarray(scale[:, None] * scipy.linalg.cholesky(covariance / np.outer(scale, scale), lower=True))
 
 
 def sample(model: LinearModel, seed: int, progress: Progress | None = None) -> Posterior:

@@ -18,8 +18,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.inference import proposals
@@ -86,13 +86,13 @@ class Numbers:
     def of(self, latent: Floats) -> tuple[Ints, Floats]:
         """Set (w,) and coordinates (w, D) of numbers (w, d); what does not matter in a set is not to be looked at."""
         column = {name: latent[:, i] for i, name in enumerate(self.names)}
-        on = np.column_stack([column[name] > special.ndtri(_SWITCHES[name]) for name in self.switches])
+        on = np.column_stack([column[name] > scipy.special.ndtri(_SWITCHES[name]) for name in self.switches])
         if "rate" in column:
             on[:, self.switches.index("rate")] &= on[:, self.switches.index(SLOW)]
         # logarithm of the probability of more, given that it is present
-        log = {name: special.log_ndtr(-column[name]) - np.log1p(-_SWITCHES[name]) for name in self.switches}
+        log = {name: scipy.special.log_ndtr(-column[name]) - np.log1p(-_SWITCHES[name]) for name in self.switches}
         beyond = {name: np.minimum(each, 0.0) for name, each in log.items()}
-        found = {name: np.maximum(-special.ndtri_exp(each), _LEAST) for name, each in beyond.items()}
+        found = {name: np.maximum(-scipy.special.ndtri_exp(each), _LEAST) for name, each in beyond.items()}
         if "spread" in column:
             length = np.sqrt(-2 * beyond["spread"]) / np.maximum(np.hypot(column["first"], column["second"]), 1e-300)
             found |= {name: length * column[name] for name in ("first", "second")}
@@ -112,7 +112,7 @@ class Numbers:
         found = dict(zip(self.names, normal.T, strict=True))
         if "log_sigma" in column:
             found["log_sigma"] = column["log_sigma"]
-        beyond = {name: special.log_ndtr(-column[name]) for name in self.switches if name != "spread"}
+        beyond = {name: scipy.special.log_ndtr(-column[name]) for name in self.switches if name != "spread"}
         if "spread" in found:
             square = column["first"] ** 2 + column["second"] ** 2
             beyond["spread"] = -0.5 * square
@@ -122,11 +122,11 @@ class Numbers:
                 found[name] = np.where(present, length * column[name], found[name])
         for i, name in enumerate(self.switches):
             absent = _SWITCHES[name]
-            without = special.ndtri(absent * uniform[:, i])
+            without = scipy.special.ndtri(absent * uniform[:, i])
             if name == "rate":
                 slow = on[:, self.switches.index(SLOW)]
                 without = np.where(slow, without, found[name])
-            found[name] = np.where(on[:, i], -special.ndtri_exp(np.log1p(-absent) + beyond[name]), without)
+            found[name] = np.where(on[:, i], -scipy.special.ndtri_exp(np.log1p(-absent) + beyond[name]), without)
         return np.column_stack([found[name] for name in self.names])
 
 
@@ -211,7 +211,7 @@ def present(density: LogDensity, begin: Present, seed: int, looks: int = _LOOKS,
         gains = [*gains, np.maximum(density(z) - begin.log_density(z), _NEVER)][-_RECALLED:]
         every, gain = np.vstack(draws), np.concatenate(gains)
         from_any = np.stack([each.log_density(every) for each in fits[-_RECALLED:]])
-        known = begin.log_density(every) - special.logsumexp(from_any, axis=0)
+        known = begin.log_density(every) - scipy.special.logsumexp(from_any, axis=0)
         before, power = power, highest_power(gain, known, power, enough * len(every))
         enough = max(0.5 * enough, _LEAST_ENOUGH) if power < min(1.0, _STUCK * before) else enough
         fits.append(_fitted(begin, every, weights(power * gain + known)))

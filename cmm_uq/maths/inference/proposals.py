@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from cmm_uq.base.points import Floats
 
@@ -93,7 +93,9 @@ class Proposal:
     @cached_property
     def _constant(self) -> float:
         d = len(self.centre)
-        constant = special.gammaln(0.5 * (_DOF + d)) - special.gammaln(0.5 * _DOF) - 0.5 * d * np.log(np.pi * _DOF)
+        constant = (
+            scipy.special.gammaln(0.5 * (_DOF + d)) - scipy.special.gammaln(0.5 * _DOF) - 0.5 * d * np.log(np.pi * _DOF)
+        )
         return float(constant - np.linalg.slogdet(self.factor)[1])
 
     @cached_property
@@ -200,7 +202,7 @@ def _mixture(density: LogDensity, centre: Floats, factor: Floats, random: Any) -
                 break
         every, gain = np.vstack(draws), np.concatenate(gains)
         from_any = np.stack([proposal.log_density(every) for proposal in proposals[-_RECALLED:]])
-        known = -0.5 * np.sum(every**2, axis=1) - special.logsumexp(from_any, axis=0)
+        known = -0.5 * np.sum(every**2, axis=1) - scipy.special.logsumexp(from_any, axis=0)
         before, power = power, highest_power(gain, known, power, enough * len(every))
         enough = max(0.5 * enough, _LEAST_ENOUGH) if power < min(1.0, _STUCK * before) else enough
         proposals.append(_fitted(proposals[-1], every, weights(power * gain + known), random))
@@ -218,7 +220,7 @@ def _fitted(proposal: Proposal, z: Floats, weight: Floats, random: Any) -> Propo
     found = Proposal(proposal.centre, proposal.factor, np.full(_PARTS, 1 / _PARTS), centres, factors)
     for _ in range(_REFITS):
         log, squares = found.log_each(z)
-        share = weight[:, None] * np.exp(log - special.logsumexp(log, axis=1, keepdims=True))
+        share = weight[:, None] * np.exp(log - scipy.special.logsumexp(log, axis=1, keepdims=True))
         part = share.sum(axis=0)
         pull = share * (_DOF + d) / (_DOF + squares)
         # fewer draws say nothing about a distribution of its own

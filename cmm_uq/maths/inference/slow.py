@@ -15,7 +15,7 @@ from functools import cached_property
 from math import copysign, isnan
 
 import numpy as np
-from scipy import linalg
+import scipy
 
 from cmm_uq.base.points import Floats, Ints
 
@@ -112,7 +112,7 @@ class SlowFirst:
             factor = np.linalg.cholesky(precision)
             solved = (weights @ across).reshape(len(at), -1, c)
             for lower, each in zip(factor, solved, strict=True):
-                each[:] = linalg.lapack.dtrtrs(lower.T, each.T, trans=1, overwrite_b=1)[0].T
+                each[:] = scipy.linalg.lapack.dtrtrs(lower.T, each.T, trans=1, overwrite_b=1)[0].T
             rows = np.zeros((len(at), R, c))
             rows[:, near] = solved
             left[at] -= rows @ rows.transpose(0, 2, 1)

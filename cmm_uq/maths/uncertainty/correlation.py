@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import Floats
@@ -157,7 +157,7 @@ def _copula(names: Sequence[str], inputs: Sequence[Distribution], matrix: Floats
     root = square_root(underlying)
 
     def draw(rng: np.random.Generator, n: int) -> list[Floats]:
-        probabilities = _inside(special.ndtr(root @ rng.standard_normal((len(inputs), n))))
+        probabilities = _inside(scipy.special.ndtr(root @ rng.standard_normal((len(inputs), n))))
         return [given.quantile(p) for given, p in zip(inputs, probabilities, strict=True)]
 
     return draw
@@ -171,11 +171,11 @@ def _underlying_correlation(a: tuple[str, Distribution], b: tuple[str, Distribut
     """Correlation of two normal variables that gives the two transformed ones the wanted correlation."""
     if wanted == 0:
         return 0.0
-    nodes, weights = special.roots_hermitenorm(_HERMITE_NODES)
+    nodes, weights = scipy.special.roots_hermitenorm(_HERMITE_NODES)
     weights = weights / np.sqrt(2 * np.pi)
-    inside = _inside(special.ndtr(nodes))
+    inside = _inside(scipy.special.ndtr(nodes))
     orders = np.arange(1, _HERMITE_NODES // 2)
-    basis = special.eval_hermitenorm(orders[:, None], nodes) / np.sqrt(special.factorial(orders))[:, None]
+    basis = scipy.special.eval_hermitenorm(orders[:, None], nodes) / np.sqrt(scipy.special.factorial(orders))[:, None]
     # by Mehler's formula the covariance of the two is a power series in the correlation of the normal variables
     terms = np.prod([basis @ (weights * given.quantile(inside)) for _, given in (a, b)], axis=0)
     spread = float(a[1].standard_deviation) * float(b[1].standard_deviation)

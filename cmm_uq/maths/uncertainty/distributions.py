@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
@@ -33,7 +33,7 @@ class DistributionShape:
 
 
 POINT = DistributionShape(0.0, lambda _, n: np.zeros(n), np.zeros_like)
-NORMAL = DistributionShape(1.0, lambda rng, n: rng.standard_normal(n), special.ndtri)
+NORMAL = DistributionShape(1.0, lambda rng, n: rng.standard_normal(n), lambda p: scipy.special.ndtri(p))
 RECTANGULAR = DistributionShape(1 / 3, lambda rng, n: 2 * rng.random(n) - 1, lambda p: 2 * p - 1)
 TRIANGULAR = DistributionShape(
     1 / 6,
@@ -50,13 +50,13 @@ def t_shape(dof: float) -> DistributionShape:
     """T distribution; of infinite variance with two degrees of freedom or fewer."""
     variance = dof / (dof - 2) if dof > 2 else np.inf
     return DistributionShape(
-        variance, lambda rng, n: rng.standard_t(dof, n), lambda p: np.asarray(special.stdtrit(dof, p))
+        variance, lambda rng, n: rng.standard_t(dof, n), lambda p: np.asarray(scipy.special.stdtrit(dof, p))
     )
 
 
 def gamma_shape(order: float) -> DistributionShape:
     return DistributionShape(
-        order, lambda rng, n: rng.standard_gamma(order, n), lambda p: np.asarray(special.gammaincinv(order, p))
+        order, lambda rng, n: rng.standard_gamma(order, n), lambda p: np.asarray(scipy.special.gammaincinv(order, p))
     )
 
 

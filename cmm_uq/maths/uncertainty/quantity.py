@@ -17,7 +17,7 @@ from decimal import ROUND_HALF_UP, ROUND_UP, Decimal
 from math import ceil, floor, isfinite, isinf, isnan, log10
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Number
@@ -207,10 +207,10 @@ def _quantile(tail: float, p: Floats, value: Floats, low: Floats, high: Floats) 
     """Where the mixture's distribution function reaches a probability, by halving between the outermost ends."""
     own = low if tail < 0.5 else high
     below, above = float(own.min()), float(own.max())
-    factor = -float(special.ndtri(_TAIL))
+    factor = -float(scipy.special.ndtri(_TAIL))
     for _ in range(_HALVINGS):
         middle = 0.5 * (below + above)
         width = np.where(middle < value, value - low, high - value) / factor
-        reached = float(p @ special.ndtr((middle - value) / np.maximum(width, _NO_WIDTH)))
+        reached = float(p @ scipy.special.ndtr((middle - value) / np.maximum(width, _NO_WIDTH)))
         below, above = (middle, above) if reached < tail else (below, middle)
     return 0.5 * (below + above)

@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
@@ -160,7 +160,7 @@ def coverage_factor(dof: Floats | float, coverage: float) -> Floats:
     p = (1 + coverage) / 2
     # a t quantile with very many degrees of freedom is that of the normal distribution
     many = truncated > 1e10
-    return np.asarray(np.where(many, special.ndtri(p), special.stdtrit(np.where(many, 1.0, truncated), p)))
+    return np.asarray(np.where(many, scipy.special.ndtri(p), scipy.special.stdtrit(np.where(many, 1.0, truncated), p)))
 
 
 def factor_of_noise(noise: Quantity, u_noise: float = 1.0, u_known: float = 0.0) -> float:

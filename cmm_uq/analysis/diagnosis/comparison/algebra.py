@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse, special
 
 from cmm_uq.analysis.diagnosis.noise import NoiseKind
 from cmm_uq.base.points import Floats
@@ -169,7 +169,7 @@ class SigmaIntegral:
     def uniform(self) -> float:
         """Constant of the gamma integral over a uniform ln σ."""
         half, step = 0.5 * self.degrees, float(np.log(self.sigma[1] / self.sigma[0]))
-        return float(special.gammaln(half) + (half - 1) * np.log(2) + self.log_sigma[0] - np.log(step))
+        return float(scipy.special.gammaln(half) + (half - 1) * np.log(2) + self.log_sigma[0] - np.log(step))
 
     @cached_property
     def table(self) -> tuple[Floats, Floats] | None:
@@ -178,7 +178,7 @@ class SigmaIntegral:
             return None
         nodes = np.linspace(-16.0, 8.0, 1500) + np.log(max(self.square, 1e-300))
         exponent = self.log_sigma - self.degrees * np.log(self.sigma) - 0.5 * np.exp(nodes)[:, None] / self.sigma**2
-        return nodes, np.asarray(special.logsumexp(exponent, axis=1), dtype=np.float64)
+        return nodes, np.asarray(scipy.special.logsumexp(exponent, axis=1), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +189,7 @@ class Precision:
     the determinant. ``basis`` (m, g) see :meth:`explained`.
     """
 
-    whitening: sparse.csr_array
+    whitening: scipy.sparse.csr_array
     rows: Floats
     log: float
     basis: Floats
@@ -215,7 +215,7 @@ class Precision:
         return self.whitening.diagonal()[:, None]
 
     @cached_property
-    def _transposed(self) -> sparse.csc_array:
+    def _transposed(self) -> scipy.sparse.csc_array:
         return self.whitening.T
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
@@ -110,7 +110,7 @@ def _of_subsets(count: int, weight: float) -> Floats:
     """Log probability (``count`` + 1,) of one set of none, one, two … of some effects that act as readily as one another."""
     a, b = READILY
     size = np.arange(count + 1)
-    log = special.betaln(a + size, b + count - size) - special.betaln(a, b)
+    log = scipy.special.betaln(a + size, b + count - size) - scipy.special.betaln(a, b)
     log[1:] += np.log(weight)
     return np.asarray(log - np.log(1 + (weight - 1) * -np.expm1(log[0])), dtype=np.float64)
 
@@ -147,7 +147,7 @@ class Combinations:
     @cached_property
     def probability(self) -> dict[Key, float]:
         log = np.array([c.log_posterior for c in self.by_key.values()])
-        return dict(zip(self.by_key, np.exp(log - special.logsumexp(log)).tolist(), strict=True))
+        return dict(zip(self.by_key, np.exp(log - scipy.special.logsumexp(log)).tolist(), strict=True))
 
     def likeliest(self, keys: Iterable[Key]) -> Key:
         """The most probable of some combinations."""

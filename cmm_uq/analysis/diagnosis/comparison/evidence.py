@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg, special
+import scipy
 
 from cmm_uq.analysis.diagnosis.comparison import algebra
 from cmm_uq.analysis.diagnosis.comparison.algebra import Precision, SigmaIntegral
@@ -64,7 +64,7 @@ class CandidateComparison:
         if not self.baseline.shape[1]:
             return np.zeros((len(self.observed), 0))
         length = np.linalg.norm(self.baseline, axis=0)
-        U, s, _ = linalg.svd(self.baseline / np.where(length > 0, length, 1.0), full_matrices=False)
+        U, s, _ = scipy.linalg.svd(self.baseline / np.where(length > 0, length, 1.0), full_matrices=False)
         return np.asarray(U[:, s > 1e-9 * s[0]], dtype=np.float64)
 
     def rest(self, columns: Floats) -> Floats:
@@ -164,7 +164,7 @@ class CandidateComparison:
         every = self.squares if left is None else self._by_noise(left[:, None])[:, :, 0] @ left
         log = self._logs[:, None] + self.log_sigma - self.degrees_of_freedom * np.log(self.sigma)
         log -= 0.5 * every[:, None] / self.sigma**2
-        return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
+        return np.asarray(np.exp(log - scipy.special.logsumexp(log)), dtype=np.float64)
 
     def log_evidence(
         self, left: Floats | None = None, conditions: Sequence[Version] = (), among: Container[int] | None = None
@@ -185,7 +185,7 @@ class CandidateComparison:
     def of_versions(self, index: int, conditions: Sequence[Version] = ()) -> tuple[Ints, Floats, Floats]:
         """Visible versions (v,) of an explanation, log evidence of each beside what is given, and its log weight."""
         found = [
-            (group.member, special.logsumexp(cube[:, :, 0], axis=1), group.weight)
+            (group.member, scipy.special.logsumexp(cube[:, :, 0], axis=1), group.weight)
             for group, cube in self.each(None, conditions, (index,))
         ]
         if not found:
@@ -246,7 +246,7 @@ class CandidateComparison:
         """Probability (kinds,) of each kind of noise, conditional on explanations at their sizes."""
         known = self._beside(None, conditions)
         log = self._integral(known.squares.copy())[:, 0] + known.log
-        return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
+        return np.asarray(np.exp(log - scipy.special.logsumexp(log)), dtype=np.float64)
 
     def each(
         self, data: Floats | None, conditions: Sequence[Version], among: Container[int] | None = None

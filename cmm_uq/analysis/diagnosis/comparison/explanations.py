@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy import linalg
+import scipy
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
@@ -373,7 +373,7 @@ def smooth_functions(covariate: Floats) -> Iterator[Floats]:
     grid = np.linspace(0, 1, _GRID)
     for length in LENGTH_SCALES:
         kernel = np.exp(-0.5 * ((grid[:, None] - grid[None, :]) / length) ** 2)
-        eigenvalues, vectors = linalg.eigh(kernel)
+        eigenvalues, vectors = scipy.linalg.eigh(kernel)
         keep = eigenvalues > _KEPT * eigenvalues[-1]
         cross = np.exp(-0.5 * ((place[:, None] - grid[None, :]) / length) ** 2)
         yield UNKNOWN_SD * cross @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
@@ -386,7 +386,7 @@ def _smooth_in_space(readings: Floats, lengths: tuple[float, ...] = _SPACE_LENGT
     some = distinct[np.unique(np.linspace(0, len(distinct) - 1, _SPACE_PLACES).round().astype(int))]
     among, across = (np.sum((points[:, None] - some) ** 2, axis=2) for points in (some, place))
     for length in lengths:
-        eigenvalues, vectors = linalg.eigh(np.exp(-0.5 * among / length**2))
+        eigenvalues, vectors = scipy.linalg.eigh(np.exp(-0.5 * among / length**2))
         keep = np.flatnonzero(eigenvalues > _KEPT * eigenvalues[-1])[-_SPACE_RANK:]
         factor = np.exp(-0.5 * across / length**2) @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
         yield UNKNOWN_SD * factor

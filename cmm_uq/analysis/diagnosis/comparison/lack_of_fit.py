@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import comb
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse, special
 
 from cmm_uq.analysis.diagnosis.comparison.combinations import EFFECTS
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
@@ -79,10 +79,10 @@ def draw_noise(
     white[order] = random.standard_normal((len(order), draws)) * (1.0 if wider is None else wider)
     white *= side[:, None]
     # the whitening is mostly an orthogonal matrix T between two diagonal ones: D·T·S; the root is then S⁻¹·Tᵀ·D⁻¹·T
-    turned = kind.whitening @ sparse.diags_array(1 / noise_scale)
+    turned = kind.whitening @ scipy.sparse.diags_array(1 / noise_scale)
     squares = turned @ turned.T
     length = np.sqrt(squares.diagonal())
-    if abs(squares - sparse.diags_array(length**2)).max() <= _ORTHOGONAL * float(length.max()) ** 2:
+    if abs(squares - scipy.sparse.diags_array(length**2)).max() <= _ORTHOGONAL * float(length.max()) ** 2:
         found = kind.coloured((turned @ white) / length[:, None])
     else:  # as of readings that follow each other: the symmetric root (m, m) of the covariance without what is slow
         half = kind.coloured(np.eye(len(order)))
@@ -249,14 +249,14 @@ class _Evidence:
     def log_odds(self) -> Floats:
         """Log odds (b,) of something; see :func:`statistic_of`."""
         odds = self.something - self.nothing
-        log_odds = special.logsumexp(log_prior(self.explanations)[:, None] + odds, axis=0)
+        log_odds = scipy.special.logsumexp(log_prior(self.explanations)[:, None] + odds, axis=0)
         if self.lead is None:
             return np.asarray(log_odds, dtype=np.float64)
         pair = np.log(EFFECTS[2] / EFFECTS[0]) - np.log(comb(len(self.single), 2)) + np.log(NOTHING)
         for version, columns in _together(self.lead).items():
             first = version.explanation
             beside = np.ascontiguousarray(self.both[:, columns])[[i for i in self.single if i != first]]
-            gain = special.logsumexp(beside, axis=0) - self.alone[columns]
+            gain = scipy.special.logsumexp(beside, axis=0) - self.alone[columns]
             log_odds[columns] = np.logaddexp(log_odds[columns], pair + (gain + odds[first, columns]))
         return np.asarray(log_odds, dtype=np.float64)
 

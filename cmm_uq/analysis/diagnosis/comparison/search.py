@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.analysis.diagnosis.comparison import explanations as candidate
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key, explore
@@ -114,7 +114,7 @@ def _of(first: ModelComparison, combinations: Combinations, chosen: Key, stated:
     found = first.model if not chosen else with_effects(first, versions, chosen)
     for i in chosen:
         member, evidence, weight = first.comparison.of_versions(i, [v for v in versions if v.explanation != i])
-        probability = np.exp(evidence + weight - special.logsumexp(evidence + weight))
+        probability = np.exp(evidence + weight - scipy.special.logsumexp(evidence + weight))
         other = float(probability[[first.explanations[i].members[m].rough for m in member]].sum())
         if other > ASSERTED or any(combinations.of(j) > combinations.of(i) for j in combinations.imitating(i)):
             rough.add(i)
@@ -248,7 +248,7 @@ def model_comparison(
     nothing, something = comparison.log_evidence()
     log_odds = something[:, 0] - nothing[0]
     prior = log_prior(candidates)
-    log_total = special.logsumexp(np.append(prior + log_odds, np.log(NOTHING)))
+    log_total = scipy.special.logsumexp(np.append(prior + log_odds, np.log(NOTHING)))
     p_value, null, maxima = lack_of_fit(comparison, seed, alpha)
     probability = np.exp(prior + log_odds - log_total)
     return ModelComparison(model, values, comparison, log_odds, probability, p_value, null, maxima)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import linalg, special
+import scipy
 
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
@@ -89,7 +89,7 @@ class SetUpTemperature(OfSetUps):
 
     def _contrasts(self) -> Floats:
         """(q, q − 1) orthonormal, each without a mean (Helmert)."""
-        return np.asarray(linalg.helmert(len(np.unique(self.whose().points.measurement))).T, dtype=np.float64)
+        return np.asarray(scipy.linalg.helmert(len(np.unique(self.whose().points.measurement))).T, dtype=np.float64)
 
 
 class ArtefactBending(OwnFault):
@@ -184,8 +184,8 @@ class OwnForm(OwnFault, CommonSize):
 def _harmonic(degree: int, order: int, polar: Floats, azimuth: Floats) -> Floats:
     """Real spherical harmonic (n,) of mean square one over the sphere."""
     k = abs(order)
-    legendre = special.lpmv(k, degree, np.cos(polar))
-    log_ratio = special.gammaln(degree - k + 1) - special.gammaln(degree + k + 1)
+    legendre = scipy.special.lpmv(k, degree, np.cos(polar))
+    log_ratio = scipy.special.gammaln(degree - k + 1) - scipy.special.gammaln(degree + k + 1)
     norm = np.sqrt((2 * degree + 1) * (1 if k == 0 else 2) * np.exp(log_ratio))
     wave = np.cos(k * azimuth) if order >= 0 else np.sin(k * azimuth)
     return np.asarray(norm * legendre * wave, dtype=np.float64)
