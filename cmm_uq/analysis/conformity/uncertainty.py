@@ -383,10 +383,8 @@ def _averaged(value: Floats, limit: Floats, shared: Floats, slope: Floats, group
                 np.where(s == 0, beyond, end(axis=0)) for beyond, end in ((-np.inf, ends.min), (np.inf, ends.max))
             )
         outside = (s == 0) & ((moved > top) | (signed & (moved < -top)))
-        chance = scipy.special.ndtr(np.minimum.reduceat(upper, starts)) - scipy.special.ndtr(
-            np.maximum.reduceat(lower, starts)
-        )
-        chance = np.maximum(0.0, chance)
+        most, least = np.minimum.reduceat(upper, starts), np.maximum.reduceat(lower, starts)
+        chance = np.maximum(0.0, scipy.special.ndtr(most) - scipy.special.ndtr(least))
         chance = np.where(np.logical_or.reduceat(outside, starts, axis=0), 0.0, chance)
         total += float(chance.prod(axis=0).sum())
     return total / len(settings)
