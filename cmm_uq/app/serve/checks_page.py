@@ -201,6 +201,7 @@ def _comparison(view: SiteView, head: tuple[int, str]) -> tuple[Block, ...]:
     found = plural(last.count, one=say("One thing is not as it was recorded"),
                    many=say("{count} things are not as they were recorded", count=number(last.count, ",d")))  # fmt: skip
     kinds = {"chain": say("Entry"), "index": say("Table"), "file": say("File"), "missing": say("Missing file")}
+    kinds |= {"clock": say("Clock"), "schema": say("Database")}
     rows = tuple(
         (Cell(say("Entry {number}", number=number(one.entry)) if one.entry is not None else say("Records")),
          Cell(kinds.get(one.kind, Verbatim(one.kind))), Cell(Verbatim(one.problem)))

@@ -85,6 +85,15 @@ def following(previous: str, number: int, at: dt.datetime, kind: str, content: M
     return Entry(number, moment, kind, text, previous, hash_of(previous, number, moment, kind, text))
 
 
+def instant(text: str) -> dt.datetime | None:
+    """A moment of recording as it stands in an entry; ``None`` where the text is none, with its zone."""
+    try:
+        moment = dt.datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    return moment if moment.tzinfo else None
+
+
 def moment_of(at: dt.datetime) -> str:
     """A moment as entries have it: UTC with microseconds and Z; one without a zone is UTC already."""
     utc = at.replace(tzinfo=dt.UTC) if at.tzinfo is None else at.astimezone(dt.UTC)

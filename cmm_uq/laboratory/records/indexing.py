@@ -228,21 +228,25 @@ def verified(records: Records, head: str | None, *, files: bool) -> list[ChainFi
     """What is wrong; see :meth:`cmm_uq.laboratory.records.store.Records.verify`."""
     with records.reading() as connection:  # one transaction: one state, whoever writes meanwhile
         found = chain(connection, head)
-        found += _schema(connection)
-        if not any(finding.kind in ("chain", "schema") for finding in found):
+        broken = any(finding.kind == "chain" for finding in found)
+        schema = list(_schema(connection))
+        if not broken and not any(finding.problem.startswith(_UNREADABLE) for finding in schema):
             found += _tables(connection)
+        found += schema
         if files and not any(finding.kind == "chain" for finding in found):
             found += _files(connection, records.home)
     return found[:MOST]
 
 
+_UNREADABLE = ("the table ", "the column ")  # what begins a finding that rows cannot be compared beside
 _CLOCKS = dt.timedelta(minutes=10)  # by which the clocks of several computers may differ
 
 
 def chain(connection: Connection, head: str | None = None) -> list[ChainFinding]:
     """What is wrong with the entries by themselves, and with the clock that they were written by."""
     found: list[ChainFinding] = []
-    latest: dt.datetime | None = None
+    clocks: list[ChainFinding] = []
+    before: dt.datetime | None = None
     number, previous, met = 0, facts.BEGINNING, head is None
     for entry in in_blocks(partial(entry_block, connection)):
         if entry.number != number + 1:
@@ -253,20 +257,20 @@ def chain(connection: Connection, head: str | None = None) -> list[ChainFinding]
             found.append(ChainFinding("chain", "does not follow the entry before it", entry.number))
         if not entry.true:
             found.append(ChainFinding("chain", "was altered", entry.number))
-        elif (moment := _moment(entry.at)) is None:
+        elif (moment := facts.instant(entry.at)) is None:
             found.append(ChainFinding("chain", f"is of no time: {entry.at!r}", entry.number))
-        elif latest is not None and moment < latest - _CLOCKS:
-            problem = f"is of {entry.at}, and an entry before it of {facts.moment_of(latest)}: a clock was wrong"
-            found.append(ChainFinding("clock", problem, entry.number))
         else:
-            latest = moment if latest is None else max(latest, moment)
+            if before is not None and moment < before - _CLOCKS and len(clocks) < MOST:
+                problem = f"is of {entry.at}, and the entry before it of {facts.moment_of(before)}: a clock was wrong"
+                clocks.append(ChainFinding("clock", problem, entry.number))
+            before = moment
         number, previous, met = entry.number, entry.hash, met or entry.hash == head
         if len(found) >= MOST:
             return found
     if not met:
         problem = f"no entry has the hash {head}: the last are missing, or all were written anew"
         found.append(ChainFinding("chain", problem))
-    return found
+    return [*found, *clocks]
 
 
 def _schema(connection: Connection) -> Iterator[ChainFinding]:
@@ -289,11 +293,12 @@ def _schema(connection: Connection) -> Iterator[ChainFinding]:
         yield from _apart("trigger or view", set(there), set(tables.TRIGGERS["sqlite"]))
         return
     query = (
-        "SELECT t.tgname || ' ' || t.tgenabled::text || ' ' || p.proname || p.prosrc FROM pg_trigger t "
+        "SELECT concat_ws(' ', t.tgname, t.tgtype, t.tgenabled, t.tgqual, p.proname) || p.prosrc FROM pg_trigger t "
         "JOIN pg_proc p ON p.oid = t.tgfoid WHERE t.tgrelid = 'entries'::regclass AND NOT t.tgisinternal"
     )
     refuses = "O entries_stay BEGIN RAISE EXCEPTION 'entries are never changed'; END "
-    triggers = {f"{name} {refuses}" for name in ("entries_no_change", "entries_no_truncate")}
+    # before each row that is deleted or updated (1 + 2 + 8 + 16), before a truncation (2 + 32), without a condition
+    triggers = {f"{name} {refuses}" for name in ("entries_no_change 27", "entries_no_truncate 34")}
     yield from _apart("trigger", set(connection.exec_driver_sql(query).scalars()), triggers)
 
 
@@ -302,15 +307,6 @@ def _apart(sort: str, there: set[str], made: set[str]) -> Iterator[ChainFinding]
         yield ChainFinding("schema", f"the {sort} {name} is missing")
     for name in sorted(there - made):
         yield ChainFinding("schema", f"the {sort} {name} is not of the records")
-
-
-def _moment(text: str) -> dt.datetime | None:
-    """A time of recording; ``None`` where the text is none, in UTC as they are written."""
-    try:
-        moment = dt.datetime.fromisoformat(text)
-    except ValueError:
-        return None
-    return moment if moment.tzinfo else None
 
 
 def rebuild(connection: Connection) -> None:

@@ -20,7 +20,16 @@ from sqlalchemy import Connection, Engine, delete, func, insert, select, text
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import MANIFEST, InDoubtError, finish_interrupted, is_pending, sha256_of
-from cmm_uq.laboratory.records.facts import BEGINNING, ChainFinding, Entry, canonical, following, moment_of, now
+from cmm_uq.laboratory.records.facts import (
+    BEGINNING,
+    ChainFinding,
+    Entry,
+    canonical,
+    following,
+    instant,
+    moment_of,
+    now,
+)
 from cmm_uq.laboratory.records.indexing import Indexer, entry_block, in_blocks, verified
 from cmm_uq.laboratory.records.place import APPLICATION, shown, told
 from cmm_uq.laboratory.records.queries import RecordQueries, entry_of_results
@@ -77,7 +86,11 @@ class Records(RecordQueries):
         """Latest moment of any entry, whatever clock the last one was written by; ``None`` where there is none."""
         with self.reading() as connection:
             at = connection.execute(select(func.max(entries.c.at))).scalar()
-        return None if at is None else dt.datetime.fromisoformat(at)
+        if at is not None and (moment := instant(at)) is None:
+            raise CmmUqError(
+                f"an entry is of no time: {at!r}", where=self.shown, fix="cmm-uq records verify says which"
+            )
+        return None if at is None else moment
 
     def entries(self, first: int = 1, kind: str | None = None) -> Iterator[Entry]:
         """Entries in their order, of one kind or all, read block by block."""

@@ -19,6 +19,7 @@ from cmm_uq.laboratory.records.tables import TRIGGERS
 from tests.laboratory.records.histories import certificate, history, moment
 
 DAY = dt.date(2026, 3, 2)
+DAY_3PM = moment(DAY)
 
 
 @pytest.fixture(scope="module")
@@ -177,15 +178,50 @@ def test_tables_triggers_and_indexes_that_are_not_as_they_are_made_are_named(
     assert problem in finding.problem
 
 
-def test_time_that_runs_backwards_is_named_but_for_what_clocks_differ_by(tmp_path: Path) -> None:
-    times = [dt.datetime(2026, 3, 2, 15, minute, tzinfo=dt.UTC) for minute in (30, 21)]
-    times += [dt.datetime(2025, 1, 26, 15, tzinfo=dt.UTC), dt.datetime(2026, 3, 2, 16, tzinfo=dt.UTC)]
+@pytest.mark.parametrize(("years", "found"), [
+    ((2026, 2025, 2026), [2]), ((2026, 2030, 2026, 2027), [3]), ((2025, 2026, 2027), []),
+])  # fmt: skip
+def test_time_that_runs_backwards_is_named_once_at_every_step_back(
+    years: tuple[int, ...], found: list[int], tmp_path: Path
+) -> None:
+    """A single entry of the future does not make all that follow it suspicious."""
     with open_records(tmp_path / "r.db", create=True) as records:
-        records.append_all(("sent", {"a": number}, at) for number, at in enumerate(times))
-        (finding,) = records.verify()
-    assert (finding.kind, finding.entry) == ("clock", 3)
-    assert finding.problem.startswith("is of 2025-01-26T15:00:00")
-    assert "an entry before it of 2026-03-02T15:30:00" in finding.problem
+        records.append_all(("sent", {"a": year}, dt.datetime(year, 3, 2, tzinfo=dt.UTC)) for year in years)
+        findings = records.verify()
+    assert [(one.kind, one.entry) for one in findings] == [("clock", number) for number in found]
+    for one in findings:
+        now, before = years[one.entry - 1], years[one.entry - 2]
+        assert one.problem.startswith(f"is of {now}-03-02T00:00:00")
+        assert f"the entry before it of {before}-03-02T00:00:00" in one.problem
+
+
+@pytest.mark.parametrize(("minutes", "named"), [(9, False), (11, True)])
+def test_clocks_of_several_computers_may_differ_by_ten_minutes(minutes: int, named: bool, tmp_path: Path) -> None:
+    with open_records(tmp_path / "r.db", create=True) as records:
+        for at in (DAY_3PM, DAY_3PM - dt.timedelta(minutes=minutes)):
+            records.append("sent", {}, at=at)
+        assert bool(records.verify()) is named
+
+
+def test_as_many_wrong_clocks_as_there_may_be_hide_no_altered_entry(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cmm_uq.laboratory.records.indexing.MOST", 2)
+    with open_records(tmp_path / "r.db", create=True) as records:
+        for number in range(8):
+            records.append("sent", {"a": number}, at=DAY_3PM - dt.timedelta(days=number % 2))
+    spoilt = spoiled(tmp_path / "r.db", tmp_path, lambda raw: raw.execute(
+        "UPDATE entries SET content = '{}' WHERE number = 8"
+    ))  # fmt: skip
+    assert ("chain", 8) in findings(spoilt)
+
+
+def test_rows_are_compared_beside_an_index_that_somebody_added(whole: Path, tmp_path: Path) -> None:
+    def spoil(raw: sqlite3.Connection) -> None:
+        raw.execute("CREATE INDEX quicker ON figures (value)")
+        raw.execute("UPDATE figures SET u = u / 2 WHERE certificate = 1")
+
+    assert {kind for kind, _ in findings(spoiled(whole, tmp_path, spoil))} == {"schema", "index"}
 
 
 def test_an_entry_of_no_time_with_a_hash_of_its_own_is_found(tmp_path: Path) -> None:
@@ -199,6 +235,8 @@ def test_an_entry_of_no_time_with_a_hash_of_its_own_is_found(tmp_path: Path) -> 
         assert [(one.kind, one.entry, one.problem) for one in records.verify()] == [
             ("chain", 1, "is of no time: 'yesterday'")
         ]
+        with pytest.raises(CmmUqError, match="an entry is of no time: 'yesterday'"):
+            _ = records.last_moment
 
 
 def test_a_text_that_holds_numbers_or_quotes_is_the_same_when_read_back(tmp_path: Path) -> None:

@@ -75,7 +75,11 @@ def test_the_server_refuses_to_change_entries_and_what_was_changed_is_found(url:
 
 
 @pytest.mark.parametrize(("change", "problem"), [
-    ("ALTER TABLE entries DISABLE TRIGGER entries_no_change", "the trigger entries_no_change O entries_stay BEGIN"),
+    ("ALTER TABLE entries DISABLE TRIGGER entries_no_change", "the trigger entries_no_change 27 O entries_stay BEGIN"),
+    ("CREATE OR REPLACE TRIGGER entries_no_change BEFORE UPDATE OR DELETE ON entries FOR EACH ROW WHEN (false) "
+     "EXECUTE FUNCTION entries_stay()", "the trigger entries_no_change 27 O entries_stay BEGIN"),
+    ("CREATE OR REPLACE TRIGGER entries_no_change BEFORE INSERT ON entries FOR EACH ROW EXECUTE FUNCTION entries_stay()",
+     "the trigger entries_no_change 27 O entries_stay BEGIN"),
     ("CREATE OR REPLACE FUNCTION entries_stay() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN RETURN NEW; END $$",
      "is missing"),
     ("CREATE TABLE more (a integer)", "the table more is not of the records"),
