@@ -236,6 +236,13 @@ def with_attribute(signature: etree._Element) -> None:
     signature.find(f"{DS}SignatureValue").set("U", "0.1 µm")
 
 
+def with_a_space_of_names(signature: etree._Element) -> None:
+    value = signature.find(f"{DS}SignatureValue")
+    named = etree.Element(value.tag, value.attrib, nsmap={**value.nsmap, "U": "urn:0.1-um"})
+    named.text, named.tail = value.text, value.tail
+    signature.replace(value, named)
+
+
 OBJECT = f'<Object xmlns="{DS[1:-1]}">U = 0.1 µm</Object>'
 PROPERTIES = f"{DS}Object/{XADES}QualifyingProperties"
 UNSIGNED = f'<UnsignedProperties xmlns="{XADES[1:-1]}"/>'
@@ -248,6 +255,7 @@ STAMPLESS = UNSIGNED.replace("/>", "><UnsignedSignatureProperties><SignatureTime
     (with_further(PROPERTIES, UNSIGNED), "UnsignedProperties"), (with_further(PROPERTIES, "<U>0.1</U>"), "U"),
     (with_further(PROPERTIES, f"{STAMPLESS}</UnsignedProperties>"), "SignatureTimeStamp"),
     (with_text(f"{DS}Object", "U = 0.1 µm"), "Object"), (with_attribute, "SignatureValue"),
+    (with_a_space_of_names, "SignatureValue"),
     (with_text(f"{DS}SignatureValue", "U = 0.1 µm", tail=True), "Signature"),
 ])  # fmt: skip
 def test_what_a_signature_holds_besides_its_own_form_is_named(
@@ -322,6 +330,16 @@ def test_a_list_of_revocations_beside_a_time_stamp_counts(
     ))  # fmt: skip
     found = only(signatures_of_xml(etree.tostring(root), trust))
     assert (found.good, found.revocation, found.level) == (good, revocation, level)
+
+
+@pytest.mark.parametrize("further", ["VT0wLjE=", "====", "A"])
+def test_more_behind_what_is_decoded_of_a_time_stamp_or_a_certificate_counts_against_it(
+    further: str, signed: bytes, stamper: Held, trust: Trust
+) -> None:
+    root = stamped(signed, stamper)
+    token = root[-1].find(f".//{XADES}EncapsulatedTimeStamp")
+    token.text = token.text.rstrip("=") + "==" + further
+    assert not only(signatures_of_xml(etree.tostring(root), trust)).good
 
 
 def test_nothing_counts_but_what_covers_the_whole_root(xml: bytes, held: Held, trust: Trust) -> None:
