@@ -170,6 +170,7 @@ class LiveInstrument:
 
     def _lost(self, why: Text) -> Iterator[source.Event]:
         yield from self._rest()
+        self._framer = Framer(self._profile.frame)
         self._close_port()
         yield from self._silent(why)
 
@@ -329,6 +330,11 @@ class Conversation:
         return False
 
 
+MOST_LINES = (
+    200  # among which an instrument is looked for that says which one it is: each is looked at with all before it
+)
+
+
 class Introduction:
     def __init__(self, wanted: Identify) -> None:
         self._pattern = re.compile(wanted.pattern)
@@ -337,6 +343,8 @@ class Introduction:
         self.found: Identity | None = None  # what it said; ``None`` until it did
 
     def hear(self, message: FramedMessage) -> None:
+        if len(self._lines) == MOST_LINES:
+            return
         self._lines.append(message.body.decode("latin-1").strip("\r\n"))
         whole = "\n".join(self._lines)
         found = self._pattern.search(whole)

@@ -15,7 +15,7 @@ from cmm_uq.base.files.csv_table import column_problem
 from cmm_uq.base.files.limits import JOB_BYTES, TEXT
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.laboratory.live.instruments.parsing import check_profile
-from cmm_uq.laboratory.live.instruments.profile import ProfileFile, bytes_of, shown
+from cmm_uq.laboratory.live.instruments.profile import NUMBER, ProfileFile, bytes_of, shown
 from cmm_uq.laboratory.live.instruments.source import Event, Reading, Returned
 
 ENDING = ".toml"
@@ -52,8 +52,6 @@ def profile_of(content: bytes, path: Path) -> ProfileFile:
 def _folder() -> Path:
     return Path(str(files("cmm_uq") / "laboratory" / "live" / "instruments" / "profiles"))
 
-
-NUMBER = r"[-+]?\s*\d+\.?\d*(?:[Ee][-+]?\d+)?"  # A number in a line
 
 _FOUND = re.compile(r"(?:[-+]\s*|(?<![\w.]))\d+(?:\.\d+)?(?:[Ee][-+]?\d+)?|(?<=[A-Za-z_])\d+\.\d+")
 """The 1 of CH1 is none, the 20.1 of T20.1 is one."""
@@ -150,7 +148,7 @@ def _lines(wanted: ProfileDraft, pattern: str, values: Mapping[str, float]) -> l
 
 def _literal(text: str) -> str:
     """Text that must be there, with as many blanks as there may be."""
-    return r"\s*".join(
+    return r"\s*+".join(
         "".join(re.escape(chr(byte)) if 32 <= byte < 127 else f"\\x{byte:02x}" for byte in bytes_of(part))
         for part in re.split(r"\s+", text)
     )

@@ -32,16 +32,21 @@ class FramedMessage:
     raw: bytes
     body: bytes  # without terminator, first and last byte
     whole: bool = True  # whether it is a message; else bytes between messages, or a message without its end
+    overlong: bool = False  # whether it is part of a message that is longer than any may be
 
 
 class Framer:
-    """Messages out of a stream of bytes; no byte is lost, none is in two messages."""
+    """Messages out of a stream of bytes; no byte is lost, none is in two messages.
+
+    A line that is too long is none up to its terminator: what its end looks like is nothing that the instrument said.
+    """
 
     def __init__(self, frame: MessageFrame) -> None:
         self._terminator, self._start, self._stop = map(bytes_of, (frame.terminator, frame.start, frame.stop))
         self._length, self._longest = frame.length, frame.longest
         self._waiting = bytearray()
         self._looked = 0
+        self._overlong: bytes | None = None  # of a line that is too long, the last bytes that were taken
 
     def feed(self, received: bytes) -> list[FramedMessage]:
         self._waiting += received
@@ -49,7 +54,7 @@ class Framer:
 
     def rest(self) -> FramedMessage | None:
         """What waits for its end and will not get it; afterwards nothing waits."""
-        return self._no_message(len(self._waiting)) if self._waiting else None
+        return self._no_message(len(self._waiting), overlong=self._overlong is not None) if self._waiting else None
 
     @property
     def waiting(self) -> bool:
@@ -63,7 +68,13 @@ class Framer:
         if size is None and len(self._waiting) < self._longest:
             return None
         if size is None or size > self._longest:
-            return self._no_message(self._longest)
+            taken = self._no_message(self._longest, overlong=True)
+            if self._terminator:
+                self._overlong = taken.raw[1 - len(self._terminator) or len(taken.raw) :]
+            return taken
+        if self._overlong is not None:
+            self._overlong = None
+            return self._no_message(size, overlong=True)
         raw = self._taken(size)
         return FramedMessage(raw, raw[len(self._start) : len(raw) - len(self._terminator or self._stop)])
 
@@ -71,7 +82,9 @@ class Framer:
         """Bytes of the message that waits; ``None`` where its end has not come."""
         if self._length:
             return self._length if len(self._waiting) >= self._length else None
-        end = self._terminator or self._stop
+        end, before = self._terminator or self._stop, self._overlong or b""
+        if before and (place := (before + self._waiting[: len(end)]).find(end)) >= 0:
+            return place + len(end) - len(before)
         place = self._waiting.find(end, max(self._looked, len(self._start)))
         if place < 0:
             # What was looked at once need not be looked at again, but an end may have begun in its last bytes.
@@ -85,9 +98,9 @@ class Framer:
         self._looked = 0
         return raw
 
-    def _no_message(self, size: int) -> FramedMessage:
+    def _no_message(self, size: int, *, overlong: bool = False) -> FramedMessage:
         raw = self._taken(size)
-        return FramedMessage(raw, raw, whole=False)
+        return FramedMessage(raw, raw, whole=False, overlong=overlong)
 
 
 _PINT: Mapping[str, str] = MappingProxyType({
@@ -172,6 +185,11 @@ class Parser:
 
     def read(self, message: FramedMessage, answers: int = 0) -> Understood:
         text = message.body.decode("latin-1")
+        if message.overlong:
+            most, seen = self._profile.frame.longest, _seen(message.raw)
+            return Understood(
+                status=say("a line of more than {most} characters is dropped, to its end: {seen}", most=most, seen=seen)
+            )
         if any(pattern.fullmatch(text) for pattern in self._ignored):
             return Understood()
         if not message.whole:

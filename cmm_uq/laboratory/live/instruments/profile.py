@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 import struct
+from functools import partial
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
 from cmm_uq.base.errors import printable
 from cmm_uq.base.files.table import AnyFloat, Column, JobTable
+from cmm_uq.laboratory.live.instruments.linear import NotLinearError, Use, check_linear
 
 NAMES = (
     "NUL", "SOH", "STX", "ETX", "EOT", "ENQ", "ACK", "BEL", "BS", "HT", "LF", "VT", "FF", "CR", "SO", "SI", "DLE",
@@ -53,9 +55,18 @@ def _codes(text: str) -> str:
     return text
 
 
-def _pattern(text: str) -> str:
+NUMBER = r"[-+]?\s*+\d++(?:\.\d*+)?(?:[Ee][-+]?\d++)?"  # A number in a line
+_NUMBER_BEFORE = r"[-+]?\s*\d+\.?\d*(?:[Ee][-+]?\d+)?"  # in profiles that earlier versions of `instruments new` wrote
+
+
+def _pattern(text: str, use: Use = "search") -> str:
+    if _NUMBER_BEFORE in text:  # nothing behind a repeat of theirs needs what it read
+        text = re.sub(r"\\s\*(?![+?])", r"\\s*+", text.replace(_NUMBER_BEFORE, NUMBER))
     try:
         re.compile(text)
+        check_linear(text, use)
+    except NotLinearError:
+        raise
     except (re.error, RecursionError, OverflowError) as error:
         raise ValueError(f"is no regular expression: {error}") from None
     return text
@@ -64,7 +75,10 @@ def _pattern(text: str) -> str:
 Bytes = Annotated[str, Field(max_length=500), AfterValidator(_codes)]
 """Bytes as manuals write them, with ``<CR>`` and ``<0x41>``."""
 
-Pattern = Annotated[str, Field(min_length=1, max_length=10_000), AfterValidator(_pattern)]
+_Expression = Annotated[str, Field(min_length=1, max_length=10_000)]
+Pattern = Annotated[_Expression, AfterValidator(_pattern)]
+WholePattern = Annotated[_Expression, AfterValidator(partial(_pattern, use="fullmatch"))]
+Separator = Annotated[_Expression, AfterValidator(partial(_pattern, use="split"))]
 Unit = Annotated[str, Field(pattern=r"^[A-Za-z_°µ%/ ]*$", max_length=40)]
 Seconds = Annotated[float, Field(gt=0, le=86400)]
 
@@ -100,7 +114,7 @@ class MessageFrame(JobTable):
     length: Annotated[int, Field(ge=0, le=65536)] = 0
     """Bytes of a message, the first one included; without a first byte only for instruments that are asked."""
     longest: Annotated[int, Field(ge=1, le=1_000_000)] = 4096
-    """Bytes after which a message that has not ended is given up."""
+    """Bytes after which a message that has not ended is given up; a line to its terminator, which ends no message then."""
 
     @model_validator(mode="after")
     def _one_of(self) -> Self:
@@ -145,7 +159,7 @@ class Parse(JobTable):
 
     pattern: Pattern | None = None
     """Regular expression that is searched in the message; each named group is a quantity."""
-    separator: Pattern | None = None
+    separator: Separator | None = None
     """Regular expression of what stands between fields: `,` or `[,;\\s]+`."""
     struct: str | None = None
     """Binary fields of the message without its first and last byte, in the notation of Python's struct: `<hhf`."""
@@ -155,7 +169,7 @@ class Parse(JobTable):
     """Whether a message may have fewer fields than are named."""
     decimal: Literal[".", ","] = "."
     """Decimal sign of numbers in text."""
-    ignore: Annotated[list[Pattern], Field(max_length=50)] = []
+    ignore: Annotated[list[WholePattern], Field(max_length=50)] = []
     """Messages that say nothing: prompts, echoes, empty lines; the whole message fits one of these."""
 
     @model_validator(mode="after")

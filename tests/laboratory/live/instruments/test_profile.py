@@ -281,7 +281,34 @@ def test_a_message_is_what_stands_between_its_marks() -> None:
     assert [one.body for one in Framer(FRAMES[3]).feed(b"\xaa1234\xaa5678")] == [b"1234", b"5678"]
     assert [(one.body, one.whole) for one in Framer(FRAMES[0]).feed(b"0123456789\r\n0123456789a\r\n")] == [
         (b"0123456789", True), (b"0123456789a\r", False), (b"\n", False),
-    ][:2]  # fmt: skip
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("frame", FRAMES[:2], ids=range(2))
+@given(before=BYTES, line=st.binary(min_size=10, max_size=40).filter(lambda data: b"\r" not in data), cuts=CUTS)
+def test_the_end_of_a_line_that_is_too_long_is_no_message_and_the_next_line_is(
+    frame: MessageFrame, before: bytes, line: bytes, cuts: list[int]
+) -> None:
+    end = bytes_of(frame.terminator)
+    framer = Framer(frame.model_copy(update={"longest": 9}))
+    data = before + end + line + end + b"20.0" + end
+    found = [one for part in pieces(data, cuts) for one in framer.feed(part)]
+    assert found[-1] == FramedMessage(b"20.0" + end, b"20.0")
+    cut, place = [], len(found) - 2
+    while b"".join(cut) != line + end:
+        cut.insert(0, found[place].raw)
+        assert (found[place].whole, found[place].overlong) == (False, True)
+        place -= 1
+
+
+def test_a_line_that_is_too_long_is_said_to_be() -> None:
+    line = "20.0 " * 1000
+    framer, parser = Framer(profile_named("line-logger").frame), Parser(profile_named("line-logger"))
+    told = [parser.read(one) for one in framer.feed(f"{line}\n20.5\n".encode())]
+    assert [str(one.status)[:56] for one in told[:-1]] == [
+        "a line of more than 4096 characters is dropped, to its e"
+    ] * 2
+    assert [dict(one.values) for one in told] == [{}, {}, {"value1": 20.5}]
 
 
 @pytest.mark.parametrize("name", [name for name in ready() if profile_named(name).protocol == "messages"])
