@@ -55,7 +55,7 @@ def main(root: Path, port: int, pause_s: float) -> int:
         return content
 
     print("begun", flush=True)
-    work = JobReporting(out, state, report, outbox.add)
+    work = JobReporting(out, state, report, outbox.announce)
     settings = RunTable(quiet_s=0.0, back_off_s=0.1)
     return ScheduledRun(
         [root / "jobs"], settings, work, outbox, lambda on: (), lambda line: None, lambda text: None, clock

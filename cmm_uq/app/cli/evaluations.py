@@ -26,7 +26,10 @@ def report(
     ),
     out: Path | None = opt.out(None, "reports/<job id>"),
     seed: int = opt.seed(),
-    end: Ending = opt.ending(DOCUMENTS),
+    end: Ending = opt.ending(
+        DOCUMENTS,
+        "unless everything conforms and agrees with the model; with --scheduled 1 while anything needs a person",
+    ),
     records: str | None = opt.RECORDS,
     sign: str | None = opt.SIGN,
     time_server: str | None = opt.TIME_SERVER,
@@ -42,7 +45,7 @@ def report(
     dry_run: bool = flag(False, "--dry-run", "With --scheduled: say what would happen, and do nothing."),
 ) -> None:
     """Estimate, decide, and write certificate.html, certificate.pdf, certificate.xml and results.json."""
-    alone = {**{f"--{name}": getattr(end, name) for name in ("force", "strict", "verbose", "language")}, "--sign": sign}
+    alone = {**{f"--{name}": getattr(end, name) for name in ("force", "verbose", "language")}, "--sign": sign}
     many = {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run}
     if name := next((name for name, value in (alone if scheduled else many).items() if value), ""):
         wrong, fix = ("without", "Leave it out") if scheduled else ("with", "Add --scheduled")
@@ -51,7 +54,7 @@ def report(
         from cmm_uq.app.cli.records import STANDARD_OUTPUT, run
         from cmm_uq.app.commands.laboratory.schedule import ScheduledOptions
 
-        options = ScheduledOptions(tuple(job), out, schedule, records, seed or None, dry_run)
+        options = ScheduledOptions(tuple(job), out, schedule, records, seed or None, dry_run, end.strict)
         raise typer.Exit(run(options, None if end.quiet and lines is None else lines or STANDARD_OUTPUT))
     if len(job) > 1:
         raise CmmUqError(f"{len(job)} jobs are named, and a report is of one", where=str(job[1]),

@@ -93,7 +93,7 @@ def _batch_summary(batch: Batch, most: int | None) -> Summary:
     """What came of it, and which jobs failed, the first of them or all."""
     from cmm_uq.base.messages import Text, Verbatim, plural, say
     from cmm_uq.certificate.wording import Headline, Summary
-    from cmm_uq.laboratory.schedule.state import duration, pace
+    from cmm_uq.laboratory.schedule.processes import duration, pace
 
     counts = ((batch.already, say("{count} there already", count=batch.already)),
               (batch.planned, say("{count} still to be measured", count=batch.planned)),

@@ -206,8 +206,8 @@ def ready(
     scheduler: str = argument(..., "cron, systemd or windows.", "SCHEDULER"),
     folders: list[Path] = argument(..., "Folders with jobs.", "FOLDER"),
     schedule: Path | None = SCHEDULE,
-    at: str = option("06:15", "Time of day.", "HH:MM"),
-    days: str = option("", "Days of the week: MON,THU.", "DAYS", "every day"),
+    at: str = option("", "Time of day.", "HH:MM", "that of the schedule, else 06:15"),
+    days: str = option("", "Days of the week: MON,THU.", "DAYS", "those of the schedule, else every day"),
     out: Path | None = option(None, "Folder to write the files to.", "DIR", "printed"),
 ) -> None:
     """Print what starts a scheduled run: a line of cron, a service and a timer of systemd, a task of Windows."""

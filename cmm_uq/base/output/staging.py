@@ -280,6 +280,22 @@ def synced(folder: Path) -> None:
             os.close(descriptor)
 
 
+def replace_file(path: Path, content: bytes, fix: str = "Make room, or mend the folder's permissions") -> None:
+    """Write a file anew, and its folder: who reads it finds the old content or the new one, after a power cut too."""
+    temporary = path.with_name(f".unfinished-{secrets.token_hex(6)}")
+    with writing_to(path, fix):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            with temporary.open("xb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    synced(path.parent)
+
+
 def _token(placing: Path) -> str:
     """Whose stage a folder is; empty where it is not one."""
     try:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.base.output.staging import synced
 from cmm_uq.laboratory.live.instruments.source import Moment
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
@@ -109,7 +110,7 @@ class RecordingJournal:
         self._waiting: list[bytes] = []
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
-            _keep_name(path.parent)
+            synced(path.parent)
         except OSError as error:
             raise refused("cannot be made", error, path) from None
 
@@ -162,36 +163,9 @@ def refused(
     return OutputError(f"{what}: {error.strerror}", where=str(path), fix=fix)
 
 
-def _keep_name(folder: Path) -> None:
-    """Put the names in a folder on the disk, where the system can."""
-    if os.name == "nt":
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
 def made_folder(folder: Path) -> None:
     """Make a folder, and those above it, that may be there already."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot be made: {error.strerror}", where=str(folder), fix="Name another folder") from None
-
-
-def written_whole(path: Path, content: bytes) -> None:
-    """Write a file, or write it anew: whoever reads it finds the old content or the new one, also after a power cut."""
-    temporary = path.with_name(f".unfinished-{path.name}")
-    try:
-        with temporary.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-        _keep_name(path.parent)
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-        raise refused("cannot be written", error, path) from None

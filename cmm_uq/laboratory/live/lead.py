@@ -21,10 +21,10 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.output.manifest import sha256_of
+from cmm_uq.base.output.staging import replace_file
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.acquired import AcquisitionRecord, as_file, provenance_name
 from cmm_uq.jobs.derived_job import PROGRAM
-from cmm_uq.laboratory.live.journal import written_whole
 from cmm_uq.laboratory.live.recorder import COORDINATES
 from cmm_uq.laboratory.live.story import EVENTS, FOLDER, Place, Point, Story
 
@@ -229,15 +229,15 @@ class LiveRecording:
         digest = hashlib.sha256(content).hexdigest()
         if digest != self._last and (self._last is not None or rows):
             hashes = [digest, *([self._last] if self._last else [])]
-            written_whole(self._beside, as_file(self._provenance(story, rows, hashes)))
-            written_whole(self.path, content)
+            replace_file(self._beside, as_file(self._provenance(story, rows, hashes)))
+            replace_file(self.path, content)
             self._last = digest
 
     def finish(self, story: Story, lead: Lead) -> None:
         """Write what stands beside the recording once more: gaps and notes since its last point."""
         self.write(story, lead)
         if self._last is not None and (rows := rows_of(story, lead)):
-            written_whole(self._beside, as_file(self._provenance(story, rows, [self._last])))
+            replace_file(self._beside, as_file(self._provenance(story, rows, [self._last])))
 
     def _provenance(self, story: Story, rows: Sequence[Row], hashes: Sequence[str]) -> dict[str, Any]:
         return {

@@ -178,7 +178,8 @@ class JobReporting:
     state: State  # what earlier runs have done
     report: Report
     queue: Callable[[Sequence[Notice]], object]  # lets notices go out, before a job counts as done
-    further: Callable[[JobFolder], Iterable[Notice]] = lambda job: ()
+    further: Callable[[JobFolder], Iterable[Notice]] = lambda job: ()  # of the machine, after a report
+    still: Callable[[JobFolder], Iterable[Notice]] = lambda job: ()  # and later, of its newest certificate
 
     def lock_of(self, job: JobFolder) -> Path:
         """Its lock file; one for two ids that some systems take for one."""
@@ -198,6 +199,16 @@ class JobReporting:
             raise CmmUqError(f"{', '.join(changed)} changed after the certificate was released", where=str(job.folder),
                              fix="Give the new recording a job id of its own, or withdraw the certificate")  # fmt: skip
         return f"changed: {', '.join(changed)}" if changed else ""
+
+    def standing(self, job: JobFolder) -> list[Notice]:
+        """What a person must hear of a certificate until it is released, withdrawn or replaced."""
+        results = self.state.results(job.id)
+        found = [] if results is None else [*self._notices(job, results), *self.still(job)]
+        return found if found and self.state.is_draft(job.id) else []
+
+    def _notices(self, job: JobFolder, results: Mapping[str, Any]) -> list[Notice]:
+        inputs = json.dumps(results.get("job", {}).get("inputs_sha256", {}), sort_keys=True)
+        return of_results(results, hashlib.sha256(inputs.encode()).hexdigest(), str(self.out / job.id))
 
     def take(self, job: JobFolder) -> JobOutcome:
         """Report a job unless it has its certificate, or another run is at it."""
@@ -234,9 +245,7 @@ class JobReporting:
                     content = (folder / RESULTS).read_bytes()
             results = json.loads(content)
             turn.through = False  # until its messages wait to be sent, the next run has to look at it again
-            inputs = results.get("job", {}).get("inputs_sha256", {})
-            digest = hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
-            notices = [*of_results(results, digest, str(folder)), *self.further(job)]
+            notices = [*self._notices(job, results), *self.further(job)]
             self.queue(notices)
             turn.through = True
             if not why:

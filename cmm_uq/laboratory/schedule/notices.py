@@ -11,8 +11,6 @@ import contextlib
 import datetime as dt
 import hashlib
 import json
-import os
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,13 +19,13 @@ from pathlib import Path
 from typing import Any, Literal, Protocol, get_args
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Text, Verbatim, commas, day, say
+from cmm_uq.base.messages import Text, Verbatim, commas, day, plural, say
 from cmm_uq.base.output.new_file import writing_to
-from cmm_uq.base.output.staging import synced
+from cmm_uq.base.output.staging import replace_file
 from cmm_uq.jobs.verdicts import Verdicts
-from cmm_uq.laboratory.schedule.state import PRIVATE, State, turn
+from cmm_uq.laboratory.schedule.state import AHEAD, PRIVATE, Dispatch, State, turn
 
-Event = Literal["fail", "incomplete", "undecided", "mismatch", "drift", "due", "error"]  # what a message may be about
+Event = Literal["fail", "incomplete", "undecided", "mismatch", "drift", "due", "missed", "error"]
 EVENTS: tuple[Event, ...] = get_args(Event)
 
 _OF_OUTCOME: Mapping[str, Event] = {"fail": "fail", "conditional fail": "fail", "incomplete": "incomplete"}
@@ -114,6 +112,19 @@ def of_drift(machine: str, changed: Sequence[Text], entry: int) -> Notice:
     return Notice("drift", f"machine {machine}", say("drift: {of}", of=of), text, str(entry))
 
 
+def of_missed(last: dt.datetime, begun: dt.datetime, missed: Sequence[dt.datetime]) -> Notice:
+    """Of starts since the last run without one; of a clock that was set back where there are none."""
+    times = [Verbatim(f"{one:%Y-%m-%d %H:%M}") for one in (last, begun, *missed)]
+    if not missed:
+        text = say("the last run began on {last}, and the clock says {now}: one is wrong", last=times[0], now=times[1])
+        return Notice("missed", "the clock", say("a wrong clock"), text, last.isoformat())
+    listed = times[2:] if len(missed) <= MOST else [*times[2 : MOST // 2], Verbatim("…"), *times[-MOST // 2 :]]
+    title = plural(len(missed), one=say("1 run was missed"), many=say("{count} runs were missed", count=len(missed)))
+    pattern = "{count}, after the run of {last}: {times}. What was due then is done and said now."
+    text = say(pattern, count=title, last=times[0], times=commas(listed))
+    return Notice("missed", "the runs", title, text, f"{last.isoformat()} {missed[-1].isoformat()}")
+
+
 def decisions(results: Mapping[str, Any]) -> list[str]:
     """Every decision of conformity on a certificate, in its order."""
     return [one.outcome for one in Verdicts.of_results(results)]
@@ -176,6 +187,7 @@ def within(seconds: float, call: Callable[[], str], who: str) -> str:
 _MENDED = "Free the disk, or mend the permissions"
 MOST = 20  # messages that one run sends one by one through a channel; what is beyond goes in one
 LISTED = 200  # titles in a message of several
+_EXIT_CODE = "exit code"  # by which a run tells whoever started it
 _WAITING, _SENT, _UNFINISHED = ".json", ".sent", ".unfinished-"
 _ABANDONED_S = 3600.0  # age at which nobody writes a file any more that takes milliseconds
 
@@ -189,11 +201,25 @@ class Delivery:
 
 
 @dataclass(frozen=True)
+class Announcement:
+    """What stands, since when it is known, and whether this run is the one to say it in its exit code."""
+
+    notice: Notice
+    since: dt.datetime
+    counts: bool = True
+
+
+@dataclass(eq=False)
 class Outbox:
     out: Path
     channels: Sequence[Channel]
     state: State
     now: Callable[[], str]
+    resumed: bool = False  # whether a run before ended in the middle, so that nobody saw its exit code
+
+    @property
+    def moment(self) -> dt.datetime:
+        return dt.datetime.fromisoformat(self.now())
 
     @property
     def folder(self) -> Path:
@@ -211,12 +237,43 @@ class Outbox:
             added += [notice] if any(new) else []
         return added
 
+    def announce(self, notices: Sequence[Notice]) -> list[Announcement]:
+        """Let notices of what stands go out, and have the exit code say what is new, or was last said in another week.
+
+        A week of the calendar, and not seven days: runs once a week are never exactly seven days apart, and a clock that was
+        wrong hides nothing for longer.
+        """
+        self.add(notices)
+        announced = []
+        for notice in notices:
+            message = OutgoingMessage.of(notice, _EXIT_CODE, self.now())
+            content = {**message.as_data(), "channel": _EXIT_CODE}
+            counts = notice.event != "error" and self.state.claim(message.key, content, self._again)
+            known = self.state.sent(message.key)
+            announced.append(Announcement(notice, min(known.first, self.moment) if known else self.moment, counts))
+        return announced
+
+    def _again(self, before: Dispatch | None) -> bool:
+        return before is None or self.resumed or _week(before.last) != _week(self.moment)
+
+    def _went_out(self, key: str) -> bool:
+        """Whether a message went out; one by a clock that was ahead of this one may have said what is true only now."""
+        known = self.state.sent(key)
+        return known is not None and known.last <= self.moment + AHEAD
+
+    def _by_another(self, key: str) -> bool:
+        """Whether a run beside this one was faster, as far as can be known."""
+        with contextlib.suppress(CmmUqError):
+            return self._went_out(key)
+        return False
+
     def sent_at_once(self, notices: Iterable[Notice]) -> list[Delivery]:
         """Send notices that cannot wait in a file; nothing of it is remembered."""
         return [
             Delivery(message, channel.name, *_attempt(channel, message))
             for notice in notices
             for channel, message in self._messages(notice)
+            if not self._place(message.key).exists()
         ]
 
     def waiting(self) -> int:
@@ -229,7 +286,7 @@ class Outbox:
         with turn(self.out / PRIVATE / "messages.lock", patience_s=patience_s) as mine:
             if mine is None:
                 return []
-            for path in self.folder.glob(f"{_UNFINISHED}*"):  # of a run that was killed while it wrote a message
+            for path in self.folder.parent.glob(f"*/{_UNFINISHED}*"):  # of a run that was killed in the middle of it
                 with contextlib.suppress(OSError):
                     if time.time() - path.stat().st_mtime > _ABANDONED_S:
                         path.unlink()
@@ -242,7 +299,11 @@ class Outbox:
         known, done = {channel.name: channel for channel in self.channels}, list[Delivery]()
         by_channel: dict[str, list[tuple[OutgoingMessage, Path]]] = {}
         for path in self.folder.glob(f"*{_WAITING}"):
-            if (read := _read(path)) is not None:
+            if (read := _read(path)) is None:
+                continue
+            if self._by_another(read[0].key):
+                _drop(path)
+            else:
                 by_channel.setdefault(read[1], []).append((read[0], path))
         for name, waiting in by_channel.items():
             waiting.sort(key=lambda one: (one[0].at, one[0].key))
@@ -270,30 +331,27 @@ class Outbox:
                 continue
             message, name = read
             try:
-                if not self.state.sent(message.key):
+                if not self._went_out(message.key):
                     self.state.add_sent(message.key, {**message.as_data(), "channel": name})
             except CmmUqError:
                 return
             _drop(path)
 
+    def _place(self, key: str) -> Path:
+        return self.folder / f"{key}{_WAITING}"
+
     def _wait(self, message: OutgoingMessage, channel: str) -> bool:
-        place = self.folder / f"{message.key}{_WAITING}"
-        if self.state.sent(message.key) or place.exists() or place.with_suffix(_SENT).exists():
+        place = self._place(message.key)
+        if place.exists() or place.with_suffix(_SENT).exists() or self._went_out(message.key):
             return False
-        with writing_to(place, _MENDED):
-            self.folder.mkdir(parents=True, exist_ok=True)
-            content = json.dumps({"channel": channel, "message": message.as_data()}, ensure_ascii=False)
-            with tempfile.NamedTemporaryFile("wb", dir=self.folder, prefix=_UNFINISHED, delete=False) as file:
-                try:
-                    file.write(content.encode())
-                    file.flush()
-                    os.fsync(file.fileno())
-                except OSError:
-                    os.unlink(file.name)  # noqa: PTH108
-                    raise
-            os.replace(file.name, place)  # noqa: PTH105
-            synced(self.folder)
+        content = json.dumps({"channel": channel, "message": message.as_data()}, ensure_ascii=False)
+        replace_file(place, content.encode(), _MENDED)
         return True
+
+
+def _week(moment: dt.datetime) -> tuple[int, int]:
+    """Year and week of the calendar (ISO 8601), where this computer stands."""
+    return moment.astimezone().isocalendar()[:2]
 
 
 def _read(path: Path) -> tuple[OutgoingMessage, str] | None:

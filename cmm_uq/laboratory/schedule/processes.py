@@ -16,6 +16,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
@@ -288,3 +289,51 @@ def _converse(
             done.put(talk.ask(*task))
     except BaseException as error:
         done.put(error)
+
+
+class Pace:
+    """Counts what is done of a number of jobs, by a clock that never goes back."""
+
+    def __init__(self, count: int, clock: Callable[[], float] = time.monotonic) -> None:
+        self.count = count
+        self.done = self.failed = 0
+        self._clock, self._began, self._computed = clock, clock(), 0
+
+    def add(self, *, computed: bool = True, failed: bool = False) -> None:
+        """One more is done; one that was there already says nothing of the pace."""
+        self.done += 1
+        self.failed += failed
+        self._computed += computed
+
+    @property
+    def seconds(self) -> float:
+        return self._clock() - self._began
+
+    @property
+    def part(self) -> float:
+        """Of the whole that is done."""
+        return self.done / self.count if self.count else 1.0
+
+    def __str__(self) -> str:
+        parts = [f"{self.done} of {self.count}", *([f"{self.failed} failed"] if self.failed else [])]
+        if self._computed and (seconds := self.seconds) > 0:
+            rate = self._computed / seconds
+            parts += [pace(rate), *([f"{duration((self.count - self.done) / rate)} left"] if self.part < 1 else [])]
+        return ", ".join(parts)
+
+
+def pace(rate: float) -> str:
+    """Jobs in the unit of time in which there are some."""
+    for seconds, unit in ((1, "s"), (60, "min")):
+        if rate * seconds >= 1:
+            return f"{rate * seconds:.1f}/{unit}"
+    return f"{rate * 3600:.1f}/h"
+
+
+def duration(seconds: float) -> str:
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

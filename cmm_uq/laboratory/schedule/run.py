@@ -30,13 +30,15 @@ from cmm_uq.laboratory.schedule.jobs import (
     quiet_since,
     snapshot,
 )
-from cmm_uq.laboratory.schedule.notices import Delivery, Notice, Outbox, of_error
+from cmm_uq.laboratory.schedule.notices import Announcement, Delivery, Notice, Outbox, of_error, of_missed
+from cmm_uq.laboratory.schedule.schedulers import starts
 from cmm_uq.laboratory.schedule.settings import RunTable
-from cmm_uq.laboratory.schedule.state import Problems
+from cmm_uq.laboratory.schedule.state import Problems, last_run, remember_run, running
 
 SCHEMA = "cmm-uq/scheduled/1"
 _IN_A_ROW = 3  # jobs one after another whose output is impossible: then it is so for the others too
 _PATIENCE_S = 60.0  # how long to wait for another run that sends messages
+_EARLY = dt.timedelta(minutes=10)  # by how much a run may begin before its time: clocks are set
 
 
 @dataclass(frozen=True)
@@ -61,8 +63,10 @@ class ScheduledRun:
     log: Callable[[str], None]  # takes a line for a person
     clock: RunClock
     dry: bool = False  # say what would happen, and do nothing
+    strict: bool = False  # end with 1 while anything stands
     counted: dict[str, int] = field(default_factory=dict)
     codes: set[int] = field(default_factory=lambda: {0})
+    standing: list[Notice] = field(default_factory=list)
 
     @cached_property
     def problems(self) -> Problems:
@@ -70,23 +74,45 @@ class ScheduledRun:
 
     def through(self) -> int:
         """The exit code: 0 all is well, 1 something needs a person, 2 bad input, 3 output impossible."""
-        jobs = self._distinct(self._found())
         if self.dry:
-            for job in jobs:
+            for job in self._distinct(self._found()):
                 self._end(self._would(job))
             return self._conclude()
+        with contextlib.ExitStack() as stack:
+            with contextlib.suppress(OutputError):  # what cannot be written, jobs and messages say
+                self.outbox.resumed = stack.enter_context(running(self.work.out))
+            return self._through(self.clock.now().astimezone())
+
+    def _through(self, begun: dt.datetime) -> int:
+        last = last_run(self.work.out)
+        jobs = self._distinct(self._found())
         self._send(1, last=False)
         ready, changing = self._parted(jobs)
         self._report_all(ready)
         self._report_all(self._settled(changing, {job.id.casefold() for job in jobs}))
         try:
-            for notice in self.due(self.clock.now().date()):
-                new = bool(self._queue([notice])) or not self.outbox.channels
-                self._line({"due": notice.about, "event": notice.event, "why": str(notice.text)}, int(new))
+            self._stand(self._missed(last, begun))
+            for notice in self.due(self.clock.now().astimezone().date()):
+                self._stand([notice])
         except CmmUqError as error:
             self._line({"due": None, "event": "error", "why": str(error)}, 3 if isinstance(error, OutputError) else 2)
         self._send(self.settings.tries, last=True)
-        return self._conclude()
+        try:
+            remember_run(self.work.out, begun, self.clock.now())
+        except OutputError as error:
+            self._line({"standing": None, "event": "error", "why": str(error)}, 3)
+        return self._conclude(last)
+
+    def _missed(self, last: dt.datetime | None, begun: dt.datetime) -> list[Notice]:
+        """Starts since the last run without one; what was due then, this run does and says."""
+        if last is not None and last > begun + _EARLY:
+            return [of_missed(last, begun, ())]
+        if last is None or not self.settings.at:
+            return []
+        # by the clock on the wall, wherever it hung; the last of them is this run
+        after, until = (one.replace(tzinfo=None) for one in (last + _EARLY, begun))
+        times = starts(after, until, self.settings.at, self.settings.days)
+        return [of_missed(last, begun, times[:-1])] if len(times) > 1 else []
 
     def _found(self) -> list[JobFolder]:
         found: dict[Path, JobFolder] = {}
@@ -207,31 +233,51 @@ class ScheduledRun:
     def _end(self, ended: JobOutcome) -> None:
         """Tell what came of a job; an error goes out once while it stands."""
         self.counted[ended.state] = self.counted.get(ended.state, 0) + 1
-        self._tell(ended.line(), ended.code)
+        age = {}
         if ended.error is not None and not self.dry:
             since = self.problems.since(ended.name, ended.why, self.clock.moment())
+            age = self._age(dt.datetime.fromisoformat(since))
             self._queue([of_error(ended.error, ended.name, since)])
         elif ended.state not in (BUSY, WAITING, GONE):
             self._mended(ended.name)
             self._mended(str(ended.job.folder))
+        self._tell({**ended.line(), **age}, ended.code)
+        self.standing.extend(ended.notices)
+        if ended.state == UNCHANGED and not self.dry:
+            try:
+                self._stand(self.work.standing(ended.job))
+            except CmmUqError as error:
+                self._line({"standing": ended.name, "event": "error", "why": str(error)}, 2)
         if ended.state != UNCHANGED:
             said = ended.why if ended.error is not None else ", ".join(filter(None, (ended.why, *ended.events)))
             self._log(f"{ended.state} {ended.name}" + (f": {said}" if said else ""))
+
+    def _stand(self, notices: Sequence[Notice]) -> None:
+        """Tell what stands, and for how long it has been known."""
+        for one in self._queue(notices):
+            key = "due" if one.notice.event == "due" else "standing"
+            told = {key: one.notice.about, "event": one.notice.event, "why": str(one.notice.text)}
+            self._line({**told, **self._age(one.since)}, int(one.counts or self.strict))
+        self.standing.extend(notices)
+
+    def _age(self, since: dt.datetime) -> dict[str, Any]:
+        days = max(0, (self.clock.now().astimezone().date() - since.astimezone().date()).days)  # of the calendar
+        return {"since": since.astimezone(dt.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"), "days": days}
 
     def _mended(self, about: str) -> None:
         if not self.dry:
             self.problems.mended(about)
 
-    def _queue(self, notices: Sequence[Notice]) -> list[Notice]:
+    def _queue(self, notices: Sequence[Notice]) -> list[Announcement]:
         """Let notices go out; where they cannot be kept they are sent at once, and again by the next run."""
         try:
-            return self.outbox.add(notices)
+            return self.outbox.announce(notices)
         except CmmUqError as error:  # a full disk, or records that were lost meanwhile
             self.codes.add(3)
             self._log(f"a message cannot be kept: {error}")
             for one in self.outbox.sent_at_once(notices):
                 self._sent(one)
-            return list(notices)
+            return [Announcement(one, self.outbox.moment) for one in notices]
 
     def _line(self, told: dict[str, Any], code: int) -> None:
         self._tell({**told, "exit_code": code}, code)
@@ -245,10 +291,11 @@ class ScheduledRun:
         if not self.dry:
             self.log(f"{self.clock.moment()} {text}")
 
-    def _conclude(self) -> int:
+    def _conclude(self, last: dt.datetime | None = None) -> int:
         code = max(self.codes)
-        waiting = self.outbox.waiting()
-        self._tell({"run": self.counted, "dry": self.dry, "messages_waiting": waiting, "exit_code": code}, code)
+        told = {"run": self.counted, "dry": self.dry, "standing": len(self.standing)}
+        told |= {"last_run": last and last.isoformat(), "messages_waiting": self.outbox.waiting()}
+        self._tell({**told, "exit_code": code}, code)
         counts = ", ".join(f"{count} {state}" for state, count in self.counted.items()) or "nothing found"
         self._log(f"run ended with {code}: {counts}")
         return code

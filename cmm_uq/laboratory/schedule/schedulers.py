@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import shlex
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
@@ -98,6 +99,20 @@ READY: Mapping[str, Callable[[ScheduledCall], dict[str, str]]] = MappingProxyTyp
     {"cron": cron, "systemd": systemd, "windows": windows}
 )
 """Files by the name of the scheduler, each with its text."""
+
+
+def starts(after: dt.datetime, until: dt.datetime, at: str, days: Sequence[str]) -> list[dt.datetime]:
+    """When runs are to start by the clock on the wall: an hour that comes twice counts once, one that is skipped does not."""
+    of_day, found = dt.time.fromisoformat(at), []
+    for ordinal in range(after.toordinal(), until.toordinal() + 1):
+        time = dt.datetime.combine(dt.date.fromordinal(ordinal), of_day)
+        if after < time <= until and (not days or DAYS[time.weekday()] in days) and _exists(time):
+            found.append(time)
+    return found
+
+
+def _exists(time: dt.datetime) -> bool:
+    return time.astimezone(dt.UTC).astimezone().replace(tzinfo=None) == time
 
 
 def encoded(name: str, text: str) -> bytes:

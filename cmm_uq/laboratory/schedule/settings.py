@@ -61,6 +61,7 @@ def web_address(text: str) -> str:
 Address = Annotated[str, Field(max_length=254), AfterValidator(_address)]
 Variable = Annotated[str, Field(max_length=100), AfterValidator(_variable)]
 Events = Annotated[list[Event], Field(min_length=1, max_length=len(EVENTS))]
+Day = Literal["MON", "TUE", "WED", "THU", "FRI", "SAT", "SUN"]
 Seconds = Annotated[float, Field(gt=0, le=600)]
 
 
@@ -83,6 +84,10 @@ class RunTable(JobTable):
     """Whether a folder without a single job is all well; otherwise it is bad input, as a drive that is not there would be."""
     due_within_days: Annotated[int, Field(ge=0, le=3650)] = 30
     """How long before a due date a message goes out."""
+    at: Annotated[str, Field(pattern=r"^(([01]\d|2[0-3]):[0-5]\d)?$")] = ""
+    """Time of day at which runs are started, as `06:15`, by the clock on the wall: a missed one is named by the next run."""
+    days: Annotated[list[Day], Field(max_length=7)] = Field(default=[])
+    """Days of the week on which they are, as `MON`; every day where it is left out."""
 
 
 class LogTable(JobTable):

@@ -8,6 +8,7 @@ afterwards: words in a file that nobody holds were left by a run that ended in t
 from __future__ import annotations
 
 import contextlib
+import datetime as dt
 import hashlib
 import json
 import logging
@@ -16,6 +17,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -23,9 +25,10 @@ from cmm_uq.base.errors import CmmUqError, OutputError, printable
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.output import read_manifest, sha256_of
-from cmm_uq.base.output.new_file import write_new
-from cmm_uq.base.output.staging import locked
+from cmm_uq.base.output.staging import locked, replace_file
 from cmm_uq.jobs.source import RESULTS
+from cmm_uq.jobs.verdicts import NONE
+from cmm_uq.laboratory.records.facts import instant
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.facts import RecordedCertificate
@@ -36,17 +39,38 @@ PRIVATE = ".scheduled"  # folder beside the reports with locks and messages
 COMMAND = "report"
 
 
+_FIX = "Free the disk, or mend the permissions"
+_PATIENCE_S = 2.0  # how long to wait for another run that writes a line, or what it told
+
+
+@dataclass(frozen=True)
+class Dispatch:
+    """When the same thing went out, to a receiver or in an exit code: for the first time, and for the last."""
+
+    first: dt.datetime
+    last: dt.datetime
+
+
 class State(Protocol):
-    """What is remembered from run to run."""
+    """What is remembered from run to run; without it everything is new again."""
 
     def reported(self, job: str) -> Mapping[str, str] | None:
         """SHA-256 by name of every file that a job's newest certificate was made from; ``None`` where it has none."""
 
+    def results(self, job: str) -> Mapping[str, Any] | None:
+        """What the newest certificate of a job states, as results.json has it; ``None`` where it has none."""
+
     def released(self, job: str) -> bool:
         """Whether a person has released the newest certificate of a job, so that it must not be replaced."""
 
-    def sent(self, key: str) -> bool: ...
+    def is_draft(self, job: str) -> bool:
+        """Whether nobody has released or withdrawn the newest certificate of a job yet."""
+
+    def sent(self, key: str) -> Dispatch | None: ...
     def add_sent(self, key: str, content: Mapping[str, Any]) -> None: ...
+
+    def claim(self, key: str, content: Mapping[str, Any], again: Callable[[Dispatch | None], bool]) -> bool:
+        """Remember that something goes out now, where it goes out again: of runs at the same time one only is to say it."""
 
 
 @dataclass(frozen=True)
@@ -56,27 +80,42 @@ class FolderState:
     out: Path
 
     def reported(self, job: str) -> Mapping[str, str] | None:
+        return inputs_of(self.results(job))
+
+    def results(self, job: str) -> Mapping[str, Any] | None:
         folder = self.out / job
         manifest = read_manifest(folder)
         if manifest is None or (manifest.owner.command, manifest.owner.job) != (COMMAND, job):
             return None
         there = all(os.path.lexists(folder / name) for name in manifest.files)
-        return inputs_in(folder) if there and sha256_of(folder / RESULTS) == manifest.files.get(RESULTS) else None
+        digest = sha256_of(folder / RESULTS)
+        return _results_in(folder, digest) if there and digest == manifest.files.get(RESULTS) else None
 
     def released(self, job: str) -> bool:
         return False
 
-    def sent(self, key: str) -> bool:
-        return self._marker(key).exists()
+    def is_draft(self, job: str) -> bool:
+        return True
+
+    def sent(self, key: str) -> Dispatch | None:
+        try:
+            data = json.loads(self._marker(key).read_text(encoding="utf-8"))
+            last = _moment(data["at"])
+            first = _moment(data.get("first")) or last
+        except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            return None  # damaged: once more does less harm than never
+        return None if last is None or first is None else Dispatch(min(first, last), last)
 
     def add_sent(self, key: str, content: Mapping[str, Any]) -> None:
-        marker = self._marker(key)
-        try:
-            marker.parent.mkdir(parents=True, exist_ok=True)
-            marker.write_text(json.dumps(content, ensure_ascii=False), encoding="utf-8")
-        except OSError as error:
-            fix = "Free the disk, or mend the permissions"
-            raise OutputError(f"cannot be written: {error.strerror}", where=str(marker), fix=fix) from error
+        replace_file(self._marker(key), json.dumps(content, ensure_ascii=False).encode(), _FIX)
+
+    def claim(self, key: str, content: Mapping[str, Any], again: Callable[[Dispatch | None], bool]) -> bool:
+        with turn(self.out / PRIVATE / "told.lock", patience_s=_PATIENCE_S):
+            before = self.sent(key)
+            if again(before):
+                self.add_sent(key, {**content, **({"first": before.first.isoformat()} if before else {})})
+                return True
+        return False
 
     def _marker(self, key: str) -> Path:
         return self.out / PRIVATE / "sent" / f"{key}.json"
@@ -87,42 +126,75 @@ class RecordsState:
 
     def __init__(self, records: Records, out: Path) -> None:
         self.records, self.folder = records, FolderState(out)
-        self._sent: set[str] = set()
+        self._sent: dict[str, Dispatch] = {}
         self._read = 0
 
     def reported(self, job: str) -> Mapping[str, str] | None:
-        if (here := self.folder.reported(job)) is not None:
+        return inputs_of(self.results(job))
+
+    def results(self, job: str) -> Mapping[str, Any] | None:
+        if inputs_of(here := self.folder.results(job)) is not None:
             digest = sha256_of(self.folder.out / job / RESULTS)
             if digest is not None and self.records.has_results(digest) is not None:
                 return here
-        newest = self._newest(job)
-        inputs = None if newest is None else next(self.records.entries(newest.entry)).data.get("inputs")
-        return {str(name): str(digest) for name, digest in inputs.items()} if inputs else None
+        if (newest := self._newest(job)) is None:
+            return None
+        data = next(self.records.entries(newest.entry)).data  # its files were taken away
+        decided = [] if newest.decision == NONE else [{"standard": "its certificate", "decision": newest.decision}]
+        of = {"id": job, "machine": data["machine"]["name"], "inputs_sha256": data.get("inputs") or None}
+        diagnosis = {"verdict": newest.diagnosis}
+        return {"job": of, "verdicts": data.get("verdicts"), "conformity": decided, "diagnosis": diagnosis}
 
     def released(self, job: str) -> bool:
         newest = self._newest(job)
         return newest is not None and newest.state == "released"
 
-    def sent(self, key: str) -> bool:
+    def is_draft(self, job: str) -> bool:
+        newest = self._newest(job)
+        return newest is None or newest.state == "draft"
+
+    def sent(self, key: str) -> Dispatch | None:
         for entry in self.records.entries(self._read + 1, kind="sent"):
-            self._sent.add(str(entry.data.get("key")))
+            data = entry.data
+            at = _moment(data.get("at")) or _moment(entry.at)
+            if at is not None:
+                known = self._sent.get(str(data.get("key")))
+                self._sent[str(data.get("key"))] = Dispatch(min(known.first, at) if known else at, at)
             self._read = entry.number
-        return key in self._sent
+        return self._sent.get(key)
 
     def add_sent(self, key: str, content: Mapping[str, Any]) -> None:
         self.records.append("sent", {**content, "key": key})
+
+    def claim(self, key: str, content: Mapping[str, Any], again: Callable[[Dispatch | None], bool]) -> bool:
+        if not again(self.sent(key)):  # as on most days
+            return False
+        with self.records.writing() as writing:
+            if again(self.sent(key)):
+                writing.add([("sent", {**content, "key": key}, None)])
+                return True
+        return False
 
     def _newest(self, job: str) -> RecordedCertificate | None:
         found = self.records.certificates(job=job, origin=None, values=False)
         return max(found, key=lambda one: one.entry, default=None)
 
 
-def inputs_in(folder: Path) -> dict[str, str] | None:
-    """SHA-256 of every file that a report was made from, by name, as its results.json says; ``None`` where it does not."""
+@lru_cache(maxsize=1)
+def _results_in(folder: Path, digest: str) -> Mapping[str, Any] | None:
+    """What a results.json says; ``digest`` tells it from another in the same place."""
     try:
         data = json.loads(content_of(folder / RESULTS, TABLE_BYTES, ""))
-        return {str(name): str(digest) for name, digest in data["job"]["inputs_sha256"].items()}
-    except (CmmUqError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+    except (CmmUqError, ValueError, RecursionError):
+        return None
+    return data if isinstance(data, dict) else None
+
+
+def inputs_of(results: Mapping[str, Any] | None) -> dict[str, str] | None:
+    """SHA-256 of every file that a report was made from, by name; ``None`` where results do not say."""
+    try:
+        return {str(name): str(digest) for name, digest in results["job"]["inputs_sha256"].items()}  # type: ignore[index]
+    except (TypeError, KeyError, AttributeError):
         return None
 
 
@@ -135,16 +207,15 @@ class Problems:
             self._known = set()
 
     def since(self, about: str, problem: str, now: str) -> str:
-        """The moment at which a problem was first met; now, where it is new."""
+        """The moment at which a problem was first met; now, where it is new, or the moment is damaged or of the future."""
         path = self.folder / f"{_short(about)}-{_short(problem)}"
-        with contextlib.suppress(OSError, OutputError):  # a full disk: it will be new again
-            self.folder.mkdir(parents=True, exist_ok=True)
-            write_new(path, now.encode())
-            self._known.add(path.name)
-        try:
+        since = _moment_in(path)
+        if since is not None and since <= dt.datetime.fromisoformat(now) + AHEAD:
             return path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError):
-            return now
+        with contextlib.suppress(OutputError):  # a full disk: it will be new again
+            replace_file(path, now.encode(), _FIX)
+            self._known.add(path.name)
+        return now
 
     def mended(self, about: str) -> None:
         """Forget what was wrong with a job or a folder."""
@@ -153,6 +224,45 @@ class Problems:
             self._known.discard(name)
             with contextlib.suppress(OSError):
                 (self.folder / name).unlink()
+
+
+AHEAD = dt.timedelta(days=1)
+"""By how much something may be of the future: clocks of two computers differ, and so do their zones."""
+
+
+def last_run(out: Path) -> dt.datetime | None:
+    """When the last run that came to its end began, by the clock and the zone of then."""
+    return _moment_in(out / PRIVATE / "last-run")
+
+
+def remember_run(out: Path, begun: dt.datetime, now: dt.datetime) -> None:
+    """Of runs at the same time the later one counts, unless it is of the future."""
+    before = last_run(out)
+    if before is None or not begun <= before <= now:
+        replace_file(out / PRIVATE / "last-run", begun.isoformat(timespec="seconds").encode(), _FIX)
+
+
+def _moment_in(path: Path) -> dt.datetime | None:
+    with contextlib.suppress(OSError, ValueError):
+        return _moment(path.read_text(encoding="utf-8"))
+    return None
+
+
+def _moment(text: Any) -> dt.datetime | None:
+    """A moment with its zone that any zone has; ``None`` where a text says none."""
+    moment = instant(str(text))
+    return moment if moment is not None and 2000 < moment.year < dt.MAXYEAR else None
+
+
+@contextlib.contextmanager
+def running(out: Path) -> Iterator[bool]:
+    """While a run is at work: whether one before ended in the middle, so that nobody saw its exit code."""
+    folder, cut = out / PRIVATE / "runs", False
+    for path in folder.glob("*.lock"):
+        with turn(path) as left:
+            cut |= left is not None and left.resumed
+    with turn(folder / f"{os.getpid()}-{time.monotonic_ns()}.lock"):
+        yield cut
 
 
 def _short(text: str) -> str:
@@ -192,8 +302,7 @@ def turn_at(path: Path) -> Turn | None:
         if not resumed:
             os.write(descriptor, _BEGUN)
     except OSError as error:
-        fix = "Free the disk, or mend the permissions"
-        raise OutputError(f"cannot be locked: {error.strerror}", where=str(path), fix=fix) from error
+        raise OutputError(f"cannot be locked: {error.strerror}", where=str(path), fix=_FIX) from error
     return Turn(path, descriptor, resumed)
 
 
@@ -224,57 +333,6 @@ def was_left(path: Path) -> bool:
         return path.stat().st_size > 0
     except OSError:
         return False
-
-
-class Pace:
-    """Counts what is done of a number of jobs, by a clock that never goes back."""
-
-    def __init__(self, count: int, clock: Callable[[], float] = time.monotonic) -> None:
-        self.count = count
-        self.done = self.failed = 0
-        self._clock, self._began, self._computed = clock, clock(), 0
-
-    def add(self, *, computed: bool = True, failed: bool = False) -> None:
-        """One more is done; one that was there already says nothing of the pace."""
-        self.done += 1
-        self.failed += failed
-        self._computed += computed
-
-    @property
-    def seconds(self) -> float:
-        return self._clock() - self._began
-
-    @property
-    def part(self) -> float:
-        """Of the whole that is done."""
-        return self.done / self.count if self.count else 1.0
-
-    def __str__(self) -> str:
-        parts = [f"{self.done} of {self.count}", *([f"{self.failed} failed"] if self.failed else [])]
-        if self._computed and (seconds := self.seconds) > 0:
-            rate = self._computed / seconds
-            parts += [pace(rate), *([f"{duration((self.count - self.done) / rate)} left"] if self.part < 1 else [])]
-        return ", ".join(parts)
-
-
-def pace(rate: float) -> str:
-    """Jobs in the unit of time in which there are some."""
-    for seconds, unit in ((1, "s"), (60, "min")):
-        if rate * seconds >= 1:
-            return f"{rate * seconds:.1f}/{unit}"
-    return f"{rate * 3600:.1f}/h"
-
-
-def duration(seconds: float) -> str:
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"
-
-
-_PATIENCE_S = 2.0  # how long to wait for another run that writes its line
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ import signal
 import sqlite3
 import subprocess
 import time
+from collections import Counter
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -182,6 +183,36 @@ def test_ready_files_are_printed_or_written(jobs: Path, tmp_path: Path) -> None:
     assert "--scheduled" in (tmp_path / "cmm-uq-schedule.xml").read_text(encoding="utf-16")
 
 
+@pytest.mark.skipif(shutil.which("faketime") is None, reason="faketime gives a process another clock")
+def test_by_another_clock_and_in_another_zone_what_stands_is_told_weekly_and_never_hidden(jobs: Path) -> None:
+    """400 days ahead for one run, and back: the wrong clock is named, and no fault is taken for told by it."""
+    schedule = jobs / "schedule.toml"
+    schedule.write_text(f'{QUICK}at = "06:15"\n')
+
+    def at(moment: str, zone: str = "Europe/Berlin", *further: str) -> tuple[int, list[str], int]:
+        line = ["faketime", "-f", f"@{moment}", *COMMAND, "report", "--scheduled", str(jobs), *further]
+        done = subprocess.run(line, capture_output=True, text=True, check=False, env={**os.environ, "TZ": zone})
+        assert done.stderr == ""
+        told = lines(done.stdout)
+        ages = [line["days"] for line in told if line.get("event") == "fail"]
+        return done.returncode, [line["why"] for line in told if line.get("event") == "missed"], *ages
+
+    assert at("2026-10-19 06:15:00") == (1, [])  # its certificate is made: a fail
+    assert at("2026-10-20 06:15:00") == (0, [], 1)
+    assert at("2026-10-20 07:15:00", "Europe/Berlin", "--strict") == (1, [], 1)
+    missed = (
+        "3 runs were missed, after the run of 2026-10-20 07:15: 2026-10-21 06:15, 2026-10-22 06:15, 2026-10-23 06:15"
+    )
+    assert at("2026-10-24 06:15:00") == (1, [f"{missed}. What was due then is done and said now."], 5)
+    assert at("2026-10-25 06:15:00") == (0, [], 6)  # the night with 25 hours
+    assert at("2026-10-26 06:15:00", "America/New_York") == (1, [], 7)  # another week
+    code, (why,), _ = at("2027-11-28 06:15:00")
+    assert (code, why[:39]) == (1, "397 runs were missed, after the run of ")
+    wrong = "the last run began on 2027-11-28 06:15, and the clock says 2026-10-27 06:15: one is wrong"
+    assert at("2026-10-27 06:15:00") == (1, [wrong], 8)
+    assert at("2026-10-28 06:15:00") == (0, [], 9)
+
+
 def test_what_was_reported_and_sent_is_in_the_records_and_a_dry_run_only_reads_them(jobs: Path) -> None:
     taken, where = Taken(), jobs / "lab.db"
     with web_server(taken) as port:
@@ -200,7 +231,8 @@ def test_what_was_reported_and_sent_is_in_the_records_and_a_dry_run_only_reads_t
             assert where.read_bytes() == before
     with open_records(where, read_only=True) as records:
         entries = list(records.entries())
-    assert [entry.kind for entry in entries] == ["report", "sent", "sent"]
+    ways = Counter((entry.kind, str(entry.data.get("channel"))[:7]) for entry in entries)
+    assert ways == {("report", "None"): 1, ("sent", "exit co"): 2, ("sent", "webhook"): 2}
     # a machine that does not conform is due at once
     told = {(entry.data["event"], entry.data["about"]) for entry in entries[1:]}
     assert told == {("fail", "iota-1102-20C"), ("due", "machine DEA Iota 1102")}

@@ -11,6 +11,7 @@ from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.messages import Verbatim
+from cmm_uq.base.output.staging import replace_file
 from cmm_uq.laboratory.live.instruments.source import Moment, Reading
 from cmm_uq.laboratory.live.journal import (
     NoRoomError,
@@ -19,7 +20,6 @@ from cmm_uq.laboratory.live.journal import (
     line_of,
     opened,
     record_of,
-    written_whole,
 )
 from cmm_uq.laboratory.live.recorder import put_blocks, readings_of
 from cmm_uq.laboratory.live.story import begin, read_story, sessions_in
@@ -158,14 +158,14 @@ def test_with_a_full_disk_records_wait_and_are_kept_when_there_is_room(
 
 def test_a_file_is_written_whole_or_stays_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "bar.csv"
-    written_whole(path, b"old")
+    replace_file(path, b"old")
 
     def full(file: int) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OutputError, match="No space left"):
-        written_whole(path, b"new")
+        replace_file(path, b"new")
     assert path.read_bytes() == b"old"
     assert [one.name for one in tmp_path.iterdir()] == ["bar.csv"]
 

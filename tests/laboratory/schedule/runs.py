@@ -15,7 +15,7 @@ from cmm_uq.laboratory.schedule.jobs import JobFolder, JobReporting
 from cmm_uq.laboratory.schedule.notices import Notice, Outbox
 from cmm_uq.laboratory.schedule.run import RunClock, ScheduledRun
 from cmm_uq.laboratory.schedule.settings import RunTable
-from cmm_uq.laboratory.schedule.state import FolderState, State
+from cmm_uq.laboratory.schedule.state import FolderState, RecordsState, State
 from tests.laboratory.schedule.told import Kept
 
 JOB = '[job]\nid = "{id}"\n[recording]\nfile = "points.csv"\n'
@@ -43,11 +43,13 @@ class Jobs:
     slept: list[float] = field(default_factory=list)
     lines: list[dict[str, Any]] = field(default_factory=list)
     logged: list[str] = field(default_factory=list)
+    name: str = "reports"  # of the folder of the reports
+    told: bool = True  # by the channel; else by exit codes alone
     asleep: Callable[[], None] = lambda: None
 
     @property
     def out(self) -> Path:
-        return self.root / "reports"
+        return self.root / self.name
 
     def report(self, job: JobFolder) -> bytes:
         self.before(job)
@@ -64,16 +66,16 @@ class Jobs:
         self.reported.append(job.id)
         return results
 
-    def run(self, *, dry: bool = False) -> int:
+    def run(self, *, dry: bool = False, strict: bool = False) -> int:
         self.lines.clear()
         self.reported.clear()
         state = self.state or FolderState(self.out)
         clock = RunClock(lambda: self.now, lambda: sum(self.slept), self._sleep)
-        outbox = Outbox(self.out, [self.channel], state, clock.moment)
+        outbox = Outbox(self.out, [self.channel] if self.told else [], state, clock.moment)
         settings = RunTable(**{"back_off_s": 1.0, **self.settings})
-        work = JobReporting(self.out, state, self.report, outbox.add)
+        work = JobReporting(self.out, state, self.report, outbox.announce)
         tell, log, folders = self.lines.append, self.logged.append, self.folders or [self.root]
-        return ScheduledRun(folders, settings, work, outbox, self.due, tell, log, clock, dry).through()
+        return ScheduledRun(folders, settings, work, outbox, self.due, tell, log, clock, dry, strict).through()
 
     def _sleep(self, seconds: float) -> None:
         self.slept.append(seconds)
@@ -81,3 +83,12 @@ class Jobs:
 
     def states(self) -> dict[str, str]:
         return {line["job"] or Path(line["folder"]).name: line["state"] for line in self.lines if "state" in line}
+
+
+class FolderResults:
+    """The state of records, of reports that are made up and not recorded: those are found in their folder."""
+
+    def __init__(self, state: RecordsState) -> None:
+        self.sent, self.add_sent, self.claim = state.sent, state.add_sent, state.claim
+        self.reported, self.results, self.released = state.folder.reported, state.folder.results, state.folder.released
+        self.is_draft = state.folder.is_draft

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import os
 import time
 from collections.abc import Mapping
@@ -23,8 +24,10 @@ from cmm_uq.laboratory.schedule.notices import (
     of_error,
     of_results,
 )
-from cmm_uq.laboratory.schedule.state import FolderState, turn
+from cmm_uq.laboratory.schedule.state import Dispatch, FolderState, turn
 from tests.laboratory.schedule.told import NOW, Kept, notice, notices
+
+AT = dt.datetime.fromisoformat(NOW)
 
 OF_DECISION = {
     "pass": None, "conditional pass": "undecided", "incomplete": "incomplete", "undecided": "undecided",
@@ -159,8 +162,8 @@ class Locked:
     def released(self, job: str) -> bool:
         return False
 
-    def sent(self, key: str) -> bool:
-        return key in self.keys
+    def sent(self, key: str) -> Dispatch | None:
+        return Dispatch(AT, AT) if key in self.keys else None
 
     def add_sent(self, key: str, content: Mapping[str, Any]) -> None:
         if self.failures:

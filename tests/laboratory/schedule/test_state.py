@@ -17,13 +17,11 @@ from cmm_uq.base.output import Owner, staged
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.store import Records
 from cmm_uq.laboratory.schedule.jobs import JobFolder, JobReporting
+from cmm_uq.laboratory.schedule.processes import Pace, duration, pace
 from cmm_uq.laboratory.schedule.state import (
     FolderState,
     Log,
-    Pace,
     RecordsState,
-    duration,
-    pace,
     turn,
     turn_at,
     was_left,
@@ -115,7 +113,9 @@ def test_runs_with_records_send_once_and_their_chain_holds(tmp_path: Path, recor
     assert jobs.run() == 0
     assert jobs.reported == []
     assert len(jobs.channel.messages) == 1
-    assert [entry.kind for entry in records.entries()] == ["sent", "report"]
+    assert [(entry.kind, entry.data.get("channel")) for entry in records.entries()] == [
+        ("sent", "exit code"), ("sent", "kept"), ("report", None),
+    ]  # fmt: skip
     assert records.verify(files=False) == []
 
 

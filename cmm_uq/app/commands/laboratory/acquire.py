@@ -19,6 +19,7 @@ from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.messages import Verbatim
+from cmm_uq.base.output.staging import replace_file
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE
@@ -34,7 +35,7 @@ from cmm_uq.laboratory.live.conducting import Conductor
 from cmm_uq.laboratory.live.instruments.instrument import open_source
 from cmm_uq.laboratory.live.instruments.ipp_machine import IppMachine
 from cmm_uq.laboratory.live.instruments.source import SYSTEM, Clock, LiveSource, Moment
-from cmm_uq.laboratory.live.journal import made_folder, written_whole
+from cmm_uq.laboratory.live.journal import made_folder
 from cmm_uq.laboratory.live.judging import Judge
 from cmm_uq.laboratory.live.lead import Lead, LiveRecording
 from cmm_uq.laboratory.live.recorder import Recorder
@@ -56,7 +57,7 @@ def _take(file: DroppedFile, job: Job, watched: WatchedFolder, conductor: Conduc
         folder = job.folder / FOLDER / "files"
         made_folder(folder)
         path = folder / f"{1 + sum(1 for _ in folder.iterdir()):04d}-{file.path.name}"
-        written_whole(path, file.content)
+        replace_file(path, file.content)
     except OutputError as error:
         conductor.tell(Verbatim(str(error)))
         watched.again(file.path)
@@ -253,6 +254,6 @@ def write_trial(folder: Path, out: Path) -> Path:
     for name, content in {**job.inputs, **plan_file(job)}.items():
         if name not in left_out:
             made_folder((out / name).parent)
-            written_whole(out / name, content)
-    written_whole(out / "job.toml", tomlkit.dumps(document).encode())
+            replace_file(out / name, content)
+    replace_file(out / "job.toml", tomlkit.dumps(document).encode())
     return out

@@ -24,8 +24,7 @@ from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import interruption, staged
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.place import NONE
-from cmm_uq.laboratory.schedule.processes import TaskAnswer, WorkerTask, answers, check_workers, processes
-from cmm_uq.laboratory.schedule.state import Pace
+from cmm_uq.laboratory.schedule.processes import Pace, TaskAnswer, WorkerTask, answers, check_workers, processes
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records

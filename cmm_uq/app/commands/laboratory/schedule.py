@@ -31,7 +31,7 @@ from cmm_uq.laboratory.schedule.jobs import REPORTED, JobFolder, JobReporting
 from cmm_uq.laboratory.schedule.run import RunClock, ScheduledRun
 from cmm_uq.laboratory.schedule.schedulers import DAYS, READY, ScheduledCall, encoded
 from cmm_uq.laboratory.schedule.settings import FILE, ScheduleFile, channels, read_schedule
-from cmm_uq.laboratory.schedule.state import FolderState, Log, Problems, RecordsState
+from cmm_uq.laboratory.schedule.state import AHEAD, FolderState, Log, Problems, RecordsState
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
@@ -110,22 +110,27 @@ def write_schedule(path: Path) -> None:
 
 
 def ready_files(
-    scheduler: str, folders: Sequence[Path], schedule: Path | None = None, *, at: str = "06:15", days: str = "",
+    scheduler: str, folders: Sequence[Path], schedule: Path | None = None, *, at: str = "", days: str = "",
     system: str = sys.platform,
 ) -> dict[str, str]:  # fmt: skip
-    """Files for what starts a scheduled run, by name."""
+    """Files for what starts a scheduled run, by name; when, the schedule says where nothing else does, else 06:15 each day."""
     if scheduler not in READY:
         raise CmmUqError(f"there is no scheduler {scheduler!r}", fix=suggestion(scheduler, READY))
     for folder in folders:
         if not folder.is_dir():
             raise CmmUqError("no such folder", where=str(folder), fix="Name the folder that holds the job folders")
     found, named = schedule_of(folders, schedule), [day.strip().upper() for day in days.split(",") if day.strip()]
+    run = found.facts.run
+    at, named = at or run.at or "06:15", named or list(run.days)
     try:
         time_of_day = dt.datetime.strptime(at, "%H:%M")
     except ValueError:
         raise CmmUqError(f"{at!r} is no time of day", where="--at", fix="Write it as 06:15") from None
     if unknown := next((day for day in named if day not in DAYS), None):
         raise CmmUqError(f"{unknown!r} is no day of the week", where="--days", fix=f"Known: {', '.join(DAYS)}")
+    if run.at and (f"{time_of_day:%H:%M}", set(named)) != (run.at, set(run.days)):
+        what = "names another time, by which it tells which runs were missed"
+        raise CmmUqError(what, where=str(found.path), fix="Leave --at and --days away, or mend at and days there")
     home = (found.home if found.path is not None else Path()).resolve()
     path = None if schedule is None else schedule.resolve()
     program, user = (sys.executable, "-m", "cmm_uq"), getpass.getuser() if system != "win32" else ""
@@ -140,10 +145,6 @@ def write_ready(files: Mapping[str, str], folder: Path) -> list[Path]:
     for name, text in files.items():
         write_new(folder / name, encoded(name, text))
     return [folder / name for name in files]
-
-
-_AHEAD = dt.timedelta(days=1)
-"""By how much the newest entry may be of the future: clocks of two computers differ, and so do their zones."""
 
 
 @contextlib.contextmanager
@@ -163,14 +164,22 @@ def opened(place: str | Path | None, *, dry: bool) -> Iterator[Records | None]:
 
 def due_notices(records: Records | None, on: dt.date, within: dt.timedelta) -> Iterable[notices.Notice]:
     """What is to be calibrated soon, or should have been."""
-    if records is None or (latest := records.last_moment) is None:
+    if records is None or (latest := records.last_moment) is None or not (records.machines() or records.artefacts()):
         return
-    if latest.date() > on + _AHEAD:
-        what = f"the newest entry is of {latest.date()}, and the clock says {on}: what is due is not said"
-        raise CmmUqError(what, where="records", fix="Set the clock")
-    for one in due_in(records, (), on):
+    wrong = latest.date() > on + AHEAD
+    for one in due_in(records, (), max(on, latest.date()) if wrong else on):  # with all certificates that there are
         if one.due is not None and one.due <= on + within:
             yield notices.of_due(one.item, one.serial, one.due, on, one.why, beyond=one.beyond)
+    if wrong:
+        what = f"the newest entry is of {latest.date()}, and the clock says {on}: more may be due than is said"
+        raise CmmUqError(
+            what, where="records", fix="Set the clock; where it is right, cmm-uq records verify says which entry is not"
+        )
+
+
+def _newest_jobs(records: Records | None, on: dt.date) -> set[str]:
+    """Jobs of the newest certificate or check of each machine."""
+    return set() if records is None else {one.job for one in (*records.latest(on, values=False), *records.checks())}
 
 
 def drift_notices(records: Records | None, job: str, on: dt.date) -> Iterable[notices.Notice]:
@@ -198,7 +207,8 @@ class ScheduledOptions:
     ``folders``: job folders, or folders with job folders in them; ``out``: folder of the reports; by default what the
     schedule says; ``schedule``: the file; by default ``schedule.toml`` in the first folder; ``records``: file, URL,
     or ``none``; by default what the schedule says, else ``records.db`` beside the reports; ``seed``: of everything
-    random; by default what the schedule says; ``dry``: say what would happen, and do nothing.
+    random; by default what the schedule says; ``dry``: say what would happen, and do nothing; ``strict``: exit code 1
+    while anything stands.
     """
 
     folders: tuple[Path, ...]
@@ -207,6 +217,7 @@ class ScheduledOptions:
     records: str | None = None
     seed: int | None = None
     dry: bool = False
+    strict: bool = False
 
 
 def run_scheduled(asked: ScheduledOptions, tell: Tell = lambda told: None, clock: RunClock = CLOCK) -> int:
@@ -226,12 +237,17 @@ def run_scheduled(asked: ScheduledOptions, tell: Tell = lambda told: None, clock
             state = FolderState(reports) if records is None else RecordsState(records, reports)
             outbox = notices.Outbox(reports, ways, state, clock.moment)
             seed = facts.run.seed if asked.seed is None else asked.seed
-            work = JobReporting(reports, state, lambda job: _reported(job, reports, seed, place or NONE), outbox.add,
-                        lambda job: drift_notices(records, job.id, clock.now().date()))  # fmt: skip
+            today = clock.now().astimezone().date()
+            newest = _newest_jobs(records, today)
+            work = JobReporting(
+                reports, state, lambda job: _reported(job, reports, seed, place or NONE), outbox.announce,
+                lambda job: drift_notices(records, job.id, today),
+                lambda job: drift_notices(records, job.id, today) if job.id in newest else (),
+            )  # fmt: skip
             within = dt.timedelta(days=facts.run.due_within_days)
             roots = [folder.absolute() for folder in asked.folders]
             due = partial(due_notices, records, within=within)
-            run = ScheduledRun(roots, facts.run, work, outbox, due, tell, log.write, clock, asked.dry)
+            run = ScheduledRun(roots, facts.run, work, outbox, due, tell, log.write, clock, asked.dry, asked.strict)
 
             def kept() -> str:
                 count = run.counted.get(REPORTED, 0)
@@ -242,8 +258,9 @@ def run_scheduled(asked: ScheduledOptions, tell: Tell = lambda told: None, clock
                 return run.through()
     except CmmUqError as error:  # of the records: without them nothing is made, and somebody has to hear of that too
         if not asked.dry:
-            log.write(f"{clock.moment()} nothing was done: {error}")
-            notice = notices.of_error(error, _RUN, Problems(reports).since(_RUN, str(error), clock.moment()))
+            since = Problems(reports).since(_RUN, str(error), clock.moment())
+            log.write(f"{clock.moment()} nothing was done, since {since}: {error}")
+            notice = notices.of_error(error, _RUN, since)
             outbox = notices.Outbox(reports, ways, FolderState(reports), clock.moment)
             try:
                 outbox.add([notice])
