@@ -219,11 +219,11 @@ def serve(
     quiet: bool = opt.QUIET,
 ) -> None:
     """Show the records in a browser: what is due or fails, trends, certificates, artefacts. Nothing can be changed there."""
-    from cmm_uq.app.serve.site import RecordsServer, Site
+    from cmm_uq.app.serve import server as http, site as pages
 
-    site = Site(records)
+    site = pages.Site(records)
     with (
-        RecordsServer(site.answer, bind=bind, port=port, names=name or ()) as server,
+        http.RecordsServer(site.answer, bind=bind, port=port, names=name or ()) as server,
         keeping(lambda: "the page is closed"),
     ):
         if not quiet:

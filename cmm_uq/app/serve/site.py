@@ -1,37 +1,29 @@
-"""The site and its server: which address gives which page, as HTML, and a page in words for whatever goes wrong.
+"""The site: which address gives which page, as HTML, and a page in words for whatever goes wrong.
 
 Records are opened for each request and closed after it, so that a page shows what is there now, and not a file that was
-moved, restored or migrated meanwhile. The server takes one request a connection, each with a deadline, as few at a time as a
-page for one laboratory needs. It listens on this machine alone unless it is told otherwise, and answers only to its own names:
-a page elsewhere that has its own name pointed to this address (DNS rebinding) gets nothing, nor does a form from elsewhere.
+moved, restored or migrated meanwhile.
 """
 
 from __future__ import annotations
 
 import contextlib
 import datetime as dt
-import io
-import ipaddress
-import socket
 import threading
-import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from socketserver import TCPServer
-from typing import TYPE_CHECKING, Any, BinaryIO, cast
+from typing import TYPE_CHECKING, Any
 
 from cmm_uq import __version__
 from cmm_uq.app.serve import trends as drawing
 from cmm_uq.app.serve.certificate_page import certificate_page, recorded_file
 from cmm_uq.app.serve.checks_page import dropped_page, file_page, integrity_page
-from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse, bad, read_address
+from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse
 from cmm_uq.app.serve.lists import artefacts_page, certificates_page, diagnoses_page, machine_page, machines_page
 from cmm_uq.app.serve.page import Cell, Chart, PageNotice, WebPage, kind
 from cmm_uq.app.serve.view import ChainComparing, DueDates, MachineStanding, SiteView, by_rule, overview, problem_of
-from cmm_uq.base.errors import CmmUqError, OutputError, printable
+from cmm_uq.base.errors import CmmUqError, printable
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.certificate.plots import style as plot_style
 from cmm_uq.certificate.render import template_folder
@@ -199,192 +191,3 @@ class Site:
         )
         referrer = "same-origin" if page.place in WITH_FORM else "no-referrer"
         return WebResponse(render_page(page, foot), status=page.status, referrer=referrer)
-
-
-HEAD_S, BODY_S, ANSWER_S = 10.0, 60.0, 60.0
-"""Seconds that a browser has to send its request's head, to send a file, and to take its answer."""
-
-AT_ONCE = 32  # requests that are answered at the same time; further ones are turned away
-LOOPBACK = ("localhost", "127.0.0.1", "[::1]")
-Answering = Callable[[WebRequest | RefusedRequest], WebResponse]  # given a request, or why it is none; never raises
-
-
-class RecordsServer(ThreadingHTTPServer):
-    """Answers browsers until it is closed.
-
-    ``answer``: gives the page of a request; ``port``: 0 takes a free one; ``names``: further names under which
-    browsers reach this machine.
-    """
-
-    daemon_threads = True
-    request_queue_size = 64
-    allow_reuse_address = not hasattr(socket, "SO_EXCLUSIVEADDRUSE")  # on Windows it would let two servers share a port
-
-    def __init__(self, answer: Answering, *, bind: str = "127.0.0.1", port: int = 8765, names: Collection[str] = ()):
-        self.answer, self._room = answer, threading.BoundedSemaphore(AT_ONCE)
-        try:
-            address = ipaddress.ip_address(bind)
-        except ValueError:
-            raise CmmUqError(
-                "is no address of a network card", where=f"--bind {bind}",
-                fix="127.0.0.1 is this machine alone, 0.0.0.0 every network that it is in",
-            ) from None  # fmt: skip
-        self.address_family = socket.AF_INET6 if address.version == 6 else socket.AF_INET
-        self.alone = address.is_loopback
-        try:
-            super().__init__((bind, port), _Handler)
-        except OSError as error:
-            taken = f"--port {port}"
-            fix = "Name another port with --port" if port else "Name another address with --bind"
-            raise OutputError(f"cannot be listened on: {error.strerror or error}", where=taken, fix=fix) from None
-        own = {f"[{bind}]" if address.version == 6 else bind, *LOOPBACK, *(name.lower() for name in names)}
-        self.names = own if self.alone else own | {socket.gethostname().lower()}
-
-    def server_bind(self) -> None:
-        """Bind without asking the network for this machine's name, which may take seconds."""
-        TCPServer.server_bind(self)
-        self.server_name, self.server_port = str(self.server_address[0]), int(self.server_address[1])
-
-    @property
-    def url(self) -> str:
-        """Where a browser on this machine finds it."""
-        host = self.server_name
-        if ipaddress.ip_address(host).is_unspecified:
-            host = "127.0.0.1"
-        return f"http://{f'[{host}]' if ':' in host else host}:{self.server_port}/"
-
-    def answers_to(self, host: str) -> bool:
-        """Whether a Host header names this server; beyond this machine any number will do, which no rebinding can forge."""
-        name, _, port = host.lower().rpartition(":") if not host.endswith("]") else (host.lower(), "", "")
-        if not name:
-            name, port = port, ""
-        if (port or "80") != str(self.server_port):
-            return False
-        if name in self.names:
-            return True
-        with contextlib.suppress(ValueError):
-            return not self.alone and bool(ipaddress.ip_address(name.strip("[]")))
-        return False
-
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """In a thread of its own, unless too many are at work."""
-        if self._room.acquire(blocking=False):
-            super().process_request(request, client_address)
-        else:
-            self.shutdown_request(request)
-
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """As the standard library does, and make room afterwards."""
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            self._room.release()
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that went away is no event."""
-
-
-class _Timed(io.RawIOBase):
-    """What comes from a socket, until a deadline: a browser that sends a byte now and then is cut off too."""
-
-    def __init__(self, connection: socket.socket, seconds: float) -> None:
-        self._connection, self._until = connection, time.monotonic() + seconds
-
-    def allow(self, seconds: float) -> None:
-        self._until = time.monotonic() + seconds
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        left = self._until - time.monotonic()
-        if left <= 0:
-            raise TimeoutError
-        self._connection.settimeout(left)
-        return self._connection.recv_into(buffer)
-
-
-class _Handler(BaseHTTPRequestHandler):
-    server: RecordsServer
-    protocol_version = "HTTP/1.1"
-
-    def setup(self) -> None:
-        super().setup()
-        self._timed = _Timed(self.connection, HEAD_S)
-        self.rfile = cast("io.BufferedIOBase", io.BufferedReader(self._timed, 2**16))
-
-    def finish(self) -> None:
-        with contextlib.suppress(OSError):  # it went away before it had its answer
-            super().finish()
-
-    def version_string(self) -> str:
-        return f"cmm-uq/{__version__}"
-
-    def log_message(self, format: str, *args: Any) -> None:  # noqa: A002 - the standard library's name
-        """Nothing: who looked at what is nobody's business."""
-
-    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """What the standard library refuses (a malformed request, another method), in the site's words."""
-        status = HTTPStatus.METHOD_NOT_ALLOWED if code == HTTPStatus.NOT_IMPLEMENTED else HTTPStatus(code)
-        told = say("the request cannot be read: {why}", why=Verbatim(status.phrase.lower()))
-        if status == HTTPStatus.METHOD_NOT_ALLOWED:
-            told = say("this page can only be looked at")
-        self._send(self.server.answer(RefusedRequest(status, told)))
-
-    def do_GET(self) -> None:
-        try:
-            request: WebRequest | RefusedRequest = self._posted() if self.command == "POST" else self._asked()
-        except RefusedRequest as refused:
-            request = refused
-        self._send(self.server.answer(request))
-
-    do_HEAD = do_POST = do_GET  # noqa: N815 - names of the standard library
-
-    def _asked(self) -> WebRequest:
-        hosts = self.headers.get_all("Host", [])
-        if len(hosts) != 1 or not self.server.answers_to(hosts[0].strip()):
-            raise RefusedRequest(
-                HTTPStatus.MISDIRECTED_REQUEST, say("this page is not known by that name"),
-                say("Open {url}", url=Verbatim(self.server.url)),
-            )  # fmt: skip
-        path, query = read_address(self.path)
-        headers = {name.lower(): value for name, value in self.headers.items()}
-        return WebRequest(self.command, path, query, headers)
-
-    def _posted(self) -> WebRequest:
-        asked = self._asked()
-        origin = asked.headers.get("origin")
-        host = f"http://{asked.headers['host'].strip().lower()}"
-        site = asked.headers.get("sec-fetch-site", "same-origin")
-        if (origin is not None and origin.lower() != host) or site != "same-origin":
-            raise RefusedRequest(HTTPStatus.FORBIDDEN, say("the form was sent from another site"))
-        given = self.headers.get_all("Content-Length", [])
-        if len(given) != 1 or not (given[0].isascii() and given[0].isdigit()) or "transfer-encoding" in asked.headers:
-            raise RefusedRequest(HTTPStatus.LENGTH_REQUIRED, say("the request does not say how long it is"))
-        if len(given[0]) > 15:
-            raise bad(say("the request says that it is longer than anything"))
-        self._timed.allow(BODY_S)
-        body = cast("BinaryIO", self.rfile)
-        return WebRequest(asked.method, asked.path, asked.query, asked.headers, body, int(given[0]))
-
-    def _send(self, answer: WebResponse) -> None:
-        """All of it within its time; then the connection is closed, after what still comes has been let go."""
-        self.close_connection = True
-        self.connection.settimeout(ANSWER_S)
-        self.send_response(answer.status)
-        for name, value in answer.all_headers().items():
-            self.send_header(name, value)
-        self.send_header("Connection", "close")
-        self.end_headers()
-        if self.command != "HEAD":
-            self.wfile.write(answer.body)
-        if self.command == "POST" and answer.status >= HTTPStatus.BAD_REQUEST:
-            self._let_go()
-
-    def _let_go(self) -> None:
-        """Take the rest of a refused file without looking: a browser that cannot send it on would not show why."""
-        with contextlib.suppress(OSError):
-            self.connection.shutdown(socket.SHUT_WR)
-            self._timed.allow(ANSWER_S)
-            while self.rfile.read(2**16):
-                pass

@@ -10,7 +10,8 @@ from urllib.parse import urlsplit
 import pytest
 
 from cmm_uq.app.serve.exchange import WebRequest, WebResponse, read_address
-from cmm_uq.app.serve.site import RecordsServer, Site
+from cmm_uq.app.serve.server import RecordsServer
+from cmm_uq.app.serve.site import Site
 from tests.app.serve.laboratory import TODAY, opened_in
 
 

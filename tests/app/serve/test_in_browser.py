@@ -12,7 +12,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from pypdf import PdfReader
 
-from cmm_uq.app.serve.site import RecordsServer
+from cmm_uq.app.serve.server import RecordsServer
 from tests.app.serve.laboratory import entry_of, files
 from tests.certificate.test_html_layout import CONTRASTS, LABELS_COLLIDING
 

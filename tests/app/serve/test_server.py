@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.app.serve import site as server
+from cmm_uq.app.serve import server
 from cmm_uq.app.serve.exchange import WebResponse
-from cmm_uq.app.serve.site import RecordsServer
+from cmm_uq.app.serve.server import RecordsServer
 from cmm_uq.base.errors import CmmUqError, OutputError
 from tests.app.serve.laboratory import files
 from tests.app.serve.test_exchange import BOUNDARY, form
