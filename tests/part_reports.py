@@ -19,7 +19,6 @@ from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.part.measurement import PartMeasurement
-from cmm_uq.certificate.verify.pdf_file import PdfFile
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel
 from cmm_uq.maths.inference.noise import Components
@@ -62,18 +61,6 @@ def sampled_once(model: LinearModel, noise: Components, estimate: LeastSquares, 
     if key not in _SAMPLED:
         _SAMPLED[key] = sample_with_noise(model, noise, estimate, seed)
     return _SAMPLED[key]
-
-
-_TEXTS: dict[bytes, list[str]] = {}
-_texts_of = PdfFile.pages.func
-
-
-def pages_once(file: PdfFile) -> list[str]:
-    """Text of a PDF's pages, read once for all verifications of the very same bytes."""
-    key = hashlib.sha256(file.content).digest()
-    if key not in _TEXTS:
-        _TEXTS[key] = _texts_of(file)
-    return _TEXTS[key]
 
 
 def unchanged(

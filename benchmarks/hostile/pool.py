@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 from benchmarks.hostile.cases import case
 from benchmarks.hostile.invariants import SECONDS
@@ -77,7 +78,7 @@ class Worker:
         self._replies.close()
 
 
-def run_all(numbers: Iterable[int], seed: int, workers: int, root: Path) -> Iterator[dict[str, object]]:
+def run_all(numbers: Iterable[int], seed: int, workers: int, root: Path) -> Iterator[dict[str, Any]]:
     """Records of all cases, as they come.
 
     Parameters
@@ -88,7 +89,7 @@ def run_all(numbers: Iterable[int], seed: int, workers: int, root: Path) -> Iter
     root : folder to work in, in memory where possible.
     """
     waiting, lock = iter(numbers), threading.Lock()
-    records: queue.Queue[dict[str, object] | None] = queue.Queue()
+    records: queue.Queue[dict[str, Any] | None] = queue.Queue()
 
     def work(place: int) -> None:
         worker = Worker(seed, root / f"worker-{place}")

@@ -1,6 +1,7 @@
 """Nothing lost, hung or half-written: ``python benchmarks/hostile/study.py [--cases N] [--kills N] [--workers N] [--seed S]``.
 
-``--part mutations|kills|disk|collisions`` runs one part; ``--only PART:NUMBER`` repeats one case and shows what it said.
+``--part mutations|signatures|kills|disk|collisions`` runs one part, of which the first two go on where they were stopped;
+``--only PART:NUMBER`` repeats one case and shows what it said.
 The first inputs of every violation are kept under ``--keep`` (reports/hostile), counts beside them, and the page is written
 from the counts.
 """
@@ -8,7 +9,9 @@ from the counts.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import itertools
+import json
 import shutil
 import sys
 import tempfile
@@ -21,7 +24,7 @@ from typing import Any
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from benchmarks.hostile import collisions, disk, kills, pool
+from benchmarks.hostile import collisions, disk, kills, pool, signatures
 from benchmarks.hostile.cases import case, lay_out
 from benchmarks.hostile.invariants import Outcome
 from benchmarks.hostile.page import PARTS, Tally, load, page
@@ -57,14 +60,44 @@ def trials(part: str, options: argparse.Namespace) -> Iterator[Trial]:
             yield collision.second, collision.what, partial(collisions.meet, collision)
 
 
-def mutations(tally: Tally, options: argparse.Namespace, work: Path, tick: Callable[[], None]) -> None:
-    """Run the mutated inputs."""
-    for record in pool.run_all(range(options.cases), options.seed, options.workers, work):
+def in_process(tally: Tally, options: argparse.Namespace, work: Path, tick: Callable[[], None]) -> None:
+    """Run mutated inputs or attacks; records are lines of a file, from which a study that was stopped goes on."""
+    part = tally.part
+    runs = {"mutations": partial(_pooled, options, work), "signatures": partial(signatures.run, options.seed)}
+    for record in resumed(f"{part}-{options.seed}", range(count_of(part, options)), options, runs[part]):
         found: Any = record["found"]
         fields: dict[str, Any] = {name: record[name] for name in ("number", "target", "what", "code", "said", "ran")}
-        if tally.add(kind=str(fields.pop("target")), found=found, **fields):
-            _keep(int(str(record["number"])), record, options)
+        if tally.add(kind=str(fields.pop("target")), found=found, **fields) and part == "mutations":
+            _keep(int(record["number"]), record, options)
         tick()
+
+
+def count_of(part: str, options: argparse.Namespace) -> int:
+    return int({"mutations": options.cases, "signatures": options.attacks}[part])
+
+
+def _pooled(options: argparse.Namespace, work: Path, numbers: Sequence[int]) -> Iterator[dict[str, Any]]:
+    return pool.run_all(numbers, options.seed, options.workers, work)
+
+
+def resumed(
+    name: str, numbers: Iterable[int], options: argparse.Namespace,
+    run: Callable[[Sequence[int]], Iterator[dict[str, Any]]],
+) -> Iterator[dict[str, Any]]:  # fmt: skip
+    """Records of all numbers: those of a study that was stopped from its file, the others run and written there."""
+    options.keep.mkdir(parents=True, exist_ok=True)
+    path = options.keep / f"{name}.jsonl"
+    known = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+        with contextlib.suppress(ValueError):  # the last line of a study that was killed
+            record = json.loads(line)
+            known[record["number"]] = record
+    yield from (known[number] for number in numbers if number in known)
+    with path.open("a", encoding="utf-8") as file:
+        for record in run([number for number in numbers if number not in known]):
+            file.write(json.dumps(record) + "\n")
+            file.flush()
+            yield record
 
 
 def _keep(number: int, record: dict[str, object], options: argparse.Namespace) -> None:
@@ -104,9 +137,9 @@ def run_part(part: str, options: argparse.Namespace, progress: Progress) -> Tall
     task = progress.add_task(PARTS[part][0], total=None)
     with tempfile.TemporaryDirectory(prefix="hostile-", dir=memory()) as work:
         tick = partial(progress.advance, task)
-        if part == "mutations":
-            progress.update(task, total=options.cases)
-            mutations(tally, options, Path(work), tick)
+        if part in ("mutations", "signatures"):
+            progress.update(task, total=count_of(part, options))
+            in_process(tally, options, Path(work), tick)
         else:
             given = list(trials(part, options))
             progress.update(task, total=len(given))
@@ -123,6 +156,8 @@ def repeat(which: str, options: argparse.Namespace) -> None:
         if part == "mutations":
             record: Any = next(iter(pool.run_all([int(number)], options.seed, 1, Path(work))))
             _keep(int(number), dict(record), options)
+        elif part == "signatures":
+            record = next(signatures.run(options.seed, [int(number)]))
         else:
             kind, what, run = next(itertools.islice(trials(part, options), int(number), None))
             record = (kind, what, *run(Path(work) / "case"))
@@ -134,6 +169,7 @@ def main(arguments: Iterable[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=100_000)
     parser.add_argument("--kills", type=int, default=1000)
+    parser.add_argument("--attacks", type=int, default=1000)
     parser.add_argument("--workers", type=int, default=4)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--part", choices=PARTS, action="append")

@@ -72,7 +72,6 @@ PDF_PAGES = Limit(2_000, "pages", "PDF that is verified", "a certificate has a d
 PDF_UNPACKED = Limit(
     400_000_000, "bytes", "PDF that is verified, once it is unpacked", "ten times the largest certificate"
 )
-PDF_DRAWN = Limit(20_000_000, "bytes", "page of a PDF that is verified, once drawn", "a crowded picture has 2 000 000")
 HTML_BYTES = Limit(64_000_000, "bytes", "HTML that is verified", "a certificate with crowded pictures has ten million")
 HTML_DEPTH = Limit(100, "levels", "tags in HTML that is verified", "a cell of a table is at 10")
 JSON_BYTES = Limit(64_000_000, "bytes", "results.json", "the figures of the largest recording take half of it")

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from asn1crypto import cms, crl, ocsp, x509
 from cryptography import x509 as certificates
-from cryptography.exceptions import InvalidSignature
+from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.asymmetric.padding import PKCS1v15
+from cryptography.x509 import ocsp as responses
+from pyhanko.sign.general import extract_certificate_info
 from pyhanko.sign.validation.generic_cms import validate_tst_signed_data
 from pyhanko_certvalidator import CertificateValidator, ValidationContext
 from pyhanko_certvalidator.errors import InvalidCertificateError, PathBuildingError, PathValidationError, RevokedError
 
-from cmm_uq.base.messages import Text, Verbatim, day, say
+from cmm_uq.base.messages import Text, Verbatim, commas, day, say
 from cmm_uq.certificate.sign.found import NOBODY, FileSignature, Revocation, Trust, ran
 from cmm_uq.certificate.sign.signer import is_test, unfit
 
@@ -31,6 +37,7 @@ class Evidence:
     certificates: tuple[x509.Certificate, ...] = ()  # above the signers'
     revocations: tuple[crl.CertificateList, ...] = ()
     answers: tuple[ocsp.OCSPResponse, ...] = ()
+    others: tuple[cms.SignedData, ...] = ()  # time stamps and further signatures that it is for as well
 
 
 def judged(signature: FileSignature, certificate: x509.Certificate, evidence: Evidence, trust: Trust) -> FileSignature:
@@ -48,6 +55,9 @@ def judged(signature: FileSignature, certificate: x509.Certificate, evidence: Ev
     found += map(Verbatim, reasons)
     if _spoilt(evidence, trust):
         found.append(SPOILT)
+    elif further := list(dict.fromkeys(_unaccounted(certificate, evidence, trust))):
+        what = commas([Verbatim(name) for name in further])
+        found.append(say("what comes with the signature belongs to no chain of its certificates: {what}", what=what))
     if at is None:
         return replace(signature, test_key=test, problems=(*found, NO_TIME))
     if not signer.not_valid_before_utc <= at <= signer.not_valid_after_utc:
@@ -65,22 +75,107 @@ def judged(signature: FileSignature, certificate: x509.Certificate, evidence: Ev
                    problems=tuple(found))  # fmt: skip
 
 
+def _issued(certificate: certificates.Certificate, issuer: certificates.Certificate) -> bool:
+    try:
+        certificate.verify_directly_issued_by(issuer)
+    except (ValueError, TypeError, InvalidSignature, UnsupportedAlgorithm):
+        return False
+    return True
+
+
+def _unaccounted(certificate: x509.Certificate, evidence: Evidence, trust: Trust) -> Iterator[str]:
+    """Names of what no signature covers and no chain from a signer, a time stamp or a responder needs; of issuers of lists."""
+    load = certificates.load_der_x509_certificate
+    yield from (name for one in evidence.others for name in _further(one))
+    signed = [extract_certificate_info(one) for one in evidence.others if len(one["certificates"])]
+    answers = [answer for one in evidence.answers if (answer := _answer(one)) is not None]
+    known = {load(certificate.dump()), *(load(one.signer_cert.dump()) for one in signed)}
+    beside = {load(one.dump()) for one in (*evidence.certificates, *(c for one in signed for c in one.other_certs))}
+    beside |= {one for answer in answers for one in answer.certificates}
+    lists = [certificates.load_der_x509_crl(one.dump()) for one in evidence.revocations]
+    anchors = set(map(load, trust.anchors))
+
+    def speaks(one: certificates.Certificate) -> bool:
+        """Whether somebody known had it issued to answer or to list what was revoked, and it does."""
+        by = any(_issued(one, issuer) for issuer in known | anchors)
+        return by and (
+            any(_answered(answer, one) for answer in answers) or any(_listed_by(one, each) for each in lists)
+        )
+
+    while more := {one for one in beside - known if any(_issued(below, one) for below in known) or speaks(one)}:
+        known |= more
+    yield from (one.subject.rfc4514_string() for one in beside - known)
+    above = known | anchors
+    unnamed = set() if anchors else {one.issuer for one in known} - {one.subject for one in known}  # nobody can look
+    yield from (
+        one.issuer.rfc4514_string()
+        for one in lists
+        if one.issuer not in unnamed and not any(_listed_by(issuer, one) for issuer in above)
+    )
+    serials = {one.serial_number for one in above}
+    yield from (
+        "OCSP"
+        for answer in answers
+        if answer.serial_number not in serials or not any(_answered(answer, one) for one in above)
+    )
+    yield from ("OCSP" for _ in range(len(evidence.answers) - len(answers)))
+
+
+def _further(signed: cms.SignedData) -> Iterator[str]:
+    """Parts of a CMS that its signature does not cover, but for certificates and one time stamp (RFC 5652, 5)."""
+    inner = signed["encap_content_info"]["content_type"].native == "tst_info"
+    allowed = () if inner else ("signature_time_stamp_token",)
+    for info in signed["signer_infos"]:
+        kinds = [one["type"].native for one in info["unsigned_attrs"]]
+        yield from (
+            "unsignedAttrs"
+            for one, kind in zip(info["unsigned_attrs"], kinds, strict=True)
+            if kind not in allowed or kinds.count(kind) > 1 or len(one["values"]) > 1
+        )
+    digests = [signed["signer_infos"][0]["digest_algorithm"], *signed["digest_algorithms"]]
+    if len(digests) != 2 or any(one["parameters"].native is not None for one in digests):
+        yield "digestAlgorithms"
+    if len(signed["signer_infos"]) > 1:
+        yield "signerInfos"
+    if len(signed["crls"]) or any(one.name != "certificate" for one in signed["certificates"]):
+        yield "crls"
+
+
+def _answer(response: ocsp.OCSPResponse) -> responses.OCSPResponse | None:
+    """An answer about one certificate; ``None`` for what answers nothing."""
+    try:
+        answer = responses.load_der_ocsp_response(response.dump())
+        return answer if answer.serial_number else None
+    except ValueError:
+        return None
+
+
+def _listed_by(issuer: certificates.Certificate, revoked: certificates.CertificateRevocationList) -> bool:
+    key: Any = issuer.public_key()
+    try:
+        return revoked.issuer == issuer.subject and revoked.is_signature_valid(key)
+    except (TypeError, ValueError, UnsupportedAlgorithm):
+        return False
+
+
+def _answered(answer: responses.OCSPResponse, responder: certificates.Certificate) -> bool:
+    key, digest = responder.public_key(), answer.signature_hash_algorithm or hashes.SHA256()
+    how: tuple[Any, ...] = (ec.ECDSA(digest),) if isinstance(key, ec.EllipticCurvePublicKey) else (PKCS1v15(), digest)
+    try:
+        key.verify(answer.signature, answer.tbs_response_bytes, *how)  # type: ignore[union-attr]
+    except (InvalidSignature, TypeError, ValueError, AttributeError, UnsupportedAlgorithm):
+        return False
+    return True
+
+
 def _spoilt(evidence: Evidence, trust: Trust) -> bool:
     """Whether a certificate that no signature covers is not as its issuer, who is known here too, has signed it."""
-
-    def signed(certificate: certificates.Certificate, issuer: certificates.Certificate) -> bool:
-        try:
-            certificate.verify_directly_issued_by(issuer)
-        except (ValueError, TypeError, InvalidSignature):
-            return False
-        return True
-
     encoded = [certificate.dump() for certificate in evidence.certificates]
     try:
         known = [certificates.load_der_x509_certificate(data) for data in {*encoded, *trust.anchors}]
         for certificate in map(certificates.load_der_x509_certificate, encoded):
             issuers = [issuer for issuer in known if issuer.subject == certificate.issuer]
-            if issuers and not any(signed(certificate, issuer) for issuer in issuers):
+            if issuers and not any(_issued(certificate, issuer) for issuer in issuers):
                 return True
     except ValueError:
         return True

@@ -134,7 +134,9 @@ PADES = "/ETSI.CAdES.detached"
 UNREADABLE = say("the signature cannot be read")
 NO_PADES = say("the signature is no PAdES signature")
 BEHIND = say("bytes stand behind it that belong to no revision of the file")
-_END = re.compile(rb"startxref\s+\d+\s+%%EOF")
+STAMP_ELSE = say(
+    "what stands behind it is not a time stamp alone that fits, is of somebody trusted and says nothing else"
+)
 _TOLD = 6  # kinds of objects that a message names
 
 
@@ -154,7 +156,7 @@ def signatures_of_pdf(data: bytes, trust: Trust, *, where: str = "the PDF") -> t
     file = _File(data, reader, tuple(embedded), evidence, trust)
     found = []
     for signature in embedded:
-        if signature.sig_object.get("/Type") != "/DocTimeStamp":
+        if not _is_stamp(signature):
             try:
                 found.append(_judged(file, signature))
             except Exception:  # whatever a hostile file makes the library raise
@@ -174,11 +176,12 @@ class _File:
 def _judged(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
     from pyhanko.sign.validation.generic_cms import message_imprint_checker
 
-    from cmm_uq.certificate.sign.chain import Evidence, judged, stamped_time
+    from cmm_uq.certificate.sign.chain import judged, stamped_time
 
-    evidence = Evidence(
-        (*file.evidence.certificates, *embedded.other_embedded_certs), file.evidence.revocations, file.evidence.answers
-    )
+    signed = [one.signed_data for one in file.embedded]
+    tokens = [token for one in file.embedded if (token := _token(one)) is not None]
+    certificates = (*file.evidence.certificates, *embedded.other_embedded_certs)
+    evidence = replace(file.evidence, certificates=certificates, others=(*signed, *tokens))
     token, imprint = _token(embedded), message_imprint_checker(embedded.signer_info)
     stamped, proven = (None, False) if token is None else stamped_time(token, imprint, evidence, file.trust)
     at = stamped
@@ -191,11 +194,21 @@ def _judged(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
     whole, appended = _whole(file, embedded)
     if embedded.sig_object.get("/SubFilter") != PADES:
         problems.append(NO_PADES)
-    signed = file.data[: int(embedded.byte_range[2]) + int(embedded.byte_range[3])]
-    found = judged(FileSignature(
-        "", (*problems, *appended), time=at, time_proven=proven, intact=intact, covers_whole_file=intact and whole,
-        content=signed if intact else b"",
-    ), embedded.signer_cert, evidence, file.trust)  # fmt: skip
+    revision = file.data[: int(embedded.byte_range[2]) + int(embedded.byte_range[3])]
+    found = judged(
+        FileSignature(
+            "",
+            (*problems, *appended),
+            time=at,
+            time_proven=proven,
+            intact=intact,
+            covers_whole_file=intact and whole,
+            content=revision if intact else b"",
+        ),
+        embedded.signer_cert,
+        evidence,
+        file.trust,
+    )
     return replace(found, level=f"PAdES B-{_level(file, embedded, stamped, known=found.revocation == 'good')}")
 
 
@@ -251,26 +264,40 @@ def _whole(file: _File, embedded: EmbeddedPdfSignature) -> tuple[bool, list[Text
     """Whether only time stamps, evidence and further signatures were appended, and else what."""
     from pyhanko.sign.diff_analysis import DiffResult, ModificationLevel
 
-    from cmm_uq.certificate.sign.pdf_library import POLICY
+    from cmm_uq.certificate.sign.pdf_library import (
+        LASTING,
+        POLICY,
+        is_all_of_stamps,
+        is_good_stamp,
+        places_of,
+        unaccounted,
+    )
 
-    embedded.compute_integrity_info(diff_policy=POLICY)
-    result = embedded.diff_result
-    # whether another signature covers what was appended after this one
-    later = any(other.signed_revision > embedded.signed_revision for other in file.embedded)
+    # whether a further signature, whose signer is judged as well, covers what was appended after this one
+    later = any(one.signed_revision > embedded.signed_revision for one in file.embedded if not _is_stamp(one))
     most = ModificationLevel.FORM_FILLING if later else ModificationLevel.LTA_UPDATES
+    embedded.compute_integrity_info(diff_policy=POLICY if later else LASTING)
+    result, allowed = embedded.diff_result, embedded.summarise_integrity_info()["docmdp_ok"]
     revisions = range(embedded.signed_revision + 1, file.reader.total_revisions)
-    *ends, rest = _END.split(file.data[int(embedded.byte_range[2]) + int(embedded.byte_range[3]) :])
-    if rest.strip() or len(ends) != len(revisions):
+    end = int(embedded.byte_range[2]) + int(embedded.byte_range[3])
+    if not later and unaccounted(file.data, end, [places_of(file.reader, one) for one in revisions]):
         return False, [BEHIND]
     empty = [one for one in revisions if not file.reader.xrefs.explicit_refs_in_revision(one)]
-    if isinstance(result, DiffResult) and result.modification_level <= most and not empty:
-        return True, []
+    if isinstance(result, DiffResult) and result.modification_level <= most and allowed and not empty:
+        stamps = () if later else [one for one in file.embedded if one.signed_revision in revisions]
+        alone = later or is_all_of_stamps(file.reader, embedded.signed_revision)
+        alone &= all(_fits(file.data, one) and is_good_stamp(one, file.evidence, file.trust) for one in stamps)
+        return (True, []) if alone else (False, [STAMP_ELSE])
     count = file.reader.total_revisions - 1 - embedded.signed_revision
     changed = commas([Verbatim(name) for name in _changed(file.reader, embedded.signed_revision)])
     return False, [
         plural(count, one=say("{count} revision was appended after it, and changes {what}", count=count, what=changed),
                many=say("{count} revisions were appended after it, and change {what}", count=count, what=changed))
     ]  # fmt: skip
+
+
+def _is_stamp(embedded: EmbeddedPdfSignature) -> bool:
+    return bool(embedded.sig_object.get("/Type") == "/DocTimeStamp")
 
 
 def _changed(reader: PdfFileReader, signed: int) -> list[str]:
@@ -296,22 +323,27 @@ def _token(embedded: EmbeddedPdfSignature) -> Any:
 
 
 def _evidence(reader: PdfFileReader) -> Evidence:
-    """What the store of the document holds (ISO 32000-2, 12.8.4.3)."""
-    from asn1crypto import crl, ocsp
-    from pyhanko.sign.validation.dss import DocumentSecurityStore
-    from pyhanko.sign.validation.errors import NoDSSFoundError
+    """What the store of the document holds, and it holds nothing else (ISO 32000-2, 12.8.4.3)."""
+    from asn1crypto import crl, ocsp, x509
 
     from cmm_uq.certificate.sign.chain import Evidence
 
-    try:
-        store = DocumentSecurityStore.read_dss(reader)
-    except NoDSSFoundError:
-        return Evidence()
-    lists, answers = ([one.get_object().data for one in kept] for kept in (store.crls, store.ocsps))
-    return Evidence(
-        tuple(store.load_certs()), tuple(crl.CertificateList.load(one) for one in lists),
-        tuple(ocsp.OCSPResponse.load(one) for one in answers),
-    )  # fmt: skip
+    def inner(held: Any, key: str, otherwise: Any) -> Any:
+        return held[key] if key in held else otherwise  # noqa: SIM401 - get() of the library follows no references
+
+    store = inner(reader.root, "/DSS", {})
+    sorts = {"/Certs": x509.Certificate, "/CRLs": crl.CertificateList, "/OCSPs": ocsp.OCSPResponse}
+    listed = {key: list(inner(store, key, [])) for key in sorts}
+    for entry in (one.get_object() for one in inner(store, "/VRI", {}).values()):
+        if not re.fullmatch(r"[0-9DZ:+'-]*", str(inner(entry, "/TU", ""))):
+            raise ValueError("a time of the store is none")
+        for key in entry.keys() - {"/Type", "/TU"}:
+            if not {str(one) for one in entry[key]} <= {str(one) for one in listed.get(f"{key}s", ())}:
+                raise ValueError(f"{key} of one signature is not in the store of the document")
+    streams = {key: [one.get_object() for one in kept] for key, kept in listed.items()}
+    if any(set(one) - {"/Length", "/Filter"} for kept in streams.values() for one in kept):
+        raise ValueError("a stream of a certificate says more than the certificate")
+    return Evidence(*(tuple(sort.load(one.data, strict=True) for one in streams[key]) for key, sort in sorts.items()))
 
 
 def _level(file: _File, embedded: EmbeddedPdfSignature, stamped: dt.datetime | None, *, known: bool) -> str:
@@ -322,7 +354,6 @@ def _level(file: _File, embedded: EmbeddedPdfSignature, stamped: dt.datetime | N
         return "B"
     if not known or not (file.evidence.revocations or file.evidence.answers):
         return "T"
-    later = [one for one in file.embedded if one.sig_object.get("/Type") == "/DocTimeStamp"
-             and one.signed_revision > embedded.signed_revision]  # fmt: skip
+    later = [one for one in file.embedded if _is_stamp(one) and one.signed_revision > embedded.signed_revision]
     archived = any(stamped_time(one.signed_data, one.compute_digest, file.evidence, file.trust)[1] for one in later)
     return "LTA" if archived else "LT"

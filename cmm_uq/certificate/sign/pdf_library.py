@@ -9,6 +9,7 @@ from __future__ import annotations
 import datetime as dt
 import http.client
 import io
+import re
 import urllib.error
 import urllib.request
 from collections.abc import Iterable
@@ -22,6 +23,8 @@ from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
 from pyhanko.pdf_utils.reader import PdfFileReader
 from pyhanko.sign import signers
 from pyhanko.sign.diff_analysis import DEFAULT_DIFF_POLICY, ModificationLevel, StandardDiffPolicy
+from pyhanko.sign.diff_analysis.rules.file_structure_rules import CatalogModificationRule
+from pyhanko.sign.diff_analysis.rules.form_field_rules import DSSCompareRule
 from pyhanko.sign.diff_analysis.rules_api import ReferenceUpdate, WhitelistRule
 from pyhanko.sign.fields import enumerate_sig_fields
 from pyhanko.sign.signers import PdfTimeStamper
@@ -32,6 +35,7 @@ from pyhanko_certvalidator.errors import PathBuildingError, PathValidationError
 from pyhanko_certvalidator.registry import SimpleCertificateStore
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.sign.chain import Evidence, stamped_time
 from cmm_uq.certificate.sign.found import Trust, appending
 from cmm_uq.certificate.sign.signer import ONE_DIGEST, Signer
 
@@ -134,6 +138,121 @@ POLICY = StandardDiffPolicy(
     [*DEFAULT_DIFF_POLICY.global_rules, Tagged().as_qualified(ModificationLevel.FORM_FILLING)],
     DEFAULT_DIFF_POLICY.form_rule,
 )
+"""For what a further signature covers, whose signer is judged as well."""
+
+LASTING = StandardDiffPolicy(
+    [
+        CatalogModificationRule(frozenset({"/AcroForm", "/DSS"})),
+        DSSCompareRule().as_qualified(ModificationLevel.LTA_UPDATES),
+    ],
+    DEFAULT_DIFF_POLICY.form_rule,
+)
+"""For what stands behind the last signature: evidence and time stamps, for which no signer vouches."""
+
+_STAMP = {
+    "/Type": r"/DocTimeStamp",
+    "/Filter": r"/Adobe\.PPKLite",
+    "/SubFilter": r"/ETSI\.RFC3161",
+    "/Contents": r".*",
+    "/ByteRange": r"\[.*\]",
+    "/M": r"D:[0-9Z+'-]*",
+}
+_WIDGET = {
+    "/FT": "/Sig",
+    "/T": r"[A-Za-z]+\d*",
+    "/Type": "/Annot",
+    "/Subtype": "/Widget",
+    "/F": r"\d+",
+    "/Rect": r".*",
+    "/P": r".*",
+    "/TU": "Timestamp",
+    "/V": r".*",
+}
+"""What a time stamp of the document and its unseen field state, and nothing that could be read (ISO 32000-2, 12.8.5)."""
+
+
+def is_good_stamp(embedded: Any, evidence: Evidence, trust: Trust) -> bool:
+    """Whether a time stamp of the document fits, is of somebody trusted where anybody is, and says nothing besides."""
+    pairs = ((embedded.sig_object, _STAMP), (embedded.sig_field, _WIDGET))
+    plain = all(
+        key in form and re.fullmatch(form[key], str(value), re.DOTALL)
+        for held, form in pairs
+        for key, value in held.items()
+    )
+    at, proven = stamped_time(embedded.signed_data, embedded.compute_digest, evidence, trust)
+    return plain and (proven or (at is not None and not trust.anchors))
+
+
+_BLANK = b"\0\t\n\f\r "
+_WHITE, _STRING = rb"[\0\t\n\f\r ]", rb"\((?:[^()\\]|\\.|\((?:[^()\\]|\\.)*\))*\)"
+_TOKEN = re.compile(
+    rb"%b+|<<|>>|[\[\]]|<[0-9A-Fa-f\s]*>|/[^\0\t\n\f\r ()<>\[\]{}/%%]*|[+-]?[0-9.]+|true|false|null|R(?![A-Za-z])|%b"
+    % (_WHITE, _STRING),
+    re.DOTALL,
+)
+_BEGIN = re.compile(rb"%b*(\d+) (\d+) obj" % _WHITE)
+_ENTRIES = rb"(?:\d+ \d+%b*\n(?:\d{10} \d{5} [nf](?: \r| \n|\r\n))*)*" % _WHITE
+_TABLE = re.compile(rb"%b*xref%b+%btrailer(?=%b*<<)" % (_WHITE, _WHITE, _ENTRIES, _WHITE))
+_END = re.compile(rb"%b*startxref%b+(\d+)%b+%%%%EOF%b*" % ((_WHITE,) * 4))
+_TRAILER = re.compile(
+    rb"%b*<<(?:%b*(?:/(?:Size|Prev) \d+|/(?:Root|Info) \d+ \d+ R|/ID%b*\[(?:%b*(?:%b|<[0-9A-Fa-f]*>)){2}%b*\]))*%b*>>"
+    % (*(_WHITE,) * 4, _STRING, _WHITE, _WHITE),
+    re.DOTALL,
+)
+_STREAM = re.compile(rb"stream\r?\n")
+_ENDSTREAM = re.compile(rb"(?:\r\n|\n|\r)?endstream%b*" % _WHITE)
+
+
+def unaccounted(data: bytes, begin: int, revisions: Iterable[set[tuple[int, int]]]) -> bool:
+    """Whether a byte from ``begin`` on belongs to no object in the table of its revision, no table and no trailer.
+
+    ``revisions``: number and place of each object that a table has, by revision (ISO 32000-2, 7.5.6).
+    """
+    at = begin
+    for listed in revisions:
+        seen = set[tuple[int, int]]()
+        while head := _BEGIN.match(data, at):
+            seen.add((int(head[1]), head.start(1)))
+            if (at := _end_of_object(data, head.end())) < 0:
+                return True
+        table = _TABLE.match(data, at)
+        trailer = table and _TRAILER.match(data, table.end())
+        end = trailer and _END.match(data, trailer.end())
+        if table is None or end is None or seen != listed or int(end[1]) != data.index(b"xref", table.start()):
+            return True
+        at = end.end()
+    return bool(data[at:].strip(_BLANK))
+
+
+def _end_of_object(data: bytes, at: int) -> int:
+    """Behind what an object holds, a stream by its length; -1 where something else stands in it."""
+    depth, before, length = 0, b"", 0
+    while token := _TOKEN.match(data, at):
+        at, text = token.end(), token[0]
+        depth += (text in (b"<<", b"[")) - (text in (b">>", b"]"))
+        length = int(text) if before == b"/Length" and text.isdigit() and depth == 1 else length
+        before = text if text.strip(_BLANK) else before
+    if stream := _STREAM.match(data, at):
+        end = _ENDSTREAM.match(data, stream.end() + length)
+        at = end.end() if end else -1
+    return at + 6 if depth == 0 and at >= 0 and data.startswith(b"endobj", at) else -1
+
+
+def places_of(reader: Any, revision: int) -> set[tuple[int, int]]:
+    """Number and place of each object that the table of a revision has; none within other objects."""
+    refs = reader.xrefs.explicit_refs_in_revision(revision)
+    return {(one.idnum, reader.xrefs.get_historical_ref(one, revision)) for one in refs}
+
+
+def is_all_of_stamps(reader: Any, signed: int) -> bool:
+    """Whether behind a signed revision nothing was added that nothing refers to, and no field but those of time stamps."""
+    for revision in range(signed + 1, reader.xrefs.total_revisions):
+        held = reader.get_historical_resolver(revision)
+        named = held.collect_dependencies(held.trailer_view.raw_get("/Root"))
+        if reader.xrefs.explicit_refs_in_revision(revision) - named - {held.root_ref}:
+            return False
+    before = {name for name, _, _ in enumerate_sig_fields(reader.get_historical_resolver(signed))}
+    return all(value is not None or name in before for name, value, _ in enumerate_sig_fields(reader))
 
 
 def _grown(old: Any, new: Any) -> list[Any]:

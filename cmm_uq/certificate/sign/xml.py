@@ -24,7 +24,7 @@ from cmm_uq.certificate.sign.found import BROKEN, STAMP_BROKEN, WEAK, FileSignat
 from cmm_uq.certificate.sign.signer import Signer
 
 if TYPE_CHECKING:
-    from asn1crypto import x509
+    from asn1crypto import cms, x509
     from lxml.etree import _Element
 
     from cmm_uq.certificate.sign.chain import Evidence
@@ -200,7 +200,8 @@ def _found(data: bytes, element: _Element, *, several: bool, trust: Trust) -> Fi
     references = [str(one.get("URI")) for one in element.iterfind(f"{DS}SignedInfo/{DS}Reference")]
     content = _verified(data, signer, references)
     evidence = Evidence((*certificates[1:], *added.certificates), added.revocations, added.answers)
-    stamped, proven = _stamp_of_signature(element, evidence, trust)
+    stamped, proven, tokens = _stamp_of_signature(element, evidence, trust)
+    evidence = replace(evidence, others=tokens)
     problems = [] if content else [BROKEN]
     if stamped is None and element.find(STAMP) is not None:
         problems.append(STAMP_BROKEN)
@@ -332,8 +333,10 @@ def _evidence(element: _Element) -> Evidence | None:
     return None if None in found else Evidence(*(tuple(each) for each in found))
 
 
-def _stamp_of_signature(element: _Element, evidence: Evidence, trust: Trust) -> tuple[dt.datetime | None, bool]:
-    """Time of a time stamp over the canonical SignatureValue (EN 319 132-1, 5.3), and whether somebody trusted made it."""
+def _stamp_of_signature(
+    element: _Element, evidence: Evidence, trust: Trust
+) -> tuple[dt.datetime | None, bool, tuple[cms.SignedData, ...]]:
+    """Time of a time stamp over the canonical SignatureValue (EN 319 132-1, 5.3), whether somebody trusted made it, and it."""
     from asn1crypto import cms
     from lxml import etree
 
@@ -341,14 +344,15 @@ def _stamp_of_signature(element: _Element, evidence: Evidence, trust: Trust) -> 
 
     tokens = _values(element, f"{STAMP}/{XADES}EncapsulatedTimeStamp", partial(cms.ContentInfo.load, strict=True))
     if not tokens:
-        return None, False
+        return None, False, ()
     method = element.find(f"{STAMP}/{DS}CanonicalizationMethod")
     algorithm = CANONICAL[0] if method is None else str(method.get("Algorithm"))
     if algorithm not in CANONICAL:
-        return None, False
+        return None, False, ()
     value = etree.tostring(element.find(f"{DS}SignatureValue"), method="c14n", exclusive=algorithm == CANONICAL[2],
                            with_tail=False)  # fmt: skip
-    return stamped_time(tokens[0]["content"], lambda digest: hashlib.new(digest, value).digest(), evidence, trust)
+    token = tokens[0]["content"]
+    return *stamped_time(token, lambda digest: hashlib.new(digest, value).digest(), evidence, trust), (token,)
 
 
 def _verified(data: bytes, signer: x509.Certificate, references: list[str]) -> bytes:

@@ -21,7 +21,7 @@ from cmm_uq.certificate.verify.figures import quantities
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.given import JOB, RESULTS, Given, canonical, strict_json
 from cmm_uq.certificate.verify.html_page import read_html
-from cmm_uq.certificate.verify.views import Difference, differing_parts, first_difference, squashed
+from cmm_uq.certificate.verify.views import Difference, differing_parts, first_difference
 from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
@@ -262,9 +262,11 @@ def by_other_kernels(data: Any, new: Any) -> bool:
     return bool(figures) and sum(a[path] != b[path] for path in figures) > _OTHER_KERNELS * len(figures)
 
 
-def beyond_sampling(data: Any, new: Any, found: list[tuple[str, Any, Any]]) -> Iterator[tuple[str, Any, Any]]:
-    """Of some differences those that neither printed digits nor Monte Carlo error explain."""
-    draws = min(filter(None, map(_draws, (data, new))), default=0.0)
+def beyond_sampling(
+    data: Any, new: Any, found: list[tuple[str, Any, Any]], *, sampled: bool = True
+) -> Iterator[tuple[str, Any, Any]]:
+    """Of some differences those that neither printed digits nor, of what was ``sampled``, Monte Carlo error explain."""
+    draws = min(filter(None, map(_draws, (data, new))), default=0.0) if sampled else 0.0
     part = _ERRORS * math.sqrt(2.0 / draws) if draws > 0 else 1e-6
     uncertain = dict(quantities(new, inner=True))
     for path, stands, should in found:
@@ -318,9 +320,11 @@ def _compare_html(inquiry: Inquiry, given: Given, again: Again, *, kernels: bool
     if content == should:
         return True
     if kernels:
-        here, there = (_NUMBER.sub("#", squashed(text)) for text in (page.text, read_html(should, name).text))
+        here, there = (_NUMBER.sub("#", " ".join(text.split())) for text in (page.text, read_html(should, name).text))
         if here == there:
-            inquiry.left("pictures", "the figures differ in their last digits, and with them the pictures")
+            inquiry.left(
+                f"figures and pictures of {name}", "the figures differ in their last digits, and with them the pictures"
+            )
             return False
     line, stands, wanted = _first_line(content, should)
     inquiry.wrong("again", name, f"line {line}", "is not what its inputs give", stands, wanted)
@@ -366,7 +370,7 @@ def _compare_pdf(inquiry: Inquiry, given: Given, again: Again) -> bool:
         return True
     name, pdf = given.pdf
     if again.pdf is None:
-        inquiry.left("drawings and letters of the PDF's pages", again.why_no_pdf)
+        inquiry.left(f"pages of {name}", again.why_no_pdf)
         return False
     inquiry.looked("again")
     stands, should = pdf.content[: pdf.ends[0]], again.pdf

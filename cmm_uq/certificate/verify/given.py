@@ -20,6 +20,7 @@ from cmm_uq.base.files.limits import GIVEN, JSON_BYTES, JSON_DEPTH, NUMERAL, PDF
 from cmm_uq.base.languages.translation import ENGLISH, Code
 from cmm_uq.base.output import MANIFEST
 from cmm_uq.base.output.manifest import Manifest, parsed, plain_name
+from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.html_page import HtmlPage, read_html
 from cmm_uq.certificate.verify.pdf_file import PdfFile, read_pdf
@@ -223,6 +224,8 @@ def check_files(inquiry: Inquiry, given: Given) -> None:
             inquiry.wrong("files", given.html[0], place, problem)
     if given.manifest is not None:
         _check_manifest(inquiry, given, given.manifest)
+    with inquiry.reading("files", PROVENANCE):
+        _check_provenance(inquiry, given)
 
 
 def _check_pdf(inquiry: Inquiry, name: str, pdf: PdfFile, *, deeper: bool) -> None:
@@ -263,6 +266,18 @@ def _check_manifest(inquiry: Inquiry, given: Given, manifest: Manifest) -> None:
     same = ("program", "files")
     for key in stands.keys() ^ own.keys() or {key for key in own if key not in same and own[key] != stands[key]}:
         inquiry.wrong("files", MANIFEST, key, "says otherwise than cmm-uq writes it", stands.get(key), own.get(key))
+
+
+def _check_provenance(inquiry: Inquiry, given: Given) -> None:
+    """Whether the files given are those whose hashes provenance.json, attached or beside them, has."""
+    if (content := given.files.get(PROVENANCE)) is None:
+        return
+    entities, there = strict_json(content, PROVENANCE).get("entity", {}), {**given.contents, **given.files}
+    for one in entities.values():
+        name, digest = one.get("prov:label"), one.get("cmm-uq:sha256")
+        if digest is not None and name in there and not name.endswith(".xml"):  # which may be signed since then
+            problem = f"is not the file whose hash {PROVENANCE} has"
+            inquiry.compare("files", name, "", problem, sha256(there[name]).hexdigest(), digest)
 
 
 def language_of(data: Mapping[str, Any]) -> Code:

@@ -1,4 +1,4 @@
-"""A certificate's HTML read as what it shows: text in order, tables, words of pictures; and nothing that does not belong.
+"""A certificate's HTML read as what it shows, text in order, and nothing that does not belong.
 
 The page is one file without scripts, forms or references to anything outside it, with the tags and attributes of the
 template and no others. Whatever else is in a page is named, since it may show something else than what is read here.
@@ -40,34 +40,12 @@ _REACHES_OUT = re.compile(r"url\s*\(\s*(?!#)|@import|expression\s*\(|javascript:
 
 
 @dataclass
-class HtmlTable:
-    """A table as shown: heading of each column with its unit, and cells."""
-
-    headings: list[str] = field(default_factory=list)
-    rows: list[list[str]] = field(default_factory=list)
-
-
-@dataclass
-class HtmlDecision:
-    """A statement of conformity as shown: what the colours say, and its text."""
-
-    outcome: str
-    text: str = ""
-
-
-@dataclass
 class HtmlPage:
     """What a page shows, in order."""
 
     text: str = ""
     title: str = ""  # of the window: title and number of the document
-    banner: str = ""  # at the head of every page, if any
-    language: str = ""
-    style: str = ""  # sheet
     pictures: list[bytes] = field(default_factory=list)  # that are no drawings: the logo
-    metas: dict[str, str] = field(default_factory=dict)
-    tables: list[HtmlTable] = field(default_factory=list)
-    decisions: list[HtmlDecision] = field(default_factory=list)
     problems: list[tuple[str, str]] = field(default_factory=list)  # what does not belong there, each with its place
 
 
@@ -89,28 +67,9 @@ class _Reader(HTMLParser):
         self.page, self._where, self._open = HtmlPage(), where, list[str]()
         self._text: list[str] = []
         self._unseen: dict[str, list[str]] = {"title": [], "style": []}
-        self._banner: list[str] = []
-        self._cell: list[str] | None = None
-        self._deciding: int | None = None
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self._check(tag, attrs)
-        given = {name: value or "" for name, value in attrs}
-        if tag == "meta" and "name" in given:
-            self.page.metas[given["name"]] = given.get("content", "")
-        if tag == "html":
-            self.page.language = given.get("lang", "")
-        if tag == "div" and given.get("class", "").startswith("decision "):
-            self.page.decisions.append(HtmlDecision(given["class"].removeprefix("decision ")))
-            self._deciding = len(self._open)
-        if tag == "table":
-            self.page.tables.append(HtmlTable())
-        elif tag == "tr" and self.page.tables and "tbody" in self._open:
-            self.page.tables[-1].rows.append([])
-        elif tag in ("td", "th"):
-            self._cell = []
-            if "data-label" in given:
-                self._label(given["data-label"])
         self._text.append(" ")
         if tag not in _VOID:
             self._open.append(tag)
@@ -128,13 +87,6 @@ class _Reader(HTMLParser):
             return
         self._open.pop()
         self._text.append(" ")
-        if self._deciding is not None:
-            self.page.decisions[-1].text += " "
-            if len(self._open) == self._deciding:
-                self._deciding = None
-        if tag in ("td", "th") and self._cell is not None:
-            self._row(_spaced("".join(self._cell)))
-            self._cell = None
 
     def handle_data(self, data: str) -> None:
         inner = self._open[-1] if self._open else ""
@@ -145,12 +97,6 @@ class _Reader(HTMLParser):
                 self._problem("has text outside its body")
         else:
             self._text.append(data)
-            if self._deciding is not None:
-                self.page.decisions[-1].text += data
-            if "aside" in self._open:
-                self._banner.append(data)
-            if self._cell is not None:
-                self._cell.append(data)
 
     def handle_comment(self, data: str) -> None:
         self._problem("has a comment, which the template has not")
@@ -169,9 +115,8 @@ class _Reader(HTMLParser):
         for tag in self._open:
             self._problem(f"does not close <{tag}>")
         page = self.page
-        page.text, page.banner = "".join(self._text), _spaced("".join(self._banner))
-        page.title, page.style = "".join(self._unseen["title"]), "".join(self._unseen["style"])
-        if _REACHES_OUT.search(page.style):
+        page.text, page.title = "".join(self._text), "".join(self._unseen["title"])
+        if _REACHES_OUT.search("".join(self._unseen["style"])):
             page.problems.append(("style sheet", "refers to something outside the file"))
 
     def _check(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
@@ -204,33 +149,9 @@ class _Reader(HTMLParser):
             return False
         return kind in ("data:image/png", "data:image/svg+xml")
 
-    def _label(self, label: str) -> None:
-        """The heading that a cell has on narrow screens, which must be that of its column."""
-        table = self.page.tables[-1] if self.page.tables else None
-        column = len(table.rows[-1]) if table and table.rows else 0
-        heading = table.headings[column] if table and column < len(table.headings) else ""
-        if _squashed(label) not in (_squashed(heading), _squashed(heading) + "/"):
-            self._problem(f"labels a cell {label!r} under the heading {heading!r}")
-
-    def _row(self, text: str) -> None:
-        if not self.page.tables:
-            self._problem("has a cell outside a table")
-        elif "thead" in self._open:
-            self.page.tables[-1].headings.append(text)
-        elif self.page.tables[-1].rows:
-            self.page.tables[-1].rows[-1].append(text)
-
     def _problem(self, what: str) -> None:
         line, column = self.getpos()
         self.page.problems.append((f"line {line}, column {column + 1}", what))
 
     def _at(self) -> str:
         return f"{self._where} line {self.getpos()[0]}"
-
-
-def _spaced(text: str) -> str:
-    return " ".join(text.split())
-
-
-def _squashed(text: str) -> str:
-    return re.sub(r"[\s/]", "", text)

@@ -1,4 +1,4 @@
-"""A certificate's PDF opened within limits: text of its pages, attached files, revisions, and what does not belong there.
+"""A certificate's PDF opened within limits: attached files, revisions, and what does not belong there.
 
 Nothing of the file is run or followed. Every object that can be reached is looked at: streams are unpacked whole, with their
 checksum and up to a limit, before anything reads them; what acts, hides, encrypts or comes from outside is named.
@@ -14,18 +14,12 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property
-from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.limits import PDF_BYTES, PDF_DRAWN, PDF_OBJECTS, PDF_PAGES, PDF_UNPACKED
-
-if TYPE_CHECKING:
-    from pypdf import PdfReader
+from cmm_uq.base.files.limits import PDF_BYTES, PDF_OBJECTS, PDF_PAGES, PDF_UNPACKED
 
 _FIX = "Ask whoever sent it for the file as cmm-uq wrote it"
-SECONDS = 60.0  # longest time that reading the text of a PDF may take
 
 ACTIVE = frozenset({
     "/JavaScript", "/JS", "/Launch", "/OpenAction", "/AA", "/RichMedia", "/RichMediaContent", "/SubmitForm", "/ImportData",
@@ -37,8 +31,6 @@ HIDING = frozenset({"/OCProperties", "/OCG", "/OCMD", "/OC"})  # the same of wha
 _END = re.compile(rb"startxref\s+(\d{1,12})\s+%%EOF(?:\r\n|\n|\r)?")
 _TRAILER = re.compile(rb"trailer\s*<<(?P<told>(?s:.{0,2000}?))>>\s*(?P<end>startxref)")
 _BEFORE = re.compile(rb"/Prev\s+(\d{1,12})")
-_DO = re.compile(rb"/([^\s/<>\[\](){}%]+)\s+Do\b")
-_INVISIBLE = re.compile(rb"(?<![\d.])[1-7]\s+Tr\b")
 _UNTOLD = frozenset({"/Type", "/Length", "/Filter"})
 
 
@@ -58,19 +50,9 @@ class PdfFile:
     content: bytes
     attachments: list[Attachment] = field(default_factory=list)
     information: dict[str, str] = field(default_factory=dict)  # title, dates and the like, as the file says
-    xmp: str = ""  # the same as its metadata stream says
-    language: str = ""
     ends: list[int] = field(default_factory=list)  # bytes up to the end of each revision
     signatures: int = 0  # fields
     problems: list[tuple[str, str]] = field(default_factory=list)  # what does not belong there, each with its place
-    reader: PdfReader | None = None
-    where: str = ""
-
-    @cached_property
-    def pages(self) -> list[str]:
-        """Text of each page, as a reader copies it; looked for when it is first asked for."""
-        with reading(self.where):
-            return list(_texts(self))
 
     @property
     def files(self) -> Mapping[str, bytes]:
@@ -84,7 +66,7 @@ class PdfFile:
 def read_pdf(content: bytes, where: str) -> PdfFile:
     if len(content) > PDF_BYTES.most:
         raise CmmUqError(f"is larger than {PDF_BYTES.most} bytes", where=where, fix=_FIX)
-    found = PdfFile(content, where=where)
+    found = PdfFile(content)
     marks = list(_END.finditer(content))
     if not content.startswith(b"%PDF-") or not marks:
         raise CmmUqError("is no whole PDF: its beginning or its end is missing", where=where, fix=_FIX)
@@ -152,14 +134,10 @@ def _read(found: PdfFile, where: str) -> None:
         raise CmmUqError("is encrypted, which no PDF of cmm-uq is", where=where, fix=_FIX)
     _Walk(found, where).all(reader.trailer)
     root: Any = reader.trailer["/Root"]
-    found.language = str(root.get("/Lang", ""))
     found.information = {str(key): str(value) for key, value in (reader.metadata or {}).items()}
-    if "/Metadata" in root:
-        found.xmp = root["/Metadata"].get_object().get_data().decode("utf-8", "replace")
     found.attachments = list(_attachments(found, root))
     if len(reader.pages) > PDF_PAGES.most:
         raise CmmUqError(f"has more than {PDF_PAGES.most} pages", where=where, fix=_FIX)
-    found.reader = reader
 
 
 class _Walk:
@@ -265,42 +243,6 @@ def _attachments(found: PdfFile, root: Any) -> Iterator[Attachment]:
         yield Attachment(name, content, str(spec.get("/AFRelationship", "")).lstrip("/"))
 
 
-def _texts(found: PdfFile) -> Iterator[str]:
-    """Text of each page, as a reader copies it."""
-    until, where = monotonic() + SECONDS, found.where
-    for number, page in enumerate(found.reader.pages if found.reader else (), 1):
-        place = f"{where}: page {number}"
-        if _drawn(page, {}, ()) > PDF_DRAWN.most:
-            raise CmmUqError(f"draws more than {PDF_DRAWN.most} bytes on a page", where=place, fix=_FIX)
-        contents = page.get_contents()
-        if contents is not None and _INVISIBLE.search(contents.get_data()):
-            found.problems.append((f"page {number}", "has text that is not painted as text"))
-        yield page.extract_text()
-        if monotonic() > until:
-            raise CmmUqError(f"takes longer than {SECONDS:.0f} s to read", where=place, fix=_FIX)
-
-
 def _inner(one: Any, key: str) -> Any:
     """A part of a dictionary, whatever refers to it; an empty one where there is none."""
     return one[key] if key in one else {}  # noqa: SIM401 - get() of pypdf does not follow references
-
-
-def _drawn(page: Any, known: dict[int, int], above: tuple[int, ...]) -> int:
-    """Bytes of instructions that drawing takes, with forms within forms as often as they are drawn."""
-    forms = _inner(_inner(page, "/Resources"), "/XObject")
-    content = page.get_data() if hasattr(page, "get_data") else b""
-    if not content and "/Contents" in page:
-        content = page.get_contents().get_data()
-    total = len(content)
-    for match in _DO.finditer(content):
-        name = "/" + match[1].decode("latin-1")
-        if name not in forms or forms[name].get("/Subtype") != "/Form":
-            continue
-        form = forms[name]
-        key = id(form)
-        if key in above or len(above) > 40:
-            raise ValueError("a form is drawn within itself")
-        if key not in known:
-            known[key] = _drawn(form, known, (*above, key))
-        total = min(total + known[key], PDF_DRAWN.most + 1)
-    return total

@@ -1,18 +1,14 @@
-"""Whether PDF, HTML and digital certificate (DCC) say the same, to the character and to the element; who signed them.
+"""Whether the digital certificate (DCC) says what results.json and the inputs give, element by element; who signed what.
 
-What a PDF has more than a page is taken off first: the foot of every page, the banner at its head, the head of a table that
-goes on over pages, signs of lists. White space tells nothing: lines break elsewhere. The digital certificate is made again of
-``results.json`` and the inputs.
+Pages are compared where they are made again to the byte, and nowhere else.
 """
 
 from __future__ import annotations
 
 import datetime as dt
-import html
 import io
 import json
 import re
-import unicodedata
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
@@ -21,94 +17,15 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.base.errors import CmmUqError, NotInstalledError
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.given import Given
-from cmm_uq.certificate.verify.html_page import HtmlPage, read_html
-from cmm_uq.certificate.verify.pdf_file import PdfFile, reading
+from cmm_uq.certificate.verify.html_page import read_html
+from cmm_uq.certificate.verify.pdf_file import reading
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.sign import FileSignature, Trust
     from cmm_uq.jobs.dcc.tree import Node
     from cmm_uq.jobs.job import Job
 
-_NO_TEXT = re.compile(r"[\s\u00ad\u200b-\u200d\u2060\ufeff•—]+")
-"""What a view may have and the other not: white space, marks where words break, signs of lists and about the end."""
-
-MISSING = "□"  # in place of a character that a PDF's fonts lack
-_ANCHOR = 24  # characters by which the views are brought together again behind a difference
-_MOST_SHOWN = 20
-_CONTEXT = 24
 Difference = tuple[str, str, str]  # path in a PDF or XPath, what stands there, what should
-
-
-def squashed(text: str) -> str:
-    """Text without what tells nothing; letters composed of two are one."""
-    return _NO_TEXT.sub("", unicodedata.normalize("NFC", text))
-
-
-def compare_views(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, *, files: tuple[str, str]) -> None:
-    """Keep every difference between the text of a PDF and that of a page."""
-    name, beside = files
-    banner, at, count = squashed(page.banner), 0, 0
-    whole = squashed(page.text).removeprefix(banner)
-    replaced = any(MISSING in text for text in pdf.pages) and MISSING not in page.text
-    heads = sorted({squashed("".join(table.headings)) for table in page.tables} - {""}, key=len, reverse=True)
-    for number, text in enumerate(pdf.pages, 1):
-        where = f"page {number}"
-        shown, foot = without_foot(squashed(text), squashed(page.title), number, len(pdf.pages))
-        if not foot:
-            problem = "has no foot with title, number and count of pages"
-            inquiry.wrong("forms", name, where, problem, text[-60:].strip(), page.title)
-        if not shown.startswith(banner):
-            inquiry.wrong("forms", name, where, "does not begin with the banner", shown[:60], page.banner)
-        found, at = _differences(shown.removeprefix(banner), whole, at, heads, replaced=replaced)
-        for stands, should in found[: max(0, _MOST_SHOWN - count)]:
-            inquiry.wrong("forms", name, where, f"says something else than {beside}", stands, should)
-        count += len(found)
-    if at < len(whole):
-        inquiry.wrong("forms", name, f"page {len(pdf.pages)}", f"ends before {beside} does", "", whole[at:])
-    inquiry.looked("forms", len(pdf.pages))
-    _compare_information(inquiry, pdf, page, name)
-
-
-def without_foot(text: str, title: str, number: int, pages: int) -> tuple[str, bool]:
-    """Text of a page without its foot: title and number of the document, number of the page and count of pages."""
-    at = text.rfind(title)
-    rest = text[at + len(title) :] if at >= 0 else ""
-    if at < 0 or sorted(re.findall(r"\d+", rest)) != sorted((str(number), str(pages))) or len(rest) > 40:
-        return text, False
-    return text[:at], True
-
-
-def _differences(
-    text: str, whole: str, at: int, heads: Sequence[str], *, replaced: bool
-) -> tuple[list[tuple[str, str]], int]:
-    """What stands on a page and what should, and the place in the whole up to which they were compared."""
-    here, found = 0, list[tuple[str, str]]()
-    while here < len(text):
-        rest, other = text[here:], whole[at : at + len(text)]
-        if replaced:  # a character that the fonts lack may stand for any
-            other = "".join(MISSING if x == MISSING else y for x, y in zip(rest, other, strict=False))
-        alike = first_difference(rest, other)
-        here, at = here + alike, at + alike
-        if here == len(text):
-            break
-        if here == 0 and (head := next((one for one in heads if text.startswith(one)), "")):
-            here = len(head)
-            continue
-        skipped, on = _together(text, here, whole, at)
-        before = text[max(0, here - _CONTEXT) : here]
-        found.append((before + text[here : here + skipped], before + whole[at:on]))
-        here, at = here + skipped, on
-    return found, at
-
-
-def _together(text: str, here: int, whole: str, at: int) -> tuple[int, int]:
-    """How much of the page is passed over, and the place in the whole where both go on alike."""
-    for skipped in range(min(2000, len(text) - here)):
-        piece = text[here + skipped : here + skipped + _ANCHOR]
-        found = whole.find(piece, at, at + 4000) if len(piece) >= min(_ANCHOR, len(text) - here) else -1
-        if found >= 0:
-            return skipped, found
-    return len(text) - here, at
 
 
 def first_difference(a: Sequence[object], b: Sequence[object]) -> int:
@@ -116,43 +33,30 @@ def first_difference(a: Sequence[object], b: Sequence[object]) -> int:
     return next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
 
 
-def _compare_information(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, name: str) -> None:
-    """Title, language, subject and author in the file's own information, which a reader's window shows."""
-    subject = page.metas.get("description", "")
-    wished = {"/Title": page.title, "/Author": page.metas.get("author", ""),
-              "/Subject": f"{page.banner}. {subject}" if page.banner else subject}  # fmt: skip
-    for key, should in wished.items():
-        stands = pdf.information.get(key, "")
-        if stands.split() != should.split():
-            inquiry.wrong("forms", name, f"information {key}", "is not that of the document", stands, should)
-    for key, value in pdf.information.items():
-        if not key.endswith("Date") and "".join(value.split()) not in "".join(html.unescape(pdf.xmp).split()):
-            inquiry.wrong("forms", name, f"information {key}", "does not stand in the metadata", "", value)
-    if pdf.language.lower() != page.language.lower():
-        inquiry.wrong("forms", name, "language", "is not that of the document", pdf.language, page.language)
-    inquiry.looked("forms", 4)
-
-
-def check_style(inquiry: Inquiry, page: HtmlPage, name: str) -> None:
-    """Keep a style sheet that is not the template's: it could hide what a page says, or say something else."""
-    from cmm_uq.certificate.render import style_sheet
-
-    inquiry.looked("files")
-    if page.style.strip() != style_sheet(page.title, page.banner, page.language).strip():
-        inquiry.wrong("files", name, "style sheet", "is not that of the template")
-
-
 MOST = 8  # differences that are told
 _PAGE = re.compile(r"^/Root/Pages/Kids\[(\d+)\]")
 _NOT_STATED = frozenset({"/ID", "/Prev", "/Size", "/XRefStm", "/Length", "/Filter", "/Parent", "/DecodeParms"})
 
 
-def differing_parts(stands: bytes, should: bytes) -> list[Difference]:
-    """The first parts of two PDFs that differ, what a page has named by the page; none where only the writing does."""
+_OF_SIGNATURES = re.compile(
+    r"(?:/Root/(?:AcroForm|DSS|Extensions|StructTreeRoot|Version|Metadata)|/Root/Pages/Kids\[\d+\]/Annots|/Info)(?:[/\[]|$)"
+)
+_GROWING = re.compile(
+    r"/Root/(?:Version|Metadata|StructTreeRoot/ParentTreeNextKey)$|/Root/Metadata/|/Info/(?:ModDate|Producer)"
+)
+
+
+def differing_parts(stands: bytes, should: bytes, *, signed: bool = False) -> list[Difference]:
+    """The first parts of two PDFs that differ, what a page has named by the page; none where only the writing does.
+
+    ``signed``: what signatures add to a PDF is no difference.
+    """
     with reading("the PDF"):
         a, b = (dict(_parts(content)) for content in (stands, should))
+    added = {path for path in a if path not in b and _OF_SIGNATURES.match(path)} if signed else set()
+    paths = (path for path in {**a, **b} if a.get(path) != b.get(path) and path not in added)
     found = []
-    for path in islice((path for path in {**a, **b} if a.get(path) != b.get(path)), MOST):
+    for path in islice((path for path in paths if not (signed and _GROWING.match(path))), MOST):
         x, y = a.get(path, ""), b.get(path, "")
         begin = max(0, first_difference(x, y) - 20) if x and y else 0
         page = _PAGE.match(path)
@@ -312,6 +216,8 @@ def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> Non
             if not pdf.signatures and len(pdf.ends) > 1:
                 problem = "was changed after it was made, and nobody signed that"
                 inquiry.wrong("signatures", name, f"byte {pdf.ends[0]}", problem)
+            for where, stands, should in differing_parts(pdf.content, pdf.content[: pdf.ends[0]], signed=True):
+                inquiry.wrong("signatures", name, where, "was changed after it was made", stands, should)
             signed = sign.signatures_of_pdf(pdf.content, held, where=name) if pdf.signatures else ()
             _check_signed(inquiry, name, signed, trust)
         if given.xml is not None:

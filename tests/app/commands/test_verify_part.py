@@ -24,13 +24,11 @@ from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_pa
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.results import standing_data
-from cmm_uq.certificate.verify.pdf_file import PdfFile
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_results, plate_files, plate_of
 from tests.part_reports import (
     TRIALS,
     found_again_once,
-    pages_once,
     plate_found,
     plate_report,
     put,
@@ -40,11 +38,6 @@ from tests.part_reports import (
 
 PDF, PAGE = "part-simulated.pdf", "part-simulated.html"
 OTHER = ROOT / "examples" / "part-plate-simulated" / "machine" / "certificate-simulated.pdf"
-
-
-@pytest.fixture(autouse=True)
-def pages(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(PdfFile, "pages", property(pages_once))
 
 
 @pytest.fixture

@@ -13,8 +13,6 @@ import pytest
 from cmm_uq.certificate.verify.decisions import check_decisions
 from cmm_uq.certificate.verify.figures import check_figures, check_verdicts
 from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.certificate.verify.html_page import read_html
-from cmm_uq.certificate.verify.stated import as_stated, check_stated
 
 
 @pytest.fixture
@@ -142,50 +140,3 @@ def test_a_limit_follows_from_its_formula() -> None:
     assert not places(check_decisions, {"conformity": [right]})
     wrong = said | {"mpe": {"a_um": 2.0, "k": 200.0, "b_um": None}}
     assert places(check_decisions, {"conformity": [wrong]}) == ["conformity[0].errors[0].limit_um"]
-
-
-def test_a_quantity_is_printed_as_the_certificate_prints_it() -> None:
-    """By hand: U to two digits, the value to the same place, k to two decimals; a dash where k means nothing."""
-    assert as_stated({"value": -174.4855, "U": 15.919, "k": 2.006}) == ("−174", "16", "2.01")
-    assert as_stated({"value": 1.0, "U": 0.5, "k": 1.2})[2] == "–"
-
-
-@pytest.mark.parametrize(("path", "value", "place"), [
-    ("estimates.scale_y.ppm.value", 150.0, "table row of estimates.scale_y.ppm"),
-    ("accuracy_uncertainty.mean_length_mm.U", 0.02, "table row of accuracy_uncertainty.mean_length_mm"),
-    ("conformity.0.decision", "pass", "statement of conformity 1"),
-    ("conformity.0.value_um", 12.0, "statement of conformity 1"),
-    ("conformity.0.limit_um", 61.0, "statement of conformity 1"),
-])  # fmt: skip
-def test_a_document_that_states_another_figure_is_named(
-    made: Path, data: dict[str, Any], path: str, value: Any, place: str
-) -> None:
-    page, inquiry = read_html((made / "certificate.html").read_bytes(), "certificate.html"), Inquiry()
-    check_stated(inquiry, data, page, files=("certificate.html", "results.json"))
-    assert not inquiry.findings
-    check_stated(inquiry, changed(data, path, value), page, files=("certificate.html", "results.json"))
-    assert place in [one.place for one in inquiry.findings]
-
-
-def test_a_picture_that_is_no_input_is_named(made: Path, data: dict[str, Any]) -> None:
-    content = (made / "certificate.html").read_text(encoding="utf-8")
-    picture = '<img src="data:image/png;base64,iVBORw0KGgo=" alt="">'
-    page = read_html(content.replace("</main>", f"{picture}</main>", 1).encode(), "certificate.html")
-    assert not page.problems
-    inquiry = Inquiry()
-    check_stated(inquiry, data, page, files=("certificate.html", "results.json"))
-    assert [one.place for one in inquiry.findings] == ["logo"]
-
-
-def test_rows_in_another_order_and_units_are_named(made: Path, data: dict[str, Any]) -> None:
-    content = (made / "certificate.html").read_bytes()
-    page = read_html(content.replace(b">ppm<", b">mm<"), "certificate.html")
-    inquiry = Inquiry()
-    check_stated(inquiry, data, page, files=("certificate.html", "results.json"))
-    assert {one.problem for one in inquiry.findings} == {"states it in another unit"}
-    turned = dict(reversed(data["estimates"].items()))
-    inquiry = Inquiry()
-    check_stated(
-        inquiry, data | {"estimates": turned}, read_html(content, "x"), files=("certificate.html", "results.json")
-    )
-    assert inquiry.findings

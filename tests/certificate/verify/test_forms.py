@@ -16,13 +16,11 @@ from typer.testing import CliRunner
 
 from cmm_uq import __version__
 from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
+from cmm_uq.app.commands.certificates import affected, verification
 from cmm_uq.app.commands.certificates.verification import Verification
 from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.certificate.verify.again import Again, beyond_sampling, by_other_kernels, differences
-from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.certificate.verify.html_page import read_html
-from cmm_uq.certificate.verify.pdf_file import read_pdf
-from cmm_uq.certificate.verify.views import compare_views, without_foot
+from cmm_uq.certificate.verify.given import canonical
 from cmm_uq.jobs.job import Job
 from tests.conftest import ROOT
 
@@ -65,26 +63,8 @@ def test_computed_again_from_the_file_alone_everything_is_the_same(made: Path) -
 def test_without_computing_again_not_everything_is_checked(made: Path) -> None:
     found = verify([made], rerun=False)
     assert found.inquiry.word == "NOT WHOLLY CHECKED"
-    assert [one.what for one in found.inquiry.unchecked] == ["computing again"]
-
-
-@pytest.mark.parametrize(("old", "new", "place"), [
-    (">404.2051<", ">404.2061<", "page 1"), ("2004-09-01", "2014-09-01", "information /Subject"),
-    (">ppm<", ">ppb<", "page"), ("Fail</p>", "Pass</p>", "page"),
-])  # fmt: skip
-def test_html_that_says_something_else_than_the_pdf_is_named(made: Path, old: str, new: str, place: str) -> None:
-    page = (made / "certificate.html").read_text(encoding="utf-8")
-    assert old in page
-    pdf, inquiry = read_pdf((made / "certificate.pdf").read_bytes(), "certificate.pdf"), Inquiry()
-    spoilt = read_html(page.replace(old, new, 1).encode(), "certificate.html")
-    compare_views(inquiry, pdf, spoilt, files=("certificate.pdf", "certificate.html"))
-    assert any(one.place.startswith(place) for one in inquiry.findings)
-
-
-def test_text_of_a_page_without_its_foot() -> None:
-    assert without_foot("abcCertificate1Page2of6", "Certificate1", 2, 6) == ("abc", True)
-    assert without_foot("abcCertificate1Page3of6", "Certificate1", 2, 6)[1] is False
-    assert without_foot("abc", "Certificate1", 2, 6)[1] is False
+    pages = "texts and layout of certificate.pdf and certificate.html"
+    assert [one.what for one in found.inquiry.unchecked] == ["computing again", pages]
 
 
 def test_a_digit_of_results_is_named_by_its_path(certificate: Path, again: Again) -> None:
@@ -187,21 +167,102 @@ def test_a_manifest_that_says_otherwise_than_its_files_is_named(
     assert (finding.file, finding.place) == ("manifest.json", where)
 
 
+def by_version(folder: Path, version: str) -> None:
+    """The certificate as another version would have made it: without its PDF, which has results.json inside."""
+    (folder / "certificate.pdf").unlink()
+    for name in ("job.toml", "ballbar.csv"):
+        shutil.copy(ROOT / "examples" / "iota-1102-20C" / name, folder)
+    here = f'"version": "{__version__}"'.encode()
+    spoil(folder / "results.json", lambda content: content.replace(here, f'"version": "{version}"'.encode(), 1))
+
+
 @pytest.mark.parametrize(("by", "said"), [
     ("0.5.0", "since then touch"), ("0.3.0", "corrections since then touch this certificate"),
     ("99.0.0", "install that"),
 ])  # fmt: skip
 def test_another_version_says_which_corrections_touch_it(certificate: Path, again: Again, by: str, said: str) -> None:
     """Of corrections.toml; a version to come cannot be computed by this one."""
-    (certificate / "certificate.pdf").unlink()
-    for name in ("job.toml", "ballbar.csv"):
-        shutil.copy(ROOT / "examples" / "iota-1102-20C" / name, certificate)
-    version = f'"version": "{__version__}"'.encode()
-    spoil(certificate / "results.json", lambda content: content.replace(version, f'"version": "{by}"'.encode(), 1))
+    by_version(certificate, by)
     inquiry = checked(certificate, again).inquiry
     assert inquiry.word == "NOT WHOLLY CHECKED"
     assert said in "\n".join(map(str, inquiry.unchecked))
     assert any(note.startswith("Version 0.6.0 corrects") for note in inquiry.notes) == (by != "99.0.0")
+
+
+@pytest.fixture
+def uncorrected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(affected, "between", lambda first, last: ())
+
+
+@pytest.mark.usefixtures("uncorrected")
+def test_of_a_version_without_corrections_since_figures_are_computed_again_and_pages_are_not_checked(
+    certificate: Path, again: Again
+) -> None:
+    by_version(certificate, "0.14.0")
+    spoil(certificate / "certificate.html", lambda content: content.replace(b">404.2051<", b">404.2061<", 1))
+    inquiry = checked(certificate, again).inquiry
+    assert (inquiry.word, inquiry.findings) == ("NOT WHOLLY CHECKED", [])
+    assert inquiry.done["again"] > 80
+    assert [(one.what, one.why) for one in inquiry.unchecked] == [(
+        "texts and layout of certificate.html",
+        f"made by version 0.14.0, which alone makes them again to the byte, and this is {__version__}",
+    )]  # fmt: skip
+
+
+def restated(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
+    data = json.loads((folder / "results.json").read_bytes())
+    change(data)
+    (folder / "results.json").write_bytes(canonical(data))
+
+
+@pytest.mark.usefixtures("uncorrected")
+@pytest.mark.parametrize(("by", "said"), [(5e-3, "moved"), (0.1, "wrong"), (1.0, "wrong")])
+def test_a_figure_of_another_version_that_moved_is_noted_and_one_that_was_altered_is_found(
+    by: float, said: str, certificate: Path, again: Again
+) -> None:
+    """By a part of U, which is printed to two digits: half of the last is from 0.5 % to 5 % of it."""
+
+    def change(data: dict[str, Any]) -> None:
+        one = data["estimates"]["scale_x"]["ppm"]
+        one["value"] = float(f"{one['value'] + by * one['U'] / 2:.10g}")
+
+    by_version(certificate, "0.14.0")
+    restated(certificate, change)
+    inquiry = checked(certificate, again).inquiry
+    moved = [note for note in inquiry.notes if "figures moved within their last digit since version 0.14.0" in note]
+    wrong = [one.place for one in inquiry.findings if one.check == "again"]
+    assert (bool(moved), wrong) == (said == "moved", ["estimates.scale_x.ppm.value"] if said == "wrong" else [])
+
+
+@pytest.mark.usefixtures("uncorrected")
+@pytest.mark.parametrize("path", ["decision", "errors.0.outcome"])
+def test_a_decision_of_another_version_is_decided_again_from_the_inputs(
+    path: str, certificate: Path, again: Again
+) -> None:
+    def change(data: dict[str, Any]) -> None:
+        inner: Any = data["conformity"][0]
+        *way, last = [int(key) if key.isdigit() else key for key in path.split(".")]
+        for key in way:
+            inner = inner[key]
+        inner[last] = "pass"
+
+    by_version(certificate, "0.14.0")
+    restated(certificate, change)
+    assert f"conformity[0].{path.replace('.0.', '[0].')}" in [
+        one.place for one in checked(certificate, again).inquiry.findings if one.check == "again"
+    ]
+
+
+@pytest.mark.usefixtures("uncorrected")
+def test_a_page_of_another_version_is_held_to_the_hash_inside_the_pdf(
+    certificate: Path, again: Again, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """provenance.json, attached, has the hash of every file that was made with it."""
+    monkeypatch.setattr(verification, "__version__", "99.0.0")
+    assert checked(certificate, again).inquiry.findings == []
+    spoil(certificate / "certificate.html", lambda content: content.replace(b">404.2051<", b">404.2061<", 1))
+    (finding,) = [one for one in checked(certificate, again).inquiry.findings if one.file == "certificate.html"]
+    assert finding.problem == "is not the file whose hash provenance.json has"
 
 
 def test_a_package_that_took_part_and_is_not_here_is_named(certificate: Path, again: Again) -> None:

@@ -135,22 +135,6 @@ def test_a_stream_that_unpacks_without_end_is_refused(made: Path, monkeypatch: p
         read_pdf(content, "certificate.pdf")
 
 
-def test_forms_drawn_in_forms_without_end_are_refused(made: Path) -> None:
-    """Ten forms, each drawing the next a hundred times: 10²⁰ drawings."""
-
-    def change(pdf: pikepdf.Pdf) -> None:
-        inner = pdf.make_stream(b"BT ET", Type=pikepdf.Name.XObject, Subtype=pikepdf.Name.Form, BBox=[0, 0, 1, 1])
-        for _ in range(10):
-            resources = pikepdf.Dictionary(XObject=pikepdf.Dictionary(A=inner))
-            inner = pdf.make_stream(b"/A Do " * 100, Type=pikepdf.Name.XObject, Subtype=pikepdf.Name.Form, BBox=[0, 0, 1, 1],
-                                    Resources=resources)  # fmt: skip
-        pdf.pages[0].obj.Resources.XObject = pikepdf.Dictionary(A=inner)
-        pdf.pages[0].obj.Contents = pdf.make_stream(b"/A Do")
-
-    with pytest.raises(CmmUqError, match="draws more than"):
-        _ = read_pdf(saved(made, change), "certificate.pdf").pages
-
-
 def test_every_byte_of_a_packed_stream_counts(made: Path) -> None:
     content = bytearray((made / "certificate.pdf").read_bytes())
     at = content.index(b"stream\n", content.index(b"/FlateDecode")) + 40

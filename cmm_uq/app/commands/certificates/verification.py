@@ -31,26 +31,49 @@ Compute = Callable[["Given", "Job"], "Again"]  # the second computation: of the 
 
 
 def compute_again(
-    inquiry: Inquiry, given: Given, compute: Callable[[], Again | None], by_another: Callable[[str], str] | None = None
+    inquiry: Inquiry, given: Given, compute: Callable[[], Again | None], command: str, job: Job | None = None
 ) -> bool:
-    """Compute everything from the inputs, by this version, and keep what differs: whether the documents are the same.
+    """Compute everything from the inputs and keep what differs: whether the documents are the same to the byte.
 
-    ``by_another``: what is said of a certificate by another version.
+    By the version that made it everything is compared; of an earlier one figures and decisions, where no correction since
+    then touches what a ``command`` makes of a ``job``, whatever it is where none is given.
     """
     if given.results is None or plugins_missing(inquiry, given.results[1]):
         return False
-    if (made := _version(given)) != __version__:
-        told = by_another(made) if by_another else _NEWER
-        inquiry.left(AGAIN, f"made by version {made}, and this is {__version__}{told}")
+    made = _version(given)
+    if made != __version__ and not _computes_alike(inquiry, made, command, job):
         return False
     from cmm_uq.certificate.verify.again import compare_again
+    from cmm_uq.certificate.verify.other_version import compare_figures
 
     try:
-        computed = compute()
-        return computed is not None and compare_again(inquiry, given, computed)
+        if (computed := compute()) is None:
+            return False
+        if made == __version__:
+            return compare_again(inquiry, given, computed)
+        compare_figures(inquiry, given, computed, made)
     except CmmUqError as error:
         inquiry.wrong("again", given.results[0], "", f"cannot be computed again: {error}")
-        return False
+    return False
+
+
+def _computes_alike(inquiry: Inquiry, made: str, command: str, job: Job | None) -> bool:
+    """Whether this version gives the figures of an earlier one; what was corrected since then is named."""
+    from cmm_uq.app.commands.certificates.affected import JobInputs, between, order, stated_version
+
+    of_job = ("", None) if job is None else (job.facts.artefact.kind, JobInputs.of(job.inputs))
+    why = ": install that" if stated_version(made) >= order(__version__) else ""
+    touching = [one for one in between(made, __version__) if one.concerns(command, *of_job)]
+    inquiry.notes += [f"Version {one.version} corrects: {one.what}" for one in touching]
+    if touching:
+        count, verb = (
+            len(touching),
+            "correction since then touches" if len(touching) == 1 else "corrections since then touch",
+        )
+        why = f"; {count} {verb} this certificate"
+    if why:
+        inquiry.left(AGAIN, f"made by version {made}, and this is {__version__}{why}")
+    return not why
 
 
 def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Again:
@@ -124,23 +147,6 @@ def plugins_missing(inquiry: Inquiry, data: Mapping[str, Any]) -> bool:
     return missing
 
 
-_NEWER = ": install that"
-
-
-def _by_another_version(inquiry: Inquiry, given: Given, job: Job, made: str) -> str:
-    """Say which corrections touch a certificate of another version."""
-    from cmm_uq.app.commands.certificates.affected import JobInputs, between, order, stated_version
-
-    if stated_version(made) >= order(__version__):
-        return _NEWER
-    command = "report" if given.results and "estimates" in given.results[1] else "diagnose"
-    inputs = JobInputs.of(job.inputs)
-    touching = [one for one in between(made, __version__) if one.concerns(command, job.facts.artefact.kind, inputs)]
-    inquiry.notes += [f"Version {one.version} corrects: {one.what}" for one in touching]
-    told = "1 correction since then touches" if len(touching) == 1 else f"{len(touching)} corrections since then touch"
-    return f"; {told} this certificate"
-
-
 @dataclass(frozen=True)
 class Verification:
     """The forms of a certificate, what was found, and the job of the inputs where these are sound; of a part's report none."""
@@ -195,15 +201,12 @@ def verify_given(
         inquiry.left(AGAIN, NOT_ASKED)
     elif again is not None:
         alike = again.compute()
-    forms = [form[0] for form in (given.pdf, given.html) if form is not None]
-    if given.of_part and forms and not alike:
-        inquiry.left(
-            f"texts and layout of {' and '.join(forms)}", "they are compared where they are made again to the byte"
-        )
-    elif given.pdf is not None and given.html is not None and not alike:
-        views.compare_views(inquiry, given.pdf[1], given.html[1], files=(given.pdf[0], given.html[0]))
-    if given.html is not None and not alike and _version(given) == __version__:
-        views.check_style(inquiry, given.html[1], given.html[0])
+    forms = " and ".join(form[0] for form in (given.pdf, given.html) if form is not None)
+    if forms and not alike:
+        why = "they are compared where they are made again to the byte"
+        if rerun and (made := _version(given)) not in ("", __version__):
+            why = f"made by version {made}, which alone makes them again to the byte, and this is {__version__}"
+        inquiry.left(f"texts and layout of {forms}", why)
     stage("Done", 1.0)
     return Verification(given, inquiry, None if again is None else again.job)
 
@@ -244,15 +247,15 @@ def examine_certificate(
     def computed() -> Again:
         return compute(given, job) if compute else again(given, job, stage)
 
-    by_another = partial(_by_another_version, inquiry, given, job)
-    return Recomputation(lambda: compute_again(inquiry, given, computed, by_another), job)
+    command = "report" if given.results and "estimates" in given.results[1] else "diagnose"
+    return Recomputation(lambda: compute_again(inquiry, given, computed, command, job), job)
 
 
 def _compare(inquiry: Inquiry, given: Given) -> Job | None:
     """The forms with each other, and figures, decisions, inputs and dates; the job, where its inputs are sound."""
     if given.results is None:
         return None
-    from cmm_uq.certificate.verify import again, decisions, figures, stated
+    from cmm_uq.certificate.verify import again, decisions, figures
 
     name, data, _ = given.results
     with inquiry.reading("figures", name):
@@ -260,8 +263,6 @@ def _compare(inquiry: Inquiry, given: Given) -> Job | None:
         figures.check_figures(inquiry, data, name)
         decisions.check_decisions(inquiry, data, name)
         figures.check_verdicts(inquiry, data, name)
-        if given.html is not None:
-            stated.check_stated(inquiry, data, given.html[1], files=(given.html[0], name))
     job = job_of_inputs(inquiry, given, _job, "dates")
     if job is not None:
         again.check_job(inquiry, job, data, name)

@@ -41,7 +41,7 @@ def examine_part(
     if (job := compare_part(inquiry, given, rerun=rerun, trust=trust)) is None or given.results is None:
         return None
     computed = partial(part_again, inquiry, given, job, given.results[1], trust=trust, stage=stage)
-    return Recomputation(lambda: compute_again(inquiry, given, computed))
+    return Recomputation(lambda: compute_again(inquiry, given, computed, "part"))
 
 
 def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable[Path] | None) -> PartJob | None:
