@@ -95,6 +95,9 @@ class Points:
     directions: Floats | None = None
     # what ``time_s`` was at the start; by default 0 or, by a clock that began long before, at the first reading
     start_s: float | None = None
+    in_seconds: bool = (
+        False  # whether ``time_s`` was written by this program's own clock, so that its unit is no question
+    )
 
     def __len__(self) -> int:
         return len(self.xyz)
@@ -188,6 +191,7 @@ class Points:
             self.lines[rows] if len(self.lines) else self.lines,
             self.directions if self.directions is None or self.directions.ndim == 2 else self.directions[rows],
             self.start,
+            self.in_seconds,
         )
 
     def group_means(self, values: Floats) -> Floats:

@@ -37,6 +37,9 @@ class Instrument(ResultsPart):
     certificate: str | None = None
     columns: dict[str, str] = {}
     latency_ms: float = 0.0
+    units: dict[str, str] = {}  # by quantity, those that it does not say itself
+    units_stated: list[str] = []  # quantities whose units the job states
+    unasked: int = 0  # answers that nobody had asked for, none of which was used
 
     @property
     def sentence(self) -> Text:
@@ -47,7 +50,24 @@ class Instrument(ResultsPart):
             parts.append(say("firmware {firmware}", firmware=Verbatim(self.firmware)))
         number = self.certificate
         stated = say("certificate {number}", number=Verbatim(number)) if number else say("no certificate stated")
-        return commas([*parts, stated])
+        return commas([*parts, stated, *self._units, *self._unasked])
+
+    @property
+    def _units(self) -> list[Text]:
+        """In which units it is taken to send its quantities, and who says so."""
+        told: list[Text] = []
+        for unit in dict.fromkeys(self.units.values()):
+            of = [name for name, given in self.units.items() if given == unit]
+            shown, stated = Verbatim(unit), [name for name in of if name in self.units_stated]
+            told += [say("{names} in {unit} as stated", names=commas(names(stated)), unit=shown)] if stated else []
+            if assumed := [name for name in of if name not in stated]:
+                told.append(say("{names} in {unit} as assumed", names=commas(names(assumed)), unit=shown))
+        return told
+
+    @property
+    def _unasked(self) -> list[Text]:
+        many = say("{count} answers to no question, not used", count=self.unasked)
+        return [plural(self.unasked, one=say("1 answer to no question, not used"), many=many)] if self.unasked else []
 
 
 class Silence(ResultsPart):

@@ -126,6 +126,7 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     points, recognised = read_recording_file(
         inputs[facts.recording.file], where, machine, facts.recording, acquired.without if acquired else ()
     )
+    points = replace(points, in_seconds=acquired is not None and not acquired.changed)
     told = [recognised, None if says is None else says.recognised]
     facts, points, further = _certified_points(facts, points, inputs, source, says, told)
     told.append(further)

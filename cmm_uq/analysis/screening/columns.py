@@ -135,7 +135,7 @@ def _fraction(points: Points) -> Iterator[Finding]:
 
 def _time(points: Points, balls: bool) -> Iterator[Finding]:
     """A clock in other units, seen by the time from point to point of one set-up; single moments out of their order."""
-    if "time_s" not in points.columns:
+    if "time_s" not in points.columns or points.in_seconds:
         return
     time = points.columns["time_s"]
     steps = np.abs(np.diff(time))[np.diff(points.group) == 0]

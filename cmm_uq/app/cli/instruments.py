@@ -224,6 +224,12 @@ def list_all(end: Ending = opt.ONLY_JSON) -> None:
     end.put({"profiles": profiles, "ports": dict(ports)}, lines)
 
 
+_UNASKED = (
+    "answers that nobody had asked for: where they belong to the question, say in [send] poll how many messages it has; "
+    "where the instrument sends by itself too, say unasked = true"
+)
+
+
 @opt.command(app, "test", "instruments test fluke-1502a /dev/ttyUSB0", "instruments test table_top --job my-job")
 def try_out(
     profile: str = PROFILE,
@@ -244,12 +250,17 @@ def try_out(
             _show(event)
     attempt.trial.conclude()
     trial, identity = attempt.trial, attempt.source.identity()
-    who = ", ".join(printable(f"{key} {value}") for key, value in vars(identity).items() if value and key != "name")
+    told = [(key, value) for key, value in vars(identity).items() if isinstance(value, str) and value and key != "name"]
+    who = ", ".join(printable(f"{key} {value}") for key, value in told)
     count = f"{trial.messages} messages, {trial.with_values} with values, {trial.wrong} with something wrong"
+    if trial.unasked:
+        count += f", {trial.unasked} of them {_UNASKED}"
+    by = {name: "the job" if name in identity.units_stated else "the profile" for name in identity.units}
+    units = [f"{name} in {unit}, as {by[name]} has it" for name, unit in identity.units.items()]
     end.put({
         "identity": vars(identity), "messages": trial.messages, "with_values": trial.with_values, "wrong": trial.wrong,
-        "quantities": trial.quantities,
-    }, ["", f"{identity.name}: {who or 'does not say who it is'}", count])  # fmt: skip
+        "unasked": trial.unasked, "quantities": trial.quantities,
+    }, ["", f"{identity.name}: {who or 'does not say who it is'}", *units, count])  # fmt: skip
 
 
 @opt.command(app, "watch", "instruments watch line-logger socket://logger:4001")

@@ -96,6 +96,7 @@ Number = Annotated[int, Field(ge=-1_000_000_000, le=1_000_000_000)]  # of a meas
 # a number in a unit that only its name knows: as large as in a recording
 AnyFloat = Annotated[float, Field(ge=-1e15, le=1e15)]
 Column = Annotated[str, AfterValidator(_plain_column)]  # name of a recorded column
+Unit = Annotated[str, Field(pattern=r"^[A-Za-z_°µ%/ ]*$", max_length=40)]  # as pint spells it
 Range = Annotated[list[Position], Field(min_length=2, max_length=2)]
 Triple = Annotated[list[Position], Field(min_length=3, max_length=3)]
 Names = Annotated[list[str], Field(max_length=EFFECTS.most)]

@@ -39,7 +39,8 @@ RESULTS: Mapping[str, str] = MappingProxyType(
         "import[].KEY": "Of each file in another format than the project's own, how it was read: format, encoding, unit, …",
         "import[].columns.COLUMN": "Heading of the file that a column of the recording was taken from.",
         "acquisition.KEY": "How a recording was taken live: program, sessions, points typed, taken back or read from files.",
-        "acquisition.instruments[].KEY": "Name, maker, model, serial, firmware, certificate, columns, latency_ms.",
+        "acquisition.instruments[].KEY": "Name, maker, model, serial, firmware, certificate, columns, "
+        "latency_ms; units that it does not say, which of them the job states, answers that nobody had asked for.",
         "acquisition.columns.COLUMN.u": "Standard uncertainty (rms) of a column by interpolation in time.",
         "acquisition.columns.COLUMN.u_largest": "The largest of them.",
         "acquisition.columns.COLUMN.missing": "Measurement, point and repeat of points that it has no value of.",

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED
-from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Length, Names, Range, Uncertainty, at_least, key
+from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Length, Names, Range, Uncertainty, Unit, at_least, key
 
 Criterion = Literal["separation", "D", "A", "worst"]
 Duration = Annotated[float, Field(ge=0, le=1e6)]  # minutes or seconds
@@ -106,6 +106,8 @@ class DeclaredSource(JobTable):
     certificate: str = key("", "Number of its calibration certificate.")
     values: Annotated[dict[str, Column], Field(max_length=100)] = {}
     """Column of the recording by the quantity that the instrument gives; without it each goes into the column of its name."""
+    units: Annotated[dict[str, Unit], Field(max_length=100)] = {}
+    """Unit by quantity, where the instrument does not say it: `{ length_mm = "inch" }`; that of the profile where left out."""
     latency_ms: Annotated[float, Field(ge=0, le=1e6)] = 0.0
     """How long before the last byte of a message came its quantities were measured."""
 

@@ -226,7 +226,7 @@ class Judge:
         measurement, point, repeat = np.array([row.point.place for row in rows], dtype=np.int64).T.copy()
         return Points(
             np.array([_xyz(row.point) for row in rows]), measurement, point, repeat, self.machine,
-            {name: np.array([values[name] for values in known], dtype=np.float64) for name in names},
+            {name: np.array([values[name] for values in known], dtype=np.float64) for name in names}, in_seconds=True,
         )  # fmt: skip
 
     def _expected(self, run: Run, points: Points, repeats_most: int) -> tuple[tuple[Text, ...], Text | None]:

@@ -252,7 +252,8 @@ class LiveRecording:
             ],
             "instruments": [
                 {key: value for key, value in identity.items() if value is not None}
-                for identity in story.identities.values()
+                | {"unasked": sum(n for (source, _), n in story.unasked.items() if source == name)}
+                for name, identity in story.identities.items()
             ],
             "typed": sum(row.point.how.startswith(TYPED) for row in rows),
             "files": dict(story.files),

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments.source import Clock, Event, Identity, Moment, Reading, Returned
@@ -80,6 +80,7 @@ class Recorder:
         self._fed: dict[tuple[str, str], Stream] = {}  # the same by instrument and quantity
         self.stalled: Text | None = None  # why nothing can be kept at the moment
         self.counts: dict[str, int] = {}  # readings of each instrument in this session
+        self.unasked: dict[str, int] = {}  # those of them that are answers which nobody had asked for
         self.ill: dict[str, Text] = {}  # what is wrong with an instrument, by its name
         self.told: list[Text] = []  # what happened, to be shown once
         for source in sources:
@@ -179,6 +180,8 @@ class Recorder:
         for number in self._open:
             self._settle(number, None)
         self._open.clear()
+        for source, count in self.unasked.items():
+            self.say("unasked", source=source, count=count)
 
     def latest(self, columns: Sequence[str]) -> dict[str, float]:
         """What streams read just now, for a point that is taken while the machine stands still."""
@@ -206,6 +209,13 @@ class Recorder:
         self._came.append(reading)
         source = reading.source
         self.counts[source] = self.counts.get(source, 0) + 1
+        if reading.unasked:
+            count = self.unasked[source] = self.unasked.get(source, 0) + 1
+            if (
+                count & (count - 1) == 0
+            ):  # the first, then at each power of two, lest they fill the journal; the last at the end
+                self.say("unasked", source=source, count=count)
+                self.told.append(say("{source}: {why}", source=Verbatim(source), why=reading.status or NOTHING))
         if reading.status is not None:
             self.ill[source] = reading.status
         elif reading.values:

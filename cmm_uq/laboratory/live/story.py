@@ -170,6 +170,9 @@ class Story:
     skipped: list[tuple[int, int]] = field(default_factory=list)  # set-ups that the operator left out
     asked: list[tuple[int, int]] = field(default_factory=list)  # repeats more that were asked for
     notes: list[tuple[float, str]] = field(default_factory=list)
+    unasked: dict[tuple[str, int], int] = field(
+        default_factory=dict
+    )  # answers not asked for, by instrument and session
     files: dict[str, str] = field(default_factory=dict)  # that were read, by SHA-256, with their names
     damaged: list[str] = field(default_factory=list)  # lines of journals that are not in it
     changes: int = 0  # how many records changed what counts
@@ -202,6 +205,8 @@ class Story:
             case "skip" | "repeat":
                 runs = self.skipped if record.kind == "skip" else self.asked
                 runs.append((data["measurement"], data["repeat"]))
+            case "unasked":
+                self.unasked[data["source"], self.session.number] = data["count"]
             case "note":
                 self.notes.append((time_s, data["text"]))
             case "file":

@@ -17,7 +17,7 @@ import pytest
 
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer
-from cmm_uq.laboratory.live.instruments.simulated_line import Lines, SimulatedLine
+from cmm_uq.laboratory.live.instruments.simulated_line import Lines, Readout1502, SimulatedLine
 from cmm_uq.laboratory.live.story import read_story
 from tests.app.cli.process import COMMAND, run
 from tests.app.cli.terminal import until
@@ -199,6 +199,67 @@ values = {{ value1 = "temp_air_c", value2 = "temp_artefact_c", value3 = "dew_c" 
     assert (float(values["temp_air_c"]), float(values["temp_artefact_c"])) == (20.01, 20.02)
     assert acquired.said.columns["temp_air_c"].missing[0] == (1, 1, 2)
     assert acquired.said.gaps
+
+
+SCALES = """
+[[acquire.source]]
+name = "scales"
+profile = "line-logger"
+port = "{port}"
+values = {{ value1 = "x_mm", value2 = "y_mm", value3 = "z_mm", value4 = "temp_artefact_c" }}
+"""
+
+
+def test_points_taken_from_scales_as_fast_as_keys_are_pressed_are_reported_at_once(tmp_path: Path) -> None:
+    """Their times are of the program's own clock, so that 0.2 s from ball to ball are no minutes."""
+    speaker = Lines()
+    with SimulatedLine(speaker, "pty", tmp_path) as line:
+        folder = job_folder(tmp_path / "job", SCALES.format(port=line.port))
+        with operating(folder) as operator:
+            operator.hear("next: measurement 1")
+            for x, y, z in ((100, 100, -300), (600.001, 100, -300), (100, 100.001, -300), (600.002, 100.001, -300),
+                            (100, 100, -300), (100, 600.003, -300), (100, 100, -300), (500.001, 400, -300)):  # fmt: skip
+                speaker.readings[:] = [x, y, z, 20.0]
+                time.sleep(0.25)
+                operator.type("")
+                operator.hear("^accepted: ")
+            assert operator.end() == 0
+    job = read_job(folder)
+    steps = job.points.columns["time_s"][1::2] - job.points.columns["time_s"][::2]
+    assert (steps > 0).all()
+    assert (steps < 0.6).any()
+    told = run("report", folder)
+    assert (told.returncode, told.stderr) == (0, "")
+    (folder / "bar.csv").write_text((folder / "bar.csv").read_text(encoding="utf-8") + "# changed\n", encoding="utf-8")
+    changed = run("report", folder)  # whose clock is it now?
+    assert changed.returncode == 2
+    assert "looks like minutes or hours" in changed.stderr
+
+
+def test_answers_that_nobody_asked_for_are_counted_on_the_certificate(tmp_path: Path) -> None:
+    class Twice(Readout1502):
+        def answer(self, command: str) -> bytes:
+            return super().answer(command) * (1 + (command == "T"))
+
+    with SimulatedLine(Twice(), "pty", tmp_path) as line:
+        folder = job_folder(tmp_path / "job", f"""
+[[acquire.source]]
+name = "bar"
+profile = "fluke-1502a"
+port = "{line.port}"
+values = {{ temp_c = "temp_artefact_c" }}
+""")  # fmt: skip
+        with operating(folder) as operator:
+            operator.hear("^bar: temp_c = 20.013 answers no question, and is not used: nobody had asked")
+            operator.type("100 100 -300", "600.001 100 -300")
+            operator.hear("1 of 4 set-ups")
+            assert operator.end() == 0
+    told = read_job(folder).acquired
+    assert told is not None
+    (bar,) = told.said.instruments
+    assert bar.unasked >= 1
+    assert f"{bar.unasked} answer" in str(bar.sentence)
+    assert bar.units == {}  # it says them itself
 
 
 def test_a_folder_of_results_is_read_as_they_come(tmp_path: Path) -> None:

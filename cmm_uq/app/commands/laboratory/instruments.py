@@ -50,7 +50,8 @@ class Attempt:
 
     def __init__(self, what: str, port: str, job: Path | None) -> None:
         source, folder = declared(what, port, job)
-        self.trial = library.Trial(library.profile_named(source.profile, folder), source.port)
+        profile = library.profile_of_source(source, folder)
+        self.trial = library.Trial(profile, source.port)
         self.source: LiveSource = open_source(source, folder=folder)
         self._stop = threading.Event()
 

@@ -9,15 +9,17 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.messages import Text, Verbatim, commas, say
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments import source
+from cmm_uq.laboratory.live.instruments.conversation import Conversation
 from cmm_uq.laboratory.live.instruments.ipp_machine import open_machine
-from cmm_uq.laboratory.live.instruments.library import profile_named
+from cmm_uq.laboratory.live.instruments.library import profile_of_source, unsaid_units
 from cmm_uq.laboratory.live.instruments.parsing import FramedMessage, Framer, Parser, Understood
-from cmm_uq.laboratory.live.instruments.profile import Identify, ProfileFile, Send, bytes_of
+from cmm_uq.laboratory.live.instruments.profile import Identify, ProfileFile, bytes_of
 from cmm_uq.laboratory.live.instruments.source import SECOND, Identity
 
 RETRY_S = 0.25  # between two attempts to open a port that is gone; a return is to be noticed within 2 s
@@ -39,6 +41,7 @@ class LiveInstrument:
         self._number, self._gap_at, self._closed = 0, -1, False
         self._byte_at = clock.monotonic_ns()
         self._told, self._known = "", False
+        self._half: Text | None = None  # why the next message may not be whole, or not be an answer
         self._port: source.Port | None = opened()
         self._conversation = self._begun()
         self._held: list[source.Event] = []
@@ -82,31 +85,53 @@ class LiveInstrument:
         yield from self._rest()
 
     def _step(self, port: source.Port) -> Iterator[source.Event]:
+        if self._conversation.asks_next:
+            yield from self._heard(port.read(wait=False), port)  # what is there before a question is no answer to it
         now = self._clock.monotonic_ns()
-        question = self._conversation.question(now)
+        question = self._conversation.question(now) if self._quiet() and self._port is port else None
         if question is not None:
             if self._profile.frame.length and not self._profile.frame.start:
                 yield from self._rest()
+                self._half = None
+            elif self._parser.begins(self._framer.waiting):
+                self._half = say("it began before the question")
             port.write(question)
         received = port.read()
-        stamp = source.Moment.now(self._clock)
         if received:
-            self._byte_at = stamp.monotonic_ns
-            for framed in self._framer.feed(received):
-                yield from self._message(framed, stamp, port)
-        elif self._framer.waiting and stamp.monotonic_ns - self._byte_at > self._profile.send.answer_within_s * SECOND:
+            yield from self._heard(received, port)
+        elif self._framer.waiting and self._since_byte_s() > self._profile.send.answer_within_s:
             yield from self._rest()
         if self._conversation.overdue(self._clock.monotonic_ns()):
             yield from self._overdue(port)
+
+    def _heard(self, received: bytes, port: source.Port) -> Iterator[source.Event]:
+        if received:
+            stamp = source.Moment.now(self._clock)
+            self._byte_at = stamp.monotonic_ns
+            for framed in self._framer.feed(received):
+                yield from self._message(framed, stamp, port)
+
+    def _since_byte_s(self) -> float:
+        return (self._clock.monotonic_ns() - self._byte_at) / SECOND
+
+    def _quiet(self) -> bool:
+        """Whether no message is on its way, which a question would cut into one that came before and one that answers."""
+        return not self._framer.waiting.strip() or self._since_byte_s() > source.TICK_S
 
     def _message(
         self, framed: FramedMessage, stamp: source.Moment, port: source.Port | None = None
     ) -> Iterator[source.Event]:
         """What came, with the return of an instrument that was silent; with a port, that is asked first who it is."""
         understood = self._parser.read(framed, max(self._conversation.asked, 0))
-        if self._conversation.several and not self._conversation.waiting and understood.answers:
-            understood = Understood(status=say("comes too late, or answers no question"))
-        self._conversation.heard(stamp.monotonic_ns, answer=understood.answers)
+        half, self._half = self._half, None
+        self._conversation.heard(stamp.monotonic_ns)
+        if understood.answers:
+            back = self._conversation.expects
+            why = self._conversation.answered(stamp.monotonic_ns) if half is None else half
+            if why is not None and understood.values:
+                what = commas(Verbatim(f"{name} = {value:.10g}") for name, value in understood.values.items())
+                status = say("{what} answers no question, and is not used: {why}", what=what, why=why)
+                understood = Understood(status=status, answers=back, unasked=True)
         if understood.answers and self._gap_at >= 0:
             yield from self._returned(framed, understood, stamp, port)
         else:
@@ -139,12 +164,14 @@ class LiveInstrument:
     def _reading(self, framed: FramedMessage, understood: Understood, stamp: source.Moment) -> source.Reading:
         self._number += 1
         return source.Reading(
-            self.name, self._number, stamp.utc_ns, stamp.monotonic_ns, framed.raw, dict(understood.values), understood.status
+            self.name, self._number, stamp.utc_ns, stamp.monotonic_ns, framed.raw, dict(understood.values),
+            understood.status, unasked=understood.unasked,
         )  # fmt: skip
 
     def _rest(self) -> Iterator[source.Event]:
         rest = self._framer.rest()
         if rest is not None:
+            self._half = say("it may be the rest of the message before") if self._parser.begins(rest.raw) else None
             yield self._reading(rest, self._parser.read(rest), source.Moment.now(self._clock))
 
     def _overdue(self, port: source.Port) -> Iterator[source.Event]:
@@ -170,7 +197,7 @@ class LiveInstrument:
 
     def _lost(self, why: Text) -> Iterator[source.Event]:
         yield from self._rest()
-        self._framer = Framer(self._profile.frame)
+        self._framer, self._half = Framer(self._profile.frame), None
         self._close_port()
         yield from self._silent(why)
 
@@ -215,7 +242,7 @@ class LiveInstrument:
             if (failed := wrong or lost) is not None:
                 raise failed
             if found is not None:
-                said = {key: value for key, value in vars(found).items() if value is not None}
+                said: dict[str, Any] = {key: value for key, value in vars(found).items() if value}
                 said |= {"name": self.name, "certificate": self._declared.certificate}
                 self._identity, self._known = replace(self._declared, **said), True
         for text in self._profile.send.start:
@@ -247,10 +274,10 @@ def open_source(
     declared: DeclaredSource, *, clock: source.Clock = source.SYSTEM, folder: Path = Path()
 ) -> source.LiveSource:
     """The source that a job declares, with its port open."""
-    profile = profile_named(declared.profile, folder)
+    profile = profile_of_source(declared, folder)
     identity = source.Identity(
         declared.name, profile.maker or None, profile.model or None, declared.serial or None,
-        certificate=declared.certificate or None,
+        certificate=declared.certificate or None, units=unsaid_units(profile, declared), units_stated=list(declared.units),
     )  # fmt: skip
     if profile.protocol == "ipp":
         return open_machine(identity, profile, declared.port, clock)
@@ -264,70 +291,6 @@ def instrument(
         return LiveInstrument(identity, profile, partial(source.ReplayedFile, port, folder, clock), clock)
     far = port.startswith((*source.NETWORK, source.RFC2217))
     return LiveInstrument(identity, profile, source.opener(port, profile.connection), clock, reopen_when_silent=far)
-
-
-PAUSE = SECOND // 2
-"""After an answer that did not come: where several questions are asked, a late one would be taken for the next one's."""
-
-
-class Conversation:
-    """Questions to one instrument, one after the other, a round every so often; moments are of the monotonic clock, ns.
-
-    A silent instrument (``gap``) is asked without regard to the rounds, so that its return is noticed.
-    """
-
-    def __init__(self, send: Send, now: int, *, replayed: bool = False) -> None:
-        self._polls = [bytes_of(poll.send) for poll in send.poll]
-        self._every, self._patience = round(send.every_s * SECOND), round(send.answer_within_s * SECOND)
-        silent = send.silent_after_s
-        self._silence = None if self._polls or silent is None or replayed else round(silent * SECOND)
-        self._replayed = replayed
-        self._due = self._since = self._asked_at = self._heard_at = self._pause = now
-        self.asked = 0 if replayed else -1
-        self.waiting = self.gap = False
-
-    @property
-    def several(self) -> bool:
-        """Whether an answer may belong to one of several questions."""
-        return len(self._polls) > 1 and not self._replayed
-
-    def question(self, now: int) -> bytes | None:
-        """What to send now; ``None``: nothing yet."""
-        if not self._polls or self._replayed:
-            return None
-        if self.waiting:
-            if not self.gap or self.several or now - self._asked_at < min(self._patience, SECOND):
-                return None
-            self._asked_at = now
-            return self._polls[self.asked]
-        following = (self.asked + 1) % len(self._polls)
-        if now < self._pause or (following == 0 and now < self._due and not self.gap):
-            return None
-        if following == 0:
-            self._due += self._every * max(1, 1 + (now - self._due) // self._every)
-        self.asked, self.waiting = following, True
-        self._since = self._asked_at = now
-        return self._polls[following]
-
-    def heard(self, now: int, *, answer: bool) -> None:
-        self._heard_at = now
-        if answer:
-            self.waiting = self.gap = False
-            if self._replayed and self._polls:
-                self.asked = (self.asked + 1) % len(self._polls)
-
-    def overdue(self, now: int) -> bool:
-        """Whether an answer did not come in time, or an instrument that speaks by itself is silent; said once each time."""
-        if self.waiting and now - self._since >= self._patience:
-            self.waiting = False
-            self._pause = now + PAUSE if self.several else now
-            return True
-        if self._silence is not None:
-            allowed = min(self._silence, SECOND) if self.gap else self._silence
-            if now - self._heard_at >= allowed:
-                self._heard_at = now
-                return True
-        return False
 
 
 MOST_LINES = (
@@ -349,10 +312,8 @@ class Introduction:
         whole = "\n".join(self._lines)
         found = self._pattern.search(whole)
         if found is not None and self.found is None:
-            known = ("maker", "model", "serial", "firmware")
-            self.found = Identity(
-                "", **{key: text.strip() for key, text in found.groupdict().items() if key in known and text}
-            )
+            told = {key: text.strip() for key, text in found.groupdict().items() if text}
+            self.found = Identity("", told.get("maker"), told.get("model"), told.get("serial"), told.get("firmware"))
             self._span = whole.count("\n", 0, found.start()), whole.count("\n", 0, max(found.start(), found.end() - 1))
 
     def tells(self, place: int) -> bool:

@@ -13,9 +13,11 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.csv_table import column_problem
 from cmm_uq.base.files.limits import JOB_BYTES, TEXT
+from cmm_uq.base.files.table import unit_of
 from cmm_uq.base.files.toml_file import checked
-from cmm_uq.laboratory.live.instruments.parsing import check_profile
-from cmm_uq.laboratory.live.instruments.profile import NUMBER, ProfileFile, bytes_of, shown
+from cmm_uq.jobs.tables.plan import DeclaredSource
+from cmm_uq.laboratory.live.instruments.parsing import check_profile, check_unit
+from cmm_uq.laboratory.live.instruments.profile import NUMBER, ProfileFile, ProfileQuantity, bytes_of, shown
 from cmm_uq.laboratory.live.instruments.source import Event, Reading, Returned
 
 ENDING = ".toml"
@@ -46,6 +48,34 @@ def profile_of(content: bytes, path: Path) -> ProfileFile:
     """A profile of a file's bytes; see :func:`read_profile`."""
     found = checked(content, path, ProfileFile, most_word=TEXT.most)
     check_profile(found, str(path))
+    return found
+
+
+def profile_of_source(declared: DeclaredSource, folder: Path) -> ProfileFile:
+    """The profile of a source, with the units that the job says its instrument is set to."""
+    profile = profile_named(declared.profile, folder)
+    quantities, named = dict(profile.quantities), profile.named()
+    for name, unit in declared.units.items():
+        where, quantity = f"[[acquire.source]] {declared.name}: units", quantities.get(name, ProfileQuantity())
+        if name not in named:
+            raise CmmUqError(f"the instrument gives no {name!r}", where=where, fix=suggestion(name, named))
+        if quantity.unit_group or profile.protocol == "ipp":
+            raise CmmUqError(f"the instrument says itself in which unit {name} is", where=where, fix="Leave it out")
+        check_unit(name, unit, where)
+        quantities[name] = quantity.model_copy(update={"unit": unit})
+    return profile.model_copy(update={"quantities": quantities})
+
+
+def unsaid_units(profile: ProfileFile, declared: DeclaredSource) -> dict[str, str]:
+    """Units, by quantity, that the instrument does not say: the job's, else the profile's, else those of the names."""
+    if profile.protocol == "ipp":
+        return {}
+    found = {}
+    for name in sorted(set(declared.values) & profile.named() or profile.named()):
+        quantity = profile.quantities.get(name, ProfileQuantity())
+        unit = quantity.unit or unit_of(name) or unit_of(declared.values.get(name, name))
+        if unit and not quantity.unit_group:
+            found[name] = unit
     return found
 
 
@@ -186,6 +216,7 @@ class Trial:
     with_values: int = 0
     wrong: int = 0
     answers: int = 0
+    unasked: int = 0
     quantities: dict[str, float] = field(default_factory=dict)
     received: bytes = b""  # the last bytes that were not understood, or else that came
     told: str = ""  # the last that was wrong
@@ -195,6 +226,7 @@ class Trial:
             return
         self.messages += 1
         self.with_values += bool(event.values)
+        self.unasked += event.unasked
         self.quantities |= event.values
         if event.status is not None:
             self.wrong += 1

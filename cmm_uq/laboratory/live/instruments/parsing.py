@@ -57,8 +57,9 @@ class Framer:
         return self._no_message(len(self._waiting), overlong=self._overlong is not None) if self._waiting else None
 
     @property
-    def waiting(self) -> bool:
-        return bool(self._waiting)
+    def waiting(self) -> bytes:
+        """What waits for its end."""
+        return bytes(self._waiting)
 
     def _next(self) -> FramedMessage | None:
         if self._start and (place := self._waiting.find(self._start)):
@@ -172,6 +173,7 @@ class Understood:
     values: Mapping[str, float] = field(default_factory=dict)  # by quantity; empty where it says none
     status: Text | None = None  # what is wrong; ``None``: nothing
     answers: bool = False  # whether it is an answer: it has values, or says that something is wrong with the instrument
+    unasked: bool = False  # whether it is one that no question is known of
 
 
 class Parser:
@@ -211,6 +213,12 @@ class Parser:
             return Understood(status=error.why)
         return Understood(values, semicolons(wrong) if wrong else None, answers=bool(values))
 
+    def begins(self, part: bytes) -> bool:
+        """Whether the beginning of a message may hold some of a value: a digit, or a byte of a binary field."""
+        text = part.decode("latin-1")
+        said = part if self._parse.struct is not None else re.search(r"\d", text)
+        return bool(said) and not any(pattern.fullmatch(text) for pattern in self._ignored)
+
     def _numbers(self, body: bytes, text: str, answers: int) -> Sequence[tuple[str, str | float, str]]:
         """Name, number as sent and unit as said of each quantity of a message."""
         names, layout, separator = self._parse.fields, self._parse.struct, self._parse.separator
@@ -248,6 +256,14 @@ def _seen(raw: bytes) -> Text:
     return Verbatim(f"{shown(raw[:_SHOWN])}{'…' if len(raw) > _SHOWN else ''}")
 
 
+def check_unit(name: str, unit: str, where: str) -> None:
+    """Refuse a unit that cannot be that of a quantity's name."""
+    try:
+        conversion(unit, unit_of(name))
+    except CmmUqError as error:
+        raise CmmUqError(error.problem, where=where, fix=error.fix) from None
+
+
 def check_profile(profile: ProfileFile, where: str) -> None:
     """Refuse a profile that contradicts itself, or reads its own examples otherwise than they say."""
     if profile.protocol == "ipp":
@@ -264,10 +280,7 @@ def check_profile(profile: ProfileFile, where: str) -> None:
         if name not in named:
             raise CmmUqError("is no group or field of a message", where=at, fix=suggestion(name, named))
         for unit in (quantity.unit, *quantity.units.values()):
-            try:
-                conversion(unit, unit_of(name))
-            except CmmUqError as error:
-                raise CmmUqError(error.problem, where=at, fix=error.fix) from None
+            check_unit(name, unit, at)
     parser = Parser(profile)
     for place, example in enumerate(profile.example, 1):
         _check_example(profile, parser, example, f"{where}: [[example]] {place}")

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from cmm_uq.base.errors import printable
-from cmm_uq.base.files.table import AnyFloat, Column, JobTable
+from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Unit
 from cmm_uq.laboratory.live.instruments.linear import NotLinearError, Use, check_linear
 
 NAMES = (
@@ -79,7 +79,6 @@ _Expression = Annotated[str, Field(min_length=1, max_length=10_000)]
 Pattern = Annotated[_Expression, AfterValidator(_pattern)]
 WholePattern = Annotated[_Expression, AfterValidator(partial(_pattern, use="fullmatch"))]
 Separator = Annotated[_Expression, AfterValidator(partial(_pattern, use="split"))]
-Unit = Annotated[str, Field(pattern=r"^[A-Za-z_°µ%/ ]*$", max_length=40)]
 Seconds = Annotated[float, Field(gt=0, le=86400)]
 
 
@@ -135,6 +134,8 @@ class Poll(JobTable):
     """What is sent."""
     pattern: Pattern | None = None
     """Regular expression of its answer, with a group for each quantity; that of `[parse]` where it is left out."""
+    messages: Annotated[int, Field(ge=1, le=MOST_FIELDS)] = 1
+    """Messages with values that it is answered with; one more is that of no question, and is not used."""
 
 
 class Send(JobTable):
@@ -152,6 +153,16 @@ class Send(JobTable):
     """Time after which a question without an answer is said to be one."""
     silent_after_s: Seconds | None = None
     """Time without a message after which an instrument that speaks by itself is said to be silent; never where left out."""
+    unasked: bool = False
+    """Whether it also sends values by itself, as by a DATA key, although it is asked; else such a value is not used."""
+
+    @model_validator(mode="after")
+    def _one_question(self) -> Self:
+        if self.unasked and len(self.poll) != 1:
+            raise ValueError(
+                "unasked is for an instrument with one question: of several, nobody knows which it answers"
+            )
+        return self
 
 
 class Parse(JobTable):
@@ -192,7 +203,8 @@ class ProfileQuantity(JobTable):
     """``[quantities.NAME]``: what is to be known of one quantity beside its name."""
 
     unit: Unit = ""
-    """Unit that the instrument gives it in, as pint spells it: degF, inHg, inch; that of the name's ending where left out."""
+    """Unit that the instrument gives it in, as pint spells it: degF, inHg, inch; that of the name's ending where left out.
+    An instrument that may be set to another, and does not say which, has it in the job: `units` of `[[acquire.source]]`."""
     unit_group: str = ""
     """Group of the pattern with the unit as the message says it, for instruments that may be set to several."""
     units: Annotated[dict[str, Unit], Field(max_length=50)] = {}

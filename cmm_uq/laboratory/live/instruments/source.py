@@ -15,7 +15,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 from urllib.parse import parse_qs
@@ -53,6 +53,7 @@ class Reading:
     values: Mapping[str, float]
     status: Text | None = None
     point: str | None = None  # for a CMM what was measured (``PtMeas``), else ``None``
+    unasked: bool = False  # whether it is an answer that nobody is known to have asked for, which has no values
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,10 @@ class Identity:
     serial: str | None = None
     firmware: str | None = None
     certificate: str | None = None
+    units: Mapping[str, str] = field(default_factory=dict)  # by quantity, those that the instrument does not say
+    units_stated: list[str] = field(
+        default_factory=list
+    )  # quantities whose units the job states; the others are assumed
 
 
 @dataclass(frozen=True)
@@ -133,8 +138,8 @@ class PortLostError(Exception):
 class Port(Protocol):
     """An open port."""
 
-    def read(self) -> bytes:
-        """What came, as soon as anything comes; empty where nothing did within :data:`TICK_S`."""
+    def read(self, *, wait: bool = True) -> bytes:
+        """What came, as soon as anything comes; empty where nothing did within :data:`TICK_S`, or at once without waiting."""
 
     def write(self, data: bytes) -> None: ...
     def close(self) -> None: ...
@@ -168,9 +173,9 @@ class VisaPort:
             fix = "Check address and cable; pyvisa-info says which VISA is there"
             raise CmmUqError(f"cannot be opened: {error}", where=port, fix=fix) from None
 
-    def read(self) -> bytes:
-        if not self._asked:
-            time.sleep(TICK_S)
+    def read(self, *, wait: bool = True) -> bytes:
+        if not self._asked or not wait:
+            time.sleep(TICK_S * wait)
             return b""
         try:
             received = bytes(self._visa.read_raw())
@@ -251,9 +256,9 @@ class SerialPort:
         except (serial.SerialException, OSError, ValueError) as error:
             raise _refused(port, error) from None
 
-    def read(self) -> bytes:
+    def read(self, *, wait: bool = True) -> bytes:
         with _lost_on(self._failures):
-            first: bytes = self._serial.read(1)
+            first: bytes = self._serial.read(1) if wait or self._serial.in_waiting else b""
             return first + (self._serial.read(waiting) if first and (waiting := self._serial.in_waiting) else b"")
 
     def write(self, data: bytes) -> None:
@@ -277,11 +282,11 @@ class TcpPort:
             if hasattr(socket, name):
                 self._socket.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
 
-    def read(self) -> bytes:
+    def read(self, *, wait: bool = True) -> bytes:
         try:
-            self._socket.settimeout(TICK_S)
+            self._socket.settimeout(TICK_S if wait else 0)
             received = self._socket.recv(_CHUNK)
-        except TimeoutError:
+        except (TimeoutError, BlockingIOError):
             return b""
         except OSError as error:
             raise PortLostError(error.strerror or str(error)) from None
@@ -361,7 +366,7 @@ class ReplayedFile:
             raise CmmUqError("says no pace", where=port, fix="Write it as file:NAME?every_s=0.1") from None
         self._file = path.open("rb")
 
-    def read(self) -> bytes:
+    def read(self, *, wait: bool = True) -> bytes:
         received = self._file.readline(_REPLAYED) if self._every_s else self._file.read(_REPLAYED)
         if not received:
             raise EndOfFileError("the file is at its end")

@@ -9,6 +9,11 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.jobs.tables.plan import DeclaredSource
+from cmm_uq.laboratory.live.instruments.instrument import open_source
+from cmm_uq.laboratory.live.instruments.library import profile_of, profile_of_source, unsaid_units
+from cmm_uq.laboratory.live.instruments.parsing import Framer, Parser
+from cmm_uq.laboratory.live.instruments.profile import ProfileFile
 from cmm_uq.laboratory.live.instruments.simulated_line import (
     SPEAKERS,
     Readout1502,
@@ -191,3 +196,155 @@ def test_a_late_answer_is_no_value_where_it_could_be_that_of_another_channel(tmp
             assert "answers no question" in str(event.status)
     finally:
         late.close()
+
+
+class Generous(Speaker):
+    """It answers each question with the number of it, and may go on with something else at once."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.further, self.number = b"", 0
+
+    def answer(self, command: str) -> bytes:
+        self.number += 1
+        return f"T={self.number}\r\n".encode() + self.further
+
+
+ASKED = """name = "generous"
+title = "An instrument that is asked"
+[send]
+poll = [{ send = '?<CR>'%s }]
+every_s = %g
+answer_within_s = %g
+%s
+[parse]
+pattern = '^(?:T=)?(?P<temp_c>\\d+)$'
+"""
+
+
+def asked_profile(poll: str = "", send: str = "", every_s: float = 0.1, within_s: float = 0.4) -> ProfileFile:
+    return profile_of((ASKED % (poll, every_s, within_s, send)).encode(), Path("generous.toml"))
+
+
+def unasked(heard: Listener) -> list[Reading]:
+    return [one for one in heard.of(Reading) if isinstance(one, Reading) and one.unasked]
+
+
+@pytest.mark.parametrize("way", ["pty", "socket", "rfc2217"])
+def test_a_second_answer_to_one_question_is_named_and_never_a_value(way: Way, tmp_path: Path) -> None:
+    speaker = Generous()
+    speaker.further = b"T=777\r\n"
+    with UnreliableLine(speaker, way, tmp_path) as line, listening(opened(asked_profile(), line.port)) as heard:
+        heard.until(lambda one: len(one.good()) >= 5 and len(unasked(one)) >= 4)
+        assert 777.0 not in [one.values["temp_c"] for one in heard.good()]
+        first = unasked(heard)[0]
+        assert (first.values, first.raw) == ({}, b"T=777\r\n")
+        assert first.status == "temp_c = 777 answers no question, and is not used: nobody had asked"
+        assert not heard.of(Gap)
+
+
+@pytest.mark.parametrize(("poll", "send"), [(", messages = 2", ""), ("", "unasked = true")])
+def test_a_profile_says_that_there_are_more_messages_than_questions(poll: str, send: str, tmp_path: Path) -> None:
+    speaker = Generous()
+    speaker.further = b"T=777\r\n"
+    profile = asked_profile(poll, send)
+    with UnreliableLine(speaker, "pty", tmp_path) as line, listening(opened(profile, line.port)) as heard:
+        heard.until(lambda one: len(one.good()) >= 8)
+        assert [one.values["temp_c"] for one in heard.good()[:8]] == [1, 777, 2, 777, 3, 777, 4, 777]
+        assert not unasked(heard)
+
+
+def test_what_came_before_a_question_is_none_of_its_answers(tmp_path: Path) -> None:
+    """A value that is sent by a key, whole or begun, while the line is quiet between two questions."""
+    profile = asked_profile(every_s=0.6)
+    with UnreliableLine(Generous(), "pty", tmp_path) as line, listening(opened(profile, line.port)) as heard:
+        heard.until(lambda one: len(one.good()) >= 1)
+        line._wire.send(b"T=888\r\nT=8")  # type: ignore[union-attr]
+        heard.until(lambda one: len(unasked(one)) >= 1)
+        since = len(heard.events)
+        heard.until(lambda one: len(one.good(since)) >= 3)
+        assert (unasked(heard)[0].raw, unasked(heard)[0].values) == (b"T=888\r\n", {})
+        assert all(one.values["temp_c"] < 100 for one in heard.good())
+
+
+class Begun(Generous):
+    """Its key was pressed just before it was asked: the rest of that value comes after the question, before the answer."""
+
+    def answer(self, command: str) -> bytes:
+        return b"88\r\n" + super().answer(command) if self.number == 2 else super().answer(command)
+
+
+@pytest.mark.parametrize(("within_s", "told", "raw"), [
+    (3.0, "it began before the question", b"T=888\r\n"), (0.3, "it may be the rest of the message before", b"88\r\n"),
+])  # fmt: skip
+def test_a_value_that_began_before_the_question_is_none_of_its_answers(
+    within_s: float, told: str, raw: bytes, tmp_path: Path
+) -> None:
+    profile = asked_profile(every_s=0.6, within_s=within_s)
+    with UnreliableLine(Begun(), "pty", tmp_path) as line, listening(opened(profile, line.port)) as heard:
+        heard.until(lambda one: len(one.good()) >= 2)
+        line._wire.send(b"T=8")  # type: ignore[union-attr]
+        heard.until(lambda one: len(one.good()) >= 4)
+        (odd,) = unasked(heard)
+        assert odd.raw == raw
+        assert str(odd.status).endswith(told)
+        assert [one.values["temp_c"] for one in heard.good()[:4]] == [1, 2, 3, 4]
+
+
+def test_an_answer_that_may_be_that_of_several_questions_is_no_value_and_it_is_asked_anew(tmp_path: Path) -> None:
+    with UnreliableLine(Generous(), "pty", tmp_path) as line, listening(opened(asked_profile(), line.port)) as heard:
+        heard.until(lambda one: len(one.good()) >= 2)
+        line.mischief.hangs = True
+        heard.until(lambda one: one.of(Gap))
+        time.sleep(0.6)  # asked again meanwhile
+        line.mischief.hangs, since = False, len(heard.events)
+        heard.until(lambda one: one.of(Returned, since) and one.good(since))
+        first = unasked(heard)[0]
+        assert "questions have no answer yet, and it may be that of any" in str(first.status)
+        assert heard.events.index(heard.good(since)[0]) > heard.events.index(first)
+
+
+def test_several_questions_cannot_go_with_values_that_come_unasked() -> None:
+    with pytest.raises(CmmUqError, match="unasked is for an instrument with one question"):
+        asked_profile("}, { send = '!'", "unasked = true")
+
+
+INCHES = DeclaredSource(name="gauge", profile="mitutoyo-digimatic", units={"length_mm": "inch"})
+MILLIMETRES = DeclaredSource(name="gauge", profile="mitutoyo-digimatic")
+
+
+def read_by(source: DeclaredSource, line: bytes) -> dict[str, float]:
+    profile = profile_of_source(source, Path())
+    (message,) = Framer(profile.frame).feed(line)
+    return dict(Parser(profile).read(message).values)
+
+
+@pytest.mark.parametrize(
+    ("line", "mm"), [(b"01A-001.2340\r", -1.234), (b"01A+0000.123\r", 0.123), (b"01A+00.12345\r", 0.12345)]
+)
+def test_the_unit_of_a_gauge_is_what_is_stated_whatever_its_decimals(line: bytes, mm: float) -> None:
+    """1 inch = 25.4 mm by definition."""
+    assert read_by(MILLIMETRES, line) == {"length_mm": mm}
+    assert read_by(INCHES, line)["length_mm"] == pytest.approx(25.4 * mm, rel=1e-14)
+
+
+def test_it_is_said_what_unit_is_assumed_and_who_states_it(tmp_path: Path) -> None:
+    assert unsaid_units(profile_of_source(MILLIMETRES, Path()), MILLIMETRES) == {"length_mm": "mm"}
+    thermometer = DeclaredSource(name="t", profile="fluke-1502a")  # which says its unit
+    assert unsaid_units(profile_of_source(thermometer, Path()), thermometer) == {}
+    with UnreliableLine(SPEAKERS["mitutoyo-digimatic"](), "pty", tmp_path) as line:
+        source = open_source(INCHES.model_copy(update={"port": line.port}))
+        assert (source.identity().units, source.identity().units_stated) == ({"length_mm": "inch"}, ["length_mm"])
+        source.close()
+
+
+@pytest.mark.parametrize(("profile", "units", "told"), [
+    ("mitutoyo-digimatic", {"lenght_mm": "inch"}, "the instrument gives no 'lenght_mm'"),
+    ("mitutoyo-digimatic", {"length_mm": "degC"}, "the unit 'degC' cannot be used"),
+    ("fluke-1502a", {"temp_c": "degF"}, "the instrument says itself in which unit temp_c is"),
+    ("ipp", {"x_mm": "inch"}, "the instrument says itself"),
+])  # fmt: skip
+def test_units_that_cannot_be_are_refused_where_they_stand(profile: str, units: dict[str, str], told: str) -> None:
+    with pytest.raises(CmmUqError, match=told) as error:
+        profile_of_source(DeclaredSource(name="a", profile=profile, units=units), Path())
+    assert "[[acquire.source]] a: units" in str(error.value)

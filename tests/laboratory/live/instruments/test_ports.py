@@ -15,7 +15,8 @@ import serial
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments import source as ports
-from cmm_uq.laboratory.live.instruments.instrument import SECOND, Conversation, open_source
+from cmm_uq.laboratory.live.instruments.conversation import Conversation
+from cmm_uq.laboratory.live.instruments.instrument import SECOND, open_source
 from cmm_uq.laboratory.live.instruments.library import profile_named
 from cmm_uq.laboratory.live.instruments.profile import Connection, Poll, Send
 from cmm_uq.laboratory.live.instruments.simulated_line import Lines, SimulatedLine
@@ -179,9 +180,9 @@ def test_a_round_asks_every_question_once_and_waits_for_each_answer() -> None:
     talk = Conversation(send("a", "b", every_s=1.0), 0)
     assert talk.question(0) == b"a"
     assert talk.question(10) is None
-    talk.heard(20, answer=True)
+    assert talk.answered(20) is None
     assert talk.question(20) == b"b"
-    talk.heard(30, answer=True)
+    assert talk.answered(30) is None
     assert talk.question(SECOND - 1) is None
     assert talk.question(SECOND) == b"a"
 
@@ -192,7 +193,7 @@ def test_rounds_keep_their_raster_and_missed_ones_are_not_made_up_for() -> None:
     for now in (0, SECOND + 100, 2 * SECOND, 5 * SECOND, 5 * SECOND + 1, 6 * SECOND):
         if talk.question(now):
             asked.append(now)
-            talk.heard(now, answer=True)
+            assert talk.answered(now) is None
     assert asked == [0, SECOND + 100, 2 * SECOND, 5 * SECOND, 6 * SECOND]
 
 
@@ -216,11 +217,34 @@ def test_after_an_answer_that_did_not_come_a_late_one_has_time_to_pass() -> None
     assert talk.question(SECOND + SECOND // 2) == b"b"
 
 
+def test_an_answer_is_that_of_a_question_only_where_no_other_is_open() -> None:
+    talk = Conversation(send("a", "b", answer_within_s=1.0), 0)
+    assert talk.answered(0) == "nobody had asked"
+    assert talk.question(SECOND // 2) == b"a"
+    assert talk.overdue(2 * SECOND)
+    assert talk.question(3 * SECOND) == b"b"
+    assert talk.answered(3 * SECOND) == "2 questions have no answer yet, and it may be that of any"
+    assert talk.answered(3 * SECOND + 1) == "nobody had asked"
+    assert talk.question(3 * SECOND + SECOND // 2) is None  # the second one may still come
+    assert talk.question(4 * SECOND) == b"b"
+    assert talk.answered(4 * SECOND) is None
+
+
+def test_an_answer_that_comes_too_late_is_none_and_the_next_question_has_its_own() -> None:
+    talk = Conversation(send("a", "b", answer_within_s=1.0), 0)
+    assert talk.question(0) == b"a"
+    assert talk.overdue(SECOND)
+    assert talk.answered(SECOND + 1) == "it comes too late"
+    assert talk.question(2 * SECOND) == b"b"
+    assert talk.answered(2 * SECOND) is None
+
+
 def test_an_instrument_that_speaks_by_itself_may_be_silent_for_as_long_as_is_said() -> None:
     talk = Conversation(Send(silent_after_s=5.0), 0)
     assert talk.question(0) is None
     assert not talk.overdue(4 * SECOND)
-    talk.heard(4 * SECOND, answer=True)
+    talk.heard(4 * SECOND)
+    assert talk.answered(4 * SECOND) is None
     assert not talk.overdue(8 * SECOND)
     assert talk.overdue(9 * SECOND)
     assert not Conversation(Send(), 0).overdue(10**6 * SECOND)

@@ -223,7 +223,7 @@ def test_a_ready_profile_reads_its_examples_and_says_whence_it_is_known(name: st
 
 @pytest.mark.parametrize(("name", "raw", "told"), [
     ("fluke-1502a", b"t:  108.456 O\r", "temp_c comes in 'O'"), ("sylvac-rs232", b"ERR3\r", "outside the measuring range"),
-    ("mitutoyo-digimatic", b"01A+00.12345\r", "in inches"), ("vaisala-ptb330", b"P=******* hPa    ERR=100\r\n", "ERRS"),
+    ("mitutoyo-digimatic", b"911\r", "no gauge"), ("vaisala-ptb330", b"P=******* hPa    ERR=100\r\n", "ERRS"),
     ("heidenhain-nd287", b"\x15\r\n", "NAK"), ("moeller-wedel-elcomat", b"2 103 1.0 2.0\r", "relative"),
     ("heidenhain-nd287", b"\x02-123456789\r\n", "not understood"),
 ])  # fmt: skip
