@@ -7,11 +7,13 @@
     python3 start.py docs                              the documentation as a site, in build/site
 
 Makes a virtual environment in .venv (or in the folder that CMM_UQ_ENV names) on the first call and reuses it until
-pyproject.toml changes; the system's Python is left alone.
+pyproject.toml changes; the system's Python is left alone. Whoever installs compiles, too: others may run it from a tree
+that they cannot write to.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import subprocess
@@ -33,6 +35,7 @@ def main(arguments: list[str]) -> int:
     task = arguments[0] if arguments[:1] in (["test"], ["docs"]) else ""
     try:
         prepare(task)
+        compile_changed()
         if task:
             return test(arguments[1:]) if task == "test" else docs()
         return run("cmm-uq", *arguments)
@@ -54,9 +57,26 @@ def prepare(extra: str) -> None:
         venv.create(ENVIRONMENT, with_pip=True)
     target = f"{ROOT}[{extra}]" if extra else str(ROOT)
     pip = [str(SCRIPTS / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    # what is imported is compiled then; most of what is installed never is
     subprocess.run([*pip, "--no-compile", "--editable", target], check=True, stdout=sys.stderr)
+    # on all processors, and no tests of others, which pip compiles on one
+    compile_sources(ENVIRONMENT / ("Lib" if os.name == "nt" else "lib"))
     (ENVIRONMENT / f"installed-{extra}").write_text(wanted)
+
+
+def compile_changed() -> None:
+    """Compile the package where a source of it is newer than the last time."""
+    package, mark = ROOT / "cmm_uq", ENVIRONMENT / "compiled"
+    newest = max(path.stat().st_mtime_ns for path in package.rglob("*.py"))
+    if not mark.is_file() or mark.stat().st_mtime_ns < newest:
+        compile_sources(package)
+        with contextlib.suppress(OSError):  # of one who may not write here, and could not compile either
+            mark.touch()
+
+
+def compile_sources(folder: Path) -> None:
+    """Write the bytecode of all in a folder but tests of other packages, where it is missing or older than its source."""
+    options = ["-qq", "-j", "0", "-x", r"site-packages[\\/].*[\\/]tests[\\/]"]
+    subprocess.run([str(SCRIPTS / "python"), "-m", "compileall", *options, str(folder)], check=False)
 
 
 def test(arguments: list[str]) -> int:

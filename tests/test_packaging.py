@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tomllib
 import zipfile
+from collections.abc import Callable, Iterator
 from itertools import chain
 from pathlib import Path
 
@@ -65,6 +69,78 @@ def test_it_reports_from_an_empty_folder(unpacked: Path, tmp_path: Path) -> None
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "reports" / "iota-1102-20C" / "certificate.pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.fixture
+def beyond_permissions() -> Callable[[], None]:
+    """For the child before it runs: root without its right to write whatever permissions say; others have none."""
+    if not sys.platform.startswith("linux"):
+        pytest.skip("Linux has rights that a process can give up one by one")
+    libc = ctypes.CDLL(None, use_errno=True)
+
+    def give_up() -> None:
+        if os.geteuid() == 0 and libc.prctl(24, 1, 0, 0, 0) != 0:  # PR_CAPBSET_DROP, CAP_DAC_OVERRIDE
+            raise OSError(ctypes.get_errno(), "the right cannot be given up")
+
+    return give_up
+
+
+@contextlib.contextmanager
+def read_only(tree: Path) -> Iterator[None]:
+    inside = [tree, *tree.rglob("*")]
+    for path in inside:
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    try:
+        yield
+    finally:
+        for path in inside:
+            path.chmod(0o755 if path.is_dir() else 0o644)
+
+
+def compiled_at_start(tree: Path, home: Path, give_up: Callable[[], None]) -> set[str]:
+    """Modules of a tree that Python compiles when a command starts, as ``python -v`` says."""
+    line = [sys.executable, "-v", "-m", "cmm_uq", "schema", "job"]
+    environment = {**os.environ, "PYTHONPATH": str(tree), "HOME": str(home)}
+    for name in ("PYTHONDONTWRITEBYTECODE", "PYTHONPYCACHEPREFIX"):
+        environment.pop(name, None)
+    done = subprocess.run(
+        line, capture_output=True, text=True, check=False, cwd=home, env=environment, preexec_fn=give_up
+    )
+    assert done.returncode == 0, done.stderr[-500:]
+    assert f"{tree}/cmm_uq/__init__.py" in done.stderr
+    return set(re.findall(rf"^# code object from {re.escape(str(tree))}/(\S+\.py)$", done.stderr, re.MULTILINE))
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("way", ["nobody compiled", "pip", "start.py"])
+def test_who_may_not_write_to_the_installation_compiles_nothing_at_each_start(
+    way: str, unpacked: Path, tmp_path: Path, beyond_permissions: Callable[[], None]
+) -> None:
+    """pip compiles what it installs; start.py installs the tree as it stands, and compiles it then, and what was changed."""
+    tree, home = tmp_path / "tree", tmp_path / "home"
+    home.mkdir()
+    if way == "pip":
+        (wheel,) = unpacked.parent.glob("*.whl")
+        pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--target", tree, wheel]
+        subprocess.run(pip, check=True, env={**os.environ, "PYTHONDONTWRITEBYTECODE": ""})
+    else:
+        shutil.copytree(unpacked, tree, ignore=shutil.ignore_patterns("__pycache__"))
+    if way == "start.py":
+        shutil.copy(ROOT / "start.py", tree)
+        script = f"import start; start.SCRIPTS = start.Path(r'{sys.executable}').parent; start.compile_changed()"
+        (tree / "env").mkdir()
+        again = {**os.environ, "CMM_UQ_ENV": str(tree / "env"), "PYTHONPATH": str(tree)}
+        for _ in range(2):
+            subprocess.run([sys.executable, "-B", "-c", script], check=True, cwd=home, env=again)
+            changed = tree / "cmm_uq" / "base" / "errors.py"  # as by a new version of the sources
+            changed.write_text(changed.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
+        subprocess.run([sys.executable, "-B", "-c", script], check=True, cwd=home, env=again)
+    with read_only(tree):
+        probe = [sys.executable, "-c", f"open(r'{tree / 'cmm_uq' / 'probe'}', 'w')"]
+        assert b"Permission denied" in subprocess.run(probe, capture_output=True, preexec_fn=beyond_permissions).stderr
+        found = compiled_at_start(tree, home, beyond_permissions)
+        assert found == compiled_at_start(tree, home, beyond_permissions)
+    assert bool(found) is (way == "nobody compiled"), sorted(found)[:5]
 
 
 def test_the_locked_environment_has_whatever_the_package_asks_for() -> None:

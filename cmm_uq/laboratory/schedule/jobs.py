@@ -29,7 +29,7 @@ from cmm_uq.jobs.source import RESULTS, device_name
 from cmm_uq.jobs.tables.origin import is_planned
 from cmm_uq.laboratory.schedule import state as states
 from cmm_uq.laboratory.schedule.notices import Notice, decisions, of_results
-from cmm_uq.laboratory.schedule.state import PRIVATE, State
+from cmm_uq.laboratory.schedule.state import PRIVATE, State, inputs_of
 
 JOB_FILE = "job.toml"
 
@@ -180,6 +180,9 @@ class JobReporting:
     queue: Callable[[Sequence[Notice]], object]  # lets notices go out, before a job counts as done
     further: Callable[[JobFolder], Iterable[Notice]] = lambda job: ()  # of the machine, after a report
     still: Callable[[JobFolder], Iterable[Notice]] = lambda job: ()  # and later, of its newest certificate
+    seen: dict[str, Mapping[str, Any] | None] = field(
+        default_factory=dict
+    )  # results of the job that was looked at last
 
     def lock_of(self, job: JobFolder) -> Path:
         """Its lock file; one for two ids that some systems take for one."""
@@ -191,7 +194,10 @@ class JobReporting:
 
     def reason(self, job: JobFolder) -> str:
         """Why a job is to be reported; empty where its certificate stands."""
-        known = self.state.reported(job.id) if job.id else None
+        self.seen.clear()
+        if job.id:
+            self.seen[job.id] = self.state.results(job.id)
+        known = inputs_of(self.seen.get(job.id))
         if known is None:
             return "new"  # one without an id is refused when it is read
         changed = differing(job, known)
@@ -201,8 +207,8 @@ class JobReporting:
         return f"changed: {', '.join(changed)}" if changed else ""
 
     def standing(self, job: JobFolder) -> list[Notice]:
-        """What a person must hear of a certificate until it is released, withdrawn or replaced."""
-        results = self.state.results(job.id)
+        """What a person must hear of the certificate of an unchanged job until it is released, withdrawn or replaced."""
+        results = self.seen.get(job.id)
         found = [] if results is None else [*self._notices(job, results), *self.still(job)]
         return found if found and self.state.is_draft(job.id) else []
 

@@ -17,7 +17,6 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -88,8 +87,7 @@ class FolderState:
         if manifest is None or (manifest.owner.command, manifest.owner.job) != (COMMAND, job):
             return None
         there = all(os.path.lexists(folder / name) for name in manifest.files)
-        digest = sha256_of(folder / RESULTS)
-        return _results_in(folder, digest) if there and digest == manifest.files.get(RESULTS) else None
+        return _results_in(folder) if there and sha256_of(folder / RESULTS) == manifest.files.get(RESULTS) else None
 
     def released(self, job: str) -> bool:
         return False
@@ -180,9 +178,7 @@ class RecordsState:
         return max(found, key=lambda one: one.entry, default=None)
 
 
-@lru_cache(maxsize=1)
-def _results_in(folder: Path, digest: str) -> Mapping[str, Any] | None:
-    """What a results.json says; ``digest`` tells it from another in the same place."""
+def _results_in(folder: Path) -> Mapping[str, Any] | None:
     try:
         data = json.loads(content_of(folder / RESULTS, TABLE_BYTES, ""))
     except (CmmUqError, ValueError, RecursionError):
