@@ -86,7 +86,8 @@ def simulated_instrument(profile: str, way: str) -> Iterator[str]:
 
     way : ``pty``, ``socket`` or ``rfc2217``; empty for the usual one.
     """
-    from cmm_uq.laboratory.live.instruments.simulated_line import SPEAKERS, WAYS, SimulatedLine
+    from cmm_uq.laboratory.live.instruments.simulated_line import WAYS, SimulatedLine
+    from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS
 
     if library.profile_named(profile).protocol == "ipp":
         from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer as SimulatedMachine

@@ -23,8 +23,9 @@ from cmm_uq.laboratory.live.instruments.library import (
 )
 from cmm_uq.laboratory.live.instruments.parsing import FramedMessage, Framer, Parser, Understood
 from cmm_uq.laboratory.live.instruments.profile import MessageFrame, ProfileFile, bytes_of, shown
-from cmm_uq.laboratory.live.instruments.simulated_line import SPEAKERS, SimulatedLine, Way
+from cmm_uq.laboratory.live.instruments.simulated_line import SimulatedLine, Way
 from cmm_uq.laboratory.live.instruments.source import Reading
+from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS
 from tests.laboratory.live.instruments.listening import hasty, listening, opened
 
 
@@ -48,7 +49,7 @@ def test_what_is_no_byte_is_refused() -> None:
 WAYS: list[Way] = ["pty", "socket", "rfc2217"]
 EACH = [(name, way) for name, way in zip(SPEAKERS, itertools.cycle(WAYS), strict=False)] + [("fluke-1529", "pty")]
 SERIALS = {"vaisala-ptu300": "A1234567", "vaisala-ptb330": "A1234567", "fluke-1529": "A12345", "fluke-1502a": "A24680",
-           "isotech-millik": "21-P2460"}  # fmt: skip
+           "isotech-millik": "21-P2460", "mahr-millimar-c1202": "19051234"}  # fmt: skip
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals here")
 
