@@ -203,6 +203,9 @@ class Document:
     signatures: tuple[Signature, ...] = ()
     attachments: tuple[Text, ...] = ()  # names of the files that travel with the document
     produced_by: Text  # program and version, seed and whatever else is needed to run it again
+    records: Text = (
+        NOTHING  # how the laboratory's records stood when it was made; empty where it is kept in none by its nature
+    )
     date: dt.date | None = None  # of issue, which is also the PDF's date; the clock is never read
     language: str = "en"  # BCP 47 tag, for screen readers and hyphenation
     end: Text = say("End of certificate")  # the mark after the last line

@@ -17,6 +17,7 @@ from cmm_uq.base.plugins import KINDS, STANDARDS, versions
 from cmm_uq.certificate.document import Document
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.origin import COMPENSATED, MEASURED, SIMULATED, Origin
+from cmm_uq.laboratory.records.facts import ChainHead
 from cmm_uq.machine.physics.catalogue import plugins
 from cmm_uq.maths.inference.draws import Draws
 from cmm_uq.maths.uncertainty.quantity import Quantity
@@ -92,6 +93,21 @@ def origin_warnings(job: Job) -> list[Text]:
     if job.altered:
         texts.append(say("Changed after it was derived: {files}.", files=commas(names(job.altered))))
     return [*texts, *taken]
+
+
+def made_after(head: ChainHead | None) -> Text:
+    """How the laboratory's records stood when a document was made: their newest entry, which its own follows."""
+    if head is None:
+        return say("Records of the laboratory: none; this document was not recorded.")
+    if head.at is None:
+        return say("Records of the laboratory before this document: empty, entry 0.")
+    at, digest = Verbatim(head.at[:19].replace("T", " ")), Verbatim(head.head)
+    return say(
+        "Records of the laboratory before this document: entry {number} of {at} UTC, SHA-256 {digest}.",
+        number=head.entries,
+        at=at,
+        digest=digest,
+    )
 
 
 NAME = "cmm-uq"

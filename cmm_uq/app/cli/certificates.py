@@ -30,6 +30,13 @@ def verify(
         None, "Certificates that you trust, PEM or DER: a file or a folder; again for more.", "FILE|DIR", "nobody"
     ),
     schema: Path | None = option(None, "Folder with PTB's schemas of the DCC, that the XML is held to.", "DIR", "none"),
+    records: str | None = option(
+        None,
+        "Records of the laboratory that must have the entry which the certificate states.",
+        "WHERE",
+        "none",
+        "--records",
+    ),
     end: Ending = opt.END,
 ) -> None:
     """Compare the forms of a certificate with each other, its figures, decisions and inputs, and compute it again.
@@ -40,7 +47,14 @@ def verify(
     with end.progress() as stage:
         from cmm_uq.app.commands.certificates.verify import verify
 
-        found = verify(files, rerun=rerun, trust=trust or None, schema=schema, stage=stage or (lambda what, part: None))
+        found = verify(
+            files,
+            rerun=rerun,
+            trust=trust or None,
+            schema=schema,
+            records=records,
+            stage=stage or (lambda what, part: None),
+        )
     data = {"schema": "cmm-uq/verification/1", "subject": found.subject, **found.inquiry.as_data()}
     left = terminal.NOT_WHOLLY_CHECKED if found.inquiry.unchecked else 0
     end.put(data, _verified(found, verbose=end.verbose), terminal.NOT_VERIFIED if found.inquiry.findings else left)

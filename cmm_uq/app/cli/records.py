@@ -37,25 +37,47 @@ def _entries(count: int) -> str:
     return "1 entry" if count == 1 else f"{count} entries"
 
 
+_WITNESS = (
+    "Certificates (PDF, XML, results.json, folders): the records must have the entry that each states; again for more."
+)
+WITNESS = option(None, _WITNESS, "FILE|DIR", "none", "--witness")
+
+
 @opt.command(app, "verify", "records verify", "records verify --head 5f2c… --no-files")
 def verify(
     records: str | None = opt.RECORDS,
     head: str | None = option(None, "Hash that records head printed, filed elsewhere.", "HASH", "none", "--head"),
     files: bool = flag(True, "--files/--no-files", "Compare the files of the reports too."),
+    witness: list[Path] | None = WITNESS,
     end: Ending = opt.ONLY_JSON,
 ) -> None:
     """Find every entry that was altered, deleted, exchanged or is out of time, every table, trigger and file that is another.
 
     Exit code 4 where something is wrong. Files that are gone are told; they may only have been moved.
     """
+    from cmm_uq.certificate.verify.witness import witnesses_of
+
+    stated, without = witnesses_of(witness) if witness else ([], [])
     with _opened(records, read_only=True) as opened:
-        findings = opened.verify(None if head is None else head.strip().lower(), files=files)
+        disagreeing = opened.disagreements(stated)
+        findings = [*disagreeing, *opened.verify(None if head is None else head.strip().lower(), files=files)]
         number, last = opened.head()
     sound = all(finding.kind == "missing" for finding in findings)
     lines = [f"{one.kind}: {f'entry {one.entry}: ' if one.entry else ''}{one.problem}" for one in findings[:SHOWN]]
     lines += [f"and {len(findings) - SHOWN} more"] if len(findings) > SHOWN else []
     told = [{"kind": one.kind, "entry": one.entry, "problem": one.problem} for one in findings]
-    data = {"records": str(opened.shown), "entries": number, "head": last, "sound": sound, "findings": told}
+    data: dict[str, Any] = {
+        "records": str(opened.shown),
+        "entries": number,
+        "head": last,
+        "sound": sound,
+        "findings": told,
+    }
+    if witness:
+        count, newest = len(stated), max(one.head.entries for one in stated)
+        data["witnesses"] = {"certificates": count, "entries": newest, "passed_over": without}
+        lines += [f"passed over: {one}" for one in without[:SHOWN]]
+        lines.append(f"{count} certificates state heads up to entry {newest}; {len(disagreeing)} disagree")
     last_line = f"{_entries(number)}, {'sound' if sound else 'NOT sound'}; the last has the hash {last}"
     end.put(data, [*lines, last_line], 0 if sound else NOT_CONFORMING)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import translated as said_in
+from cmm_uq.base.messages import NOTHING, Text
 from cmm_uq.base.output import Ledger, Owner, staged
+from cmm_uq.certificate.origin import as_json, file_name, made_after, marked
 from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.certificate.result import Outcome
 from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.content import certificate_content, folder_from, kind_of_entry
+from cmm_uq.laboratory.records.facts import KEY, Heads
 from cmm_uq.laboratory.records.place import DEFAULT, NONE, beside, place_of
 
 if TYPE_CHECKING:
@@ -82,6 +85,7 @@ def called(name: str) -> str:
 Stage = Callable[[str, float], None]
 Told = Callable[[Job], None]  # told of the job as it was read, before anything is computed of it
 REPORTS, RESULTS = Path("reports"), "results.json"
+NOT_RECORDED = Heads()
 Finished = Callable[[str, bytes], bytes]  # what becomes of a document that was made, by its name
 
 
@@ -143,13 +147,14 @@ class Form:
             opened(records if self.recorded else NONE, out) as history,
             staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
         ):
+            heads = NOT_RECORDED if history is None else history.heads(self.command, owner.job)
             found = outcome()
             language = job.facts.job.language
             finished: Finished = unchanged
             if signing is not None:
                 laboratory = job.facts.laboratory.model_dump()
                 finished = signing.finished(laboratory, language=language, said=lambda text: said_in(text, language))
-            contents = self.contents(found, stage, finished=finished)
+            contents = self.contents(found, stage, finished=finished, heads=heads)
             stage(f"Writing: {len(contents)} files to {folder}", 0.95)
             ledger = None if history is None else ledger_of(history, job, self.command, folder, contents, RESULTS)
             files = place.write(contents, ledger=ledger)
@@ -165,20 +170,24 @@ class Form:
         return Owner(self.command, job.facts.job.id, job.origin)
 
     def contents(
-        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False, finished: Finished = unchanged
+        self,
+        outcome: Outcome,
+        stage: Stage = silent,
+        *,
+        results_only: bool = False,
+        finished: Finished = unchanged,
+        heads: Heads = NOT_RECORDED,
     ) -> dict[str, bytes]:
         """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted."""
-        from cmm_uq.certificate.origin import as_json
-
+        data, line = results_at(outcome.results, heads) if self.recorded else (as_json(outcome.results), NOTHING)
         if results_only:
-            return {RESULTS: as_json(outcome.results)}
+            return {RESULTS: data}
         from cmm_uq.certificate.document import translated as said
-        from cmm_uq.certificate.origin import marked
         from cmm_uq.certificate.render import render_html, render_pdf
         from cmm_uq.certificate.results.provenance import FILE, provenance
 
-        job, data = outcome.found.job, as_json(outcome.results)
-        document = said(marked(outcome.document, job), job.facts.job.language)
+        job = outcome.found.job
+        document = said(replace(marked(outcome.document, job), records=line), job.facts.job.language)
         for name in {*outcome.files, *({FILE} & {*self.further})} & job.inputs.keys():
             raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
                              fix="Rename it, in job.toml too")  # fmt: skip
@@ -199,9 +208,16 @@ class Form:
         return {**rendered, **further}
 
     def names(self, job: Job) -> list[str]:
-        from cmm_uq.certificate.origin import file_name
-
         return [file_name(document, job.origin) for document in self.documents]
+
+
+def results_at(results: Mapping[str, Any], heads: Heads) -> tuple[bytes, Text]:
+    """Contents of results.json with the head at which it is made, or was where it was recorded before; and that in words."""
+    for digest, head in {**heads.before, "": heads.now}.items():
+        data = as_json({**results, KEY: head and head.data})
+        if digest == sha256(data).hexdigest():
+            break
+    return data, made_after(head)
 
 
 def _digital(job: Job, results: bytes, rendered: Mapping[str, bytes]) -> bytes:

@@ -16,7 +16,7 @@ from cmm_uq.base.messages import Day, Number, Text, Verbatim, day, say
 from cmm_uq.base.units import MICROMETRE, UNITS
 from cmm_uq.certificate.certificate import TEMPERATURES
 from cmm_uq.certificate.clauses import DRAFT, NOT_OURS, STATEMENTS, certifies, claimed, draft, replaced_certificate
-from cmm_uq.certificate.origin import BANNERS
+from cmm_uq.certificate.origin import BANNERS, made_after
 from cmm_uq.certificate.results.provenance import Reissue
 from cmm_uq.certificate.sections.results import SIGN, UNCERTAINTY
 from cmm_uq.jobs.chain import holds_on, right
@@ -25,6 +25,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.tables.artefact import CertificateFile, Traceability
 from cmm_uq.jobs.tables.origin import MEASURED
+from cmm_uq.laboratory.records.facts import KEY, ChainHead
 
 NOT_STATED = say("not stated")
 P_STANDARD = Decimal("0.6827")  # probability of a normal distribution within one standard deviation
@@ -349,7 +350,7 @@ def _temperature(id_: str, name: Text, celsius: float, ref_type: str, texts: Lan
 
 
 def metadata(results: Mapping[str, Any], texts: Languages) -> tuple[dcc.StatementMetadata, ...]:
-    """From which files it can be computed again, and what was odd in the recording."""
+    """From which files it can be computed again, how the records stood, and what was odd in the recording."""
     again = [f"{name} SHA-256 {digest}" for name, digest in results["job"]["inputs_sha256"].items()]
     if (seed := results.get("sampling", {}).get("seed")) is not None:
         again.append(f"seed {seed}")
@@ -358,6 +359,9 @@ def metadata(results: Mapping[str, Any], texts: Languages) -> tuple[dcc.Statemen
         [each["why"] for each in results.get("screening", ())],
     )
     stated = [texts("StatementMetadata", name=name, declaration=[*map(Verbatim, again)], ref_type="cmm_inputs")]
+    if KEY in results:
+        name, made = say("Records of the laboratory"), made_after(ChainHead.of_results(results))
+        stated.append(texts("StatementMetadata", name=name, declaration=made, ref_type="cmm_records"))
     if odd:
         name = say("What is odd in the recording")
         stated.append(texts("StatementMetadata", name=name, declaration=english(odd), ref_type="cmm_screening"))

@@ -88,6 +88,7 @@ class Trust:
 WEAK = say("the signature is made with an algorithm that is weak or unknown")
 BROKEN = say("the signature does not fit the file: one of them was changed")
 STAMP_BROKEN = say("the time stamp does not fit the signature")
+AFTER = "after entry {number} of the laboratory's records, SHA-256 {hash}"  # reason of a signature of a recorded certificate
 NOBODY = say("nobody is trusted: name the certificates that you trust")
 
 
@@ -105,6 +106,7 @@ class FileSignature:
     trusted: bool = False  # a chain leads to somebody trusted, in date when it was signed
     revocation: Revocation = "not known"  # of the certificate
     test_key: bool = False  # for trying: TEST_NOTE is to be said
+    reason: str = ""  # that the signature states, of a PDF
     content: bytes = field(default=b"", repr=False)  # verified: the signed revision of a PDF, or the XML without it
 
     @property

@@ -203,6 +203,7 @@ def _judged(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
             time_proven=proven,
             intact=intact,
             covers_whole_file=intact and whole,
+            reason=str(embedded.sig_object.get("/Reason", "")),
             content=revision if intact else b"",
         ),
         embedded.signer_cert,

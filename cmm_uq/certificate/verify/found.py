@@ -51,6 +51,7 @@ CHECKS = {  # what each check makes sure of
     "decisions": "decisions follow from figures, uncertainties, limits and rules",
     "inputs": "inputs are those whose hashes results.json has",
     "dates": "artefacts were in date, and dates are in order",
+    "records": "the records have the entry that the certificate states, and the certificate",
     "again": "computed again from the inputs, everything is the same",
 }
 

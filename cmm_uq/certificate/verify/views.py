@@ -19,6 +19,7 @@ from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.given import Given
 from cmm_uq.certificate.verify.html_page import read_html
 from cmm_uq.certificate.verify.pdf_file import reading
+from cmm_uq.laboratory.records.facts import ChainHead
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.sign import FileSignature, Trust
@@ -201,15 +202,20 @@ def _is_signature(node: Node) -> bool:
 _OPENING = b"http://www.w3.org/2000/09/xmldsig#"
 
 
-def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> None:
+Signed = tuple[str, bytes, "FileSignature"]  # name and content of a file, and a signature of it
+
+
+def check_signatures(
+    inquiry: Inquiry, given: Given, trust: Trust | None, issued: dt.date | None = None
+) -> list[Signed]:
     """Keep signatures that are not intact, over the whole file, of somebody trusted, or by a key for trying.
 
     ``trust``: ``None`` where nobody said whom the reader trusts: then nothing need be signed, and a signature that is intact
-    shows that nothing was changed since, not by whom.
+    shows that nothing was changed since, not by whom. ``issued``: the day before which there was nothing to sign.
     """
     from cmm_uq.certificate import sign
 
-    held = trust or sign.Trust()
+    held, found, earliest = trust or sign.Trust(), list[Signed](), _earliest(given, issued)
     try:
         if given.pdf is not None:
             name, pdf = given.pdf
@@ -219,20 +225,53 @@ def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> Non
             for where, stands, should in differing_parts(pdf.content, pdf.content[: pdf.ends[0]], signed=True):
                 inquiry.wrong("signatures", name, where, "was changed after it was made", stands, should)
             signed = sign.signatures_of_pdf(pdf.content, held, where=name) if pdf.signatures else ()
-            _check_signed(inquiry, name, signed, trust)
+            _check_signed(inquiry, name, signed, trust, earliest)
+            found += [(name, pdf.content, one) for one in signed]
         if given.xml is not None:
             name, content = given.xml
             signed = sign.signatures_of_xml(content, held, where=name) if _OPENING in content else ()
             if signed or not given.digital_inside:  # what is inside a signed PDF is signed with it
-                _check_signed(inquiry, name, signed, trust)
+                _check_signed(inquiry, name, signed, trust, earliest)
+            found += [(name, content, one) for one in signed]
     except NotInstalledError as error:
         inquiry.left("electronic signatures", f"{error.problem}. {error.fix}")
+    return found
 
 
 AHEAD = dt.timedelta(minutes=10)  # by which clocks may differ
+_ZONES = dt.timedelta(hours=14)  # by which a day begins before UTC's, at most
 
 
-def _check_signed(inquiry: Inquiry, name: str, signed: Sequence[FileSignature], trust: Trust | None) -> None:
+Moment = tuple[dt.datetime, str]  # before which a certificate was not there to be signed, and why
+
+
+def _earliest(given: Given, issued: dt.date | None) -> list[Moment]:
+    found = []
+    if issued is not None:
+        found.append((dt.datetime.combine(issued, dt.time(), dt.UTC) - _ZONES, f"the certificate is of {issued}"))
+    head = None if given.results is None else ChainHead.of_results(given.results[1])
+    if head is not None and (moment := head.moment) is not None:
+        found.append((moment - AHEAD, f"it states entry {head.entries} of the records, of {head.at}"))
+    return found
+
+
+def _check_time(inquiry: Inquiry, name: str, signature: FileSignature, place: str, earliest: Sequence[Moment]) -> None:
+    """Keep a signature that is older than what it signs; one of the future leaves open when it was made."""
+    if (time := signature.time) is None:
+        return
+    if time > (now := dt.datetime.now(dt.UTC)) + AHEAD:
+        why = f"it says {time:%Y-%m-%d %H:%M} UTC, and the clock of this computer {now:%Y-%m-%d %H:%M} UTC"
+        inquiry.left(f"when {name} was signed", why)
+    for moment, why in earliest:
+        if time < moment:
+            inquiry.wrong(
+                "signatures", name, place, f"says {time:%Y-%m-%d %H:%M} UTC, before there was anything to sign: {why}"
+            )
+
+
+def _check_signed(
+    inquiry: Inquiry, name: str, signed: Sequence[FileSignature], trust: Trust | None, earliest: Sequence[Moment]
+) -> None:
     from cmm_uq.certificate.sign import TEST_NOTE
     from cmm_uq.certificate.sign.found import NOBODY
 
@@ -247,9 +286,7 @@ def _check_signed(inquiry: Inquiry, name: str, signed: Sequence[FileSignature], 
             f"{name}: {one.level} by {one.name or 'nobody'}, {at}{'' if one.time_proven else ' by the signer himself'}"
         )
         inquiry.notes.append(f"{who}; revocation: {one.revocation}.")
-        if one.time is not None and one.time > (now := dt.datetime.now(dt.UTC)) + AHEAD:
-            why = f"it says {one.time:%Y-%m-%d %H:%M} UTC, and the clock of this computer {now:%Y-%m-%d %H:%M} UTC"
-            inquiry.left(f"when {name} was signed", why)
+        _check_time(inquiry, name, one, f"signature {number}", earliest)
         holds = one.problems or (one.intact and one.covers_whole_file and (one.trusted or trust is None))
         for problem in one.problems if holds else ("does not hold",):
             if problem == NOBODY and trust is None:

@@ -14,7 +14,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import UNITS
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.jobs.verdicts import Verdicts
-from cmm_uq.laboratory.records.facts import PERFORMANCE
+from cmm_uq.laboratory.records.facts import KEY, PERFORMANCE, ChainHead
 
 Named = Callable[[str], str]  # how a value is called in the field, by its name: ``scale_x.ppm``
 
@@ -42,6 +42,7 @@ def certificate_content(
     try:
         job, verdicts = data["job"], Verdicts.of_results(data)
         # keys of what ISO/IEC 17025:2017, 7.8 asks for and the certificate does not state
+        head = ChainHead.of_results(data)
         missing = [str(one["key"]) for one in data.get("iso17025") or () if one["status"] == "missing"]
         return {
             "command": command, "job": str(job["id"]), "origin": str(job["origin"]), "day": str(job["date"]),
@@ -51,6 +52,7 @@ def certificate_content(
             "version": str((data.get("software") or {}).get("version") or ""), "folder": folder,
             "results_sha256": results_sha256, "files": dict(files), "inputs": dict(job.get("inputs_sha256") or {}),
             "values": values(data, named), "covariance": covariance(data), **({"missing": missing} if missing else {}),
+            **({KEY: head.data} if head else {}),
         }  # fmt: skip
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise CmmUqError(f"is no results.json of a job: {error!r}", where=folder) from error

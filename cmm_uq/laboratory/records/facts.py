@@ -12,7 +12,7 @@ import json
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
@@ -102,6 +102,62 @@ def moment_of(at: dt.datetime) -> str:
 
 def now() -> dt.datetime:
     return dt.datetime.now(dt.UTC)
+
+
+_HASH = re.compile("[0-9a-f]{64}")
+KEY = "records"  # of results.json, with the head at which a document was made
+
+
+@dataclass(frozen=True, slots=True)
+class ChainHead:
+    """The newest entry of records; a document that states it shows that the chain up to it stood before the document did."""
+
+    entries: int  # its number; 0 where there was none
+    head: str  # its hash, hexadecimal
+    at: str | None  # its moment, UTC, ISO 8601; ``None`` where there was none
+
+    @property
+    def data(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in self.__slots__}
+
+    @property
+    def moment(self) -> dt.datetime | None:
+        return None if self.at is None else instant(self.at)
+
+    @classmethod
+    def of_results(cls, results: Mapping[str, Any]) -> ChainHead | None:
+        """As a results.json states it; ``None`` where it was kept in no records, or is of a version that stated none."""
+        if (said := results.get(KEY)) is None:
+            return None
+        match said:
+            case {"entries": 0, "head": str() as head, "at": None} if head == BEGINNING and len(said) == len(
+                cls.__slots__
+            ):
+                return cls(0, BEGINNING, None)
+            case {"entries": int(number), "head": str(head), "at": str(at)} if len(said) == len(cls.__slots__):
+                if number > 0 and _HASH.fullmatch(head) and instant(at) is not None:
+                    return cls(int(number), head, at)
+        raise CmmUqError("is no head of records: a number, a hash and a moment", where=f"results.json: {KEY}")
+
+
+@dataclass(frozen=True)
+class Witness:
+    """A certificate in other hands, with the head that it states, and the SHA-256 of its results.json, as records know it."""
+
+    name: str  # of its file
+    head: ChainHead
+    results_sha256: str
+
+
+@dataclass(frozen=True)
+class Heads:
+    """Where a document may say that the records stood: now, or, where the very same was recorded ``before``, as it says.
+
+    ``before``: by SHA-256 of results.json, so that a report that is made again has the same bytes, and no second entry.
+    """
+
+    now: ChainHead | None = None
+    before: Mapping[str, ChainHead] = field(default_factory=dict)
 
 
 STATES = ("draft", "released", "withdrawn", "replaced")  # states of a certificate

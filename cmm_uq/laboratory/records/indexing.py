@@ -10,7 +10,6 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import sqlalchemy as sa
 from sqlalchemy import ColumnElement, Connection, Table, create_engine, delete, event, func, insert, select, update
 from sqlalchemy.pool import StaticPool
 
@@ -229,7 +228,7 @@ def verified(records: Records, head: str | None, *, files: bool) -> list[ChainFi
     with records.reading() as connection:  # one transaction: one state, whoever writes meanwhile
         found = chain(connection, head)
         broken = any(finding.kind == "chain" for finding in found)
-        schema = list(_schema(connection))
+        schema = list(tables.schema_findings(connection))
         if not broken and not any(finding.problem.startswith(_UNREADABLE) for finding in schema):
             found += _tables(connection)
         found += schema
@@ -271,42 +270,6 @@ def chain(connection: Connection, head: str | None = None) -> list[ChainFinding]
         problem = f"no entry has the hash {head}: the last are missing, or all were written anew"
         found.append(ChainFinding("chain", problem))
     return [*found, *clocks]
-
-
-def _schema(connection: Connection) -> Iterator[ChainFinding]:
-    """Tables, columns, indexes and triggers that are not as records are made."""
-    inspector, sqlite = sa.inspect(connection), connection.dialect.name == "sqlite"
-    made = {**tables.META.tables, tables.versions.name: tables.versions}
-    yield from _apart("table", set(inspector.get_table_names()), set(made))
-    for name, table in made.items():
-        if name not in inspector.get_table_names():
-            continue
-        columns = {str(column["name"]) for column in inspector.get_columns(name)}
-        yield from _apart(f"column of {name}", columns, set(table.columns.keys()))
-        own = [one for one in inspector.get_indexes(name) if not one.get("duplicates_constraint")]
-        indexes = {f"{one['name']} ({', '.join(map(str, one['column_names']))})" for one in own}
-        wanted = {f"{one.name} ({', '.join(one.columns.keys())})" for one in table.indexes}
-        yield from _apart(f"index of {name}", indexes, wanted)
-    if sqlite:
-        query = "SELECT sql FROM sqlite_master WHERE type IN ('trigger', 'view')"
-        there = connection.exec_driver_sql(query).scalars()
-        yield from _apart("trigger or view", set(there), set(tables.TRIGGERS["sqlite"]))
-        return
-    query = (
-        "SELECT concat_ws(' ', t.tgname, t.tgtype, t.tgenabled, t.tgqual, p.proname) || p.prosrc FROM pg_trigger t "
-        "JOIN pg_proc p ON p.oid = t.tgfoid WHERE t.tgrelid = 'entries'::regclass AND NOT t.tgisinternal"
-    )
-    refuses = "O entries_stay BEGIN RAISE EXCEPTION 'entries are never changed'; END "
-    # before each row that is deleted or updated (1 + 2 + 8 + 16), before a truncation (2 + 32), without a condition
-    triggers = {f"{name} {refuses}" for name in ("entries_no_change 27", "entries_no_truncate 34")}
-    yield from _apart("trigger", set(connection.exec_driver_sql(query).scalars()), triggers)
-
-
-def _apart(sort: str, there: set[str], made: set[str]) -> Iterator[ChainFinding]:
-    for name in sorted(made - there):
-        yield ChainFinding("schema", f"the {sort} {name} is missing")
-    for name in sorted(there - made):
-        yield ChainFinding("schema", f"the {sort} {name} is not of the records")
 
 
 def rebuild(connection: Connection) -> None:

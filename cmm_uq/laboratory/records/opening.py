@@ -171,7 +171,7 @@ def check_revision(state: str, place: str | Path) -> None:
 def _make(records: Records) -> None:
     from sqlalchemy import text
 
-    from cmm_uq.laboratory.records.tables import META, TRIGGERS
+    from cmm_uq.laboratory.records.tables import META, TRIGGERS, versions
 
     engine = records.engine
     with told(records.place):
@@ -189,11 +189,8 @@ def _make(records: Records) -> None:
             META.create_all(connection)
             for trigger in TRIGGERS[engine.dialect.name]:
                 connection.exec_driver_sql(trigger)
-            connection.exec_driver_sql(
-                "CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL, "
-                "CONSTRAINT alembic_version_pkc PRIMARY KEY (version_num))"
-            )
-            connection.execute(text("INSERT INTO alembic_version VALUES (:now)"), {"now": REVISION})
+            versions.create(connection)
+            connection.execute(versions.insert(), {"version_num": REVISION})
             if engine.dialect.name == "sqlite":
                 connection.exec_driver_sql(f"PRAGMA application_id = {APPLICATION}")
 

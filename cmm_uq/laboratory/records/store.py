@@ -23,17 +23,20 @@ from cmm_uq.base.output import MANIFEST, InDoubtError, finish_interrupted, is_pe
 from cmm_uq.laboratory.records.facts import (
     BEGINNING,
     ChainFinding,
+    ChainHead,
     Entry,
+    Heads,
+    Witness,
     canonical,
     following,
     instant,
     moment_of,
     now,
 )
-from cmm_uq.laboratory.records.indexing import Indexer, entry_block, in_blocks, verified
+from cmm_uq.laboratory.records.indexing import Indexer, chain, entry_block, in_blocks, verified
 from cmm_uq.laboratory.records.place import APPLICATION, shown, told
 from cmm_uq.laboratory.records.queries import RecordQueries, entry_of_results
-from cmm_uq.laboratory.records.tables import entries, pending
+from cmm_uq.laboratory.records.tables import certificates, entries, pending
 
 if TYPE_CHECKING:
     from cmm_uq.base.output import Ledger
@@ -70,16 +73,28 @@ class Records(RecordQueries):
 
     def signed(self, certificate: int) -> dict[str, str]:
         """SHA-256 by name of the files of a certificate (its entry) that were signed since, as they are now."""
-        found: dict[str, str] = {}
+        return {name: digest for _, files in self._signed(certificate) for name, digest in files.items()}
+
+    def _signed(self, certificate: int) -> Iterator[tuple[Entry, dict[str, str]]]:
         for entry in self.entries(certificate, kind="signed"):
             if entry.data.get("certificate") == certificate:
-                found.update(entry.data.get("files") or {})
-        return found
+                yield entry, entry.data.get("files") or {}
 
     def head(self) -> tuple[int, str]:
         """Number and hash of the last entry, to be filed elsewhere; 0 where there is none."""
         with self.reading() as connection:
             return last(connection)
+
+    def heads(self, command: str, job: str) -> Heads:
+        """Where a document of a job that a command now makes may say that the records stand."""
+        e, c, most = entries.c, certificates.c, 20
+        newest = select(e.number, e.hash, e.at).order_by(e.number.desc()).limit(1)
+        recorded = select(e.content).join(certificates, c.entry == e.number).order_by(e.number.desc()).limit(most)
+        with self.reading() as connection:
+            head = ChainHead(*connection.execute(newest).first() or (0, BEGINNING, None))
+            found = connection.execute(recorded.where(c.job == job, c.command == command))
+            each = [json.loads(content) for content in found.scalars()]
+        return Heads(head, {one["results_sha256"]: at for one in each if (at := ChainHead.of_results(one))})
 
     @property
     def last_moment(self) -> dt.datetime | None:
@@ -153,6 +168,24 @@ class Records(RecordQueries):
         """For a set of files that is to be recorded as it is put in place; the same results are recorded once."""
         return Intended(self, kind, content)
 
+    def disagreements(self, witnesses: Iterable[Witness]) -> list[ChainFinding]:
+        """What these records have otherwise than certificates state: they were rewritten, are shorter, or are others."""
+        with self.reading() as connection:
+            return [found for one in witnesses if (found := _disagreement(connection, one)) is not None]
+
+    def broken(self) -> ChainFinding | None:
+        """The first thing that is wrong with the chain itself, without which no head shows anything."""
+        with self.reading() as connection:
+            return next((one for one in chain(connection) if one.kind == "chain"), None)
+
+    def files_of(self, results_sha256: str) -> dict[str, Entry]:
+        """Entries of a certificate and its signatures by the SHA-256 of each file that they name, the first of each."""
+        if (number := self.has_results(results_sha256)) is None:
+            return {}
+        own = next(self.entries(number))
+        each = reversed([(own, own.data.get("files") or {}), *self._signed(number)])
+        return {digest: entry for entry, files in each for digest in files.values()} | {results_sha256: own}
+
     def verify(self, head: str | None = None, *, files: bool = True) -> list[ChainFinding]:
         """What is wrong of everything against the chain, and the hash of an entry that was filed elsewhere."""
         return verified(self, head, files=files)
@@ -193,6 +226,27 @@ def last(connection: Connection) -> tuple[int, str]:
     query = select(entries.c.number, entries.c.hash).order_by(entries.c.number.desc()).limit(1)
     row = connection.execute(query).first()
     return (0, BEGINNING) if row is None else (row.number, row.hash)
+
+
+def _disagreement(connection: Connection, witness: Witness) -> ChainFinding | None:
+    """Whoever rewrites an entry, or any before it, gives it another hash; what came after it has the certificate itself."""
+    head, number, (end, newest) = witness.head, witness.head.entries, last(connection)
+    own = entry_of_results(connection, witness.results_sha256)
+    row = connection.execute(select(entries.c.hash, entries.c.at).where(entries.c.number == number)).first()
+    if number > end:
+        problem = f"they end at entry {end} with the hash {newest}: their last entries are missing, or they are others"
+    elif number and (row is None or row.hash != head.head):
+        there = "is missing" if row is None else f"has the hash {row.hash}"
+        known = "" if own is None else f", though they have the certificate as entry {own}"
+        problem = f"that entry {there}: they were rewritten{known or ', or they are others'}"
+    elif row is not None and row.at != head.at:
+        problem = f"that entry is of {row.at}, and the certificate says {head.at}"
+    elif own is None:
+        problem = "they do not have the certificate itself: what came later was rewritten or lost, or they are others"
+    else:
+        return None
+    stated = f"entry {number} with the hash {head.head}" if number else "entry 0, empty records"
+    return ChainFinding("witness", f"{witness.name} was made after {stated}, and of these records {problem}", number)
 
 
 class Intended:

@@ -1,11 +1,15 @@
-"""The tables: entries, what follows from them, and sets of files on their way (SQLAlchemy Core)."""
+"""The tables: entries, what follows from them, and sets of files on their way (SQLAlchemy Core); and what is unlike them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import sqlalchemy as sa
+from sqlalchemy.schema import CreateTable
+
+from cmm_uq.laboratory.records.facts import ChainFinding
 
 META = sa.MetaData(
     naming_convention={
@@ -100,7 +104,12 @@ pending = sa.Table(
     *_stated(sa.Text, "content"),
 )  # fmt: skip
 
-versions = sa.Table("alembic_version", sa.MetaData(), sa.Column("version_num", sa.String(32)))  # revision of the tables
+versions = sa.Table(
+    "alembic_version", sa.MetaData(naming_convention={"pk": "%(table_name)s_pkc"}),
+    sa.Column("version_num", sa.String(32), primary_key=True),
+)  # fmt: skip
+"""Revision of the tables."""
+
 INDEX = (machines, adjustments, artefacts, certificates, quantities, figures, covariances, signatures)
 """Tables that follow from the entries, each after those that it refers to."""
 
@@ -124,3 +133,75 @@ TRIGGERS = {
     ),
 }
 """What refuses to change entries, by the database."""
+
+
+def schema_findings(connection: sa.Connection) -> Iterator[ChainFinding]:
+    """Tables, columns, their definitions, indexes and triggers that are not as records are made."""
+    inspector, sqlite = sa.inspect(connection), connection.dialect.name == "sqlite"
+    made, there = {**META.tables, versions.name: versions}, inspector.get_table_names()
+    yield from _apart("table", there, made)
+    for name, table in made.items():
+        if name not in there:
+            continue
+        columns = {str(column["name"]) for column in inspector.get_columns(name)}
+        yield from _apart(f"column of {name}", columns, table.columns.keys())
+        if columns == set(table.columns.keys()):
+            wanted = _definitions(str(CreateTable(table).compile(dialect=connection.dialect)))
+            stored = connection.exec_driver_sql((_SQLITE if sqlite else _POSTGRESQL).format(name)).scalars().all()
+            yield from _apart(f"definition in {name}", _definitions(stored[0]) if sqlite else stored, wanted, _plain)
+        own = [one for one in inspector.get_indexes(name) if not one.get("duplicates_constraint")]
+        indexes = {
+            f"{one['name']} ({', '.join(map(str, one['column_names']))}){' UNIQUE' * bool(one['unique'])}"
+            for one in own
+        }
+        yield from _apart(
+            f"index of {name}", indexes, [f"{one.name} ({', '.join(one.columns.keys())})" for one in table.indexes]
+        )
+    if sqlite:
+        query = "SELECT sql FROM sqlite_master WHERE type IN ('trigger', 'view')"
+        yield from _apart("trigger or view", connection.exec_driver_sql(query).scalars(), TRIGGERS["sqlite"])
+        return
+    query = (
+        "SELECT concat_ws(' ', t.tgname, t.tgtype, t.tgenabled, t.tgqual, p.proname) || p.prosrc FROM pg_trigger t "
+        "JOIN pg_proc p ON p.oid = t.tgfoid WHERE t.tgrelid = 'entries'::regclass AND NOT t.tgisinternal"
+    )
+    refuses = "O entries_stay BEGIN RAISE EXCEPTION 'entries are never changed'; END "
+    # before each row that is deleted or updated (1 + 2 + 8 + 16), before a truncation (2 + 32), without a condition
+    triggers = {f"{name} {refuses}" for name in ("entries_no_change 27", "entries_no_truncate 34")}
+    yield from _apart("trigger", connection.exec_driver_sql(query).scalars(), triggers)
+
+
+_SQLITE = "SELECT sql FROM sqlite_master WHERE type = 'table' AND name = '{}'"
+_POSTGRESQL = (
+    "SELECT concat(a.attname, ' ', format_type(a.atttypid, a.atttypmod), CASE WHEN a.attnotnull THEN ' NOT NULL' END, "
+    "' DEFAULT ' || pg_get_expr(d.adbin, d.adrelid), a.attidentity, a.attgenerated) FROM pg_attribute a "
+    "LEFT JOIN pg_attrdef d ON d.adrelid = a.attrelid AND d.adnum = a.attnum "
+    "WHERE a.attrelid = '{0}'::regclass AND a.attnum > 0 AND NOT a.attisdropped UNION ALL "
+    "SELECT concat('CONSTRAINT ', conname, ' ', pg_get_constraintdef(oid)) FROM pg_constraint "
+    "WHERE conrelid = '{0}'::regclass AND contype IN ('c', 'f', 'p', 'u', 'x')"
+)
+
+
+def _definitions(sql: str) -> list[str]:
+    """Columns and constraints of a CREATE TABLE, in any order, and what stands behind them."""
+    inside, _, behind = sql.partition("(")[2].rpartition(")")
+    return [" ".join(one.split()) for one in (*re.split(r",(?![^()]*\))", inside), behind) if one.strip()]
+
+
+def _plain(definition: str) -> str:
+    """A definition as both a database and SQLAlchemy write it."""
+    text = re.sub(r'[\s()"]', "", definition.lower())
+    return text.replace("charactervarying", "varchar").replace("doubleprecision", "float53")
+
+
+def _apart(
+    sort: str, there: Iterable[str], made: Iterable[str], plain: Callable[[str], str] = str
+) -> Iterator[ChainFinding]:
+    one, other = ({plain(name): name for name in names} for names in (there, made))
+    yield from (
+        ChainFinding("schema", f"the {sort} {other[name]} is missing") for name in sorted(other.keys() - one.keys())
+    )
+    yield from (
+        ChainFinding("schema", f"the {sort} {one[name]} is not of the records")
+        for name in sorted(one.keys() - other.keys())
+    )

@@ -178,6 +178,38 @@ def test_tables_triggers_and_indexes_that_are_not_as_they_are_made_are_named(
     assert problem in finding.problem
 
 
+@pytest.mark.parametrize(("table", "old", "new", "problem"), [
+    ("machines", "place TEXT NOT NULL", "place TEXT", "the definition in machines place TEXT NOT NULL is missing"),
+    ("figures", "u FLOAT NOT NULL", "u TEXT NOT NULL", "the definition in figures u FLOAT NOT NULL is missing"),
+    ("machines", "place TEXT", "place TEXT COLLATE NOCASE", "the definition in machines place TEXT NOT NULL is missing"),
+    ("machines", "UNIQUE (called)", "UNIQUE (called) ON CONFLICT REPLACE", "UNIQUE (called) is missing"),
+    ("figures", "PRIMARY KEY (certificate, place)", "PRIMARY KEY (certificate, place, u)", "(certificate, place) is missing"),
+    ("figures", "DEFERRABLE INITIALLY DEFERRED", "", "certificates (entry) DEFERRABLE INITIALLY DEFERRED is missing"),
+    ("signatures", "REFERENCES entries (number)", "REFERENCES certificates (entry)", "REFERENCES entries (number) DEFERRABLE"),
+])  # fmt: skip
+def test_definitions_that_are_not_as_they_are_made_are_named(
+    table: str, old: str, new: str, problem: str, whole: Path, tmp_path: Path
+) -> None:
+    """A type, NOT NULL, a key or a constraint: the table made again with the same rows and indexes, and nothing else."""
+    path = spoiled(whole, tmp_path, lambda raw: None)
+    with sqlite3.connect(path) as raw:
+        ((sql,), *indexes) = raw.execute("SELECT sql FROM sqlite_master WHERE tbl_name = ? AND sql IS NOT NULL "
+                                         "ORDER BY type DESC", (table,)).fetchall()  # fmt: skip
+        assert old in sql
+        raw.execute("PRAGMA legacy_alter_table = ON")
+        raw.execute(f"ALTER TABLE {table} RENAME TO before")
+        raw.execute(sql.replace(old, new))
+        raw.execute(f"INSERT INTO {table} SELECT * FROM before")
+        raw.execute("DROP TABLE before")
+        for (index,) in indexes:
+            raw.execute(index)
+    raw.close()
+    with open_records(path, read_only=True) as records:
+        found = [one for one in records.verify(files=False) if one.kind == "schema"]
+    assert problem in "\n".join(one.problem for one in found)
+    assert all(one.problem.startswith(f"the definition in {table} ") for one in found)
+
+
 @pytest.mark.parametrize(("years", "found"), [
     ((2026, 2025, 2026), [2]), ((2026, 2030, 2026, 2027), [3]), ((2025, 2026, 2027), []),
 ])  # fmt: skip

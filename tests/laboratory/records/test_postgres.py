@@ -14,6 +14,7 @@ from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.backup import back_up, migrate, restore
+from cmm_uq.laboratory.records.facts import BEGINNING, ChainHead, Witness
 from cmm_uq.laboratory.records.listing import CertificateFilter, chosen, courses, entry_of, standing_of_all
 from cmm_uq.laboratory.records.opening import KNOWN, REVISION, engine_of
 from tests.laboratory.records.histories import certificate, history, take_back
@@ -84,6 +85,15 @@ def test_the_server_refuses_to_change_entries_and_what_was_changed_is_found(url:
      "is missing"),
     ("CREATE TABLE more (a integer)", "the table more is not of the records"),
     ("DROP INDEX ix_certificates_job", "the index of certificates ix_certificates_job (job) is missing"),
+    ("ALTER TABLE machines ALTER COLUMN place DROP NOT NULL", "the definition in machines place TEXT NOT NULL is missing"),
+    ("ALTER TABLE figures ALTER COLUMN u TYPE real", "the definition in figures u FLOAT(53) NOT NULL is missing"),
+    ("ALTER TABLE machines ALTER COLUMN place SET DEFAULT 'x'", "the definition in machines place TEXT NOT NULL is missing"),
+    ("ALTER TABLE machines DROP CONSTRAINT uq_machines_called",
+     "the definition in machines CONSTRAINT uq_machines_called UNIQUE (called) is missing"),
+    ("ALTER TABLE signatures DROP CONSTRAINT fk_signatures_certificate", "the definition in signatures CONSTRAINT fk_"),
+    ("ALTER TABLE entries DROP CONSTRAINT ck_entries_counts", "the definition in entries CONSTRAINT ck_entries_counts CHECK"),
+    ("ALTER TABLE pending DROP CONSTRAINT pk_pending", "the definition in pending CONSTRAINT pk_pending PRIMARY KEY (token)"),
+    ("ALTER TABLE alembic_version DROP CONSTRAINT alembic_version_pkc", "the definition in alembic_version CONSTRAINT"),
 ])  # fmt: skip
 def test_a_server_whose_tables_and_triggers_are_not_as_they_are_made_is_found(
     url: str, change: str, problem: str
@@ -96,6 +106,34 @@ def test_a_server_whose_tables_and_triggers_are_not_as_they_are_made_is_found(
         found = records.verify(files=False)
     assert {one.kind for one in found} == {"schema"}
     assert problem in found[0].problem
+
+
+def test_a_certificate_is_a_witness_of_a_server_that_was_rewritten_or_is_shorter(url: str, server: str) -> None:
+    """The second certificate states the first entry; the server's chain is made anew, sound in itself, with another one."""
+    with open_records(url, create=True) as records:
+        first = records.append("report", certificate("1101"))
+        head = records.heads("report", "another").now
+        second = certificate("1102", records={"entries": 1, "head": first.hash, "at": first.at})
+        records.append("report", second)
+        assert head == ChainHead(1, first.hash, first.at)
+        assert list(records.heads("report", second["job"]).before) == [second["results_sha256"]]
+        witness = Witness("K-1102.pdf", head, second["results_sha256"])
+        assert records.disagreements([witness]) == []
+        assert records.files_of(second["results_sha256"])[second["results_sha256"]].number == 2
+    with open_records(database(server, "rewritten"), create=True) as records:
+        other = records.append("report", certificate("1101", decision="fail"))
+        records.append("report", second)
+        assert records.verify(files=False) == []
+        (found,) = records.disagreements([witness])
+        assert (found.kind, found.entry) == ("witness", 1)
+        assert f"entry 1 with the hash {first.hash}" in found.problem
+        assert (
+            f"has the hash {other.hash}: they were rewritten, though they have the certificate as entry 2"
+            in found.problem
+        )
+    with open_records(database(server, "shorter"), create=True) as records:
+        assert "they end at entry 0" in records.disagreements([witness])[0].problem
+        assert records.heads("report", "any").now == ChainHead(0, BEGINNING, None)
 
 
 def test_writers_at_the_same_time_make_one_chain(url: str) -> None:

@@ -45,7 +45,7 @@ _FIX = "Name the results.json that cmm-uq report wrote of the certificate that i
 _ELSEWHERE = frozenset({
     "schema", "software", "job", "import", "acquisition", "sampling", "identifiability", "diagnosis", "screening", "posterior",
     "conformity", "verdicts", "covariance", "iso17025", "traceability", "least_squares", "as_found", "cmc", "estimates",
-    "artefact", "accuracy", "accuracy_uncertainty", "tolerances", "noise", KEY,
+    "artefact", "accuracy", "accuracy_uncertainty", "tolerances", "noise", "records", KEY,
 })  # fmt: skip
 """Keys of results.json that are no figures of the certificate, or are read by themselves."""
 

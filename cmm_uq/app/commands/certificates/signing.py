@@ -8,7 +8,7 @@ import io
 import os
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,12 +61,13 @@ class SigningOptions:
 class Signing:
     """A signer at work on the files of one command, all at one time.
 
-    ``signer`` who signs; ``at`` time of signing; ``stamping`` level above B-B; ``None`` for B-B.
+    ``signer`` who signs; ``at`` time of signing; ``stamping`` level above B-B, ``None`` for B-B; ``reason`` that a PDF states.
     """
 
     signer: sign.Signer
     at: dt.datetime
     stamping: sign.Stamping | None = None
+    reason: str = ""
 
     def finished(
         self, laboratory: Mapping[str, Any], *, language: str = "en", said: Callable[[Text], Text] | None = None
@@ -82,7 +83,7 @@ class Signing:
 
             told = (Verbatim(str(laboratory.get(key) or "")) for key in ("name", "accreditation"))
             seen = seal(self.signer, self.at, *told, language=language, said=said or same)
-            return sign.sign_pdf(data, self.signer, seal=seen, at=self.at, stamping=self.stamping)
+            return sign.sign_pdf(data, self.signer, seal=seen, at=self.at, stamping=self.stamping, reason=self.reason)
 
         return signed
 
@@ -144,14 +145,16 @@ def sign_files(
             if file.is_symlink() or sha256(contents[name]).hexdigest() != digest:
                 raise CmmUqError("was altered after it was written", where=str(file),
                                  fix="Write it anew, or give --out DIR for a signed copy")  # fmt: skip
+        ledger, where, digest = None, "", sha256(contents.get(RESULTS, b"")).hexdigest()
+        entry = None if history is None else history.has_results(digest)
+        if history is not None and entry is not None:
+            number, head = history.head()
+            signing = replace(signing, reason=sign.AFTER.format(number=number, hash=head))
         signed = {path.name: _signed(path, signing, contents[path.name]) for path in paths}
-        results, ledger, where = contents.get(RESULTS), None, ""
-        if history is not None and results is not None:
-            entry = history.has_results(sha256(results).hexdigest())
-            if entry is not None:
-                files = {name: sha256(data).hexdigest() for name, data in signed.items()}
-                by = {"by": signing.signer.name, "test_key": signing.signer.test_key}
-                ledger, where = history.ledger("signed", {"certificate": entry, **by, "files": files}), history.shown
+        if history is not None and entry is not None:
+            files = {name: sha256(data).hexdigest() for name, data in signed.items()}
+            by = {"by": signing.signer.name, "test_key": signing.signer.test_key}
+            ledger, where = history.ledger("signed", {"certificate": entry, **by, "files": files}), history.shown
         with staged(folder, manifest.owner, expected=[*manifest.files]) as place:
             place.write({**contents, **signed}, ledger=ledger)
     return Signed(tuple(paths), where)

@@ -18,9 +18,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.verify import given as files, views
+from cmm_uq.certificate.verify import given as files, views, witness
 from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Inquiry
 from cmm_uq.certificate.verify.given import RESULTS, Given
+from cmm_uq.laboratory.records.facts import ChainHead, Heads
+from cmm_uq.laboratory.records.opening import open_records
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.files import Stage
@@ -94,7 +96,8 @@ def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Aga
             raise CmmUqError(f"{alpha!r} is no rate of false alarms", where=f"{RESULTS}: diagnosis.false_alarms")
         form, outcome = DIAGNOSE, diagnosis_outcome(job, seed=seed, alpha=alpha, stage=stage)
     kept: list[str] = []
-    written = form.contents(outcome, stage, finished=partial(as_attached, given, kept))
+    heads = Heads(ChainHead.of_results(data))
+    written = form.contents(outcome, stage, finished=partial(as_attached, given, kept), heads=heads)
     return recomputed(given, written, kept)
 
 
@@ -179,9 +182,13 @@ Examine = Callable[[Inquiry, Given], "Recomputation | None"]
 
 def verify_given(
     given: Given, examine: Examine, *, rerun: bool = True, trust: Iterable[Path] | None = None,
-    schema: Path | None = None, stage: Stage = lambda what, part: None,
+    schema: Path | None = None, records: str | Path | None = None, stage: Stage = lambda what, part: None,
 ) -> Verification:  # fmt: skip
-    """Verify files that were read; ``trust``: ``None`` for nobody, and then nothing need be signed."""
+    """Verify files that were read.
+
+    ``trust``: ``None`` for nobody, and then nothing need be signed. ``records``: those that the certificate's head is looked
+    for in; ``None`` for none.
+    """
     inquiry = Inquiry()
     _check_schema(inquiry, given)
     views.open_digital(inquiry, given)
@@ -193,7 +200,12 @@ def verify_given(
 
         trusted = trust_of(tuple(trust))
     again = examine(inquiry, given)
-    views.check_signatures(inquiry, given, trusted)
+    job = None if again is None else again.job
+    issued = None if job is None else job.facts.job.issued or job.facts.job.date
+    signed = views.check_signatures(inquiry, given, trusted, issued)
+    if records is not None:
+        with open_records(records, read_only=True) as history:
+            witness.check_records(inquiry, given, history, signed)
     if schema is not None:
         views.check_schema(inquiry, given, schema)
     alike = False
@@ -208,7 +220,7 @@ def verify_given(
             why = f"made by version {made}, which alone makes them again to the byte, and this is {__version__}"
         inquiry.left(f"texts and layout of {forms}", why)
     stage("Done", 1.0)
-    return Verification(given, inquiry, None if again is None else again.job)
+    return Verification(given, inquiry, job)
 
 
 def _version(given: Given) -> str:

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 def verify(
     paths: Iterable[Path], *, rerun: bool = True, trust: Iterable[Path] | None = None, schema: Path | None = None,
-    compute: Compute | None = None, stage: Stage = lambda what, part: None,
+    compute: Compute | None = None, records: str | Path | None = None, stage: Stage = lambda what, part: None,
 ) -> Verification:  # fmt: skip
-    """Verify the files of one certificate; ``trust``: ``None`` for nobody, and then nothing need be signed."""
+    """Verify the files of one certificate; see :func:`~cmm_uq.app.commands.certificates.verification.verify_given`."""
     trusted = None if trust is None else tuple(trust)
 
     def examine(inquiry: Inquiry, given: Given) -> Recomputation | None:
@@ -30,4 +30,5 @@ def verify(
         return examine_part(inquiry, given, rerun=rerun, trust=trusted, stage=stage)
 
     stage("Opening the files", 0.0)
-    return verify_given(read_given(tuple(paths)), examine, rerun=rerun, trust=trusted, schema=schema, stage=stage)
+    given = read_given(tuple(paths))
+    return verify_given(given, examine, rerun=rerun, trust=trusted, schema=schema, records=records, stage=stage)

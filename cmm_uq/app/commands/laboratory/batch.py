@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.commands.files import REPORTS, RESULTS, Stage, ledger_of, opened, silent
+from cmm_uq.app.commands.files import NOT_RECORDED, REPORTS, RESULTS, Stage, ledger_of, opened, silent
 from cmm_uq.app.commands.laboratory import batch_jobs
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import REPORT
@@ -190,7 +190,8 @@ class BatchRun:
                 self._count(results, computed=False)
                 continue
             self._under_way[number] = job
-            yield number, (one.folder, dict(job.inputs))
+            heads = NOT_RECORDED if self.records is None else self.records.heads(REPORT.command, job.facts.job.id)
+            yield number, (one.folder, dict(job.inputs), heads)
 
     def _write(self, number: int, job: Job, files: dict[str, bytes]) -> dict[str, Any]:
         """Contents of results.json, once all is in place."""

@@ -30,6 +30,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.content import values
+from cmm_uq.laboratory.records.facts import Heads
 from cmm_uq.laboratory.schedule.jobs import job_folders
 from cmm_uq.laboratory.schedule.processes import serve
 
@@ -169,7 +170,8 @@ def rows(results: Mapping[str, Any]) -> Iterator[Row]:
 PROGRAM = "cmm_uq.app.commands.laboratory.batch_jobs"
 
 Setting = tuple[int, bool]  # seed of everything random, and whether figures alone are wanted: no document, no picture
-Task = tuple[str, dict[str, bytes]]  # folder of a job, for messages, and contents of job.toml and of all that it names
+# folder of a job, for messages, contents of job.toml and of all that it names, and where the records stand
+Task = tuple[str, dict[str, bytes], Heads]
 
 
 def begin(setting: Setting) -> Callable[[int, Task], dict[str, bytes]]:
@@ -177,10 +179,10 @@ def begin(setting: Setting) -> Callable[[int, Task], dict[str, bytes]]:
     seed, results_only = setting
 
     def reported(number: int, task: Task) -> dict[str, bytes]:
-        folder, files = task
+        folder, files, heads = task
         job = replace(job_of(files), folder=Path(folder))
         outcome = report_outcome(job, seed=seed, composed=not results_only)
-        return REPORT.contents(outcome, results_only=results_only)
+        return REPORT.contents(outcome, results_only=results_only, heads=heads)
 
     return reported
 
