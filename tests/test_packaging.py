@@ -19,6 +19,7 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+import start
 from cmm_uq import __version__
 from cmm_uq.laboratory.live.instruments.library import ready
 from tests.catalogues import TRANSLATED
@@ -141,6 +142,17 @@ def test_who_may_not_write_to_the_installation_compiles_nothing_at_each_start(
         found = compiled_at_start(tree, home, beyond_permissions)
         assert found == compiled_at_start(tree, home, beyond_permissions)
     assert bool(found) is (way == "nobody compiled"), sorted(found)[:5]
+
+
+def test_start_compiles_what_others_import_and_not_their_tests(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where the whole environment lies below a folder called tests."""
+    monkeypatch.setattr(start, "SCRIPTS", Path(sys.executable).parent)
+    packages = tmp_path / "tests" / "lib" / "site-packages"
+    for name in ("one/a.py", "one/tests/b.py"):
+        (packages / name).parent.mkdir(parents=True, exist_ok=True)
+        (packages / name).write_text("x = 1\n")
+    start.compile_sources(tmp_path)
+    assert {path.name.split(".")[0] for path in tmp_path.rglob("*.pyc")} == {"a"}
 
 
 def test_the_locked_environment_has_whatever_the_package_asks_for() -> None:

@@ -139,7 +139,8 @@ class RecordsState:
             return None
         data = next(self.records.entries(newest.entry)).data  # its files were taken away
         decided = [] if newest.decision == NONE else [{"standard": "its certificate", "decision": newest.decision}]
-        of = {"id": job, "machine": data["machine"]["name"], "inputs_sha256": data.get("inputs") or None}
+        machine = (data.get("machine") or {}).get("name")
+        of = {"id": job, "machine": machine, "inputs_sha256": data.get("inputs") or None}
         diagnosis = {"verdict": newest.diagnosis}
         return {"job": of, "verdicts": data.get("verdicts"), "conformity": decided, "diagnosis": diagnosis}
 

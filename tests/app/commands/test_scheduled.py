@@ -19,7 +19,7 @@ from unittest import mock
 
 import pytest
 
-from cmm_uq.app.commands.laboratory.schedule import drift_notices, due_notices
+from cmm_uq.app.commands.laboratory.schedule import _newest_jobs, drift_notices, due_notices
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import read_manifest, sha256_of
 from cmm_uq.laboratory.records import open_records
@@ -295,6 +295,48 @@ def test_what_is_due_is_told_and_with_a_clock_behind_the_records_nothing_is_due(
     assert list(due_notices(None, dt.date(2027, 6, 1), dt.timedelta(days=30))) == []
 
 
+@pytest.mark.parametrize(("on", "titles"), [
+    ("2027-04-20", ["overdue since 2027-03-02: machine 1102", "due on 2027-06-01: artefact BB-7"]),
+    ("2026-04-20", []),
+])  # fmt: skip
+def test_with_a_clock_behind_the_records_what_is_due_by_it_is_said_before_the_error(
+    tmp_path: Path, on: str, titles: list[str]
+) -> None:
+    """By all certificates that there are: a machine is not taken for one that was never calibrated."""
+    said: list[str] = []
+    with open_records(tmp_path / "lab.db", create=True) as records:
+        records.append("report", certificate(), at=dt.datetime(2027, 5, 1, tzinfo=dt.UTC))
+        with pytest.raises(CmmUqError, match=f"and the clock says {on}: more may be due than is said"):
+            said.extend(
+                str(one.title) for one in due_notices(records, dt.date.fromisoformat(on), dt.timedelta(days=60))
+            )
+    assert said == titles
+
+
+def test_records_that_hold_messages_alone_have_nothing_due(tmp_path: Path) -> None:
+    with open_records(tmp_path / "lab.db", create=True) as records:
+        records.append("sent", {"key": "k"}, at=dt.datetime(2027, 5, 1, tzinfo=dt.UTC))
+        assert list(due_notices(records, dt.date(2027, 5, 1), dt.timedelta(days=60))) == []
+
+
+def test_ready_files_go_by_the_times_of_the_schedule_and_by_no_others(jobs: Path) -> None:
+    (jobs / "schedule.toml").write_text(f'{QUICK}at = "05:30"\ndays = ["THU", "MON"]\n')
+    assert "OnCalendar=Mon,Thu *-*-* 05:30:00" in run("schedule", "print", "systemd", jobs).stdout
+    assert run("schedule", "print", "cron", jobs, "--at", "5:30", "--days", "mon,thu").returncode == 0
+    for further in (("--at", "06:15"), ("--days", "MON")):
+        done = run("schedule", "print", "cron", jobs, *further)
+        assert done.returncode == 2
+        assert "names another time, by which it tells which runs were missed" in done.stderr
+
+
+@pytest.mark.parametrize(("key", "told"), [('at = "6:15"', "at"), ('days = ["Mon"]', "days"), ('at = "24:00"', "at")])
+def test_times_that_are_none_are_refused_with_their_line(jobs: Path, key: str, told: str) -> None:
+    (jobs / "schedule.toml").write_text(f"{QUICK}{key}\n")
+    done = run("report", "--scheduled", jobs)
+    assert done.returncode == 2
+    assert f"schedule.toml line 4: [run] {told}" in done.stderr
+
+
 @pytest.mark.parametrize(("value", "told"), [(2.5, False), (9.0, True)])
 def test_a_machine_that_changed_by_more_than_chance_drifts(tmp_path: Path, value: float, told: bool) -> None:
     """Against the change worked by hand: 2.0 ± 0.5 before; 0.5 more is 0.7 u, 7 more is 10 u."""
@@ -304,6 +346,8 @@ def test_a_machine_that_changed_by_more_than_chance_drifts(tmp_path: Path, value
             records.append("report", certificate(day=day, values=(row,)))
         notices = list(drift_notices(records, "1102-2026-03-01", dt.date(2026, 4, 1)))
         assert list(drift_notices(records, "1102-2025-03-01", dt.date(2026, 4, 1))) == []
+        # as long as nothing newer is known of the machine
+        assert _newest_jobs(records, dt.date(2026, 4, 1)) == {"1102-2026-03-01"}
     assert [notice.text for notice in notices] == [
         "machine 1102 changed by more than chance since the recording before: Scale error of x."
     ] * told

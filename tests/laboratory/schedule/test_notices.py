@@ -88,6 +88,20 @@ def outbox(out: Path, *channels: Channel) -> Outbox:
     return Outbox(out, channels, FolderState(out), lambda: NOW)
 
 
+def test_what_another_run_sent_between_two_looks_is_not_sent_again(tmp_path: Path) -> None:
+    """One looked before the other had sent it, and wrote its message after that."""
+    kept = Kept()
+    box = outbox(tmp_path, kept)
+    box.add([notice("a")])
+    (waiting,) = box.folder.iterdir()
+    content = waiting.read_bytes()
+    box.deliver(0.0)
+    waiting.write_bytes(content)
+    assert outbox(tmp_path, kept).deliver(0.0) == []
+    assert kept.titles == ["fail: a"]
+    assert box.waiting() == 0
+
+
 def test_what_is_found_again_and_again_goes_out_once(tmp_path: Path) -> None:
     kept = Kept()
     for _ in range(3):

@@ -15,7 +15,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.schedule.jobs import JobFolder
 from cmm_uq.laboratory.schedule.notices import Notice
 from cmm_uq.laboratory.schedule.schedulers import starts
-from cmm_uq.laboratory.schedule.state import Problems, last_run, turn_at
+from cmm_uq.laboratory.schedule.state import Problems, last_run, remember_run, turn_at
 from tests.laboratory.schedule.runs import Jobs, made
 from tests.laboratory.schedule.told import notice
 
@@ -216,6 +216,16 @@ def test_a_damaged_moment_of_the_last_run_is_none(jobs: Jobs, moved: str) -> Non
     jobs.now += DAY
     assert jobs.run() == 0
     assert last_run(jobs.out) == jobs.now
+
+
+def test_of_two_runs_the_one_that_began_later_is_the_last_whichever_ends_first(tmp_path: Path) -> None:
+    tuesday, now = MONDAY + DAY, MONDAY + 2 * DAY
+    for begun in (tuesday, MONDAY):
+        remember_run(tmp_path, begun, now)
+        assert last_run(tmp_path) == tuesday
+    remember_run(tmp_path, MONDAY + 400 * DAY, MONDAY + 400 * DAY)
+    remember_run(tmp_path, tuesday, now)  # by a clock that is right again
+    assert last_run(tmp_path) == tuesday
 
 
 def test_a_run_that_did_not_come_to_its_end_was_missed(jobs: Jobs) -> None:

@@ -13,12 +13,14 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.output import Owner, staged
+from cmm_uq.base.output import Owner, sha256_of, staged
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.store import Records
 from cmm_uq.laboratory.schedule.jobs import JobFolder, JobReporting
+from cmm_uq.laboratory.schedule.notices import of_results
 from cmm_uq.laboratory.schedule.processes import Pace, duration, pace
 from cmm_uq.laboratory.schedule.state import (
+    Dispatch,
     FolderState,
     Log,
     RecordsState,
@@ -117,6 +119,56 @@ def test_runs_with_records_send_once_and_their_chain_holds(tmp_path: Path, recor
         ("sent", "exit code"), ("sent", "kept"), ("report", None),
     ]  # fmt: skip
     assert records.verify(files=False) == []
+
+
+def test_a_certificate_that_fails_stands_until_a_person_released_it_wherever_its_files_are(
+    tmp_path: Path, records: Records
+) -> None:
+    made(tmp_path, "a", "fail")
+    jobs = Jobs(tmp_path, state=RecordsState(records, tmp_path / "reports"))
+    jobs.run()
+    results = jobs.out / "a" / "results.json"
+    inputs, digest = json.loads(results.read_text())["job"]["inputs_sha256"], sha256_of(results)
+    stated = {"statements": [{"name": "E0", "by": "S", "title": None, "outcome": "fail", "value": 9.0, "U": 1.0, "limit": 8.0,
+                              "unit": "µm", "missing": []}]}  # fmt: skip
+    content = certificate(job="a", results_sha256=digest, inputs=inputs, folder="a", decision="fail", verdicts=stated)
+    entry = records.append("report", content).number
+
+    def standing() -> list[str]:
+        assert jobs.run() == 0
+        assert jobs.reported == []
+        return [line["why"] for line in jobs.lines if "standing" in line and "run" not in line]
+
+    assert standing() == ["CMM 3 (job a): S E0: fail."]
+    shutil.rmtree(jobs.out / "a")
+    assert standing() == ["Machine 1102 (job a): S E0: fail."]
+    records.append("release", {"certificate": entry, "by": "A. Person", "reason": "reviewed"})
+    assert standing() == []
+
+
+def test_of_a_certificate_without_its_statements_the_records_know_the_gravest_outcome(
+    tmp_path: Path, records: Records
+) -> None:
+    state = RecordsState(records, tmp_path / "reports")
+    for job, facts in {"a": {"decision": "fail"}, "b": {"diagnosis": "partial"}, "c": {"decision": "none"}}.items():
+        records.append("report", certificate(job=job, inputs=INPUTS, folder=job, results_sha256=job * 64, **facts))
+    events = {job: [one.event for one in of_results(state.results(job) or {}, "", "")] for job in "abc"}
+    assert events == {"a": ["fail"], "b": ["mismatch"], "c": []}
+
+
+def test_what_is_claimed_is_said_by_one_and_known_to_all(tmp_path: Path, records: Records) -> None:
+    def again(before: Dispatch | None) -> bool:
+        return before is None or before.last.day != int(day)
+
+    for state, other in (
+        (RecordsState(records, tmp_path), RecordsState(records, tmp_path)), (FolderState(tmp_path), FolderState(tmp_path)),
+    ):  # fmt: skip
+        for day in ("23", "24"):
+            claims = [one.claim("k", {"at": f"2026-11-{day}T06:15:00Z"}, again) for one in (state, other, state)]
+            assert claims == [True, False, False]
+        known = other.sent("k")
+        assert known is not None
+        assert (known.first.day, known.last.day) == (23, 24)
 
 
 HOLD = """
