@@ -224,10 +224,7 @@ def list_all(end: Ending = opt.ONLY_JSON) -> None:
     end.put({"profiles": profiles, "ports": dict(ports)}, lines)
 
 
-_UNASKED = (
-    "answers that nobody had asked for: where they belong to the question, say in [send] poll how many messages it has; "
-    "where the instrument sends by itself too, say unasked = true"
-)
+_UNASKED = "answers to no question; where they belong to it, see messages and unasked in [send] of a profile"
 
 
 @opt.command(app, "test", "instruments test fluke-1502a /dev/ttyUSB0", "instruments test table_top --job my-job")

@@ -15,7 +15,9 @@ from cmm_uq.base.output.new_file import write_new
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments import library
 from cmm_uq.laboratory.live.instruments.instrument import open_source
+from cmm_uq.laboratory.live.instruments.simulated_line import WAYS, SimulatedLine
 from cmm_uq.laboratory.live.instruments.source import Event, LiveSource
+from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS
 
 
 def ready_profiles() -> list[tuple[str, str, str]]:
@@ -86,9 +88,6 @@ def simulated_instrument(profile: str, way: str) -> Iterator[str]:
 
     way : ``pty``, ``socket`` or ``rfc2217``; empty for the usual one.
     """
-    from cmm_uq.laboratory.live.instruments.simulated_line import WAYS, SimulatedLine
-    from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS
-
     if library.profile_named(profile).protocol == "ipp":
         from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer as SimulatedMachine
 

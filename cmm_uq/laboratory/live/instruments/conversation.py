@@ -25,6 +25,9 @@ class Conversation:
         self._replayed, self._by_itself = replayed, replayed or send.unasked or not self._polls
         self._due = self._since = self._asked_at = self._heard_at = self._pause = now
         self._open = self._left = 0  # questions without their answer; messages that the last one's still lacks
+        self._kept_since: int | None = (
+            None  # since when answers to nothing keep a question that is due from being asked
+        )
         self.asked = 0 if replayed else -1
         self.waiting = self.gap = False
 
@@ -38,6 +41,11 @@ class Conversation:
         """Whether a message with values may come now."""
         return self.waiting or self._by_itself
 
+    @property
+    def disturbed(self) -> bool:
+        """Whether it cannot be asked because it sends without being asked."""
+        return self._kept_since is not None
+
     def question(self, now: int) -> bytes | None:
         """What to send now; ``None``: nothing yet."""
         if not self._polls or self._replayed:
@@ -47,7 +55,10 @@ class Conversation:
                 return None
             return self._sent(now)
         following = (self.asked + 1) % len(self._polls)
-        if now < self._pause or (following == 0 and now < self._due and not self.gap):
+        if following == 0 and now < self._due and not self.gap:
+            return None
+        if now < self._pause:
+            self._kept_since = now if self._kept_since is None else self._kept_since
             return None
         if following == 0:
             self._due += self._every * max(1, 1 + (now - self._due) // self._every)
@@ -56,7 +67,7 @@ class Conversation:
 
     def _sent(self, now: int) -> bytes:
         question, self._left = self._polls[self.asked]
-        self._asked_at = now
+        self._asked_at, self._kept_since = now, None
         self._open += 1
         return question
 
@@ -86,6 +97,9 @@ class Conversation:
         if self.waiting and now - self._since >= self._patience:
             self.waiting = False
             self._pause = now + PAUSE if len(self._polls) > 1 else now
+            return True
+        if self._kept_since is not None and now - self._kept_since >= self._patience + PAUSE:
+            self._kept_since = now
             return True
         if self._silence is not None:
             allowed = min(self._silence, SECOND) if self.gap else self._silence

@@ -15,7 +15,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, say
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments import source
-from cmm_uq.laboratory.live.instruments.conversation import Conversation
+from cmm_uq.laboratory.live.instruments.conversation import PAUSE, Conversation
 from cmm_uq.laboratory.live.instruments.ipp_machine import open_machine
 from cmm_uq.laboratory.live.instruments.library import profile_of_source, unsaid_units
 from cmm_uq.laboratory.live.instruments.parsing import FramedMessage, Framer, Parser, Understood
@@ -41,6 +41,7 @@ class LiveInstrument:
         self._number, self._gap_at, self._closed = 0, -1, False
         self._byte_at = clock.monotonic_ns()
         self._told, self._known = "", False
+        self._noisy_at = -1  # since when bytes come that keep it from being asked
         self._half: Text | None = None  # why the next message may not be whole, or not be an answer
         self._port: source.Port | None = opened()
         self._conversation = self._begun()
@@ -115,8 +116,13 @@ class LiveInstrument:
         return (self._clock.monotonic_ns() - self._byte_at) / SECOND
 
     def _quiet(self) -> bool:
-        """Whether no message is on its way, which a question would cut into one that came before and one that answers."""
-        return not self._framer.waiting.strip() or self._since_byte_s() > source.TICK_S
+        """Whether no message is on its way, which would end behind a question; what comes without an end is not waited for."""
+        if not self._framer.waiting.strip() or self._since_byte_s() > source.TICK_S:
+            self._noisy_at = -1
+            return True
+        now = self._clock.monotonic_ns()
+        self._noisy_at = now if self._noisy_at < 0 else self._noisy_at
+        return now - self._noisy_at > PAUSE
 
     def _message(
         self, framed: FramedMessage, stamp: source.Moment, port: source.Port | None = None
@@ -178,6 +184,8 @@ class LiveInstrument:
         yield from self._rest()
         asked = bool(self._profile.send.poll)
         why = say("no answer within {s:g} s", s=self._profile.send.answer_within_s) if asked else say("nothing comes")
+        if self._conversation.disturbed:
+            why = say("it sends without being asked, so that nothing can be asked")
         if self._reopen_when_silent and self._gap_at >= 0:
             yield from self._lost(why)
         else:

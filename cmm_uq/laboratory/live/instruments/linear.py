@@ -30,7 +30,7 @@ from re import _compiler, _parser  # type: ignore[attr-defined]
 from typing import Any, Literal, NamedTuple
 
 MOST_RUNS = 100  # alive at a time
-_MOST_PLACES, _MOST_EDGES, _MOST_VECTORS, _MOST_AHEAD = 4_000, 100_000, 20_000, 100
+_MOST_PLACES, _MOST_EDGES, _MOST_STEPS, _MOST_AHEAD = 4_000, 100_000, 500_000, 100
 _CHARACTERS, _START = (
     256,
     1 << 256,
@@ -128,6 +128,8 @@ class _Automaton:
                 lines = flags & re.MULTILINE and str(value) == "AT_BEGINNING"
                 before = _START | (1 << ord("\n") if lines else 0)
                 return _passed(_Pass(before) if begins else _Pass(sure=False))
+            case "FAILURE":  # of (?!), in some versions
+                return _Part(Counter(), Counter(), Counter())
             case "ASSERT" | "ASSERT_NOT":
                 return self._look(kind == "ASSERT", value, flags)
         raise NotLinearError(
@@ -239,7 +241,7 @@ class _Texts:
                     if state not in known:
                         known.add(state)
                         heapq.heappush(waiting, (-total, next(number), state))
-            if len(known) > _MOST_VECTORS:
+            if len(known) * len(self._bits) > _MOST_STEPS:
                 raise NotLinearError("is too intricate to be checked: make it simpler")
         return most
 
@@ -337,13 +339,23 @@ def _grows(text: str, use: Use) -> bool:
 
 
 def _offending(text: str) -> str:
-    """The shortest beginning that is not linear, without what is not needed before it."""
+    """A short part of a pattern that is not linear by itself: its beginning, halved to where it grows, and so its end."""
 
     def balanced(start: int, stop: int) -> str:
-        part = text[start:stop]
-        groups = re.sub(r"\\.|\[\^?\]?[^\]]*\]", "", part)
-        return part + ")" * (groups.count("(") - groups.count(")"))
+        groups = re.sub(r"\\.|\[\^?\]?[^\]]*\]", "", text[start:stop])
+        return text[start:stop] + ")" * (groups.count("(") - groups.count(")"))
 
-    stop = next((stop for stop in range(1, len(text)) if _grows(balanced(0, stop), "fullmatch")), len(text))
-    start = next((start for start in range(stop - 1, 0, -1) if _grows(balanced(start, stop), "fullmatch")), 0)
+    def grows(start: int, stop: int) -> bool:
+        return _grows(balanced(start, stop), "fullmatch")
+
+    low, stop = 0, len(text)
+    while stop - low > 1:
+        middle = (low + stop) // 2
+        near = next((end for end in range(middle, max(low, middle - 3), -1) if grows(0, end)), None)
+        low, stop = (middle, stop) if near is None else (low, near)
+    start, high = 0, stop
+    while high - start > 1:
+        middle = (start + high) // 2
+        near = next((begin for begin in range(middle, max(start, middle - 3), -1) if grows(begin, stop)), None)
+        start, high = (start, middle) if near is None else (near, high)
     return text[start:stop]

@@ -299,6 +299,41 @@ def test_an_answer_that_may_be_that_of_several_questions_is_no_value_and_it_is_a
         assert heard.events.index(heard.good(since)[0]) > heard.events.index(first)
 
 
+class Streaming(Generous):
+    """It was set to send by itself, 20 times a second, and is asked besides."""
+
+    every_s = 0.05
+
+    def says(self) -> bytes:
+        return b"T=999\r\n"
+
+
+def test_what_streams_is_no_answer_and_it_is_said_that_nothing_can_be_asked(tmp_path: Path) -> None:
+    with UnreliableLine(Streaming(), "pty", tmp_path) as line, listening(opened(asked_profile(), line.port)) as heard:
+        heard.until(lambda one: one.of(Gap) and len(unasked(one)) >= 20)
+        told = {str(gap.why) for gap in heard.of(Gap)}  # type: ignore[union-attr]
+        assert told <= {"it sends without being asked, so that nothing can be asked", "no answer within 0.4 s"}
+        since = len(heard.events)
+        line.speaker.every_s = 0.0  # as after its start commands
+        heard.until(lambda one: len(one.good(since)) >= 2)
+        assert all(one.values["temp_c"] < 900 for one in heard.good(since))
+
+
+class Babbling(Speaker):
+    """As at a wrong baud rate: bytes without an end."""
+
+    every_s = 0.01
+
+    def says(self) -> bytes:
+        return b"\xff\xfe"
+
+
+def test_bytes_without_an_end_do_not_keep_it_from_being_asked(tmp_path: Path) -> None:
+    with UnreliableLine(Babbling(), "pty", tmp_path) as line, listening(opened(asked_profile(), line.port)) as heard:
+        heard.until(lambda one: one.of(Gap))
+        assert str(heard.of(Gap)[0].why) == "no answer within 0.4 s"  # type: ignore[union-attr]
+
+
 def test_several_questions_cannot_go_with_values_that_come_unasked() -> None:
     with pytest.raises(CmmUqError, match="unasked is for an instrument with one question"):
         asked_profile("}, { send = '!'", "unasked = true")
