@@ -32,7 +32,7 @@ CONTENTS: dict[str, list[str]] = {
         "machine/effects", "limits", "words",
     ],
     "How it works": [
-        "report", "certificate", "verify", "languages", "dcc", "signing", "iso17025", "provenance", "qif",
+        "report", "certificate", "verify", "ten-years-later", "languages", "dcc", "signing", "iso17025", "provenance", "qif",
         "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",

@@ -26,7 +26,7 @@ MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.pr
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
     "": 140, "base": 2_732, "maths": 10_200, "jobs": 11_415, "machine": 5_700, "analysis": 15_800, "laboratory": 14_240,
-    "certificate": 15_610, "artefacts": 8_700, "app": 14_055,
+    "certificate": 15_645, "artefacts": 8_700, "app": 14_042,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 235, 1501

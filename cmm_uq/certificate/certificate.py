@@ -14,7 +14,7 @@ from cmm_uq.certificate.diagnosis.page import diagnosis_sections
 from cmm_uq.certificate.document import Document, Facts, Overview, Section, Signature, with_each_text
 from cmm_uq.certificate.result import Outcome, Page, Result, StatedUncertainty
 from cmm_uq.certificate.results.contents import results
-from cmm_uq.certificate.results.provenance import COMPARED, FILE as PROVENANCE, NOT_COMPARED
+from cmm_uq.certificate.results.provenance import COMPARED, NOT_COMPARED, REBUILT
 from cmm_uq.certificate.sections import results as of_result
 from cmm_uq.certificate.sections.conformity import conformity_section
 from cmm_uq.certificate.sections.method import method, posterior_section, warnings
@@ -79,7 +79,7 @@ def formal_document(
         number=Verbatim(job.number or job.id), date=job.issued or job.date, logo=logo_of(laboratory, inputs),
         issuer=tuple(Verbatim(line) for line in (laboratory.name, *laboratory.address.splitlines()) if line),
         statements=statements if authorised else (), signatures=(signature,) if authorised and laboratory.signatory else (),
-        attachments=(*names(inputs), Verbatim("results.json"), *files, Verbatim(PROVENANCE)),
+        attachments=(*names(inputs), Verbatim("results.json"), *files, REBUILT),
         banner=clauses.DRAFT if draft else NOTHING, draft=draft, **stated,
     ), without_keys)  # fmt: skip
     return found

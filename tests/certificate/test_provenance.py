@@ -5,8 +5,10 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
+import tomllib
 from collections import defaultdict
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 from prov.model import ProvActivity, ProvAgent, ProvDerivation, ProvDocument, ProvEntity, ProvUsage
@@ -70,6 +72,7 @@ def test_another_platform_is_no_other_provenance_and_another_hash_is(monkeypatch
     with monkeypatch.context() as patched:
         patched.setattr("cmm_uq.certificate.results.provenance.machine", lambda: {"kernels": "Haswell"})
         patched.setattr("cmm_uq.certificate.results.provenance.packages", lambda: {"numpy": "2.0.0"})
+        patched.setattr("cmm_uq.certificate.results.provenance.environment", lambda: {"packages": "numpy==2.0.0"})
         there = made()
     assert there != here
     assert same_but_for_the_platform(here, there)
@@ -88,6 +91,32 @@ def test_the_platform_names_the_kernels_that_decide_over_last_bits_and_no_machin
     assert set(told) == {"python", "system", "processor", "instructions", "blas", "kernels"}
     assert told["python"].startswith("CPython 3.")
     assert told["blas"]
+
+
+def installed(monkeypatch: pytest.MonkeyPatch, **packages: str) -> dict[str, str]:
+    """What is said of an environment with these packages."""
+
+    class Installed:
+        def __init__(self, name: str, version: str) -> None:
+            self.name, self.version = name, version
+
+    monkeypatch.setattr(installation, "distributions", lambda: [Installed(*one) for one in packages.items()])
+    return installation.environment.__wrapped__()
+
+
+def test_an_environment_of_the_lock_is_named_by_its_hash_and_any_other_by_its_packages(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    lock = (ROOT / "pylock.toml").read_bytes()
+    packages = {one["name"]: one["version"] for one in tomllib.loads(lock.decode())["packages"] if "version" in one}
+    by_lock = {"lock": "pylock.toml", "sha256": hashlib.sha256(lock).hexdigest()}
+    assert installed(monkeypatch, **packages, pip="1", **{"cmm-uq": "9"}) == by_lock
+    assert installed(monkeypatch, numpy=packages["numpy"], Jinja2=packages["jinja2"]) == by_lock
+    listed = "jinja2==0.1 numpy==1.0"
+    other = {"packages": listed, "sha256": hashlib.sha256(listed.encode()).hexdigest()}
+    assert installed(monkeypatch, numpy="1.0", Jinja2="0.1") == other
+    monkeypatch.setattr(installation, "LOCK", tmp_path / "pylock.toml")
+    assert "lock" not in installed(monkeypatch, **packages)
 
 
 CLOCKS = {

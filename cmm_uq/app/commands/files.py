@@ -22,7 +22,7 @@ from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.content import certificate_content, folder_from, kind_of_entry
 from cmm_uq.laboratory.records.facts import KEY, Heads
-from cmm_uq.laboratory.records.place import DEFAULT, NONE, beside, place_of
+from cmm_uq.laboratory.records.place import DEFAULT, NONE, beside, is_url, place_of
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.signing import Signing
@@ -32,10 +32,10 @@ _UNITS_AT_THE_END = ("mm", "um", "arcsec", "ppm", "rad", "deg", "m", "k", "per")
 
 
 @contextlib.contextmanager
-def opened(where: str | Path | None, out: Path | None) -> Iterator[Records | None]:
-    """The records that a command writes to, made where there are none; ``None`` where there are to be none."""
+def opened(where: str | Path | None, out: Path | None, *, make: bool = True) -> Iterator[Records | None]:
+    """The records that a command writes to; ``None`` where there are to be none, or are none and none are to be made."""
     place = place_of(where, DEFAULT if out is None else beside(out.absolute()))
-    if place is None:
+    if place is None or not (make or is_url(place) or Path(place).exists()):
         yield None
         return
     from cmm_uq.laboratory.records.opening import open_records
@@ -143,12 +143,15 @@ class Form:
         owner = self.owner(job)
         folder = out or REPORTS / owner.job / self.below
         expected = (*self.names(job), RESULTS, *self.further)
+        where = records if self.recorded else NONE
         with (
-            opened(records if self.recorded else NONE, out) as history,
+            opened(where, out, make=False) as known,
+            contextlib.ExitStack() as made,
             staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
         ):
-            heads = NOT_RECORDED if history is None else history.heads(self.command, owner.job)
             found = outcome()
+            history = known or made.enter_context(opened(where, out))  # nothing is made of what is refused
+            heads = NOT_RECORDED if history is None else history.heads(self.command, owner.job)
             language = job.facts.job.language
             finished: Finished = unchanged
             if signing is not None:

@@ -13,10 +13,12 @@ import datetime as dt
 import hashlib
 import json
 import platform
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, distributions, version
+from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
@@ -42,6 +44,23 @@ def packages() -> dict[str, str]:
         except PackageNotFoundError:
             continue
     return found
+
+
+LOCK = Path(__file__).parents[3] / "pylock.toml"
+_INSTALLERS = {"cmm-uq", "pip", "setuptools", "uv", "wheel"}
+_LOCKED = re.compile(r'^name = "([^"]+)"\nversion = "([^"]+)"$', re.MULTILINE)
+
+
+@cache
+def environment() -> dict[str, str]:
+    """The project's lock, where whatever is installed is of it, else all that is installed; each with its SHA-256."""
+    here = {re.sub(r"[-_.]+", "-", one.name).lower(): one.version for one in distributions()}
+    content = LOCK.read_bytes() if LOCK.is_file() else b""
+    locked = set(_LOCKED.findall(content.decode()))  # of some packages several, for versions of Python
+    if locked and all(one in locked for one in here.items() if one[0] not in _INSTALLERS):
+        return {"lock": LOCK.name, "sha256": hashlib.sha256(content).hexdigest()}
+    listed = " ".join(f"{name}=={here[name]}" for name in sorted(here))
+    return {"packages": listed, "sha256": hashlib.sha256(listed.encode()).hexdigest()}
 
 
 @cache
@@ -79,7 +98,8 @@ def _kernels() -> str:
 
 
 FILE = "provenance.json"
-PLATFORM = "cmm-uq:platform"
+REBUILT = say("{file}, whose environment, installed again, computes all of this again", file=Verbatim(FILE))
+PLATFORM, ENVIRONMENT = "cmm-uq:platform", "cmm-uq:environment"
 _PREFIX = "urn:cmm-uq:"
 _RECORDING, _REPORT, _PROGRAM, _LABORATORY = "cmm-uq:recording", "cmm-uq:report", "cmm-uq:program", "cmm-uq:laboratory"
 _CERTIFICATE, _REPLACED, _ARTEFACT = "cmm-uq:certificate", "cmm-uq:replaced", "cmm-uq:artefact-certificate"
@@ -144,7 +164,7 @@ def _without_platform(data: bytes) -> object:
     entities, used = graph.get("entity", {}), graph.get("used", {})
     kept = {
         str(name): entity for name, entity in (entities.items() if isinstance(entities, dict) else ())
-        if isinstance(entity, dict) and str(name) != PLATFORM and not str(name).startswith("package:")
+        if isinstance(entity, dict) and str(name) not in (PLATFORM, ENVIRONMENT) and not str(name).startswith("package:")
     }  # fmt: skip
     others = {key: value for key, value in graph.items() if key not in ("entity", "used")}
     return others, kept, sorted(str(each["prov:entity"]) for each in used.values() if each.get("prov:entity") in kept)
@@ -164,6 +184,7 @@ def _entities(job: Behind, results: Mapping[str, Any], outputs: Mapping[str, byt
         for name, version in {**packages(), **results["software"].get("plugins", {})}.items()
     }
     found[PLATFORM] = {"prov:type": "platform"} | {f"cmm-uq:{name}": text for name, text in machine().items()}
+    found[ENVIRONMENT] = {"prov:type": "environment"} | {f"cmm-uq:{name}": text for name, text in environment().items()}
     issued = {"cmm-uq:issued": _day(said.issued)} if said.issued else {}
     found[_CERTIFICATE] = {"prov:type": _name("prov:Collection"), "prov:label": said.number or said.id, **issued}
     if replaced := said.replaces:
@@ -179,7 +200,7 @@ def _relations(
     def numbered(letter: str, key: str, other: str, pairs: Iterable[tuple[str, str]]) -> dict[str, Record]:
         return {f"_:{letter}{i}": {f"prov:{key}": a, f"prov:{other}": b} for i, (a, b) in enumerate(pairs, 1)}
 
-    behind = [name for name in entities if name.startswith("package:") or name in (PLATFORM, _ARTEFACT)]
+    behind = [name for name in entities if name.startswith("package:") or name in (PLATFORM, ENVIRONMENT, _ARTEFACT)]
     measured = [(_file(name), _RECORDING) for name in job.inputs if name == job.recording]
     made = [(name, _REPORT) for name in (*map(_file, outputs), _CERTIFICATE)]
     agents = [(_REPORT, _PROGRAM), *([(_RECORDING, _LABORATORY)] if job.laboratory.name else [])]

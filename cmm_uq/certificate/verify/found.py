@@ -46,8 +46,8 @@ NOT_ASKED = "not asked for (--no-rerun)"
 CHECKS = {  # what each check makes sure of
     "files": "the files are what cmm-uq writes, with nothing active, hidden or further in them",
     "signatures": "signatures are intact and cover the whole file; whom one must trust for them is trusted, or named above",
-    "forms": "PDF, XML, HTML and results.json say the same",
-    "figures": "the documents state the figures of results.json, and these agree with each other",
+    "forms": "results.json, the digital certificate and its page are those of the PDF and the HTML",
+    "figures": "the figures of results.json agree with each other",
     "decisions": "decisions follow from figures, uncertainties, limits and rules",
     "inputs": "inputs are those whose hashes results.json has",
     "dates": "artefacts were in date, and dates are in order",

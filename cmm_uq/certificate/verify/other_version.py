@@ -6,11 +6,12 @@ Its pages are made again to the byte by the version that made them, and by no ot
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from cmm_uq.certificate.verify.again import Again, beyond_sampling, leaves
-from cmm_uq.certificate.verify.found import Inquiry
+from cmm_uq.certificate.verify.found import AGAIN, Inquiry
 from cmm_uq.certificate.verify.given import RESULTS, Given, strict_json
 
 _STATED = re.compile(
@@ -56,3 +57,18 @@ def _figures(data: Any) -> dict[str, Any]:
 
 def _some(paths: Sequence[str]) -> str:
     return ", ".join([*paths[:_NAMED], *(["…"] if len(paths) > _NAMED else [])])
+
+
+def plugins_missing(inquiry: Inquiry, data: Mapping[str, Any]) -> bool:
+    """Packages that took part and are not here as they were then."""
+    missing = False
+    for package, wanted in (data["software"].get("plugins") or {}).items():
+        try:
+            here = version(str(package))
+        except PackageNotFoundError:
+            here = ""
+        if here != wanted:
+            missing = True
+            told = f"version {here} is installed" if here else "it is not installed"
+            inquiry.left(AGAIN, f"{package} {wanted} took part, and {told}")
+    return missing

@@ -12,7 +12,6 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -40,14 +39,14 @@ def compute_again(
     By the version that made it everything is compared; of an earlier one figures and decisions, where no correction since
     then touches what a ``command`` makes of a ``job``, whatever it is where none is given.
     """
+    from cmm_uq.certificate.verify.again import compare_again
+    from cmm_uq.certificate.verify.other_version import compare_figures, plugins_missing
+
     if given.results is None or plugins_missing(inquiry, given.results[1]):
         return False
     made = _version(given)
     if made != __version__ and not _computes_alike(inquiry, made, command, job):
         return False
-    from cmm_uq.certificate.verify.again import compare_again
-    from cmm_uq.certificate.verify.other_version import compare_figures
-
     try:
         if (computed := compute()) is None:
             return False
@@ -133,21 +132,6 @@ def as_attached(given: Given, kept: list[str], name: str, content: bytes) -> byt
         return content
     kept.append(name)
     return attached
-
-
-def plugins_missing(inquiry: Inquiry, data: Mapping[str, Any]) -> bool:
-    """Packages that took part and are not here as they were then."""
-    missing = False
-    for package, wanted in (data["software"].get("plugins") or {}).items():
-        try:
-            here = version(str(package))
-        except PackageNotFoundError:
-            here = ""
-        if here != wanted:
-            missing = True
-            told = f"version {here} is installed" if here else "it is not installed"
-            inquiry.left(AGAIN, f"{package} {wanted} took part, and {told}")
-    return missing
 
 
 @dataclass(frozen=True)
