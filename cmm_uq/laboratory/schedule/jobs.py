@@ -6,7 +6,6 @@ somebody is at them: they may lie, and where they cannot be right two looks at t
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 import os
@@ -25,7 +24,7 @@ from cmm_uq.base.files.toml_file import toml_of
 from cmm_uq.base.output import finish_interrupted, sha256_of
 from cmm_uq.base.plugins import told_with_package
 from cmm_uq.jobs.acquired import provenance_name
-from cmm_uq.jobs.source import RESULTS, device_name
+from cmm_uq.jobs.source import device_name
 from cmm_uq.jobs.tables.origin import is_planned
 from cmm_uq.laboratory.schedule import state as states
 from cmm_uq.laboratory.schedule.notices import Notice, decisions, of_results
@@ -243,17 +242,11 @@ class JobReporting:
                 return JobOutcome(job, BUSY, "another run is at it")
             finish_interrupted(folder)
             why = self.reason(job)  # asked again: another run may have been through with it
-            if not why and not turn.resumed:
+            if not why:  # what it leaves to do is said by every run
                 return JobOutcome(job, UNCHANGED)
-            content = self.report(job) if why else b"{}"
-            if not why:  # of a job whose run ended between its certificate and its messages
-                with contextlib.suppress(OSError):
-                    content = (folder / RESULTS).read_bytes()
-            results = json.loads(content)
+            results = json.loads(self.report(job))
             turn.through = False  # until its messages wait to be sent, the next run has to look at it again
             notices = [*self._notices(job, results), *self.further(job)]
             self.queue(notices)
             turn.through = True
-            if not why:
-                return JobOutcome(job, UNCHANGED)
             return JobOutcome(job, REPORTED, why, results=results, notices=notices)

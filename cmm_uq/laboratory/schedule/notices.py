@@ -261,8 +261,8 @@ class Outbox:
         known = self.state.sent(key)
         return known is not None and known.last <= self.moment + AHEAD
 
-    def _by_another(self, key: str) -> bool:
-        """Whether a run beside this one was faster, as far as can be known."""
+    def _surely_went_out(self, key: str) -> bool:
+        """The same, as far as it can be known: not of records that were lost."""
         with contextlib.suppress(CmmUqError):
             return self._went_out(key)
         return False
@@ -273,7 +273,7 @@ class Outbox:
             Delivery(message, channel.name, *_attempt(channel, message))
             for notice in notices
             for channel, message in self._messages(notice)
-            if not self._place(message.key).exists()
+            if not (self._place(message.key).exists() or self._surely_went_out(message.key))
         ]
 
     def waiting(self) -> int:
@@ -301,7 +301,7 @@ class Outbox:
         for path in self.folder.glob(f"*{_WAITING}"):
             if (read := _read(path)) is None:
                 continue
-            if self._by_another(read[0].key):
+            if self._surely_went_out(read[0].key):  # a run beside this one was faster
                 _drop(path)
             else:
                 by_channel.setdefault(read[1], []).append((read[0], path))

@@ -8,14 +8,15 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.laboratory.schedule.jobs import JobFolder
 from cmm_uq.laboratory.schedule.notices import Notice
 from cmm_uq.laboratory.schedule.schedulers import starts
-from cmm_uq.laboratory.schedule.state import Problems, last_run, remember_run, turn_at
+from cmm_uq.laboratory.schedule.state import FolderState, Problems, last_run, remember_run, turn_at
 from tests.laboratory.schedule.runs import Jobs, made
 from tests.laboratory.schedule.told import notice
 
@@ -152,6 +153,25 @@ def test_a_run_that_ended_in_the_middle_had_no_exit_code_so_the_next_one_tells_a
     os.close(left.descriptor)  # as when its process is killed
     assert [jobs.run(), jobs.run()] == [1, 0]
     assert list((jobs.out / ".scheduled" / "runs").iterdir()) == []
+
+
+@pytest.mark.parametrize(("failures", "codes"), [(1, [1, 0, 0]), (2, [3, 1, 0]), (3, [3, 3, 1])])
+def test_what_cannot_be_remembered_at_first_is_in_the_exit_code_all_the_same(
+    jobs: Jobs, failures: int, codes: list[int]
+) -> None:
+    """Locked records keep a job's notices from being queued; its second attempt finds its certificate made."""
+
+    class Locked(FolderState):
+        def claim(self, *given: Any) -> bool:
+            nonlocal failures
+            failures -= 1
+            if failures >= 0:
+                raise OutputError("the records are locked")
+            return super().claim(*given)
+
+    jobs.told, jobs.state = True, Locked(jobs.out)
+    assert [jobs.run() for _ in codes] == codes
+    assert jobs.channel.titles == ["fail: CMM 3 (job a)"]
 
 
 def test_a_clock_400_days_ahead_for_one_run_and_right_again_hides_nothing(jobs: Jobs) -> None:
