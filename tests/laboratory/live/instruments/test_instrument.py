@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
+from itertools import islice
 from pathlib import Path
 
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.tables.plan import DeclaredSource
-from cmm_uq.laboratory.live.instruments.instrument import open_source
+from cmm_uq.laboratory.live.instruments.instrument import LiveInstrument, open_source
 from cmm_uq.laboratory.live.instruments.library import profile_of, profile_of_source, unsaid_units
 from cmm_uq.laboratory.live.instruments.parsing import Framer, Parser
 from cmm_uq.laboratory.live.instruments.profile import ProfileFile
 from cmm_uq.laboratory.live.instruments.simulated_line import Way
-from cmm_uq.laboratory.live.instruments.source import Gap, Reading, Returned
+from cmm_uq.laboratory.live.instruments.source import Gap, Identity, Reading, Returned
 from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS, Readout1502, Speaker, Thermocouples
 from tests.laboratory.live.instruments.listening import Listener, hasty, listening, opened
 from tests.laboratory.live.instruments.mischief import UnreliableLine
+from tests.laboratory.live.session import FakeClock
 
 WITHIN_S = 2.0
 """From the instrument's return to its first reading: the requirement."""
@@ -260,6 +263,31 @@ def test_what_came_before_a_question_is_none_of_its_answers(tmp_path: Path) -> N
         heard.until(lambda one: len(one.good(since)) >= 3)
         assert (unasked(heard)[0].raw, unasked(heard)[0].values) == (b"T=888\r\n", {})
         assert all(one.values["temp_c"] < 100 for one in heard.good())
+
+
+class Buffered:
+    """A port in whose buffer a value waits before anything was asked; each question has its answer at once."""
+
+    def __init__(self) -> None:
+        self.buffer, self.clock = b"T=5\r\n", FakeClock()
+
+    def read(self, *, wait: bool = True) -> bytes:
+        self.clock.go(0.05 * wait)
+        received, self.buffer = self.buffer, b""
+        return received
+
+    def write(self, data: bytes) -> None:
+        self.buffer += b"T=6\r\n"
+
+    def close(self) -> None: ...
+
+
+def test_what_waits_in_the_buffer_is_drained_before_a_question() -> None:
+    port = Buffered()
+    source = LiveInstrument(Identity("a"), asked_profile(), lambda: port, port.clock)
+    first, second = (one for one in islice(source.events(threading.Event()), 2) if isinstance(one, Reading))
+    assert (first.unasked, first.values, first.raw) == (True, {}, b"T=5\r\n")
+    assert (second.unasked, second.values) == (False, {"temp_c": 6.0})
 
 
 class Begun(Generous):

@@ -25,6 +25,7 @@ from tests.laboratory.live.instruments.backtracking import Counting, check_again
 from tests.laboratory.live.instruments.test_profile import HEAD, Path
 
 EXPLODES = [
+    r"\s*+.*.*x", r"a*+(bc|bc)*d",
     r"(a+)+", r"(a+)+b", r"(a*)*b", r"\s*\s*\s*x", r".*.*.*=", r"(a|a)*b", r"(\s*,?\s*)*", r"(a|ab)*(b|c)*b*d", r"(?:a|aa)+b",
     r"\s*\s*+x", r"\d+\.?\d*x", r"(?>a+a+)b", r"(x+x+)+y", r"(.*)(\d+)z", r"^(\w+\s?)*$", r"(?i)(ab|AB)*c", r"(?:a?){60}a{60}",
     r"([ab]*a[ab]*){3}c", r"(a{1,50}){1,50}b",
