@@ -52,8 +52,13 @@ def test_a_wrong_figure_is_found_told_and_replaced_by_a_draft(archive: Path) -> 
         f"U1: {stated['value'] - OFF_MM:.10g} (u {stated['u']:.10g}) mm -> {stated['value']:.10g} (u {stated['u']:.10g}) mm"
     )
     assert lines[-2:] == [f"  draft in {Path('drafts') / 'mount'}", "1 certificate touched, 1 changed"]
-    again = (archive / "drafts" / "mount" / "results.json").read_bytes()
-    assert again == (archive / "reports" / "mount" / "results.json").read_bytes()  # the same inputs, seed and version
+    texts = [
+        (archive / folder / "mount" / "results.json").read_text(encoding="utf-8") for folder in ("drafts", "reports")
+    ]
+    again, first = (json.loads(text)["records"] for text in texts)
+    assert (again["entries"], first["entries"]) == (1, 0)  # where the records stood when each was made
+    stands, should = (text.rpartition('  "records": ')[0] for text in texts)
+    assert stands == should  # the same inputs, seed and version
     with open_records(archive / "lab.db", read_only=True) as records:
         assert [(one.entry, one.version, one.state) for one in records.certificates()] == [
             (1, "0.4.0", "draft"), (2, __version__, "draft"),
