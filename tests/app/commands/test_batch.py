@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from cmm_uq.app.commands.files import NOT_RECORDED
 from cmm_uq.app.commands.laboratory import batch as batch_run, batch_jobs
 from cmm_uq.app.commands.laboratory.batch import Batch, BatchOptions, write_batch
 from cmm_uq.app.commands.laboratory.batch_jobs import begin, conforming
@@ -62,7 +63,7 @@ def test_figures_alone_are_the_same_and_nothing_is_drawn(tmp_path: Path, monkeyp
     monkeypatch.setattr(
         "cmm_uq.certificate.plots.style.new_figure", lambda height_mm: pytest.fail("a picture is drawn")
     )
-    found = begin((0, True))(0, (str(job), dict(read_job(job).inputs)))
+    found = begin((0, True))(0, (str(job), dict(read_job(job).inputs), NOT_RECORDED))
     assert list(found) == ["results.json"]
 
 

@@ -24,8 +24,8 @@ def begin(setting: tuple[int, bool]) -> Callable[[int, Any], dict[str, bytes]]:
     return lambda number, task: answer(task, *setting)
 
 
-def answer(task: tuple[str, dict[str, bytes]], seed: int, results_only: bool) -> dict[str, bytes]:
-    _, files = task
+def answer(task: tuple[str, dict[str, bytes], Any], seed: int, results_only: bool) -> dict[str, bytes]:
+    files = task[1]
     job = tomllib.loads(files["job.toml"].decode())["job"]
     match job.get("remarks", "").split():
         case ["refuse"]:
