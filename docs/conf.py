@@ -36,7 +36,7 @@ CONTENTS: dict[str, list[str]] = {
         "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",
-        "machine/parts", "machine/part-page", "machine/other-methods", "machine/part-iota",
+        "machine/parts", "machine/field", "machine/part-page", "machine/other-methods", "machine/part-iota",
         "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
     ],
     "What it rests on": [

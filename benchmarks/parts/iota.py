@@ -19,7 +19,7 @@ import numpy as np
 import cmm_uq
 from benchmarks.examples.part_iota import COPY, FOLDER, MACHINE, ROOT, chosen, ends
 from cmm_uq.analysis.parts.machine.conditional import given_recording, joint_posterior
-from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
+from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors, with_curves
 from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.artefacts.ballbar import Ballbar
@@ -88,7 +88,7 @@ def left_out() -> dict[str, np.ndarray]:
             (spot("one", one), spot("other", other)), (PartCharacteristic("length", "distance", ("one", "other")),)
         )
         seen = float(np.linalg.norm(points.xyz[rows[1]] - points.xyz[rows[0]]) - np.linalg.norm(other - one))
-        for name, state in zip(found, (alone, given_recording(certificate, model)), strict=True):
+        for name, state in zip(found, (alone, given_recording(with_curves(certificate), model)), strict=True):
             simulated = Virtual(plan, MeasurementConditions(state)).simulated(10_000)
             found[name].append((seen - float(simulated.value[0]), float(simulated.u[0])))
     return {name: np.array(pairs) for name, pairs in found.items()}

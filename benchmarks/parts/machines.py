@@ -28,7 +28,7 @@ from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, 
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.evaluation import Evaluator, Known
 from cmm_uq.analysis.parts.machine.conditional import given_recording, joint_posterior
-from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
+from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors, with_curves
 from cmm_uq.analysis.parts.plan import PartPose
 from cmm_uq.analysis.parts.result import evaluated, stated
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
@@ -145,14 +145,20 @@ def measured(task: tuple[Cell, int, int], made: Made = Made()) -> dict[str, Any]
 
 def _measured(cell: Cell, random: np.random.Generator, made: Made) -> dict[str, Any]:
     hidden = truth.Truth.drawn(random, periods=made.periods)
+    return on_machine(cell, hidden, random, made, 1e-3 * float(np.exp(random.uniform(*np.log([0.7, 2.0])))))
+
+
+def on_machine(
+    cell: Cell, hidden: truth.Truth, random: np.random.Generator, made: Made, sigma: float
+) -> dict[str, Any]:
+    """A machine with a hidden truth, calibrated, corrected, measuring the part; ``sigma``: its noise, mm."""
     unmodelled = tuple(one for one in UNMODELLED if made.periods or not one.effect.name.startswith("periodic"))
-    sigma = 1e-3 * float(np.exp(random.uniform(*np.log([0.7, 2.0]))))
     offset = sigma * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
     model = RecordingModel(calibrated(cell, hidden, sigma, offset, random), NAMED)
     given = sigma if cell.noise == "stated" else None
     _, mean, _ = joint_posterior(model, (), sigma)
-    certificate = MachineState(MACHINE, NAMED, mean[None], StatedNoise(np.full(3, sigma)), unmodelled=unmodelled,
-                               corrections=mean)  # fmt: skip
+    certificate = with_curves(MachineState(MACHINE, NAMED, mean[None], StatedNoise(np.full(3, sigma)),
+                                           unmodelled=unmodelled, corrections=mean))  # fmt: skip
     state = given_recording(certificate, model, given, TRIALS, int(random.integers(2**31)))
     growth = (PART.cte_per_k + PART.u_cte_per_k * random.standard_normal()) * (
         PART.temperature_c - 20 + PART.u_temperature_k * random.standard_normal()

@@ -13,6 +13,7 @@ import numpy as np
 from cmm_uq.analysis.conformity.decision import Outcome, rule_words
 from cmm_uq.analysis.conformity.limits import LimitDecision
 from cmm_uq.analysis.parts.budget import PointErrors, VarianceShares, Way
+from cmm_uq.analysis.parts.influence import PriorInfluence
 from cmm_uq.analysis.parts.methods.method import MethodComparison
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.result import StatedCharacteristic
@@ -126,6 +127,7 @@ class PartMeasurement:
     asked: int = 0  # virtual measurements that were asked for, of which ``digits`` may need more
     warnings: tuple[Text, ...] = ()  # what the reader must know before using a figure
     files: Mapping[str, bytes] = field(default_factory=dict)  # that come with the page, by name
+    influence: tuple[PriorInfluence, ...] = ()  # what other priors of the machine's errors would change
 
     @property
     def characteristics(self) -> list[CharacteristicFacts]:

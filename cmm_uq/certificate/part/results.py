@@ -22,6 +22,7 @@ from cmm_uq.base.points import Floats
 from cmm_uq.certificate.origin import NAME
 from cmm_uq.certificate.part.measurement import CertificateStatus, FurtherSetUps, PartMeasurement, UnseenError
 from cmm_uq.certificate.part.method import methods_data
+from cmm_uq.certificate.part.priors_section import families_data, priors_data
 from cmm_uq.certificate.results.keys import RESULTS
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
@@ -42,7 +43,7 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
         "job": _job(found.job),
         "part": {"name": facts.part.name, "drawing": facts.part.drawing or None, "serial": facts.part.serial or None,
                  "not_measured": list(facts.part.not_measured)},
-        "machine": standing_data(found.standing),
+        "machine": standing_data(found.standing) | {"families": families_data(found)},
         "simulation": {
             "virtual_measurements": simulated.trials, "asked": found.asked, "seed": found.seed, "coverage": simulated.coverage,
             "digits": found.digits, "settled": simulated.stable, "first_order": not found.virtual.exact,
@@ -62,6 +63,7 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
         "verdicts": Verdicts.of_results({"characteristics": stated}).data(),
         "budget": _budget(found),
         "unseen": [_unseen(one) for one in found.unseen],
+        "priors": priors_data(found.influence),
         "further": None if found.further is None else _further(found.further),
         "ways": [
             {"way": _plain(way.name), "u": list(map(_in, found.characteristics, way.u.tolist()))} for way in found.ways
@@ -216,6 +218,12 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "machine.changes[].change": ("its own", "Root mean square of its change since, as the records let expect."),
         "machine.temperature_c": ("°C", "Mean temperature of the scales that the calibration recorded."),
         "machine.inputs_sha256.FILE": ("", "SHA-256 of each input of the calibration."),
+        "machine.families[].family": ("", "A family of errors of one size, where the recording says how large it is."),
+        "machine.families[].unit": ("", "Of the sizes beside it."),
+        "machine.families[].allowed": (OWN, "Root mean square that physics allows: the width of its half-normal prior."),
+        "machine.families[].size": (OWN, "As the recording shows it, the median."),
+        "machine.families[].low": (OWN, "Lower end of its 95 % interval."),
+        "machine.families[].high": (OWN, "Upper end."),
         "simulation.virtual_measurements": ("", "How many were drawn."),
         "simulation.asked": ("", "How many were asked for; `--digits` may take more."),
         "simulation.seed": ("", "Seed of the random numbers."),
@@ -287,6 +295,10 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "unseen[].title": ("", "The same in words."),
         "unseen[].share": ("", "Its share of the variance."),
         "unseen[].why": ("", "Why it was not seen, in words."),
+        "priors[].family": ("", "A family of errors, an error that no recording shows, or `all` of them."),
+        "priors[].times": ("", "By which its prior is narrower or wider."),
+        "priors[].u_ratio": ("", "u that would follow over u as stated, by characteristic; null where draws do not say it."),
+        "priors[].shift_u": ("u", "Change of the value, likewise."),
         "further.effects": ("", "Effects that further set-ups of the calibration's artefact show."),
         "further.setups": ("", "How many set-ups."),
         "further.text": ("", "The same in words."),

@@ -33,11 +33,12 @@ from cmm_uq.analysis.parts.causes.cause import (
     field_components,
     normal,
 )
-from cmm_uq.analysis.parts.machine.state import GivenPeriod, MachineState, Unmodelled
+from cmm_uq.analysis.parts.machine.state import MachineState, Unmodelled
 from cmm_uq.analysis.parts.plan import OWN_COLUMNS, PartPose, Plan, Stylus, probed
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.machine.model.field import GivenPeriod
 from cmm_uq.machine.physics.superposition import About, Superposition
 
 MACHINE, NOISE, STYLUS = "machine", "noise", "stylus"
@@ -244,6 +245,8 @@ def modelled(state: MachineState, qualified: Qualified, pose: PartPose, measured
         return np.asarray(drawn) + random.standard_normal((n, len(drift))) * drift
 
     why = dict.fromkeys(state.free, say("the calibration left it to what physics allows"))
+    as_others = say("the calibration shows little of it; as large as it shows errors of this kind to be")
+    why |= dict.fromkeys(state.as_family, as_others)
     basis = -_in_part(qualified.left(columns), pose)
     return CommonCause(name=MACHINE, factors=tuple(factors), draw=draw, named=why, basis=basis)
 

@@ -1,40 +1,29 @@
 """The machine's errors given the recording of its calibration, those included that the calibration did not model.
 
-The linear model of a calibration's recording with what the calibration left out of its model.
-
-However many errors were left out, a recording sees no more combinations of them than it has observations: those are its
-unknowns beside the calibration's own. Each error takes up what is said of them by its covariance with them, and keeps its
-prior in what is not seen.
-
-The machine's errors given the recording of its calibration, those included that the calibration did not model.
-
 What a calibration leaves out of its model does not stay out of its recording: it goes into the estimates of what is modelled,
 and into its noise. A part measured like the artefact then errs by less than both would alone, another part by more. Where the
-recording is at hand (a job, or a certificate that carries it) everything is therefore estimated together, each error with the
-prior that physics allows, under a noise of components whose sizes are sampled with them; what the machine corrects stays what
-its certificate states.
-
-However many errors were left out, a recording sees no more combinations of them than it has observations: those are sampled,
-and what it does not see of each keeps its prior.
+recording is at hand (a job, or a certificate that carries it) everything is therefore estimated together, the machine as one
+random field: each error of a size that its family has, the families' sizes and those of the noise's components as the
+recording says; what the machine corrects stays what its certificate states. What the recording does not see of a family keeps
+the size that the family is seen to have; of a family that it does not see at all, what physics allows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.analysis.parts.machine.state import GivenPeriod, MachineState, StatedNoise, Unmodelled, covariance, linear
+from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, Unmodelled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
-from cmm_uq.base.units import unit
-from cmm_uq.machine.model.measurement import ARTEFACT, RecordingModel
+from cmm_uq.machine.model.field import GivenPeriod, covariance, family_of, linear
+from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import growing_lengths, noise_of
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import PeriodicScale
-from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel, Unknown
-from cmm_uq.maths.inference.marginal import Marginal
+from cmm_uq.maths.inference.field import FieldErrors, FieldModel, sample_sizes
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import sample_with_noise
 
@@ -58,152 +47,66 @@ def shown(model: RecordingModel, effect: Effect) -> Floats:
     return model.seen(model.columns(PointwiseEffect(effect), (), about), about)
 
 
-# of the scatter of the residuals: what a combination of errors adds to the observations below which they do not show it
-_UNSEEN = 0.01
-_MOST = 400  # combinations, those that the recording sees best; what others say is left to their prior
-_SMALLEST = 1e-6  # mm: the smallest noise that is sampled
-_ROWS = 1000  # draws at once
-
-
 @dataclass(frozen=True, eq=False)
-class _Given:
-    """An error that was left out, with what a recording says of it: its part of :class:`JointModel`."""
+class RecordedField:
+    """A calibration's model, and what it left out, as one linear model with families of errors."""
 
-    effect: Effect
-    sd: Floats
-    seen: Floats
-    gain: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class _Shown:
-    """What the recording shows of an error that was left out."""
-
-    effect: Effect  # linear; of a periodic one the sum of its trials
-    # (j,) of its coefficients beforehand: what physics allows, since the recording itself says how large it may be
-    sd: Floats
-    columns: Floats  # (m, j) mm of the observations for these, without what a placing reaches, which shows nothing
-    covariance: Floats  # (m, m) mm² beforehand
-    periodic: PeriodicScale | None  # the effect itself where it is periodic, else ``None``
-    # readings, impulse: (p,) mm where its scale stood; (m, p) of the observations for a millimetre of error at each
-    readings: Floats
-    impulse: Floats
-
-    @classmethod
-    def of(cls, effect: Effect, model: RecordingModel, own: LinearModel, about: Floats) -> _Shown:
-        whole, nothing = linear(effect), np.zeros(0)
-        sd = np.array([coefficient.prior_sd for coefficient in whole.coefficients])
-        if not isinstance(effect, PeriodicScale):
-            columns = sd * _left(own, model.seen(model.columns(whole, (), about), about))
-            return cls(whole, sd, columns, columns @ columns.T, None, nothing, nothing)
-        points, impulse = model.artefact.points, _left(own, shown(model, effect))
-        readings = points.readings[effect.axis]
-        columns = sd * (impulse @ whole.basis(points)[:, "xyz".index(effect.axis)])
-        beforehand = impulse @ covariance(effect, readings, readings) @ impulse.T
-        return cls(whole, sd, columns, beforehand, effect, readings, impulse)
-
-    def given(self, into: Floats) -> _Given:
-        """The effect with the recording.
-
-        ``into``: (m, r) whose transpose takes observations, mm, to combinations.
-        """
-        seen = into.T @ self.columns
-        if self.periodic is None:
-            return _Given(self.effect, self.sd, seen, seen * self.sd)
-        none = np.zeros((len(seen), len(seen)))
-        return _Given(
-            GivenPeriod(self.periodic, self.readings, self.impulse.T @ into), np.append(self.sd, np.zeros(len(seen))),
-            np.hstack([seen, none]), np.hstack([np.zeros_like(seen), np.eye(len(seen))]),
-        )  # fmt: skip
-
-
-def _left(own: LinearModel, columns: Floats) -> Floats:
-    """Columns (m, j), mm, without what a placing reaches."""
-    return np.asarray(own.reduce(columns) * own.noise_scale[:, None])
-
-
-@dataclass(frozen=True, eq=False)
-class JointModel:
-    """The linear model of a calibration with what it left out."""
-
-    # of the calibration's unknowns, then of combinations of what it left out, standard normal beforehand
-    linear: LinearModel
-    estimate: LeastSquares  # least squares of the calibration, where these are zero
+    field: FieldModel
+    modelled: int  # coefficients of the calibration's own effects
     which: tuple[int, ...]  # places of what takes part in what was left out
     effects: tuple[Effect, ...]  # those, linear
-    sd: Floats  # (f,) of their coefficients beforehand, zero of what a recording says of an error with a period
-    seen: Floats  # (r, f) combinations that the recording sees, of the coefficients over their standard deviations
-    gain: Floats  # (r, f) what a combination that is larger by one says of each coefficient
+    sd: Floats  # (f,) of a unit of each of their coefficients, in its own unit
 
     @classmethod
-    def of(cls, model: RecordingModel, further: Sequence[Unmodelled]) -> JointModel:
-        """Of a calibration and of what it left out; what needs columns that were not recorded takes no part."""
+    def of(cls, model: RecordingModel, further: Sequence[Unmodelled], *, learned: bool = True) -> RecordedField:
+        """Of a calibration and of what it left out; what needs columns that were not recorded takes no part.
+
+        ``learned``: whether families have sizes to be found; else all are as large as physics allows.
+        """
         recorded = model.artefact.points.columns
         which = tuple(i for i, one in enumerate(further) if all(name in recorded for name in one.effect.columns))
         estimate = model.estimate()
-        own = estimate.linear
-        each = [_Shown.of(further[i].effect, model, own, estimate.about) for i in which]
-        beforehand = sum((one.covariance for one in each), np.zeros((len(own.observed), len(own.observed))))
-        squares, axes = np.linalg.eigh(beforehand)
-        least = max(_SMALLEST, _UNSEEN * estimate.least_squares.sigma_of_residuals)
-        kept = np.flatnonzero(squares > least**2)[::-1][:_MOST]
-        sizes, axes = np.sqrt(squares[kept]), axes[:, kept]
-        one = unit("1")
-        combined = tuple(Unknown(("left out", str(j)), one, 0.0, 1.0, 1.0) for j in range(len(kept)))
-        whole = replace(own, design=np.hstack([own.design, axes * sizes]), unknowns=(*own.unknowns, *combined))
-        value = np.append(estimate.least_squares.value, np.zeros(len(combined)))
-        given = [one.given(axes / sizes) for one in each]
-        none = np.zeros((len(kept), 0))
+        errors = [_errors(model, further[i].effect, estimate.about, learned) for i in which]
+        components = replace(noise_of(model), known=model.least_noise)
+        whole = FieldModel(estimate.linear, components, estimate.least_squares, tuple(errors))
+        effects, sds = list[Effect](), [np.zeros(0)]
+        for i, one in zip(which, errors, strict=True):
+            effect = further[i].effect
+            sds.append(_sd(linear(effect)))
+            if one.impulse is not None and isinstance(effect, PeriodicScale):
+                seen = whole.shown(one.impulse)
+                sds.append(np.ones(len(seen)))
+                readings = model.artefact.points.readings[effect.axis]
+                effects.append(GivenPeriod(effect, readings, seen.T))
+            else:
+                effects.append(effect)
         return cls(
-            whole, replace(estimate.least_squares, value=value), which, tuple(one.effect for one in given),
-            np.concatenate([np.zeros(0), *(one.sd for one in given)]), np.hstack([none, *(one.seen for one in given)]),
-            np.hstack([none, *(one.gain for one in given)]),
-        )  # fmt: skip
+            whole, sum(len(effect.coefficients) for effect in model.effects), which, tuple(effects), np.concatenate(sds)
+        )
 
-    def white(self, sigma_mm: float) -> tuple[Floats, Floats]:
-        """Mean (u,) of the linear model's unknowns, and R (u, u) of their covariance RᵀR, for a white noise that is known."""
-        rows, given = self.linear.priors
-        scale = np.array([unknown.scale for unknown in self.linear.unknowns])
-        whitened = np.vstack([self.linear.reduced.design / sigma_mm, rows]) * scale
-        if np.linalg.matrix_rank(whitened) < whitened.shape[1]:
-            raise open_size()
-        inverse = scale[:, None] * np.linalg.pinv(whitened)
-        mean = inverse @ np.append(self.linear.reduced.observed / sigma_mm, given)
-        return mean, np.asarray(np.linalg.qr(inverse.T, mode="r"))
-
-    def coefficients(self, draws: Floats, random: np.random.Generator) -> Floats:
-        """(N, k + f) of the calibration's effects, then of what it left out, of draws (N, …) of the linear model."""
-        k = len(draws[0]) - len(self.seen) - self._sizes
-        found = np.empty((len(draws), k + len(self.sd)))
-        found[:, :k] = draws[:, :k]
-        for start in range(0, len(draws), _ROWS):
-            rows = slice(start, start + _ROWS)
-            free = self._beforehand(random, len(draws[rows]))
-            more = draws[rows, len(draws[0]) - len(self.seen) :] - free @ self.seen.T
-            free *= self.sd
-            free += more @ self.gain
-            found[rows, k:] = free
-        return found
-
-    def _beforehand(self, random: np.random.Generator, count: int) -> Floats:
-        """Draws (N, f) of the coefficients over their standard deviations, without the recording."""
-        each = [
-            effect.beforehand(random, count) if isinstance(effect, GivenPeriod)
-            else random.standard_normal((count, len(effect.coefficients)))
-            for effect in self.effects
-        ]  # fmt: skip
-        return np.hstack([np.zeros((count, 0)), *each])
-
-    @property
-    def _sizes(self) -> int:
-        """How many of the calibration's unknowns are sizes of its artefact."""
-        return sum(unknown.key[0] == ARTEFACT for unknown in self.linear.unknowns)
+    def coefficients(self, sizes: Sizes, scales: Floats, random: np.random.Generator) -> Floats:
+        """Exact draws (N, k + f) of the calibration's effects, then of what it left out, for N sizes of noise and families."""
+        drawn = self.field.draw(sizes, scales, random)
+        further = drawn[:, drawn.shape[1] - len(self.sd) :] * self.sd
+        return np.hstack([drawn[:, : self.modelled], further])
 
 
-def open_size() -> CmmUqError:
-    """What is raised where nothing says how large the artefact is."""
-    return CmmUqError("the recording leaves a size of its artefact open, of which nothing is known beforehand",
-                      where="the calibration", fix="Give the artefact's length")  # fmt: skip
+def _sd(effect: Effect) -> Floats:
+    """Of its coefficients beforehand: what physics allows, since the recording itself says how large it may be."""
+    return np.array([coefficient.prior_sd for coefficient in effect.coefficients])
+
+
+def _errors(model: RecordingModel, effect: Effect, about: Floats, learned: bool) -> FieldErrors:
+    whole = linear(effect)
+    family = family_of(effect) if learned else None
+    if not isinstance(effect, PeriodicScale):
+        columns = model.seen(model.columns(whole, (), about), about) * _sd(whole)
+        j = columns.shape[1]
+        return FieldErrors(family, columns, lambda random, count: random.standard_normal((count, j)))
+    readings, impulse = model.artefact.points.readings[effect.axis], shown(model, effect)
+    columns = impulse @ whole.basis(model.artefact.points)[:, "xyz".index(effect.axis)] * _sd(whole)
+    beforehand = GivenPeriod(effect, readings, np.zeros((len(readings), 0))).beforehand
+    return FieldErrors(family, columns, beforehand, impulse, covariance(effect, readings, readings))
 
 
 def stated_noise(model: RecordingModel, components: Components, sizes: Sizes) -> StatedNoise:
@@ -234,31 +137,27 @@ DRAWS = 10_000
 _UNTOLD = 100.0
 
 
+def white(sigma_mm: float) -> Sizes:
+    """One draw of a noise that is known: the same of each coordinate of each point."""
+    none = np.zeros(1)
+    return Sizes(np.full((1, 3), sigma_mm), none, none, none, none + 1)
+
+
 def joint_posterior(
     model: RecordingModel, further: Sequence[Unmodelled], sigma_mm: float
 ) -> tuple[tuple[int, ...], Floats, Floats]:
     """Normal posterior of a calibration's errors and of errors that it did not model, for a white noise that is known.
 
-    ``further``: what it did not model; what needs columns that were not recorded is left out.
+    ``further``: what it did not model, as large as physics allows; what needs columns that were not recorded is left out.
 
     Returns ``which``: places in ``further`` of those that take part. ``mean, covariance``: (k,) and (k, k) of the
     coefficients of the model's effects, then of those.
     """
-    whole = JointModel.of(model, further)
-    mean, root = whole.white(sigma_mm)
-    covariance = root.T @ root
-    k = sum(len(effect.coefficients) for effect in model.effects)
-    at = np.r_[:k, len(mean) - len(whole.seen) : len(mean)]
-    into = np.zeros((k + len(whole.sd), len(at)))
-    into[:k, :k] = np.eye(k)
-    into[k:, k:] = whole.gain.T
-    free = np.vstack([np.zeros((k, len(whole.sd))), np.diag(whole.sd) - whole.gain.T @ whole.seen])
-    return whole.which, into @ mean[at], into @ covariance[np.ix_(at, at)] @ into.T + free @ free.T
-
-
-def draws_given(whole: JointModel, components: Components, sizes: Sizes, random: np.random.Generator) -> Floats:
-    """Exact draws (N, k + f) of all errors, one for each of N sizes of the noise; no finite ones where a size is open."""
-    return whole.coefficients(Marginal(whole.linear, components, whole.estimate).draw(sizes, random), random)
+    whole = RecordedField.of(model, further, learned=False)
+    mean, spread = whole.field.normal(white(sigma_mm), np.zeros(0))
+    at = np.r_[: whole.modelled, len(mean) - len(whole.sd) : len(mean)]
+    unit = np.append(np.ones(whole.modelled), whole.sd)
+    return whole.which, mean[at] * unit, spread[np.ix_(at, at)] * np.outer(unit, unit)
 
 
 def given_recording(
@@ -271,57 +170,67 @@ def given_recording(
     ``model``: of the calibration, without the observations that its certificate set aside. ``sigma_mm``: standard deviation
     of one recorded coordinate, where the noise is known and white; else it is sampled.
     """
-    whole, random = JointModel.of(model, state.unmodelled), np.random.default_rng(seed)
-    if sigma_mm is not None:
-        noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
-        mean, root = whole.white(sigma_mm)
-        drawn = whole.coefficients(mean + random.standard_normal((draws, len(root))) @ root, random)
-        return _with(state, model, whole, drawn, noise)
-    components = replace(noise_of(model), known=model.least_noise)
-    posterior = sample_with_noise(whole.linear, components, whole.estimate, seed)
-    every = _evenly(len(posterior.draws), draws)
-    sizes, drawn = posterior.sizes.at(every), whole.coefficients(posterior.draws[every], random)
-    low, high = np.quantile(sizes.coordinate, [0.05, 0.95])
-    told = bool(high <= _UNTOLD * low)
-    if not told:  # any noise would do: it is taken for what the calibration took it for, which is no less
-        estimate = model.estimate()
-        alone = sample_with_noise(estimate.linear, components, estimate.least_squares, seed)
-        sizes = alone.sizes.at(_evenly(len(alone.draws), draws))
-        drawn = draws_given(whole, components, sizes, random)
-    return _with(state, model, whole, drawn, stated_noise(model, components, sizes))
+    whole, random = RecordedField.of(model, state.unmodelled), np.random.default_rng(seed)
+    known = None if sigma_mm is None else white(sigma_mm)
+    noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
+    sizes = sample_sizes(whole.field, draws, seed, known)
+    if known is None:
+        low, high = np.quantile(sizes.noise.coordinate, [0.05, 0.95])
+        if (
+            high > _UNTOLD * low
+        ):  # any noise would do: it is taken for what the calibration took it for, which is no less
+            estimate = model.estimate()
+            alone = sample_with_noise(estimate.linear, whole.field.noise, estimate.least_squares, seed).sizes
+            typical = alone.typical
+            sizes = replace(
+                sample_sizes(whole.field, draws, seed, typical), noise=alone.at(_evenly(len(alone.placing), draws))
+            )
+        noise = stated_noise(model, whole.field.noise, sizes.noise)
+    drawn = whole.coefficients(sizes.noise, sizes.families, random)
+    together = _with(state, model, whole, drawn, noise)
+    scales = dict(zip(whole.field.families, sizes.families.T, strict=True))
+    return replace(together, scales=scales, prior_share=_shares(together), family_share=_shares(together, scales))
 
 
 def _with(
-    state: MachineState, model: RecordingModel, whole: JointModel, drawn: Floats, noise: StatedNoise
+    state: MachineState, model: RecordingModel, whole: RecordedField, drawn: Floats, noise: StatedNoise
 ) -> MachineState:
     """The state with draws (N, k + f) of all errors together."""
     if not np.isfinite(drawn).all():
-        raise open_size()
+        raise CmmUqError("a draw is no finite number", where="the calibration")
     acting = {one.name for one in state.effects}
     own = [effect.name in acting for effect in model.effects for _ in effect.coefficients]
     kept = np.flatnonzero(np.append(own, np.ones(len(whole.sd), dtype=bool)))
     none = np.zeros(len(whole.sd))
-    together = replace(
+    return replace(
         state, effects=(*state.effects, *whole.effects), draws=drawn[:, kept], noise=noise, corrected=True,
         unmodelled=tuple(one for i, one in enumerate(state.unmodelled) if i not in whole.which),
         corrections=np.append(state.corrects, none), drift=np.append(state.drift, none),
     )  # fmt: skip
-    return replace(together, prior_share=_shares(together))
 
 
-def _shares(state: MachineState) -> dict[str, float]:
-    """Posterior standard deviation of each effect over its prior one, of several coefficients in the root mean square."""
-    found, start = dict[str, float](), 0
+def _shares(state: MachineState, scales: Mapping[str, Floats] | None = None) -> dict[str, float]:
+    """Posterior standard deviation of each effect over its prior one, of several coefficients in the root mean square.
+
+    ``scales``: of the families, to which prior ones are held then; of effects without a family nothing is said.
+    """
+    squares, start = dict[str, Floats](), 0
     for effect in state.effects:
         own = state.draws[:, start : start + len(effect.coefficients)]
         start += len(effect.coefficients)
-        if isinstance(effect, GivenPeriod):
-            found[effect.name] = effect.share(own)
-            continue
+        size, family = 1.0, family_of(effect)
+        if scales is not None:
+            if family is None or family not in scales:
+                continue
+            size = float(np.mean(scales[family] ** 2))
         prior = sum(coefficient.prior_sd**2 for coefficient in effect.coefficients)
-        found[effect.name] = float(np.sqrt(own.var(axis=0).sum() / prior)) if prior else 0.0
-    return found
+        each = np.array([own.var(axis=0).sum(), size * prior])
+        if isinstance(effect, GivenPeriod):
+            each = np.array([effect.share(own) ** 2, size])
+        squares[effect.name] = squares.get(effect.name, np.zeros(2)) + each
+    return {name: float(np.sqrt(left / prior)) if prior else 0.0 for name, (left, prior) in squares.items()}
 
 
 def _evenly(count: int, wanted: int) -> Ints:
-    return np.linspace(0, count - 1, min(wanted, count)).astype(np.int64)
+    """``wanted`` places of ``count``, some more than once where there are fewer."""
+    return np.linspace(0, count - 1, wanted).astype(np.int64)

@@ -9,14 +9,6 @@ Taken is plain data that somebody else has read and verified: ``results.json`` a
 machine say how its errors drift, that is drawn with them; where nothing is known of it, the errors are named and taken as they
 were, with the age of the certificate.
 
-
-An error with a period of which only bounds are known is any within them, evenly in its logarithm. A sum over many trial
-periods, each with its share of the variance, has the same mean and nearly the same covariance between any two points; it is
-linear, so that it can be drawn together with everything else (normal where the truth is a mixture). Few trials would pretend
-to know the period: two points far apart would err alike. What a recording says of such an error follows from its covariance
-itself, a difference of cosine integrals: from the sum, amplitudes of trial periods would answer for periods between them, and
-a recording of some hundred readings would seem to determine them all. So a draw of the sum is a draw beforehand, and what the
-recording says is added to it.
 """
 
 from __future__ import annotations
@@ -25,118 +17,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property
-from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.special import sici
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.points import Floats, Machine, Points
-from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.base.points import Floats, Machine
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.machine.model.field import ALLOWED, curves, family_of
 from cmm_uq.machine.physics.catalogue import effects, every
-from cmm_uq.machine.physics.effect import CONTRACT, Effect, Parameter
-from cmm_uq.machine.physics.effects.drives import PeriodicScale
-
-_SAME = 1e-6  # of the shortest period: a distance over which nothing changes
-_LOOKED_AT = 61  # readings
-TRIED = 64  # periods: correlations of errors at two places are then off by less than a tenth in the root mean square
-
-
-class EveryPeriod(Effect):
-    """All trial periods of an effect at once; without a shape of its own."""
-
-    def __init__(self, effect: Effect) -> None:
-        self.of = effect
-        self.at = tuple(product(*(_evenly(shape.low, shape.high) for shape in effect.shape)))
-        share = 1 / np.sqrt(len(self.at))
-        self.name, self.title, self.formula = effect.name, effect.title, effect.formula
-        self.mechanism, self.points_to = effect.mechanism, effect.points_to
-        self.columns, self.tier, self.along_motion = effect.columns, effect.tier, effect.along_motion
-        self.coefficients = tuple(
-            replace(one, name=f"{one.name} {i}", prior_sd=float(one.prior_sd * share))
-            for i in range(1, len(self.at) + 1)
-            for one in effect.coefficients
-        )
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return np.concatenate([self.of.basis(points, each) for each in self.at], axis=2)
-
-
-class GivenPeriod(Effect):
-    """A periodic error with all its trial periods at once, and what a recording says of it, for each combination that it sees.
-
-    A draw f of the sum beforehand is conditioned at any reading x by f(x) + k(x, X)·B·w, w what combinations were found to be
-    less what they are by that draw and all others (conditioning by kriging: Chilès, Delfiner 2012, 7.3).
-
-    ``effect``: periodic. ``readings``: (p,) X, where the scale stood at the points of the recording, mm. ``into``: (p, r) B,
-    1/mm.
-    """
-
-    def __init__(self, effect: PeriodicScale, readings: Floats, into: Floats) -> None:
-        self.of, self.sum, self.readings, self.into = effect, EveryPeriod(effect), readings, into
-        self.name, self.title, self.formula = effect.name, effect.title, effect.formula
-        self.mechanism, self.points_to = effect.mechanism, effect.points_to
-        self.axis = self.along_motion = effect.axis
-        said = (Parameter(f"said {j}", unit("1"), 0.0) for j in range(1, into.shape[1] + 1))
-        self.coefficients = (*self.sum.coefficients, *said)
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        found = np.zeros((len(points), 3, len(self.coefficients)))
-        found[:, "xyz".index(self.axis)] = self.at(points.readings[self.axis])
-        return found
-
-    def at(self, reading: Floats) -> Floats:
-        """(n, j) mm of error at readings (n,): of the trials, then of the combinations."""
-        angle = 2 * np.pi * reading[:, None] / np.ravel(self.sum.at)
-        waves = MICROMETRE * np.stack([np.sin(angle), np.cos(angle)], axis=2).reshape(len(reading), -1)
-        return np.hstack([waves, covariance(self.of, reading, self.readings) @ self.into])
-
-    def beforehand(self, random: np.random.Generator, count: int) -> Floats:
-        """Draws (N, j) of the coefficients over their standard deviations, without the recording: of one trial period each.
-
-        Mean and covariance are those of all at once; errors of a linear estimate are then distributed as those of machines
-        with one period.
-        """
-        trials, waves = len(self.sum.at), len(self.of.coefficients)
-        found = np.zeros((count, trials, waves))
-        found[np.arange(count), random.integers(trials, size=count)] = np.sqrt(trials) * random.standard_normal(
-            (count, waves)
-        )
-        return np.hstack([found.reshape(count, -1), np.zeros((count, self.into.shape[1]))])
-
-    def share(self, draws: Floats) -> float:
-        """Standard deviation of errors by draws (N, j), between the readings of the recording, over that beforehand."""
-        between = np.linspace(self.readings.min(), self.readings.max(), _LOOKED_AT)
-        left = (draws @ self.at(between).T).var(axis=0).mean()
-        return float(np.sqrt(left) / (MICROMETRE * self.of.coefficients[0].prior_sd))
-
-
-def covariance(effect: PeriodicScale, one: Floats, other: Floats) -> Floats:
-    """(n, p) mm², of an error whose period nobody knows, at readings (n,) and (p,), mm.
-
-    The mean of σ²·cos(2πd/λ) over ln λ: σ²·(Ci(2πd/λ₀) − Ci(2πd/λ₁))/ln(λ₁/λ₀).
-    """
-    (shape,), sd = effect.shape, MICROMETRE * effect.coefficients[0].prior_sd
-    apart = 2 * np.pi * np.abs(np.subtract.outer(one, other))
-    same = apart < _SAME * shape.low
-    apart[same] = 1.0
-    found = sici(apart / shape.low)[1] - sici(apart / shape.high)[1]
-    found /= np.log(shape.high / shape.low)
-    found[same] = 1.0
-    return np.asarray(sd**2 * found)
-
-
-def _evenly(low: float, high: float) -> list[float]:
-    """The middle of each of as many equal parts of the logarithm, which have the same share of the prior each."""
-    each: list[float] = np.exp(np.log(low) + np.log(high / low) * (np.arange(TRIED) + 0.5) / TRIED).tolist()
-    return each
-
-
-def linear(effect: Effect) -> Effect:
-    """The effect itself where it has no shape, else all of its trials at once."""
-    return EveryPeriod(effect) if effect.shape else effect
-
+from cmm_uq.machine.physics.effect import CONTRACT, Effect
 
 POWER_QUANTILE = 1.6449  # of a normal error one in ten, in size, is larger than so many standard deviations
 # mechanisms that are no error of the machine on its own; those of the stylus are drawn from its qualification
@@ -215,6 +105,10 @@ class MachineState:
     )  # nonlinear parameters of effects that have some
     # by effect, part of its posterior standard deviation that is the prior's own: near 1 where the calibration said nothing
     prior_share: Mapping[str, float] = field(default_factory=dict)
+    # by effect, the same of what errors of its family are found to be: near 1 where nothing was seen of it but of others
+    family_share: Mapping[str, float] = field(default_factory=dict)
+    # (M,) sizes of families of errors over what physics allows, where its recording says how large they are
+    scales: Mapping[str, Floats] = field(default_factory=dict)
     unmodelled: tuple[Unmodelled, ...] = ()  # errors that it may have besides
     drift: Floats = field(
         default_factory=lambda: np.zeros(0)
@@ -272,6 +166,12 @@ class MachineState:
         """Effects that the calibration left to their priors."""
         return tuple(effect.name for effect in self.effects if self.prior_share.get(effect.name, 0.0) > FREE)
 
+    @property
+    def as_family(self) -> tuple[str, ...]:
+        """Effects of which the calibration shows less than of others of their family, whose size they have."""
+        free = self.free
+        return tuple(name for name, share in self.family_share.items() if share > FREE and name not in free)
+
 
 def of_machine(effect: Effect) -> bool:
     """Whether an effect is an error of the machine, and not of an artefact or of a probe."""
@@ -313,6 +213,13 @@ def unmodelled_errors(modelled: Iterable[str], detected: Mapping[str, float | No
         seen = np.inf if size is None else size / POWER_QUANTILE
         found.append(Unmodelled(effect, np.asarray(allowed * min(1.0, seen / allowed[0])), size))
     return tuple(found)
+
+
+def with_curves(state: MachineState) -> MachineState:
+    """With the smooth functions of the axes in place of their simplest forms among the errors that were not modelled."""
+    plain = tuple(one for one in state.unmodelled if family_of(one.effect) not in ALLOWED)
+    every = (Unmodelled(one, np.array([c.prior_sd for c in one.coefficients])) for one in curves())
+    return replace(state, unmodelled=(*plain, *every))
 
 
 def noise_of_draws(reported: Mapping[str, Floats]) -> StatedNoise:

@@ -16,7 +16,7 @@ import numpy as np
 from cmm_uq import __version__
 from cmm_uq.analysis.diagnosis.held_out import thin_out
 from cmm_uq.analysis.parts.machine.conditional import given_recording
-from cmm_uq.analysis.parts.machine.state import MachineState, machine_stated
+from cmm_uq.analysis.parts.machine.state import MachineState, machine_stated, with_curves
 from cmm_uq.app.commands.certificates.verification import Verification, examine_certificate, verify_given
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import with_noise
@@ -366,7 +366,7 @@ def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineStat
         quantities = np.unique(place, axis=0)
         most = _MOST * count // max(len(quantities), 1)
         model = thin_out(model, partial(observe, job.facts.artefact, where=job.recording_path), seed, most)
-        together = given_recording(state, model, seed=seed)
+        together = given_recording(with_curves(state), model, seed=seed)
     except CmmUqError as error:
         why = Verbatim(error.problem)
         told = say("The errors could not be drawn given the recording ({why}): {apart}.", why=why, apart=apart)
@@ -374,6 +374,8 @@ def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineStat
     text: Text = say(
         "All errors are drawn together, given the recording of the calibration, those included that it did not model."
     )
+    if together.scales:
+        text = after(text, say("Errors of each kind are as large as the recording shows that kind to be."))
     if (some := int(model.used.sum())) < count:
         text = after(text, say("{some} of its {count} observations are reckoned with.", some=some, count=count))
     return together, text, True

@@ -13,6 +13,7 @@ import numpy as np
 from cmm_uq.analysis.conformity.decision import PriorKnowledge
 from cmm_uq.analysis.conformity.limits import LimitDecision, Limits, judge
 from cmm_uq.analysis.parts.budget import DRAWS as SHARED, point_errors, variance_shares, ways
+from cmm_uq.analysis.parts.influence import prior_influence
 from cmm_uq.analysis.parts.methods.of_job import compare_methods, methods_of
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.result import conforming, evaluated, middle, stated, within_bounds
@@ -120,6 +121,7 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
         for line, share, why in shares.told(name, virtual.named, MATTERS)
     )
     further = further_of(machine.job, unseen)
+    influence = prior_influence(virtual, machine.state, simulated.u, seed)
 
     # values, limits, decisions (JCGM 106)
     stage("Decisions", 0.85)
@@ -132,7 +134,7 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
         None if further is None else further.further, decisions, together, tuple(reductions),
         point_errors(virtual, seed=seed), (x, y, z), machine.standing, compare_methods(characteristics, shares, methods),
         digits=options.digits, seed=seed, asked=trials, warnings=machine.warnings,
-        files={} if further is None else further.files,
+        files={} if further is None else further.files, influence=influence,
     )  # fmt: skip
 
 

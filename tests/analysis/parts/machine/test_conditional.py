@@ -14,21 +14,16 @@ from scipy.stats import binom
 
 import cmm_uq
 from cmm_uq.analysis.parts.machine.conditional import (
-    JointModel,
-    draws_given,
+    RecordedField,
     given_recording,
     joint_posterior,
     shown,
     stated_noise,
 )
 from cmm_uq.analysis.parts.machine.state import (
-    TRIED,
-    EveryPeriod,
-    GivenPeriod,
     MachineState,
     StatedNoise,
     Unmodelled,
-    covariance,
     machine_stated,
     of_machine,
 )
@@ -39,6 +34,7 @@ from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import RecordingModel
+from cmm_uq.machine.model.field import TRIED, EveryPeriod, GivenPeriod, covariance
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.model.recorded import Noise
 from cmm_uq.machine.physics.catalogue import effects
@@ -83,7 +79,7 @@ def test_what_cannot_be_told_from_the_recording_stays_on_its_own() -> None:
     further = left_out("hysteresis_x", "rotation_x_x", "periodic_scale_y")
     which, mean, _ = joint_posterior(calibration(), further, SIGMA)
     assert which == (1, 2)  # play needs directions of approach
-    assert len(mean) == 6 + 1 + 2 * TRIED + len(JointModel.of(calibration(), further).seen)
+    assert len(mean) == 6 + 1 + 2 * TRIED + RecordedField.of(calibration(), further, learned=False).field.into.shape[1]
 
 
 def test_all_trial_periods_together_have_nearly_the_covariance_of_a_period_that_nobody_knows() -> None:
@@ -135,7 +131,7 @@ def test_what_a_recording_says_of_an_error_with_a_period_is_what_its_covariance_
     further, between = left_out("periodic_scale_y"), np.linspace(333.0, 800.0, 40)
     mean, variance = beside(model, sigma, between)
     _, found, spread = joint_posterior(model, further, sigma)
-    (effect,) = JointModel.of(model, further).effects
+    (effect,) = RecordedField.of(model, further, learned=False).effects
     assert isinstance(effect, GivenPeriod)
     at = effect.at(between)
     np.testing.assert_allclose(at @ found[6:], mean, atol=0.02 * float(np.sqrt(np.diagonal(variance).mean())))
@@ -149,7 +145,7 @@ def test_what_a_recording_says_of_an_error_with_a_period_is_what_its_covariance_
 def test_a_draw_of_an_error_with_a_period_has_one_beforehand_with_the_covariance_of_all() -> None:
     """Products of two coefficients scatter by √(3·64/100 000) at most, a mixture of 64 normals; six times that."""
     model, further = gauge(), left_out("periodic_scale_y")
-    (effect,) = JointModel.of(model, further).effects
+    (effect,) = RecordedField.of(model, further).effects
     assert isinstance(effect, GivenPeriod)
     draws = effect.beforehand(np.random.default_rng(3), 100_000)
     waves, said = draws[:, : 2 * TRIED], draws[:, 2 * TRIED :]
@@ -175,7 +171,7 @@ def test_offsets_of_set_ups_widen_what_is_left_out_as_generalised_least_squares_
     """Variance of a length: 2σ² of each reading and 2τ² of its set-up, common to its three repeats; with all priors
     (XᵀV⁻¹X + P)⁻¹, V filled in by hand. Covariances of 40 000 draws scatter by 1 %."""
     model, further = repeated(3), left_out("rotation_x_x", "straightness_x_y")
-    together, components, count = JointModel.of(model, further), noise_of(model), 40_000
+    together, count = RecordedField.of(model, further, learned=False), 40_000
     whole = replace(model, effects=(*model.effects, *(one.effect for one in further)))
     about = model.estimate().about
     linear = whole.linearised(np.concatenate([about[:6], np.zeros(2), about[6:]]))
@@ -189,7 +185,7 @@ def test_offsets_of_set_ups_widen_what_is_left_out_as_generalised_least_squares_
         covariance = every[:8, :8]
         none = np.zeros(count)
         sizes = Sizes(np.full((count, 3), sigma), np.full(count, tau), none, none, none + 1)
-        drawn = draws_given(together, components, sizes, np.random.default_rng(4))
+        drawn = together.coefficients(sizes, np.zeros((count, 0)), np.random.default_rng(4))
         scale = np.sqrt(np.diagonal(covariance))
         np.testing.assert_allclose(
             np.cov(drawn.T) / np.outer(scale, scale), covariance / np.outer(scale, scale), atol=0.03

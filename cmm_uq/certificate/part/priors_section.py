@@ -1,0 +1,124 @@
+"""How large the recording of the calibration shows each family of errors to be, and what rests on what was known before."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.analysis.parts.influence import ALL, MATTERS, PriorInfluence
+from cmm_uq.base.messages import DASH, Number, Text, Verbatim, number, say, signed
+from cmm_uq.base.units import unit
+from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
+from cmm_uq.certificate.part.measurement import PartMeasurement
+from cmm_uq.certificate.wording import effect_title
+from cmm_uq.machine.model.field import FAMILIES, allowed
+
+_LITTLE = 0.01  # change that is not worth a line
+
+
+def priors_section(found: PartMeasurement) -> Section:
+    """Sizes of the families, and what would change with other priors."""
+    title = say("What the recording says of the machine's errors, and what it does not")
+    if not found.influence:
+        return section(title)
+    return section(
+        title, Paragraph(priors_words(found), "warning" if resting(found) else "plain"), _sizes(found), _changes(found)
+    )
+
+
+def resting(found: PartMeasurement) -> list[str]:
+    """Characteristics whose U, or value by a part of U, changes by a tenth with another prior of one family or of all."""
+    names = [one.name for one in found.characteristics]
+    k = np.array([one.U / one.u if one.u else np.inf for one in found.stated])
+    beyond = np.zeros(len(names), dtype=bool)
+    for one in found.influence:
+        beyond |= ~(np.abs(one.u - 1) < MATTERS) | ~(np.abs(one.shift) / k < MATTERS)
+    return [name for name, rests in zip(names, beyond, strict=True) if rests]
+
+
+def priors_words(found: PartMeasurement) -> Text:
+    """What rests on priors, in a sentence."""
+    names = resting(found)
+    if not names:
+        return say(
+            "Where priors of the machine's errors are half as wide, or twice, no figure changes by a tenth of U."
+        )
+    return say(
+        "{count} of {all} characteristics rest on what was taken for the machine's errors before its recording: their value "
+        "or U changes by a tenth of U or more where a prior is half as wide, or twice.",
+        count=len(names), all=len(found.stated),
+    )  # fmt: skip
+
+
+def family_words(name: str) -> Text:
+    if name == ALL:
+        return say("All of them together")
+    return FAMILIES.get(name) or effect_title(name)
+
+
+def _sizes(found: PartMeasurement) -> Table | None:
+    heads = (say("Errors"), Column(say("Physics allows")), Column(say("As recorded")), Column(say("95 % interval")))
+    rows = []
+    for one in families_data(found):
+        of_unit = unit(str(one["unit"]))
+        size, low, high, most = (number(one[key], ".2g") for key in ("size", "low", "high", "allowed"))
+        rows.append((
+            family_words(str(one["family"])), say("{value} {unit}", value=most, unit=of_unit),
+            say("{value} {unit}", value=size, unit=of_unit), say("{low} to {high} {unit}", low=low, high=high, unit=of_unit),
+        ))  # fmt: skip
+    return table(say("Sizes of errors, root mean square"), heads, rows, say(
+        "A family has one size, half-normal beforehand with what physics allows, and as the recording of the calibration "
+        "shows it afterwards; its members of which little is seen are taken as large as the others. Of play the size of the "
+        "gap, of periodic errors of the amplitude."
+    ))  # fmt: skip
+
+
+def _changes(found: PartMeasurement) -> Table | None:
+    heads = (say("Errors"), Column(say("Prior times")), Column(say("u changes by"), unit("%")), say("Of"),
+             Column(say("Value changes by"), unit("%")), say("Of"))  # fmt: skip
+    shown = [one for one in found.influence if one.family == ALL or not _little(one)]
+    return table(say("If this were different"), heads, (_change(found, one) for one in shown), say(
+        "The largest change of all characteristics, of the value as a part of its u. A dash: too few of the machines drawn "
+        "would be of that sort to say. Priors that would change nothing by more than 1 % are left out."
+    ))  # fmt: skip
+
+
+def _little(one: PriorInfluence) -> bool:
+    """Whether nothing changes by more than a hundredth; not where draws do not say it."""
+    return bool(np.all(np.abs(one.u - 1) < _LITTLE) and np.all(np.abs(one.shift) < _LITTLE))
+
+
+def _change(found: PartMeasurement, one: PriorInfluence) -> tuple[Text, ...]:
+    name, times = family_words(one.family), number(one.times, "g")
+    if not np.isfinite(one.u).all():
+        return name, times, DASH, DASH, DASH, DASH
+    u, value = int(np.argmax(np.abs(one.u - 1))), int(np.argmax(np.abs(one.shift)))
+    called = [Verbatim(each.name) for each in found.characteristics]
+    return name, times, _percent(one.u[u] - 1), called[u], _percent(one.shift[value]), called[value]
+
+
+def _percent(part: float) -> Number:
+    return signed(100 * part, ".0f")
+
+
+def families_data(found: PartMeasurement) -> list[dict[str, Any]]:
+    """Size of each family as the recording shows it."""
+    rows = []
+    for name, sizes in found.given.machine.scales.items():
+        most, of_unit = allowed(name)
+        low, median, high = (most * np.quantile(sizes, [0.025, 0.5, 0.975])).tolist()
+        rows.append({"family": name, "allowed": most, "unit": of_unit, "size": median, "low": low, "high": high})
+    return rows
+
+
+def priors_data(influence: Iterable[PriorInfluence]) -> list[dict[str, Any]]:
+    return [
+        {"family": one.family, "times": one.times, "u_ratio": _known(one.u), "shift_u": _known(one.shift)}
+        for one in influence
+    ]
+
+
+def _known(values: np.ndarray) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]

@@ -1,0 +1,204 @@
+"""The machine as a random field: errors that it has besides those that are named, in families of one size each.
+
+Each of the guideway errors of VDI/VDE 2617-3 is a smooth function of the reading of its axis: position (beyond its scale), the
+straightnesses and the rotations of a carriage. A function is a sum of cosines over the travel T,
+
+    f(a) = A·Σ_k w_k·c_k·√2·cos(πk(a − a₀)/T),   c_k ~ N(0, s²),   Σ w_k² = 1,   w_k ~ 1/k
+
+with A what physics allows of its root mean square. Long waves (k up to 2) and short ones have sizes s of their own, so that
+no correlation length is taken for known. An error with a period, and play, are families too.
+
+An error with a period of which only bounds are known is any within them, evenly in its logarithm. A sum over many trial
+periods, each with its share of the variance, has the same mean and nearly the same covariance between any two points; it is
+linear, so that it can be drawn together with everything else. Few trials would pretend to know the period: two points far
+apart would err alike. What a recording says of such an error follows from its covariance itself, a difference of cosine
+integrals: from the sum, amplitudes of trial periods would answer for periods between them, and a recording of some hundred
+readings would seem to determine them all. So a draw of the sum is a draw beforehand, and what the recording says is added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from scipy.special import sici
+
+from cmm_uq.base.messages import Text, say
+from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
+from cmm_uq.machine.physics.catalogue import EVERY
+from cmm_uq.machine.physics.effect import Effect, Family, Parameter, along
+from cmm_uq.machine.physics.effects.drives import Hysteresis, PeriodicScale, ScaleCurvature
+from cmm_uq.machine.physics.effects.rigid_body import Rotation, Straightness, turned
+
+PERIODIC, PLAY, POSITION, STRAIGHTNESS, ROTATION = "periodic", "play", "position", "straightness", "rotation"
+_LONG, _SHORT = " long", " short"
+WAVES, LONG = 8, 2  # of a function; those that count as long
+FAMILIES: Mapping[str, Text] = {
+    PERIODIC: say("Periodic errors of the scales"), PLAY: say("Play of the drives"),
+    POSITION + _LONG: say("Position errors along the axes, long waves"),
+    POSITION + _SHORT: say("Position errors along the axes, short waves"),
+    STRAIGHTNESS + _LONG: say("Straightnesses, long waves"), STRAIGHTNESS + _SHORT: say("Straightnesses, short waves"),
+    ROTATION + _LONG: say("Rotations, long waves"), ROTATION + _SHORT: say("Rotations, short waves"),
+}  # fmt: skip
+# root mean square that physics allows: µm along an axis beyond its scale, µm across it, ″
+ALLOWED = {POSITION: 20.0, STRAIGHTNESS: 50.0, ROTATION: 30.0}
+_SAME = 1e-6  # of the shortest period: a distance over which nothing changes
+_LOOKED_AT = 61  # readings
+TRIED = 64  # periods: correlations of errors at two places are then off by less than a tenth in the root mean square
+
+
+def family_of(effect: Effect) -> str | None:
+    """Family whose size its errors share; ``None`` of an effect with a size of its own."""
+    if isinstance(effect, Curve):
+        return effect.family
+    kinds: dict[type[Effect], str] = {
+        PeriodicScale: PERIODIC,
+        GivenPeriod: PERIODIC,
+        Hysteresis: PLAY,
+        ScaleCurvature: POSITION,
+        Straightness: STRAIGHTNESS,
+        Rotation: ROTATION,
+    }
+    return next((name for kind, name in kinds.items() if isinstance(effect, kind)), None)
+
+
+class Curve(Effect):
+    """One of the smooth functions, its long or its short waves; it has the name of the effect that is its simplest form."""
+
+    def __init__(self, of: Family, *, long: bool) -> None:
+        self.of, kind = of, family_of(of)
+        self.kind = str(kind)
+        self.name, self.title, self.formula = of.name, of.title, of.formula
+        self.mechanism, self.points_to, self.along_motion = of.mechanism, of.points_to, of.along_motion
+        every = np.arange(1, WAVES + 1)
+        self.orders = every[:LONG] if long else every[LONG:]
+        self.family = self.kind + (_LONG if long else _SHORT)
+        share = 1 / self.orders / np.sqrt(np.sum(1 / every**2.0))
+        allowed, of_unit = ALLOWED[self.kind], unit("″" if kind == ROTATION else "µm")
+        self.coefficients = tuple(
+            Parameter(f"wave {k}", of_unit, float(allowed * part)) for k, part in zip(self.orders, share, strict=True)
+        )
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        axis = self.of.axis
+        low, high = points.machine.travel(axis)
+        angle = np.pi * (points.readings[axis] - low) / (high - low)
+        waves = np.sqrt(2.0) * np.cos(angle[:, None] * self.orders)
+        if isinstance(self.of, Rotation):
+            each = [turned(points, axis, self.of.about, ARCSECOND * wave) for wave in waves.T]
+            return np.concatenate(each, axis=2)
+        return along(self.of.direction if isinstance(self.of, Straightness) else axis, MICROMETRE * waves)
+
+
+def curves() -> tuple[Curve, ...]:
+    """Of a machine of three axes."""
+    each = [one for one in EVERY.values() if isinstance(one, Family) and family_of(one) in ALLOWED]
+    return tuple(Curve(one, long=long) for one in each for long in (True, False))
+
+
+def allowed(family: str) -> tuple[float, str]:
+    """Root mean square of an error of a family that physics allows, and its unit; of play the gap."""
+    if family == PLAY:
+        return 30.0, "µm"
+    if family == PERIODIC:
+        return 10.0 * float(np.sqrt(2.0)), "µm"
+    one = next(curve for curve in curves() if curve.family == family)
+    return float(np.sqrt(sum(c.prior_sd**2 for c in one.coefficients))), "″" if one.kind == ROTATION else "µm"
+
+
+class EveryPeriod(Effect):
+    """All trial periods of an effect at once; without a shape of its own."""
+
+    def __init__(self, effect: Effect) -> None:
+        self.of = effect
+        self.at = tuple(product(*(_evenly(shape.low, shape.high) for shape in effect.shape)))
+        share = 1 / np.sqrt(len(self.at))
+        self.name, self.title, self.formula = effect.name, effect.title, effect.formula
+        self.mechanism, self.points_to = effect.mechanism, effect.points_to
+        self.columns, self.tier, self.along_motion = effect.columns, effect.tier, effect.along_motion
+        self.coefficients = tuple(
+            replace(one, name=f"{one.name} {i}", prior_sd=float(one.prior_sd * share))
+            for i in range(1, len(self.at) + 1)
+            for one in effect.coefficients
+        )
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return np.concatenate([self.of.basis(points, each) for each in self.at], axis=2)
+
+
+class GivenPeriod(Effect):
+    """A periodic error with all its trial periods, and what a recording says of it, for each combination it sees.
+
+    A draw f of the sum beforehand is conditioned at any reading x by f(x) + k(x, X)·B·w, w what combinations were found to be
+    less what they are by that draw and all others (conditioning by kriging: Chilès, Delfiner 2012, 7.3).
+
+    ``effect``: periodic. ``readings``: (p,) X, where the scale stood at the points of the recording, mm. ``into``: (p, r) B,
+    1/mm.
+    """
+
+    def __init__(self, effect: PeriodicScale, readings: Floats, into: Floats) -> None:
+        self.of, self.sum, self.readings, self.into = effect, EveryPeriod(effect), readings, into
+        self.name, self.title, self.formula = effect.name, effect.title, effect.formula
+        self.mechanism, self.points_to = effect.mechanism, effect.points_to
+        self.axis = self.along_motion = effect.axis
+        said = (Parameter(f"said {j}", unit("1"), 0.0) for j in range(1, into.shape[1] + 1))
+        self.coefficients = (*self.sum.coefficients, *said)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        found = np.zeros((len(points), 3, len(self.coefficients)))
+        found[:, "xyz".index(self.axis)] = self.at(points.readings[self.axis])
+        return found
+
+    def at(self, reading: Floats) -> Floats:
+        """(n, j) mm of error at readings (n,): of the trials, then of the combinations."""
+        angle = 2 * np.pi * reading[:, None] / np.ravel(self.sum.at)
+        waves = MICROMETRE * np.stack([np.sin(angle), np.cos(angle)], axis=2).reshape(len(reading), -1)
+        return np.hstack([waves, covariance(self.of, reading, self.readings) @ self.into])
+
+    def beforehand(self, random: np.random.Generator, count: int) -> Floats:
+        """Draws (N, j) of the coefficients over their standard deviations, without the recording: of one trial period each.
+
+        Mean and covariance are those of all at once; errors of a linear estimate are then distributed as those of machines
+        with one period.
+        """
+        trials, waves = len(self.sum.at), len(self.of.coefficients)
+        found = np.zeros((count, trials, waves))
+        found[np.arange(count), random.integers(trials, size=count)] = np.sqrt(trials) * random.standard_normal(
+            (count, waves)
+        )
+        return np.hstack([found.reshape(count, -1), np.zeros((count, self.into.shape[1]))])
+
+    def share(self, draws: Floats) -> float:
+        """Standard deviation of errors by draws (N, j), between the readings of the recording, over that beforehand."""
+        between = np.linspace(self.readings.min(), self.readings.max(), _LOOKED_AT)
+        left = (draws @ self.at(between).T).var(axis=0).mean()
+        return float(np.sqrt(left) / (MICROMETRE * self.of.coefficients[0].prior_sd))
+
+
+def covariance(effect: PeriodicScale, one: Floats, other: Floats) -> Floats:
+    """(n, p) mm², of an error whose period nobody knows, at readings (n,) and (p,), mm.
+
+    The mean of σ²·cos(2πd/λ) over ln λ: σ²·(Ci(2πd/λ₀) − Ci(2πd/λ₁))/ln(λ₁/λ₀).
+    """
+    (shape,), sd = effect.shape, MICROMETRE * effect.coefficients[0].prior_sd
+    apart = 2 * np.pi * np.abs(np.subtract.outer(one, other))
+    same = apart < _SAME * shape.low
+    apart[same] = 1.0
+    found = sici(apart / shape.low)[1] - sici(apart / shape.high)[1]
+    found /= np.log(shape.high / shape.low)
+    found[same] = 1.0
+    return np.asarray(sd**2 * found)
+
+
+def _evenly(low: float, high: float) -> list[float]:
+    """The middle of each of as many equal parts of the logarithm, which have the same share of the prior each."""
+    each: list[float] = np.exp(np.log(low) + np.log(high / low) * (np.arange(TRIED) + 0.5) / TRIED).tolist()
+    return each
+
+
+def linear(effect: Effect) -> Effect:
+    """The effect itself where it has no shape, else all of its trials at once."""
+    return EveryPeriod(effect) if effect.shape else effect

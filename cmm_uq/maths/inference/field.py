@@ -1,0 +1,357 @@
+"""A linear model beside which errors act in families, each of a size that the observations themselves say.
+
+    observed = design · parameters + Σ_f s_f · columns_f · c_f + placing · (anything) + noise,   c_f ~ N(0, 1)
+
+Beforehand each s_f is half-normal: one stands for as large as physics allows, and none is excluded below. Given the sizes of
+the families and of the noise everything is normal, so that these alone are sampled (emcee), by their exact density in the
+space of observations; all else is drawn from its exact distribution given them (Matheron's rule: Chilès, Delfiner 2012,
+Geostatistics, 7.3). A family shrinks by what observations show of it and by nothing else: where they show nothing of it, the
+density is that of the prior.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.maths.inference.ensembles import Chains, run_ensembles
+from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel, reached
+from cmm_uq.maths.inference.marginal import Marginal
+from cmm_uq.maths.inference.noise import Components, Sizes
+from cmm_uq.maths.inference.posterior import start
+from cmm_uq.maths.inference.proposals import LogDensity, tempered, weights
+
+Drawn = Callable[[np.random.Generator, int], Floats]
+# of the residuals' scatter: an observation that each coefficient, as large as physics allows, moves less shows only noise, as
+# contrasts of repeats do, whose points are nearly the same; less still where all are as large as that. The same of orthonormal
+# columns of the placings
+_UNSEEN, _REACHED = (1e-4, 0.02), 1e-4
+_QUADRATIC = 1e8  # above any sum of squares that is not absurd
+_NUMBERS = 2_000_000  # in the matrices that are factorised at once
+# draws of sizes that are weighed, and what they must be worth in independent ones, else a sampler draws them
+_LOOKED_AT, _WORTH = 4000, 200.0
+_EFFECTIVE, _STEPS = 400, 40  # sizes are few and smooth: what follows from them needs no more of them
+_HELD = 250  # sizes that all draws have among them
+_STEP, _MOST_STEPS, _FLATTEST, _WIDER, _NEVER = 0.05, 60, 0.5, 1.3, -1e30
+_SMALLEST = 1e-4  # of a family's size
+
+
+@dataclass(frozen=True, eq=False)
+class FieldErrors:
+    """Errors of one cause: j coefficients, normal beforehand with one standard deviation each."""
+
+    family: str | None  # whose size they share; ``None`` where they have the size one
+    columns: Floats  # (m, j) of the observations, mm, for one standard deviation of each at the size one
+    draw: Drawn  # coefficients (N, j) beforehand, in standard deviations at the size one
+    # (m, p) of the observations for an error at each of p places, and its covariance (p, p) at the size one, where that is
+    # not by the columns
+    impulse: Floats | None = None
+    covariance: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FieldModel:
+    """The linear model of a recording, the noise of its observations, and families of errors beside it."""
+
+    linear: LinearModel
+    noise: Components
+    estimate: LeastSquares
+    errors: tuple[FieldErrors, ...]
+
+    @cached_property
+    def _known(self) -> Ints:
+        return np.flatnonzero(np.isfinite(self.linear.prior_sd))
+
+    @cached_property
+    def _turned(self) -> Floats:
+        """(m, …) columns [parameters in prior standard deviations, families, deviation], turned."""
+        linear, value = self.linear, self.estimate.value
+        off = (linear.prior_mean - value)[self._known]
+        left = linear.observed - linear.design @ value - linear.design[:, self._known] @ off
+        own = linear.design[:, self._known] * linear.effective_sd[self._known]
+        return np.asarray(self.noise.turn @ np.hstack([own, *(one.columns for one in self.errors), left[:, None]]))
+
+    @cached_property
+    def _free(self) -> Floats:
+        """(m, q) turned columns of which nothing is known: of placings, and of sizes without a certificate."""
+        linear = self.linear
+        unknown = np.flatnonzero(~np.isfinite(linear.prior_sd))
+        placing = reached(np.asarray(self.noise.turn @ linear.freedoms.dense()))
+        sizes = np.asarray(self.noise.turn @ (linear.design[:, unknown] * linear.scale[unknown]))
+        whole = reached(np.hstack([placing, sizes])) if len(unknown) else placing
+        if whole.shape[1] < placing.shape[1] + len(unknown):
+            raise CmmUqError("the recording leaves a size of its artefact open, of which nothing is known beforehand",
+                             where="the calibration", fix="Give the artefact's length")  # fmt: skip
+        return whole
+
+    @cached_property
+    def _rows(self) -> tuple[Ints, Ints]:
+        """Turned observations that what is unknown moves, and those that show noise alone, as contrasts of repeats do."""
+        m = len(self.linear.observed)
+        if self.noise.slow.shape[1]:
+            return np.arange(m), np.arange(0)
+        least = _UNSEEN[bool(self.families)] * self.estimate.sigma_of_residuals
+        moved = np.any(np.abs(self._turned[:, :-1]) > least, axis=1)
+        acting = moved | np.any(np.abs(self._free) > _REACHED, axis=1)
+        return np.flatnonzero(acting), np.flatnonzero(~acting)
+
+    @cached_property
+    def into(self) -> Floats:
+        """(m, n) orthonormal combinations of the observations that no placing reaches, and something else does."""
+        rows, m = self._rows[0], len(self.linear.observed)
+        free = self._free[rows]
+        Q, R, _ = scipy.linalg.qr(free, pivoting=True) if free.size else (np.eye(len(rows)), np.zeros((0, 0)), None)
+        diagonal = np.abs(np.diag(R))
+        rank = int(np.sum(diagonal > 1e-10 * diagonal.max(initial=0.0)))
+        found = np.zeros((m, len(rows) - rank))
+        found[rows] = Q[:, rank:]
+        return found
+
+    @cached_property
+    def _seen(self) -> Floats:
+        """(n, …) of these combinations, the columns as in :attr:`_turned`."""
+        return self.into.T @ self._turned
+
+    @cached_property
+    def families(self) -> tuple[str, ...]:
+        """Those whose size is to be found."""
+        return tuple(dict.fromkeys(one.family for one in self.errors if one.family is not None))
+
+    @cached_property
+    def _parts(self) -> Floats:
+        """(c + F + 1, n²) covariances for unit variances of each class of noise, of each family, and what has a known size."""
+        index, shares = self.noise.classes
+        each = [np.where((index == c)[:, None], self.into, 0.0) for c in range(len(shares))]
+        own = self._seen[:, : len(self._known)]
+        sized = dict.fromkeys((*self.families, None), np.zeros_like(own @ own.T))
+        sized[None] = own @ own.T
+        at = len(self._known)
+        for one in self.errors:
+            seen = self._seen[:, at : at + one.columns.shape[1]]
+            at += one.columns.shape[1]
+            if one.covariance is None or one.impulse is None:
+                sized[one.family] = sized[one.family] + seen @ seen.T
+            else:
+                impulse = self.shown(one.impulse)
+                sized[one.family] = sized[one.family] + impulse @ one.covariance @ impulse.T
+        return np.stack([*(part.T @ part for part in each), *sized.values()]).reshape(len(each) + len(sized), -1)
+
+    def shown(self, columns: Floats) -> Floats:
+        """(n, p) of the combinations, of columns (m, p) of the observations."""
+        return np.asarray(self.into.T @ np.asarray(self.noise.turn @ columns))
+
+    @cached_property
+    def _alone(self) -> tuple[Floats, Floats]:
+        """Count and sum of squares, by class, of observations that show noise alone."""
+        index, classes = self.noise.classes[0][self._rows[1]], len(self.noise.classes[1])
+        squares = self._turned[self._rows[1], -1] ** 2
+        count = np.bincount(index, minlength=classes).astype(np.float64)
+        return count, np.bincount(index, weights=squares, minlength=classes).astype(np.float64)
+
+    def _covariance(self, sizes: Sizes, scales: Floats) -> Floats:
+        """(w, n, n) of the combinations, mm²."""
+        return self._noise(sizes, np.hstack([scales**2, np.ones((len(scales), 1))]))
+
+    def _noise(self, sizes: Sizes, more: Floats | None = None) -> Floats:
+        """(w, n, n) of noise in them, mm², and ``more`` (w, F + 1): variances of families, and of what has a known size."""
+        n, weights = self.into.shape[1], self.noise.variances(sizes)[0] @ self.noise.classes[1].T
+        weights = weights if more is None else np.hstack([weights, more])
+        found = (weights @ self._parts[: weights.shape[1]]).reshape(-1, n, n)
+        if self.noise.slow.shape[1]:
+            for i in np.flatnonzero(sizes.slow > 0):
+                seen = self.shown(self.noise.waves(sizes.at(slice(i, i + 1))))
+                found[i] += seen @ seen.T
+        return np.asarray(found)
+
+    def log_likelihood(self, sizes: Sizes, scales: Floats) -> Floats:
+        """(w,) up to a constant, of sizes of the noise and of the families (w, F)."""
+        n, count = self.into.shape[1], len(scales)
+        v = self.noise.variances(sizes)[0] @ self.noise.classes[1].T
+        many, squares = self._alone
+        found = -0.5 * (np.log(v) @ many + (1 / v) @ squares)
+        step = max(1, _NUMBERS // (n + 1) ** 2)
+        for i in range(0, count, step):
+            part = slice(i, i + step)
+            whole = np.empty((len(scales[part]), n + 1, n + 1))
+            whole[:, :n, :n] = self._covariance(sizes.at(part), scales[part])
+            whole[:, n, :n] = whole[:, :n, n] = self._seen[:, -1]
+            whole[:, n, n] = _QUADRATIC
+            factor = _factors(whole)
+            diagonal = np.einsum("wii->wi", factor)
+            found[part] -= np.log(diagonal[:, :n]).sum(axis=1) + 0.5 * (_QUADRATIC - diagonal[:, n] ** 2)
+        return np.where(np.isfinite(found), found, -np.inf)
+
+    def draw(self, sizes: Sizes, scales: Floats, random: np.random.Generator) -> Floats:
+        """Exact draws (N, k + …), one for each of N sizes of noise and families (N, F), of which many may be the same.
+
+        Parameters, not a number where they have no prior; then of each error its coefficients, in standard deviations at the
+        size one, and, where its covariance is not by its columns, n numbers w more, for which its errors at any places are
+        larger by (covariance with the p places) · ``shown(impulse)``ᵀ · w.
+        """
+        table = np.column_stack([*vars(sizes).values(), scales])
+        _, first, which = np.unique(table, axis=0, return_index=True, return_inverse=True)
+        found = np.empty((len(scales), len(self.linear.unknowns) + sum(map(self._width, self.errors))))
+        for place, i in enumerate(first):
+            rows = np.flatnonzero(which.ravel() == place)
+            found[rows] = self._drawn(sizes.at(slice(i, i + 1)), scales[i], len(rows), random)
+        return found
+
+    def _width(self, one: FieldErrors) -> int:
+        return int(one.columns.shape[1]) + (0 if one.covariance is None else int(self.into.shape[1]))
+
+    def _drawn(self, sizes: Sizes, scale: Floats, count: int, random: np.random.Generator) -> Floats:
+        known, noise = len(self._known), self.noise
+        factor = scipy.linalg.cho_factor(self._covariance(sizes, scale[None])[0])
+        variance = (noise.variances(sizes)[0] @ noise.shares.T)[0]
+        # what was observed less all that could have been: parameters, errors, noise
+        own = random.standard_normal((count, known))
+        left = self._seen[:, -1] - own @ self._seen[:, :known].T
+        left -= (random.standard_normal((count, len(variance))) * np.sqrt(variance)) @ self.into
+        if noise.slow.shape[1] and sizes.slow[0] > 0:
+            waves = self.shown(noise.waves(sizes))
+            left -= random.standard_normal((count, waves.shape[1])) @ waves.T
+        beforehand, at = list[Floats](), known
+        for one in self.errors:
+            beforehand.append(self._size(one, scale) * one.draw(random, count))
+            left -= beforehand[-1] @ self._seen[:, at : at + one.columns.shape[1]].T
+            at += one.columns.shape[1]
+        weight = scipy.linalg.cho_solve(factor, left.T).T
+        found = [self._parameters(own + weight @ self._seen[:, :known])]
+        for one, drawn, gain in zip(self.errors, beforehand, self._gains(scale), strict=True):
+            found.append(np.hstack([drawn, np.zeros((count, self._width(one) - drawn.shape[1]))]) + weight @ gain)
+        return np.hstack(found)
+
+    def _size(self, one: FieldErrors, scale: Floats) -> float:
+        return 1.0 if one.family is None else float(scale[self.families.index(one.family)])
+
+    def _gains(self, scale: Floats) -> list[Floats]:
+        """(n, …) of each error, by how much each number of a draw changes with the weight of each combination."""
+        found, at = list[Floats](), len(self._known)
+        for one in self.errors:
+            seen = self._seen[:, at : at + one.columns.shape[1]]
+            at += one.columns.shape[1]
+            gain = seen if one.covariance is None else np.hstack([np.zeros_like(seen), np.eye(len(seen))])
+            found.append(self._size(one, scale) ** 2 * gain)
+        return found
+
+    def _parameters(self, own: Floats) -> Floats:
+        found = np.full((len(own), len(self.linear.unknowns)), np.nan)
+        found[:, self._known] = self.linear.prior_mean[self._known] + own * self.linear.effective_sd[self._known]
+        return found
+
+    def normal(self, sizes: Sizes, scale: Floats) -> tuple[Floats, Floats]:
+        """Mean and covariance of what :meth:`draw` draws, for sizes of noise (one draw) and of families (F,)."""
+        known = len(self._known)
+        whole = self._covariance(sizes, scale[None])[0]
+        sd = self.linear.effective_sd[self._known]
+        prior, seen = [np.ones(known)], [self._seen[:, :known]]
+        gains, at = [seen[0] * sd], known
+        for one, gain in zip(self.errors, self._gains(scale), strict=True):
+            j = one.columns.shape[1]
+            more = np.zeros((len(whole), self._width(one) - j))
+            prior += [np.full(j, self._size(one, scale)), np.zeros(more.shape[1])]
+            seen += [self._seen[:, at : at + j], more]
+            gains.append(gain)
+            at += j
+        units = np.concatenate([sd, np.ones(sum(map(self._width, self.errors)))])
+        root = units * np.concatenate(prior)
+        to_each = np.linalg.solve(whole, np.hstack(gains)).T
+        residue = np.diag(root) - to_each @ (np.hstack(seen) * np.concatenate(prior))
+        noise = self._noise(sizes)[0]
+        mean = to_each @ self._seen[:, -1]
+        mean[:known] += self.linear.prior_mean[self._known]
+        return mean, residue @ residue.T + to_each @ noise @ to_each.T
+
+
+def _factors(matrices: Floats) -> Floats:
+    try:
+        return np.asarray(np.linalg.cholesky(matrices))
+    except np.linalg.LinAlgError:
+        found = np.full_like(matrices, np.nan)
+        for i, matrix in enumerate(matrices):
+            try:
+                found[i] = np.linalg.cholesky(matrix)
+            except np.linalg.LinAlgError:
+                continue
+        return found
+
+
+def size_of(latent: Floats) -> Floats:
+    """Half-normal sizes of standard normal numbers."""
+    return np.maximum(scipy.special.ndtri(0.5 * (1 + scipy.special.ndtr(latent))), _SMALLEST)
+
+
+@dataclass(frozen=True, eq=False)
+class FieldSizes:
+    """Sizes of noise and families, as often as their posterior has them."""
+
+    noise: Sizes  # (N,)
+    families: Floats  # (N, F) of those that are learned
+    worth: float  # independent draws that they are worth
+    chains: Chains | None  # of emcee, where the approximation by which they are drawn is not good enough
+
+
+def sample_sizes(model: FieldModel, draws: int, seed: int, known: Sizes | None = None) -> FieldSizes:
+    """Posterior of the sizes of noise and families, ``draws`` of them, of which some hundred are different.
+
+    ``known``: of the noise, one draw, where it is not to be found.
+    """
+    d = 0 if known is not None else model.noise.dimension
+    count = len(model.families)
+    if known is not None and not count:
+        return FieldSizes(known.at(np.zeros(draws, dtype=np.int64)), np.zeros((draws, 0)), np.inf, None)
+
+    def sizes(latent: Floats) -> Sizes:
+        return model.noise.sizes(latent[:, :d]) if known is None else known.at(np.zeros(len(latent), dtype=np.int64))
+
+    def density(latent: Floats) -> Floats:
+        noise = latent[:, :d]
+        prior = -0.5 * np.sum(latent[:, d:] ** 2, axis=1)
+        if known is None:
+            inside = (noise[:, 0] > np.log(max(1e-6, model.noise.least))) & (noise[:, 0] < np.log(10.0))
+            prior = np.where(inside, prior, -np.inf)
+            noise = np.where(inside[:, None], noise, inside_of)
+            prior = prior + model.noise.log_prior(noise, model.noise.sizes(noise))
+        whole = np.hstack([noise, latent[:, d:]])
+        found = prior + model.log_likelihood(sizes(whole), size_of(latent[:, d:]))
+        return np.where(np.isfinite(found), found, -np.inf)
+
+    begin, _ = start(Marginal(model.linear, model.noise, model.estimate))
+    inside_of = begin[:d]
+    centre, factor = _laplace(density, np.append(begin[:d], np.zeros(count)))
+    proposal = tempered(density, centre, _WIDER * factor, seed)
+    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(29,))))
+    z = proposal.draws(_LOOKED_AT, random)
+    latent = proposal.parameters(z)
+    weight = weights(density(latent) - proposal.log_density(z))
+    worth, chains = float(1 / np.sum(weight**2)), None
+    if worth >= _WORTH:
+        # as many of each as its weight says, evenly spread
+        place = np.searchsorted(np.cumsum(weight), (np.arange(_HELD) + 0.5) / _HELD * (1 - 1e-12))
+        latent = latent[np.minimum(place, len(latent) - 1)]
+    else:
+        chains = run_ensembles(density, proposal, seed, effective_samples=_EFFECTIVE, steps_at_once=_STEPS)
+        latent, worth = chains.draws[np.linspace(0, len(chains.draws) - 1, _HELD).astype(np.int64)], chains.ess_min
+    latent = latent[np.arange(draws) % len(latent)]
+    return FieldSizes(sizes(latent), size_of(latent[:, d:]), worth, chains)
+
+
+def _laplace(density: LogDensity, start_at: Floats) -> tuple[Floats, Floats]:
+    """Where a density is largest (d,), and a factor (d, d) of its covariance there, nowhere much wider than the prior."""
+    d, steps = len(start_at), _STEP * np.eye(len(start_at))
+
+    def fall(at: Floats) -> tuple[float, Floats]:
+        values = np.maximum(density(np.vstack([at, at + steps, at - steps])), _NEVER)
+        return -float(values[0]), -(values[1 : d + 1] - values[d + 1 :]) / (2 * _STEP)
+
+    found = scipy.optimize.minimize(fall, start_at, jac=True, method="L-BFGS-B", options={"maxiter": _MOST_STEPS})
+    each = np.array([fall(found.x + step)[1] - fall(found.x - step)[1] for step in steps]) / (2 * _STEP)
+    values, vectors = np.linalg.eigh(0.5 * (each + each.T))
+    spread = (vectors / np.maximum(values, _FLATTEST)) @ vectors.T
+    return np.asarray(found.x), np.linalg.cholesky(spread)
