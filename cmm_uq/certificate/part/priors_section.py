@@ -100,7 +100,7 @@ def _change(found: PartMeasurement, one: PriorInfluence) -> tuple[Text, ...]:
 
 
 def _percent(part: float) -> Number:
-    return signed(100 * part, ".0f")
+    return signed(100 * part, ".0f") if abs(part) >= 0.005 else number(0.0, ".0f")
 
 
 def families_data(found: PartMeasurement) -> list[dict[str, Any]]:

@@ -52,7 +52,7 @@ TRIED = 64  # periods: correlations of errors at two places are then off by less
 
 def family_of(effect: Effect) -> str | None:
     """Family whose size its errors share; ``None`` of an effect with a size of its own."""
-    if isinstance(effect, Curve):
+    if isinstance(effect, AxisFunction):
         return effect.family
     kinds: dict[type[Effect], str] = {
         PeriodicScale: PERIODIC,
@@ -65,7 +65,7 @@ def family_of(effect: Effect) -> str | None:
     return next((name for kind, name in kinds.items() if isinstance(effect, kind)), None)
 
 
-class Curve(Effect):
+class AxisFunction(Effect):
     """One of the smooth functions, its long or its short waves; it has the name of the effect that is its simplest form."""
 
     def __init__(self, of: Family, *, long: bool) -> None:
@@ -93,10 +93,10 @@ class Curve(Effect):
         return along(self.of.direction if isinstance(self.of, Straightness) else axis, MICROMETRE * waves)
 
 
-def curves() -> tuple[Curve, ...]:
+def curves() -> tuple[AxisFunction, ...]:
     """Of a machine of three axes."""
     each = [one for one in EVERY.values() if isinstance(one, Family) and family_of(one) in ALLOWED]
-    return tuple(Curve(one, long=long) for one in each for long in (True, False))
+    return tuple(AxisFunction(one, long=long) for one in each for long in (True, False))
 
 
 def allowed(family: str) -> tuple[float, str]:

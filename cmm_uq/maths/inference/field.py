@@ -22,7 +22,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.inference.ensembles import Chains, run_ensembles
 from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel, reached
-from cmm_uq.maths.inference.marginal import Marginal
+from cmm_uq.maths.inference.marginal import SIGMA_BOUNDS, Marginal, cholesky
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import start
 from cmm_uq.maths.inference.proposals import LogDensity, tempered, weights
@@ -182,7 +182,7 @@ class FieldModel:
             whole[:, :n, :n] = self._covariance(sizes.at(part), scales[part])
             whole[:, n, :n] = whole[:, :n, n] = self._seen[:, -1]
             whole[:, n, n] = _QUADRATIC
-            factor = _factors(whole)
+            factor = cholesky(whole)
             diagonal = np.einsum("wii->wi", factor)
             found[part] -= np.log(diagonal[:, :n]).sum(axis=1) + 0.5 * (_QUADRATIC - diagonal[:, n] ** 2)
         return np.where(np.isfinite(found), found, -np.inf)
@@ -269,19 +269,6 @@ class FieldModel:
         return mean, residue @ residue.T + to_each @ noise @ to_each.T
 
 
-def _factors(matrices: Floats) -> Floats:
-    try:
-        return np.asarray(np.linalg.cholesky(matrices))
-    except np.linalg.LinAlgError:
-        found = np.full_like(matrices, np.nan)
-        for i, matrix in enumerate(matrices):
-            try:
-                found[i] = np.linalg.cholesky(matrix)
-            except np.linalg.LinAlgError:
-                continue
-        return found
-
-
 def size_of(latent: Floats) -> Floats:
     """Half-normal sizes of standard normal numbers."""
     return np.maximum(scipy.special.ndtri(0.5 * (1 + scipy.special.ndtr(latent))), _SMALLEST)
@@ -314,7 +301,9 @@ def sample_sizes(model: FieldModel, draws: int, seed: int, known: Sizes | None =
         noise = latent[:, :d]
         prior = -0.5 * np.sum(latent[:, d:] ** 2, axis=1)
         if known is None:
-            inside = (noise[:, 0] > np.log(max(1e-6, model.noise.least))) & (noise[:, 0] < np.log(10.0))
+            inside = (noise[:, 0] > np.log(max(SIGMA_BOUNDS[0], model.noise.least))) & (
+                noise[:, 0] < np.log(SIGMA_BOUNDS[1])
+            )
             prior = np.where(inside, prior, -np.inf)
             noise = np.where(inside[:, None], noise, inside_of)
             prior = prior + model.noise.log_prior(noise, model.noise.sizes(noise))

@@ -145,7 +145,7 @@ class Marginal:
         left, logs = slow.precision(v, prior.ravel(), precision, walks)
         diagonal = np.arange(left.shape[1])
         left[:, diagonal, diagonal] *= 1 + _JITTER
-        return _cholesky(left), log - 0.5 * np.log(v) @ slow.counts - logs
+        return cholesky(left), log - 0.5 * np.log(v) @ slow.counts - logs
 
     def _of_slow(self, sizes: Sizes) -> tuple[Floats, Floats, Floats]:
         """What is known beforehand of slow noise' coefficients.
@@ -202,7 +202,7 @@ class Marginal:
             # of as many observations as freedoms nothing is left
             whole[:, -1, -1] = np.maximum(whole[:, -1, -1], np.finfo(np.float64).tiny)
             log -= own
-        return _cholesky(whole), log
+        return cholesky(whole), log
 
     def _eliminated(self, v: Floats, products: Floats) -> tuple[Floats, Floats]:
         """What the placings take from the precision (w, P, P), and half the logarithm of their own determinant (w,)."""
@@ -212,7 +212,7 @@ class Marginal:
         own = each[:, :, :j]
         own[:, diagonal, diagonal] *= 1 + _JITTER
         own[:, diagonal, diagonal] += np.tile(self._absent, (w, 1))
-        factor = _cholesky(own)
+        factor = cholesky(own)
         rows = each[:, :, j:]
         for i in range(j):  # forward substitution
             rows[:, i] /= factor[:, i, i, None]
@@ -283,7 +283,7 @@ class Marginal:
         return np.asarray(self.estimate.value + found / self._length[-1 - k : -1])
 
 
-def _cholesky(matrices: Floats) -> Floats:
+def cholesky(matrices: Floats) -> Floats:
     """Lower factors; ``nan`` for those that are not positive definite."""
     try:
         return np.asarray(np.linalg.cholesky(matrices))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.points import Points
-from cmm_uq.machine.model.field import ALLOWED, FAMILIES, WAVES, Curve, allowed, curves, family_of
+from cmm_uq.machine.model.field import ALLOWED, FAMILIES, WAVES, AxisFunction, allowed, curves, family_of
 from cmm_uq.machine.physics.catalogue import EVERY
 from cmm_uq.machine.physics.effect import Family
 from tests.parts_drawn import MACHINE
@@ -17,10 +17,10 @@ COUNT = np.arange(1, 41)
 POINTS = Points(XYZ, COUNT, COUNT, np.ones(40, dtype=np.int64), MACHINE, {})
 
 
-def curve(name: str, *, long: bool = True) -> Curve:
+def curve(name: str, *, long: bool = True) -> AxisFunction:
     effect = EVERY[name]
     assert isinstance(effect, Family)
-    return Curve(effect, long=long)
+    return AxisFunction(effect, long=long)
 
 
 def test_a_machine_has_eighteen_functions_of_long_and_of_short_waves() -> None:
