@@ -64,10 +64,10 @@ def case(seed: int, number: int) -> Case:
     return Case(number, _target(first), "; ".join(said), files, _reads(start), _full(start, random_))
 
 
-def lay_out(case: Case, folder: Path) -> None:
+def lay_out(case: Case, folder: Path, *, exist_ok: bool = False) -> None:
     """Make the folder of a case: ``job/`` with its files, and a stranger's file beside."""
     job = folder / "job"
-    job.mkdir(parents=True)
+    job.mkdir(parents=True, exist_ok=exist_ok)
     (folder / NOTES).write_bytes(b"mine\n")
     for name, content in case.files.items():
         if name not in case.odd:

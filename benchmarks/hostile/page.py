@@ -11,6 +11,7 @@ OUTCOMES = {"0": "done", "2": "refused (2)", "3": "output impossible (3)", "4": 
             "130": "SIGINT (130)", "143": "SIGTERM (143)", "-9": "killed", "None": "stopped"}  # fmt: skip
 PARTS = {
     "mutations": ("Mutated inputs", "input"),
+    "commands": ("Hostile files for every command", "command"),
     "signatures": ("Attacks on signatures", "form"),
     "kills": ("Kills and interruptions", "command and signal"),
     "disk": ("Places that cannot be written to", "command"),

@@ -17,6 +17,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+from benchmarks.hostile import every_command
 from benchmarks.hostile.cases import case
 from benchmarks.hostile.invariants import SECONDS
 
@@ -32,9 +33,9 @@ ROOT = Path(__file__).parents[2]
 class Worker:
     """One worker process and the pipe on which it replies."""
 
-    def __init__(self, seed: int, root: Path) -> None:
+    def __init__(self, seed: int, root: Path, part: str = "mutations") -> None:
         reading, writing = os.pipe()
-        command = [*WORKER, "--seed", str(seed), "--root", str(root), "--reply", str(writing)]
+        command = [*WORKER, "--seed", str(seed), "--root", str(root), "--reply", str(writing), "--part", part]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, pass_fds=[writing], cwd=ROOT,
                                          stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
         os.close(writing)
@@ -78,7 +79,9 @@ class Worker:
         self._replies.close()
 
 
-def run_all(numbers: Iterable[int], seed: int, workers: int, root: Path) -> Iterator[dict[str, Any]]:
+def run_all(
+    numbers: Iterable[int], seed: int, workers: int, root: Path, part: str = "mutations"
+) -> Iterator[dict[str, Any]]:
     """Records of all cases, as they come.
 
     Parameters
@@ -87,12 +90,13 @@ def run_all(numbers: Iterable[int], seed: int, workers: int, root: Path) -> Iter
     seed : of the study.
     workers : processes at once.
     root : folder to work in, in memory where possible.
+    part : mutated inputs, or every command.
     """
     waiting, lock = iter(numbers), threading.Lock()
     records: queue.Queue[dict[str, Any] | None] = queue.Queue()
 
     def work(place: int) -> None:
-        worker = Worker(seed, root / f"worker-{place}")
+        worker = Worker(seed, root / f"worker-{place}", part)
         for _ in itertools.count():
             with lock:
                 number = next(waiting, None)
@@ -100,7 +104,7 @@ def run_all(numbers: Iterable[int], seed: int, workers: int, root: Path) -> Iter
                 break
             record = worker.run(number)
             if isinstance(record, str):
-                this = case(seed, number)
+                this = (every_command.case if part == "commands" else case)(seed, number)
                 ran = this.command[0] if this.command else ""
                 record = {"number": number, "target": this.target, "what": this.what, "code": None, "ran": ran,
                           "found": [record], "said": "", "seconds": 0.0}  # fmt: skip
@@ -108,7 +112,7 @@ def run_all(numbers: Iterable[int], seed: int, workers: int, root: Path) -> Iter
             records.put(record)
             if worker.cases >= CASES:
                 worker.end()
-                worker = Worker(seed, root / f"worker-{place}")
+                worker = Worker(seed, root / f"worker-{place}", part)
         worker.end()
         shutil.rmtree(root / f"worker-{place}", ignore_errors=True)
         records.put(None)

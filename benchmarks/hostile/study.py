@@ -1,6 +1,6 @@
 """Nothing lost, hung or half-written: ``python benchmarks/hostile/study.py [--cases N] [--kills N] [--workers N] [--seed S]``.
 
-``--part mutations|signatures|kills|disk|collisions`` runs one part, of which the first two go on where they were stopped;
+``--part mutations|commands|signatures|kills|disk|collisions`` runs one part; the first three go on where they were stopped;
 ``--only PART:NUMBER`` repeats one case and shows what it said.
 The first inputs of every violation are kept under ``--keep`` (reports/hostile), counts beside them, and the page is written
 from the counts.
@@ -24,7 +24,7 @@ from typing import Any
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from benchmarks.hostile import collisions, disk, kills, pool, signatures
+from benchmarks.hostile import collisions, disk, every_command, kills, pool, signatures
 from benchmarks.hostile.cases import case, lay_out
 from benchmarks.hostile.invariants import Outcome
 from benchmarks.hostile.page import PARTS, Tally, load, page
@@ -63,7 +63,8 @@ def trials(part: str, options: argparse.Namespace) -> Iterator[Trial]:
 def in_process(tally: Tally, options: argparse.Namespace, work: Path, tick: Callable[[], None]) -> None:
     """Run mutated inputs or attacks; records are lines of a file, from which a study that was stopped goes on."""
     part = tally.part
-    runs = {"mutations": partial(_pooled, options, work), "signatures": partial(signatures.run, options.seed)}
+    runs = {"mutations": partial(_pooled, options, work, "mutations"), "commands": partial(_pooled, options, work, "commands"),
+            "signatures": partial(signatures.run, options.seed)}  # fmt: skip
     for record in resumed(f"{part}-{options.seed}", range(count_of(part, options)), options, runs[part]):
         found: Any = record["found"]
         fields: dict[str, Any] = {name: record[name] for name in ("number", "target", "what", "code", "said", "ran")}
@@ -73,11 +74,17 @@ def in_process(tally: Tally, options: argparse.Namespace, work: Path, tick: Call
 
 
 def count_of(part: str, options: argparse.Namespace) -> int:
-    return int({"mutations": options.cases, "signatures": options.attacks}[part])
+    return int(
+        {
+            "mutations": options.cases,
+            "commands": options.each * len(every_command.ARGUMENTS),
+            "signatures": options.attacks,
+        }[part]
+    )
 
 
-def _pooled(options: argparse.Namespace, work: Path, numbers: Sequence[int]) -> Iterator[dict[str, Any]]:
-    return pool.run_all(numbers, options.seed, options.workers, work)
+def _pooled(options: argparse.Namespace, work: Path, part: str, numbers: Sequence[int]) -> Iterator[dict[str, Any]]:
+    return pool.run_all(numbers, options.seed, options.workers, work, part)
 
 
 def resumed(
@@ -137,7 +144,7 @@ def run_part(part: str, options: argparse.Namespace, progress: Progress) -> Tall
     task = progress.add_task(PARTS[part][0], total=None)
     with tempfile.TemporaryDirectory(prefix="hostile-", dir=memory()) as work:
         tick = partial(progress.advance, task)
-        if part in ("mutations", "signatures"):
+        if part in ("mutations", "commands", "signatures"):
             progress.update(task, total=count_of(part, options))
             in_process(tally, options, Path(work), tick)
         else:
@@ -170,6 +177,7 @@ def main(arguments: Iterable[str] | None = None) -> int:
     parser.add_argument("--cases", type=int, default=100_000)
     parser.add_argument("--kills", type=int, default=1000)
     parser.add_argument("--attacks", type=int, default=1000)
+    parser.add_argument("--each", type=int, default=100, help="cases of each command")
     parser.add_argument("--workers", type=int, default=4)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--part", choices=PARTS, action="append")
@@ -186,7 +194,9 @@ def main(arguments: Iterable[str] | None = None) -> int:
     options.page.write_text(page(load(options.keep)), encoding="utf-8")
     for tally in tallies:
         print(f"{tally.part}: {tally.cases} cases, {tally.violating} with a violation, {tally.seconds:.0f} s")
-    return int(any(tally.violating for tally in tallies))
+    if never := sorted(set(every_command.commands()) - set(every_command.ARGUMENTS)):
+        print(f"never run: {', '.join(never)}", file=sys.stderr)
+    return int(bool(never) or any(tally.violating or not tally.cases for tally in tallies))
 
 
 if __name__ == "__main__":

@@ -19,7 +19,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
-from benchmarks.hostile.cases import Case, case, lay_out
+from benchmarks.hostile import cases, every_command
+from benchmarks.hostile.cases import Case
 from benchmarks.hostile.invariants import Outcome, lost, problems, set_problems, snapshot
 from benchmarks.hostile.seeds import small_truth
 
@@ -50,12 +51,13 @@ def read(kind: str, path: Path) -> None:
 class Runner:
     """Runs the command in this process, with what it says caught by descriptor, and a fault shown where it happened."""
 
-    def __init__(self, stdout: TextIO, stderr: TextIO) -> None:
+    def __init__(self, stdout: TextIO, stderr: TextIO, part: str = "mutations") -> None:
         from cmm_uq.app.cli import commands, main
         from cmm_uq.base.errors import CmmUqError
         from cmm_uq.base.output import interruption
 
-        commands.app.command("read")(read)
+        if part == "mutations":  # in place of the command that prints a certificate
+            commands.app.command("read")(read)
         inner = commands.run
 
         def shown() -> int:
@@ -105,11 +107,34 @@ class Runner:
         return os.pread(file.fileno(), min(size, 1 << 20), 0).decode("utf-8", "replace")
 
 
+def run_of_command(this: Case, run: Runner, root: Path, begin: Callable[[], None]) -> dict[str, object]:
+    """Lay a case of any command out, run it, and say what of its words, its end and the files beside does not hold."""
+    shutil.rmtree(root, ignore_errors=True)
+    root.mkdir(parents=True)
+    every_command.lay_out(this, root)
+    os.chdir(root)
+    before = snapshot(root)
+    begin()
+    outcome = run(this.command)
+    allowed = outcome.code in every_command.CODES.get(this.target, ())
+    if this.target in ("check", "batch") and outcome.stdout:  # these say on standard output what is wrong
+        allowed = allowed or outcome.code == 2
+    found = [] if allowed and "Traceback" not in outcome.stderr else problems(outcome, quiet=False)
+    own = frozenset(name for name in before if this.target in ("sign", "release") and name.startswith("job/"))
+    after = {name: seal for name, seal in snapshot(root).items() if not name.endswith(("-wal", "-shm"))}
+    found += lost({name: seal for name, seal in before.items() if not name.endswith("records.db")}, after, own=own)
+    if outcome.code == 2 and {name for name in after if not name.endswith((".lock", "records.db"))} - set(before):
+        found.append("something is written though refused")
+    os.chdir("/")
+    return {"number": this.number, "target": this.target, "what": this.what, "code": outcome.code, "ran": this.target,
+            "found": found, "said": outcome.stderr[-1500:] if found else "", "seconds": outcome.seconds}  # fmt: skip
+
+
 def run_case(this: Case, run: Runner, root: Path, begin: Callable[[], None]) -> dict[str, object]:
     """Lay a case out, run it, and say what does not hold."""
     shutil.rmtree(root, ignore_errors=True)
     root.mkdir(parents=True)
-    lay_out(this, root)
+    cases.lay_out(this, root)
     (root / "truth.toml").write_bytes(small_truth())
     os.chdir(root)
     before = snapshot(root)
@@ -140,19 +165,20 @@ def main() -> None:
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--root", type=Path, required=True)
     parser.add_argument("--reply", type=int, required=True)
+    parser.add_argument("--part", choices=("mutations", "commands"), default="mutations")
     options = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     reply = os.fdopen(options.reply, "w")
     for number, name in ((1, "stdout"), (2, "stderr")):
         os.dup2(os.memfd_create(name), number)
-    run = Runner(sys.stdout, sys.stderr)
+    run = Runner(sys.stdout, sys.stderr, options.part)
 
     def tell(**message: object) -> None:
         print(json.dumps(message), file=reply, flush=True)
 
+    make, judge = {"mutations": (cases.case, run_case), "commands": (every_command.case, run_of_command)}[options.part]
     for line in sys.stdin:
-        this = case(options.seed, int(line))
-        tell(done=run_case(this, run, options.root, lambda: tell(begins=True)))
+        tell(done=judge(make(options.seed, int(line)), run, options.root, lambda: tell(begins=True)))
 
 
 if __name__ == "__main__":

@@ -45,8 +45,12 @@ class Entry:
 
     @property
     def data(self) -> dict[str, Any]:
-        found: dict[str, Any] = json.loads(self.content)
-        return found
+        try:
+            return dict(json.loads(self.content))
+        except (ValueError, TypeError, RecursionError):
+            raise CmmUqError(
+                f"entry {self.number} is not as it was recorded", fix="See cmm-uq records verify"
+            ) from None
 
     @property
     def true(self) -> bool:

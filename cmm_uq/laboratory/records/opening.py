@@ -105,6 +105,8 @@ def _check_file(path: Path, create: bool) -> None:
     """The file itself is not looked into: closing it would drop SQLite's locks of this process on it."""
     if path.is_dir():
         raise CmmUqError("is a folder, and records are a file", where=str(path), fix="Name a file in it: records.db")
+    if os.path.exists(path) and not path.is_file():  # noqa: PTH110 - a pipe would be waited for; raises nothing
+        raise CmmUqError("is no file, and records are one", where=str(path), fix="Name a file: records.db")
     try:
         if not path.exists():
             if not create:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import sqlite3
 from collections.abc import Iterator
@@ -58,6 +59,9 @@ def told(place: str | Path) -> Iterator[None]:
         raise OutputError(f"the database fails: {_first_line(str(error))}", where=shown(place)) from error
     except sqlite3.Error as error:
         raise _in_words(str(error), shown(place)) from error
+    except json.JSONDecodeError as error:
+        fix = "cmm-uq records verify says which entry"
+        raise CmmUqError("an entry is not as it was recorded: it is no JSON", where=shown(place), fix=fix) from error
 
 
 _MEND, _RESTORE = "Mend the permissions of the file and its folder", "Restore a backup: cmm-uq records restore FILE"
