@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.analysis.parts.influence import ALL, MATTERS, PriorInfluence
-from cmm_uq.base.messages import DASH, Number, Text, Verbatim, number, say, signed
+from cmm_uq.base.messages import DASH, Number, Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
 from cmm_uq.certificate.part.measurement import PartMeasurement
@@ -22,9 +22,13 @@ def priors_section(found: PartMeasurement) -> Section:
     """Sizes of the families, and what would change with other priors."""
     title = say("What the recording says of the machine's errors, and what it does not")
     if not found.influence:
-        return section(title)
+        return section(title, _bounds(found))
     return section(
-        title, Paragraph(priors_words(found), "warning" if resting(found) else "plain"), _sizes(found), _changes(found)
+        title,
+        Paragraph(priors_words(found), "warning" if resting(found) else "plain"),
+        _sizes(found),
+        _bounds(found),
+        _changes(found),
     )
 
 
@@ -72,6 +76,18 @@ def _sizes(found: PartMeasurement) -> Table | None:
         "A family has one size, half-normal beforehand with what physics allows, and as the recording of the calibration "
         "shows it afterwards; its members of which little is seen are taken as large as the others. Of play the size of the "
         "gap, of periodic errors of the amplitude."
+    ))  # fmt: skip
+
+
+def _bounds(found: PartMeasurement) -> Table | None:
+    heads = (say("Errors"), Column(say("At most"), unit("µm")), say("Stated by"))
+    rows = (
+        (commas([effect_title(name) for name in one.errors]), number(one.largest_um, "g"), Verbatim(one.source))
+        for one in found.job.facts.machine_state.bound
+    )
+    return table(say("Bounds that are stated"), heads, rows, say(
+        "Of play the gap, of a periodic error the amplitude, which 95 of 100 do not exceed. They are taken as stated: the "
+        "recording of the calibration cannot show these errors by itself."
     ))  # fmt: skip
 
 

@@ -43,7 +43,10 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
         "job": _job(found.job),
         "part": {"name": facts.part.name, "drawing": facts.part.drawing or None, "serial": facts.part.serial or None,
                  "not_measured": list(facts.part.not_measured)},
-        "machine": standing_data(found.standing) | {"families": families_data(found)},
+        "machine": standing_data(found.standing) | {
+            "families": families_data(found),
+            "bounds": [one.model_dump() for one in facts.machine_state.bound],
+        },
         "simulation": {
             "virtual_measurements": simulated.trials, "asked": found.asked, "seed": found.seed, "coverage": simulated.coverage,
             "digits": found.digits, "settled": simulated.stable, "first_order": not found.virtual.exact,
@@ -218,6 +221,9 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "machine.changes[].change": ("its own", "Root mean square of its change since, as the records let expect."),
         "machine.temperature_c": ("°C", "Mean temperature of the scales that the calibration recorded."),
         "machine.inputs_sha256.FILE": ("", "SHA-256 of each input of the calibration."),
+        "machine.bounds[].errors": ("", "Errors whose bound the job states."),
+        "machine.bounds[].largest_um": ("µm", "What 95 of 100 do not exceed."),
+        "machine.bounds[].source": ("", "Who states it."),
         "machine.families[].family": ("", "A family of errors of one size, where the recording says how large it is."),
         "machine.families[].unit": ("", "Of the sizes beside it."),
         "machine.families[].allowed": (OWN, "Root mean square that physics allows: the width of its half-normal prior."),

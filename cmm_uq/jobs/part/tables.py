@@ -6,7 +6,7 @@ import datetime as dt
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -23,6 +23,9 @@ from cmm_uq.jobs.tables.origin import MEASURED, Origin
 
 Expansion = Annotated[float, Field(ge=-1e-4, le=1e-3)]  # A coefficient of expansion, 1/K: steel has 11.5e-6.
 SmallExpansion = Annotated[float, Field(ge=0, le=1e-4)]
+BoundedError = Literal[
+    "hysteresis_x", "hysteresis_y", "hysteresis_z", "periodic_scale_x", "periodic_scale_y", "periodic_scale_z"
+]
 Kelvins = Annotated[float, Field(ge=0, le=100)]
 Uncertainties = Annotated[list[Uncertainty], Field(min_length=3, max_length=3)]
 Angles = Annotated[list[Degrees], Field(min_length=3, max_length=3)]
@@ -51,6 +54,16 @@ class PartFacts(JobTable):
     """What the drawing asks for besides and this job leaves out; the certificate says so."""
 
 
+class BoundFacts(JobTable):
+    """One ``[[machine_state.bound]]``: what a datasheet or certificate says that errors of the machine do not exceed."""
+
+    errors: Annotated[list[BoundedError], Field(min_length=1)] = required("Effects that it is of.")
+    largest_um: Annotated[float, Field(gt=0, le=1000)] = required(
+        "What 95 of 100 do not exceed: the gap of play, the amplitude of a periodic error."
+    )
+    source: Name = required("Where that is stated, for the report: datasheet or certificate, with its date.")
+
+
 class MachineStateFacts(JobTable):
     """``[machine_state]``: the machine as its certificate states it, and where its axes go."""
 
@@ -70,8 +83,13 @@ class MachineStateFacts(JobTable):
     origin_mm: Triple = [0.0, 0.0, 0.0]
     """Scale reading of the origin of the coordinates that `[placing]` speaks of."""
     corrected: bool = key(True, "Whether the machine corrects the errors that its calibration found.")
+    bound: Annotated[list[BoundFacts], Field(max_length=LISTED.most)] = []
+    """Bounds of errors that the calibration's recording cannot show, with their sources."""
 
     def problems(self) -> Iterator[str]:
+        stated = [name for one in self.bound for name in one.errors]
+        for name in sorted({name for name in stated if stated.count(name) > 1}):
+            yield f"{name} has more than one bound: state the one that holds"
         if (self.certificate is None) == (self.job is None):
             yield "give either certificate or job: what states the machine's errors"
         if self.job is not None and self.posterior:

@@ -19,11 +19,12 @@ readings would seem to determine them all. So a draw of the sum is a draw before
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from scipy.special import sici
+from scipy.special import ndtri, sici
 
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats, Points
@@ -54,6 +55,8 @@ def family_of(effect: Effect) -> str | None:
     """Family whose size its errors share; ``None`` of an effect with a size of its own."""
     if isinstance(effect, AxisFunction):
         return effect.family
+    if effect.stated:
+        return None
     kinds: dict[type[Effect], str] = {
         PeriodicScale: PERIODIC,
         GivenPeriod: PERIODIC,
@@ -91,6 +94,15 @@ class AxisFunction(Effect):
             each = [turned(points, axis, self.of.about, ARCSECOND * wave) for wave in waves.T]
             return np.concatenate(each, axis=2)
         return along(self.of.direction if isinstance(self.of, Straightness) else axis, MICROMETRE * waves)
+
+
+def bounded(effect: Effect, largest_um: float) -> Effect:
+    """Play whose gap, or a periodic error whose amplitude, 95 of 100 do not exceed: normal, or with normal sine and cosine."""
+    quantile = np.sqrt(-2 * np.log(0.05)) if isinstance(effect, PeriodicScale) else ndtri(0.975)
+    found = copy(effect)
+    found.stated = True
+    found.coefficients = tuple(replace(one, prior_sd=float(largest_um / quantile)) for one in effect.coefficients)
+    return found
 
 
 def curves() -> tuple[AxisFunction, ...]:

@@ -88,6 +88,7 @@ class Effect(ABC):
         None  # pair of axes whose squareness it is (``xy``, ``yz``, ``zx``); it then gives its :meth:`lean`
     )
     of_artefact: bool = False  # whether it is a fault of the artefact itself, which only that artefact can say in full
+    stated: bool = False  # whether its prior sd is of a bound that somebody states, and not what physics allows
     mostly: float = 1.0  # part of its prior sd that it mostly keeps to, where a certificate says so and may be wrong
     means: Text = NOTHING  # what a reported amount means at the machine, in words with blanks; see :meth:`meaning`
     sense: tuple[Text, Text] = (NOTHING, NOTHING)  # a word for a positive and for a negative amount, where these differ

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.points import Points
-from cmm_uq.machine.model.field import ALLOWED, FAMILIES, WAVES, AxisFunction, allowed, curves, family_of
+from cmm_uq.machine.model.field import ALLOWED, FAMILIES, WAVES, AxisFunction, allowed, bounded, curves, family_of
 from cmm_uq.machine.physics.catalogue import EVERY
 from cmm_uq.machine.physics.effect import Family
 from tests.parts_drawn import MACHINE
@@ -68,3 +68,12 @@ def test_effects_know_their_family() -> None:
         "rotation_x_x": "rotation",
     }
     assert family_of(curve("rotation_x_x", long=False)) == "rotation short"
+
+
+def test_a_bound_is_what_ninety_five_of_a_hundred_do_not_exceed() -> None:
+    """Of a gap by the normal quantile 1.96; of an amplitude by Rayleigh's distribution, √(−2·ln 0.05) = 2.448."""
+    gap, wave = bounded(EVERY["hysteresis_x"], 2.0), bounded(EVERY["periodic_scale_y"], 0.5)
+    assert gap.coefficients[0].prior_sd == pytest.approx(2.0 / 1.959964)
+    assert [one.prior_sd for one in wave.coefficients] == pytest.approx([0.5 / 2.447747] * 2)
+    assert (family_of(gap), family_of(wave)) == (None, None)
+    assert EVERY["hysteresis_x"].coefficients[0].prior_sd == 30.0

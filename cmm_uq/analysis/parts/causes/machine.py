@@ -245,6 +245,8 @@ def modelled(state: MachineState, qualified: Qualified, pose: PartPose, measured
         return np.asarray(drawn) + random.standard_normal((n, len(drift))) * drift
 
     why = dict.fromkeys(state.free, say("the calibration left it to what physics allows"))
+    said = say("the calibration shows little of it; as large as the bound that is stated allows")
+    why |= {effect.name: said for effect in state.effects if effect.stated and effect.name in why}
     as_others = say("the calibration shows little of it; as large as it shows errors of this kind to be")
     why |= dict.fromkeys(state.as_family, as_others)
     basis = -_in_part(qualified.left(columns), pose)
@@ -278,7 +280,8 @@ def _unmodelled(one: Unmodelled, qualified: Qualified, pose: PartPose) -> Common
     as_shown = say("the calibration did not model it; as large as its recording would not have shown")
     as_allowed = say("the calibration did not model it; as large as physics allows")
     name, basis = one.effect.name, -_in_part(qualified.left(columns), pose)
-    why = {name: as_shown if one.bounded else as_allowed}
+    as_stated = say("the calibration did not show it; as large as the bound that is stated allows")
+    why = {name: as_stated if one.effect.stated else as_shown if one.bounded else as_allowed}
     return CommonCause(name=MACHINE, factors=(name,) * (k * count), draw=draw, named=why, basis=basis)
 
 

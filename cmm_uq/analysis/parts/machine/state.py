@@ -24,7 +24,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.machine.model.field import ALLOWED, curves, family_of
+from cmm_uq.machine.model.field import ALLOWED, bounded, curves, family_of
 from cmm_uq.machine.physics.catalogue import effects, every
 from cmm_uq.machine.physics.effect import CONTRACT, Effect
 
@@ -222,6 +222,22 @@ def with_curves(state: MachineState) -> MachineState:
     return replace(state, unmodelled=(*plain, *every))
 
 
+def with_bounds(state: MachineState, largest_um: Mapping[str, float]) -> MachineState:
+    """With errors that were not modelled as large as somebody states, by name, µm; what was modelled is known by that."""
+    known = {one.effect.name for one in state.unmodelled}
+    for name in largest_um:
+        if name not in known:
+            raise CmmUqError(f"the calibration estimates {name}, which no bound says better", where=BOUNDS,
+                             fix="Leave the bound out")  # fmt: skip
+    found = []
+    for one in state.unmodelled:
+        if (largest := largest_um.get(one.effect.name)) is not None:
+            effect = bounded(one.effect, largest)
+            one = replace(one, effect=effect, sd=np.array([c.prior_sd for c in effect.coefficients]))
+        found.append(one)
+    return replace(state, unmodelled=tuple(found))
+
+
 def noise_of_draws(reported: Mapping[str, Floats]) -> StatedNoise:
     """The noise in draws (M,) of a posterior by ``noise.…_um``; along each axis where these were told apart."""
     one = reported.get("noise.coordinate_um")
@@ -234,7 +250,7 @@ def noise_of_draws(reported: Mapping[str, Floats]) -> StatedNoise:
     return StatedNoise(MICROMETRE * np.column_stack(axes), placing, slow, growth_mm=growth)
 
 
-_WHERE = "the machine's results.json"
+_WHERE, BOUNDS = "the machine's results.json", "job.toml [[machine_state.bound]]"
 
 
 def machine_stated(

@@ -16,7 +16,7 @@ import numpy as np
 from cmm_uq import __version__
 from cmm_uq.analysis.diagnosis.held_out import thin_out
 from cmm_uq.analysis.parts.machine.conditional import given_recording
-from cmm_uq.analysis.parts.machine.state import MachineState, machine_stated, with_curves
+from cmm_uq.analysis.parts.machine.state import MachineState, machine_stated, with_bounds, with_curves
 from cmm_uq.app.commands.certificates.verification import Verification, examine_certificate, verify_given
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import with_noise
@@ -148,6 +148,8 @@ def state_machine(
     machine = _machine(job, stated.job)
     fits(machine)
     state = machine_stated(stated.results, stated.draws, machine, corrected=job.facts.machine_state.corrected)
+    stated_bounds = {name: one.largest_um for one in job.facts.machine_state.bound for name in one.errors}
+    state = with_bounds(state, stated_bounds)
     # where the calibration modelled the scales' expansion, their errors are those of 20 °C
     expanding = any(column.startswith("temp_") for effect in state.effects for column in effect.columns)
     known_at = None if expanding else standing.temperature_c

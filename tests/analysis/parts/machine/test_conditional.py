@@ -26,6 +26,7 @@ from cmm_uq.analysis.parts.machine.state import (
     Unmodelled,
     machine_stated,
     of_machine,
+    with_bounds,
 )
 from cmm_uq.analysis.parts.plan import PartCharacteristic, PartPose, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
@@ -310,6 +311,23 @@ def test_a_machine_corrects_what_its_certificate_states_and_no_more(corrected: b
     )
     found = given_recording(state, calibration(), SIGMA, 500)
     np.testing.assert_allclose(found.corrects, [*(draws.mean(axis=0) if corrected else np.zeros(6)), 0.0])
+
+
+def test_a_bound_that_is_stated_holds_what_a_recording_does_not_show() -> None:
+    """Bars show no play: it keeps what is stated. A periodic error they show a little: never larger than stated."""
+    apart = left_out("hysteresis_x", "periodic_scale_y")
+    state = MachineState(BARS.machine, effects(MODELLED), np.zeros((2, 6)), unmodelled=apart)
+    found = with_bounds(state, {"hysteresis_x": 2.0, "periodic_scale_y": 0.5})
+    assert found.unmodelled[0].sd == pytest.approx([2.0 / 1.959964])
+    drawn = given_recording(found, calibration(), SIGMA, 4000)
+    assert [one.effect.name for one in drawn.unmodelled] == ["hysteresis_x"]
+    assert drawn.scales == {}
+    periodic = drawn.effects[-1]
+    assert isinstance(periodic, GivenPeriod)
+    at = periodic.at(np.linspace(300.0, 800.0, 50))
+    assert 1e3 * float((drawn.draws[:, 6:] @ at.T).std()) == pytest.approx(0.5 / 2.447747, rel=0.1)
+    with pytest.raises(CmmUqError, match="the calibration estimates scale_x, which no bound says better"):
+        with_bounds(state, {"scale_x": 1.0})
 
 
 def test_a_certificate_says_what_it_left_free() -> None:
