@@ -85,10 +85,11 @@ def _bounds(found: PartMeasurement) -> Table | None:
         (commas([effect_title(name) for name in one.errors]), number(one.largest_um, "g"), Verbatim(one.source))
         for one in found.job.facts.machine_state.bound
     )
-    return table(say("Bounds that are stated"), heads, rows, say(
+    note = say(
         "Of play the gap, of a periodic error the amplitude, which 95 of 100 do not exceed. They are taken as stated: the "
         "recording of the calibration cannot show these errors by itself."
-    ))  # fmt: skip
+    )
+    return table(say("Bounds that are stated"), heads, rows, note)
 
 
 def _changes(found: PartMeasurement) -> Table | None:

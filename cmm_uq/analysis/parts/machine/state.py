@@ -227,8 +227,8 @@ def with_bounds(state: MachineState, largest_um: Mapping[str, float]) -> Machine
     known = {one.effect.name for one in state.unmodelled}
     for name in largest_um:
         if name not in known:
-            raise CmmUqError(f"the calibration estimates {name}, which no bound says better", where=BOUNDS,
-                             fix="Leave the bound out")  # fmt: skip
+            problem = f"the calibration estimates {name}, which no bound says better"
+            raise CmmUqError(problem, where=BOUNDS, fix="Leave the bound out")
     found = []
     for one in state.unmodelled:
         if (largest := largest_um.get(one.effect.name)) is not None:
