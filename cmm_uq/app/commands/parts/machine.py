@@ -148,7 +148,9 @@ def state_machine(
     machine = _machine(job, stated.job)
     fits(machine)
     state = machine_stated(stated.results, stated.draws, machine, corrected=job.facts.machine_state.corrected)
-    stated_bounds = {name: one.largest_um for one in job.facts.machine_state.bound for name in one.errors}
+    stated_bounds: dict[str, float] = {
+        name: one.largest_um for one in job.facts.machine_state.bound for name in one.errors
+    }
     state = with_bounds(state, stated_bounds)
     # where the calibration modelled the scales' expansion, their errors are those of 20 °C
     expanding = any(column.startswith("temp_") for effect in state.effects for column in effect.columns)
