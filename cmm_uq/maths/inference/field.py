@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy
@@ -25,7 +26,7 @@ from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel, reach
 from cmm_uq.maths.inference.marginal import SIGMA_BOUNDS, Marginal, cholesky
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import start
-from cmm_uq.maths.inference.proposals import LogDensity, tempered, weights
+from cmm_uq.maths.inference.proposals import LogDensity, Proposal, highest_power, moments, weights
 
 Drawn = Callable[[np.random.Generator, int], Floats]
 # of the residuals' scatter: an observation that each coefficient, as large as physics allows, moves less shows only noise, as
@@ -34,10 +35,11 @@ Drawn = Callable[[np.random.Generator, int], Floats]
 _UNSEEN, _REACHED = (1e-4, 0.02), 1e-4
 _QUADRATIC = 1e8  # above any sum of squares that is not absurd
 _NUMBERS = 2_000_000  # in the matrices that are factorised at once
-# draws of sizes that are weighed, and what they must be worth in independent ones, else a sampler draws them
-_LOOKED_AT, _WORTH = 4000, 200.0
+# draws of sizes that are weighed, at once and at most, and what they must be worth; else a sampler draws them
+_LOOKED_AT, _MOST_LOOKED_AT, _WORTH = 4000, 24_000, 200.0
 _EFFECTIVE, _STEPS = 400, 40  # sizes are few and smooth: what follows from them needs no more of them
 _HELD = 250  # sizes that all draws have among them
+_ADAPTED, _ROUND, _COUNT = 5, 1000, 0.05  # rounds, draws of each, part of them that must count
 _STEP, _MOST_STEPS, _FLATTEST, _WIDER, _NEVER = 0.05, 60, 0.5, 1.3, -1e30
 _SMALLEST = 1e-4  # of a family's size
 
@@ -314,12 +316,15 @@ def sample_sizes(model: FieldModel, draws: int, seed: int, known: Sizes | None =
     begin, _ = start(Marginal(model.linear, model.noise, model.estimate))
     inside_of = begin[:d]
     centre, factor = _laplace(density, np.append(begin[:d], np.zeros(count)))
-    proposal = tempered(density, centre, _WIDER * factor, seed)
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(29,))))
-    z = proposal.draws(_LOOKED_AT, random)
-    latent = proposal.parameters(z)
-    weight = weights(density(latent) - proposal.log_density(z))
-    worth, chains = float(1 / np.sum(weight**2)), None
+    proposal = _adapted(density, centre, _WIDER * factor, random)
+    latent, log, worth, chains = np.zeros((0, d + count)), np.zeros(0), 0.0, None
+    while worth < _WORTH and len(latent) < _MOST_LOOKED_AT:
+        z = proposal.draws(_LOOKED_AT, random)
+        more = proposal.parameters(z)
+        latent, log = np.vstack([latent, more]), np.append(log, density(more) - proposal.log_density(z))
+        weight = weights(log)
+        worth = float(1 / np.sum(weight**2))
     if worth >= _WORTH:
         # as many of each as its weight says, evenly spread
         place = np.searchsorted(np.cumsum(weight), (np.arange(_HELD) + 0.5) / _HELD * (1 - 1e-12))
@@ -329,6 +334,19 @@ def sample_sizes(model: FieldModel, draws: int, seed: int, known: Sizes | None =
         latent, worth = chains.draws[np.linspace(0, len(chains.draws) - 1, _HELD).astype(np.int64)], chains.ess_min
     latent = latent[np.arange(draws) % len(latent)]
     return FieldSizes(sizes(latent), size_of(latent[:, d:]), worth, chains)
+
+
+def _adapted(density: LogDensity, centre: Floats, factor: Floats, random: Any) -> Proposal:
+    """A t distribution with the moments of the density, let in by degrees: as far as enough draws of a round count."""
+    for _ in range(_ADAPTED):
+        proposal = Proposal.single(centre, factor)
+        z = proposal.draws(_ROUND, random)
+        latent = proposal.parameters(z)
+        log = np.maximum(density(latent) - proposal.log_density(z), _NEVER)
+        power = highest_power(log, np.zeros(_ROUND), 0.0, _COUNT * _ROUND)
+        centre, covariance = moments(latent, weights(power * log))
+        factor = np.linalg.cholesky(covariance + 1e-9 * np.trace(covariance) * np.eye(len(centre)))
+    return Proposal.single(centre, factor)
 
 
 def _laplace(density: LogDensity, start_at: Floats) -> tuple[Floats, Floats]:
