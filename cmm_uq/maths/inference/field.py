@@ -35,8 +35,8 @@ Drawn = Callable[[np.random.Generator, int], Floats]
 _UNSEEN, _REACHED = (1e-4, 0.02), 1e-4
 _QUADRATIC = 1e8  # above any sum of squares that is not absurd
 _NUMBERS = 2_000_000  # in the matrices that are factorised at once
-# draws of sizes that are weighed, at once and at most, and what they must be worth; else a sampler draws them
-_LOOKED_AT, _MOST_LOOKED_AT, _WORTH = 4000, 24_000, 200.0
+# draws of sizes that are weighed, at once and at most; worth with which that ends, and below which a sampler draws them
+_LOOKED_AT, _MOST_LOOKED_AT, _WORTH, _LEAST_WORTH = 4000, 24_000, 200.0, 50.0
 _EFFECTIVE, _STEPS = 400, 40  # sizes are few and smooth: what follows from them needs no more of them
 _HELD = 250  # sizes that all draws have among them
 _ADAPTED, _ROUND, _COUNT = 5, 1000, 0.05  # rounds, draws of each, part of them that must count
@@ -310,7 +310,8 @@ def sample_sizes(model: FieldModel, draws: int, seed: int, known: Sizes | None =
             noise = np.where(inside[:, None], noise, inside_of)
             prior = prior + model.noise.log_prior(noise, model.noise.sizes(noise))
         whole = np.hstack([noise, latent[:, d:]])
-        found = prior + model.log_likelihood(sizes(whole), size_of(latent[:, d:]))
+        with np.errstate(over="ignore", invalid="ignore"):  # of sizes that no machine has
+            found = prior + model.log_likelihood(sizes(whole), size_of(latent[:, d:]))
         return np.where(np.isfinite(found), found, -np.inf)
 
     begin, _ = start(Marginal(model.linear, model.noise, model.estimate))
@@ -325,7 +326,7 @@ def sample_sizes(model: FieldModel, draws: int, seed: int, known: Sizes | None =
         latent, log = np.vstack([latent, more]), np.append(log, density(more) - proposal.log_density(z))
         weight = weights(log)
         worth = float(1 / np.sum(weight**2))
-    if worth >= _WORTH:
+    if worth >= _LEAST_WORTH:
         # as many of each as its weight says, evenly spread
         place = np.searchsorted(np.cumsum(weight), (np.arange(_HELD) + 0.5) / _HELD * (1 - 1e-12))
         latent = latent[np.minimum(place, len(latent) - 1)]

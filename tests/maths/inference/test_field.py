@@ -120,7 +120,7 @@ def test_sizes_have_their_posterior() -> None:
 def test_a_sampler_draws_them_where_the_approximation_is_not_good_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = families(observed((0.2, 1.0), 4))
     weighed = sample_sizes(whole, 4000, 1, white(SIGMA))
-    monkeypatch.setattr(field, "_WORTH", np.inf)
+    monkeypatch.setattr(field, "_LEAST_WORTH", np.inf)
     sampled = sample_sizes(whole, 4000, 1, white(SIGMA))
     assert sampled.chains is not None
     sd = weighed.families.std(axis=0)
