@@ -20,9 +20,8 @@ from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_pa
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel
-from cmm_uq.maths.inference.noise import Components
-from cmm_uq.maths.inference.posterior import NoisyPosterior, sample_with_noise
+from cmm_uq.maths.inference.field import FieldModel, FieldSizes, sample_sizes
+from cmm_uq.maths.inference.noise import Sizes
 from tests.part_machines import by_certificate, plate_of
 
 TRIALS = 1000  # enough to be computed again to the byte; how near draws come to the truth is looked at elsewhere
@@ -52,15 +51,16 @@ def plate_report() -> Mapping[str, bytes]:
 
 
 _AGAIN: dict[tuple[object, ...], PartMeasurement] = {}
-_SAMPLED: dict[bytes, NoisyPosterior] = {}
+_SIZES: dict[bytes, FieldSizes] = {}
 
 
-def sampled_once(model: LinearModel, noise: Components, estimate: LeastSquares, seed: int) -> NoisyPosterior:
-    """The posterior of a machine's recording, sampled once for all tests that are not about sampling it again."""
-    key = hashlib.sha256(pickle.dumps((model, noise, estimate, seed))).digest()
-    if key not in _SAMPLED:
-        _SAMPLED[key] = sample_with_noise(model, noise, estimate, seed)
-    return _SAMPLED[key]
+def sampled_once(model: FieldModel, draws: int, seed: int, known: Sizes | None = None) -> FieldSizes:
+    """Sizes of a machine's errors and noise, sampled once for all tests that are not about sampling them again."""
+    columns = [one.columns for one in model.errors]
+    key = hashlib.sha256(pickle.dumps((model.linear, model.noise, columns, draws, seed, known))).digest()
+    if key not in _SIZES:
+        _SIZES[key] = sample_sizes(model, draws, seed, known)
+    return _SIZES[key]
 
 
 def unchanged(

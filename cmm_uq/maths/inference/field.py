@@ -38,7 +38,7 @@ _NUMBERS = 2_000_000  # in the matrices that are factorised at once
 # draws of sizes that are weighed, at once and at most; worth with which that ends, and below which a sampler draws them
 _LOOKED_AT, _MOST_LOOKED_AT, _WORTH, _LEAST_WORTH = 4000, 24_000, 200.0, 50.0
 _EFFECTIVE, _STEPS = 400, 40  # sizes are few and smooth: what follows from them needs no more of them
-_HELD = 250  # sizes that all draws have among them
+HELD = 250  # sizes that all draws have among them
 _ADAPTED, _ROUND, _COUNT = 5, 1000, 0.05  # rounds, draws of each, part of them that must count
 _STEP, _MOST_STEPS, _FLATTEST, _WIDER, _NEVER = 0.05, 60, 0.5, 1.3, -1e30
 _SMALLEST = 1e-4  # of a family's size
@@ -328,11 +328,11 @@ def sample_sizes(model: FieldModel, draws: int, seed: int, known: Sizes | None =
         worth = float(1 / np.sum(weight**2))
     if worth >= _LEAST_WORTH:
         # as many of each as its weight says, evenly spread
-        place = np.searchsorted(np.cumsum(weight), (np.arange(_HELD) + 0.5) / _HELD * (1 - 1e-12))
+        place = np.searchsorted(np.cumsum(weight), (np.arange(HELD) + 0.5) / HELD * (1 - 1e-12))
         latent = latent[np.minimum(place, len(latent) - 1)]
     else:
         chains = run_ensembles(density, proposal, seed, effective_samples=_EFFECTIVE, steps_at_once=_STEPS)
-        latent, worth = chains.draws[np.linspace(0, len(chains.draws) - 1, _HELD).astype(np.int64)], chains.ess_min
+        latent, worth = chains.draws[np.linspace(0, len(chains.draws) - 1, HELD).astype(np.int64)], chains.ess_min
     latent = latent[np.arange(draws) % len(latent)]
     return FieldSizes(sizes(latent), size_of(latent[:, d:]), worth, chains)
 

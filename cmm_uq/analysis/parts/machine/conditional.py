@@ -17,13 +17,13 @@ import numpy as np
 
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, Unmodelled
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.points import Floats, Ints, Points
+from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model.field import GivenPeriod, covariance, family_of, linear
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import growing_lengths, noise_of
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import PeriodicScale
-from cmm_uq.maths.inference.field import FieldErrors, FieldModel, sample_sizes
+from cmm_uq.maths.inference.field import HELD, FieldErrors, FieldModel, sample_sizes
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import sample_with_noise
 
@@ -181,10 +181,8 @@ def given_recording(
         ):  # any noise would do: it is taken for what the calibration took it for, which is no less
             estimate = model.estimate()
             alone = sample_with_noise(estimate.linear, whole.field.noise, estimate.least_squares, seed).sizes
-            typical = alone.typical
-            sizes = replace(
-                sample_sizes(whole.field, draws, seed, typical), noise=alone.at(_evenly(len(alone.placing), draws))
-            )
+            some = np.linspace(0, len(alone.placing) - 1, HELD).astype(np.int64)[np.arange(draws) % HELD]
+            sizes = replace(sample_sizes(whole.field, draws, seed, alone.typical), noise=alone.at(some))
         noise = stated_noise(model, whole.field.noise, sizes.noise)
     drawn = whole.coefficients(sizes.noise, sizes.families, random)
     together = _with(state, model, whole, drawn, noise)
@@ -229,8 +227,3 @@ def _shares(state: MachineState, scales: Mapping[str, Floats] | None = None) -> 
             each = np.array([effect.share(own) ** 2, size])
         squares[effect.name] = squares.get(effect.name, np.zeros(2)) + each
     return {name: float(np.sqrt(left / prior)) if prior else 0.0 for name, (left, prior) in squares.items()}
-
-
-def _evenly(count: int, wanted: int) -> Ints:
-    """``wanted`` places of ``count``, some more than once where there are fewer."""
-    return np.linspace(0, count - 1, wanted).astype(np.int64)
