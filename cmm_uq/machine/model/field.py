@@ -113,12 +113,8 @@ def curves() -> tuple[AxisFunction, ...]:
 
 def allowed(family: str) -> tuple[float, str]:
     """Root mean square of an error of a family that physics allows, and its unit; of play the gap."""
-    if family == PLAY:
-        return 30.0, "µm"
-    if family == PERIODIC:
-        return 10.0 * float(np.sqrt(2.0)), "µm"
-    one = next(curve for curve in curves() if curve.family == family)
-    return float(np.sqrt(sum(c.prior_sd**2 for c in one.coefficients))), "″" if one.kind == ROTATION else "µm"
+    one = next(effect for effect in (*EVERY.values(), *curves()) if family_of(effect) == family)
+    return float(np.sqrt(sum(c.prior_sd**2 for c in one.coefficients))), str(one.coefficients[0].unit)
 
 
 class EveryPeriod(Effect):

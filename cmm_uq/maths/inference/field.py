@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -121,6 +122,12 @@ class FieldModel:
         return self.into.T @ self._turned
 
     @cached_property
+    def _each(self) -> list[Floats]:
+        """(n, j) of these combinations for each of the errors."""
+        ends = len(self._known) + np.cumsum([0, *(one.columns.shape[1] for one in self.errors)])
+        return [self._seen[:, start:end] for start, end in pairwise(ends.tolist())]
+
+    @cached_property
     def families(self) -> tuple[str, ...]:
         """Those whose size is to be found."""
         return tuple(dict.fromkeys(one.family for one in self.errors if one.family is not None))
@@ -133,10 +140,7 @@ class FieldModel:
         own = self._seen[:, : len(self._known)]
         sized = dict.fromkeys((*self.families, None), np.zeros_like(own @ own.T))
         sized[None] = own @ own.T
-        at = len(self._known)
-        for one in self.errors:
-            seen = self._seen[:, at : at + one.columns.shape[1]]
-            at += one.columns.shape[1]
+        for one, seen in zip(self.errors, self._each, strict=True):
             if one.covariance is None or one.impulse is None:
                 sized[one.family] = sized[one.family] + seen @ seen.T
             else:
@@ -218,11 +222,9 @@ class FieldModel:
         if noise.slow.shape[1] and sizes.slow[0] > 0:
             waves = self.shown(noise.waves(sizes))
             left -= random.standard_normal((count, waves.shape[1])) @ waves.T
-        beforehand, at = list[Floats](), known
-        for one in self.errors:
-            beforehand.append(self._size(one, scale) * one.draw(random, count))
-            left -= beforehand[-1] @ self._seen[:, at : at + one.columns.shape[1]].T
-            at += one.columns.shape[1]
+        beforehand = [self._size(one, scale) * one.draw(random, count) for one in self.errors]
+        for drawn, seen in zip(beforehand, self._each, strict=True):
+            left -= drawn @ seen.T
         weight = scipy.linalg.cho_solve(factor, left.T).T
         found = [self._parameters(own + weight @ self._seen[:, :known])]
         for one, drawn, gain in zip(self.errors, beforehand, self._gains(scale), strict=True):
@@ -234,10 +236,8 @@ class FieldModel:
 
     def _gains(self, scale: Floats) -> list[Floats]:
         """(n, …) of each error, by how much each number of a draw changes with the weight of each combination."""
-        found, at = list[Floats](), len(self._known)
-        for one in self.errors:
-            seen = self._seen[:, at : at + one.columns.shape[1]]
-            at += one.columns.shape[1]
+        found = list[Floats]()
+        for one, seen in zip(self.errors, self._each, strict=True):
             gain = seen if one.covariance is None else np.hstack([np.zeros_like(seen), np.eye(len(seen))])
             found.append(self._size(one, scale) ** 2 * gain)
         return found
@@ -253,14 +253,11 @@ class FieldModel:
         whole = self._covariance(sizes, scale[None])[0]
         sd = self.linear.effective_sd[self._known]
         prior, seen = [np.ones(known)], [self._seen[:, :known]]
-        gains, at = [seen[0] * sd], known
-        for one, gain in zip(self.errors, self._gains(scale), strict=True):
-            j = one.columns.shape[1]
-            more = np.zeros((len(whole), self._width(one) - j))
-            prior += [np.full(j, self._size(one, scale)), np.zeros(more.shape[1])]
-            seen += [self._seen[:, at : at + j], more]
-            gains.append(gain)
-            at += j
+        gains = [seen[0] * sd, *self._gains(scale)]
+        for one, own in zip(self.errors, self._each, strict=True):
+            more = np.zeros((len(whole), self._width(one) - own.shape[1]))
+            prior += [np.full(own.shape[1], self._size(one, scale)), np.zeros(more.shape[1])]
+            seen += [own, more]
         units = np.concatenate([sd, np.ones(sum(map(self._width, self.errors)))])
         root = units * np.concatenate(prior)
         to_each = np.linalg.solve(whole, np.hstack(gains)).T
