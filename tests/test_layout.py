@@ -26,7 +26,7 @@ MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.pr
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
     "": 140, "base": 2_730, "maths": 10_532, "jobs": 11_431, "machine": 5_880, "analysis": 15_661, "laboratory": 14_241,
-    "certificate": 15_807, "artefacts": 8_646, "app": 14_043,
+    "certificate": 15_811, "artefacts": 8_646, "app": 14_043,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 235, 1500

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.analysis.parts.influence import ALL, MATTERS, PriorInfluence
-from cmm_uq.base.messages import DASH, Number, Text, Verbatim, commas, number, say, signed
+from cmm_uq.base.messages import DASH, Text, Verbatim, commas, number, say, signed
+from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
 from cmm_uq.certificate.part.measurement import PartMeasurement
@@ -16,6 +17,7 @@ from cmm_uq.certificate.wording import effect_title
 from cmm_uq.machine.model.field import FAMILIES, allowed
 
 _LITTLE = 0.01  # change that is not worth a line
+_SHOWN = 0.005  # change that is not zero as printed
 
 
 def priors_section(found: PartMeasurement) -> Section:
@@ -111,13 +113,15 @@ def _change(found: PartMeasurement, one: PriorInfluence) -> tuple[Text, ...]:
     name, times = family_words(one.family), number(one.times, "g")
     if not np.isfinite(one.u).all():
         return name, times, DASH, DASH, DASH, DASH
-    u, value = int(np.argmax(np.abs(one.u - 1))), int(np.argmax(np.abs(one.shift)))
-    called = [Verbatim(each.name) for each in found.characteristics]
-    return name, times, _percent(one.u[u] - 1), called[u], _percent(one.shift[value]), called[value]
+    return name, times, *_largest(found, one.u - 1), *_largest(found, one.shift)
 
 
-def _percent(part: float) -> Number:
-    return signed(100 * part, ".0f") if abs(part) >= 0.005 else number(0.0, ".0f")
+def _largest(found: PartMeasurement, changes: Floats) -> tuple[Text, Text]:
+    """The largest of changes (c,) in per cent, and whose it is; a zero is nobody's."""
+    i = int(np.argmax(np.abs(changes)))
+    if abs(changes[i]) < _SHOWN:
+        return number(0.0, ".0f"), DASH
+    return signed(100 * changes[i], ".0f"), Verbatim(found.characteristics[i].name)
 
 
 def families_data(found: PartMeasurement) -> list[dict[str, Any]]:
@@ -137,5 +141,5 @@ def priors_data(influence: Iterable[PriorInfluence]) -> list[dict[str, Any]]:
     ]
 
 
-def _known(values: np.ndarray) -> list[float | None]:
+def _known(values: Floats) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]

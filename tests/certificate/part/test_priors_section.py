@@ -1,0 +1,116 @@
+"""How large a report says each family of errors to be, and which of its figures rest on priors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cmm_uq.analysis.parts.influence import ALL, PriorInfluence
+from cmm_uq.certificate.document import Paragraph, Section, Table
+from cmm_uq.certificate.part.measurement import PartMeasurement
+from cmm_uq.certificate.part.priors_section import families_data, priors_data, priors_section, resting
+from cmm_uq.jobs.part.tables import BoundFacts
+from tests.certificate.parts_found import found_of, machine, measured_points
+from tests.jobs.part.parts import plate
+
+DATASHEET = BoundFacts(errors=["periodic_scale_x", "hysteresis_y"], largest_um=0.5, source="Datasheet S-1, 2024")
+
+
+@pytest.fixture(scope="module")
+def found() -> PartMeasurement:
+    return found_of(points=measured_points(plate()))
+
+
+def told(found: PartMeasurement, *influence: PriorInfluence) -> Section:
+    return priors_section(replace(found, influence=influence))
+
+
+def tables(section: Section) -> dict[str, Table]:
+    return {str(block.caption): block for block in section.blocks if isinstance(block, Table)}
+
+
+def paragraph(section: Section) -> Paragraph:
+    return next(block for block in section.blocks if isinstance(block, Paragraph))
+
+
+def change(
+    found: PartMeasurement, u: Iterable[float] = (), shift: Iterable[float] = (), **of: object
+) -> PriorInfluence:
+    """Of ratios of u, and of shifts over u, for the first characteristics; nothing changes of the others."""
+    ratios, shifts = np.ones(len(found.stated)), np.zeros(len(found.stated))
+    u, shift = list(u), list(shift)
+    ratios[: len(u)], shifts[: len(shift)] = u, shift
+    return replace(PriorInfluence("play", 2.0, ratios, shifts), **of)  # type: ignore[arg-type]
+
+
+def with_sizes(found: PartMeasurement) -> PartMeasurement:
+    """Play of a fifth of what physics allows in the median, from 0 to 0.4; long waves of rotations of all of it."""
+    even = np.linspace(0.0, 0.4, 4001)
+    scales = {"play": even, "rotation long": np.ones(4001)}
+    return replace(found, given=replace(found.given, machine=replace(machine(), scales=scales)))
+
+
+def test_sizes_are_those_of_the_draws_times_what_physics_allows(found: PartMeasurement) -> None:
+    """30 µm of play; of eight waves of 30″ with weights 1/k the first two have 30″·√((1 + 1/4)/Σ 1/k²) = 27.14″."""
+    sized = with_sizes(found)
+    play, rotation = families_data(sized)
+    assert (play["allowed"], play["unit"]) == (30.0, "µm")
+    assert [play[key] for key in ("low", "size", "high")] == pytest.approx([30 * 0.01, 30 * 0.2, 30 * 0.39])
+    assert (
+        rotation["size"] == rotation["allowed"] == pytest.approx(30 * np.sqrt(1.25 / sum(k**-2.0 for k in range(1, 9))))
+    )
+    rows = tables(told(sized, change(found)))["Sizes of errors, root mean square"].rows
+    assert rows[0] == ("Play of the drives", "30 µm", "6 µm", "0.3 to 12 µm")
+    assert rows[1] == ("Rotations, long waves", "27 ″", "27 ″", "27 to 27 ″")
+
+
+def test_the_largest_change_is_told_with_whose_it_is(found: PartMeasurement) -> None:
+    """u falls by 4 % at most and of the second, the value moves by 0.03 u at most and of the first, downwards."""
+    table = tables(told(found, change(found, [1.02, 0.96], [-0.03, 0.01], times=0.5)))["If this were different"]
+    one, two = (each.name for each in found.characteristics[:2])
+    assert table.rows == (("Play of the drives", "0.5", "−4", two, "−3", one),)
+
+
+def test_what_changes_nothing_is_no_row_but_that_of_all(found: PartMeasurement) -> None:
+    little = change(found, [1.009], [0.004])
+    table = tables(told(found, little, replace(little, family=ALL)))["If this were different"]
+    one = found.characteristics[0].name
+    assert table.rows == (("All of them together", "2", "1", one, "0", "–"),)
+
+
+def test_what_draws_do_not_say_is_a_dash_and_rests_on_the_prior(found: PartMeasurement) -> None:
+    nothing = np.full(len(found.stated), np.nan)
+    unsaid = PriorInfluence("periodic", 2.0, nothing, nothing)
+    assert tables(told(found, unsaid))["If this were different"].rows[0][2:] == ("–",) * 4
+    assert len(resting(replace(found, influence=(unsaid,)))) == len(found.stated)
+    assert priors_data([unsaid])[0]["u_ratio"] == [None] * len(found.stated)
+
+
+def test_a_tenth_of_u_or_of_expanded_uncertainty_makes_a_figure_rest_on_the_prior(found: PartMeasurement) -> None:
+    """A shift counts as a part of U = k·u: 0.1·k of u and no less."""
+    k = found.stated[0].U / found.stated[0].u
+    names = [one.name for one in found.characteristics]
+    for one, rests in (
+        (change(found, [1.099, 0.901]), []), (change(found, [1.0, 1.101]), [names[1]]),
+        (change(found, [0.899]), [names[0]]), (change(found, shift=[0.099 * k]), []),
+        (change(found, shift=[-0.101 * k]), [names[0]]),
+    ):  # fmt: skip
+        assert resting(replace(found, influence=(one,))) == rests
+    calm, warned = paragraph(told(found, change(found))), paragraph(told(found, change(found, [1.0, 1.5])))
+    assert (calm.tone, warned.tone) == ("plain", "warning")
+    assert str(warned.text).startswith(f"1 of {len(names)} characteristics rest on what was taken")
+
+
+def test_bounds_stand_with_their_source(found: PartMeasurement) -> None:
+    state = found.job.facts.machine_state.model_copy(update={"bound": [DATASHEET]})
+    job = replace(found.job, facts=found.job.facts.model_copy(update={"machine_state": state}))
+    for influence in ((), (change(found),)):
+        rows = tables(told(replace(found, job=job), *influence))["Bounds that are stated"].rows
+        assert rows == (("Periodic scale error of X, Hysteresis of Y", "0.5", "Datasheet S-1, 2024"),)
+
+
+def test_a_part_without_influence_or_bounds_has_no_such_section(found: PartMeasurement) -> None:
+    assert not told(found).blocks
