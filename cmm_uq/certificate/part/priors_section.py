@@ -40,7 +40,7 @@ def resting(found: PartMeasurement) -> list[str]:
     k = np.array([one.U / one.u if one.u else np.inf for one in found.stated])
     beyond = np.zeros(len(names), dtype=bool)
     for one in found.influence:
-        beyond |= ~(np.abs(one.u - 1) < MATTERS) | ~(np.abs(one.shift) / k < MATTERS)
+        beyond |= (np.abs(one.u - 1) >= MATTERS) | (np.abs(one.shift) / k >= MATTERS)
     return [name for name, rests in zip(names, beyond, strict=True) if rests]
 
 
@@ -99,20 +99,18 @@ def _changes(found: PartMeasurement) -> Table | None:
              Column(say("Value changes by"), unit("%")), say("Of"))  # fmt: skip
     shown = [one for one in found.influence if one.family == ALL or not _little(one)]
     return table(say("If this were different"), heads, (_change(found, one) for one in shown), say(
-        "The largest change of all characteristics, of the value as a part of its u. A dash: too few of the machines drawn "
-        "would be of that sort to say. Priors that would change nothing by more than 1 % are left out."
+        "The largest change of all characteristics, of the value as a part of its u. Errors of a family that the recording "
+        "hardly shows are scaled with its prior. Priors that would change nothing by more than 1 % are left out."
     ))  # fmt: skip
 
 
 def _little(one: PriorInfluence) -> bool:
-    """Whether nothing changes by more than a hundredth; not where draws do not say it."""
+    """Whether nothing changes by more than a hundredth."""
     return bool(np.all(np.abs(one.u - 1) < _LITTLE) and np.all(np.abs(one.shift) < _LITTLE))
 
 
 def _change(found: PartMeasurement, one: PriorInfluence) -> tuple[Text, ...]:
     name, times = family_words(one.family), number(one.times, "g")
-    if not np.isfinite(one.u).all():
-        return name, times, DASH, DASH, DASH, DASH
     return name, times, *_largest(found, one.u - 1), *_largest(found, one.shift)
 
 
@@ -136,10 +134,6 @@ def families_data(found: PartMeasurement) -> list[dict[str, Any]]:
 
 def priors_data(influence: Iterable[PriorInfluence]) -> list[dict[str, Any]]:
     return [
-        {"family": one.family, "times": one.times, "u_ratio": _known(one.u), "shift_u": _known(one.shift)}
+        {"family": one.family, "times": one.times, "u_ratio": one.u.tolist(), "shift_u": one.shift.tolist()}
         for one in influence
     ]
-
-
-def _known(values: Floats) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]

@@ -303,7 +303,7 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "unseen[].why": ("", "Why it was not seen, in words."),
         "priors[].family": ("", "A family of errors, an error that no recording shows, or `all` of them."),
         "priors[].times": ("", "By which its prior is narrower or wider."),
-        "priors[].u_ratio": ("", "u that would follow over u as stated, by characteristic; null where draws do not say it."),
+        "priors[].u_ratio": ("", "u that would follow over u as stated, by characteristic."),
         "priors[].shift_u": ("u", "Change of the value, likewise."),
         "further.effects": ("", "Effects that further set-ups of the calibration's artefact show."),
         "further.setups": ("", "How many set-ups."),

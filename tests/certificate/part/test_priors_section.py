@@ -81,12 +81,12 @@ def test_what_changes_nothing_is_no_row_but_that_of_all(found: PartMeasurement) 
     assert table.rows == (("All of them together", "2", "1", one, "0", "–"),)
 
 
-def test_what_draws_do_not_say_is_a_dash_and_rests_on_the_prior(found: PartMeasurement) -> None:
-    nothing = np.full(len(found.stated), np.nan)
-    unsaid = PriorInfluence("periodic", 2.0, nothing, nothing)
-    assert tables(told(found, unsaid))["If this were different"].rows[0][2:] == ("–",) * 4
-    assert len(resting(replace(found, influence=(unsaid,)))) == len(found.stated)
-    assert priors_data([unsaid])[0]["u_ratio"] == [None] * len(found.stated)
+def test_results_have_every_change(found: PartMeasurement) -> None:
+    data = priors_data([change(found, [1.5], [-0.25], times=0.5)])
+    rest = len(found.stated) - 1
+    assert data == [
+        {"family": "play", "times": 0.5, "u_ratio": [1.5] + [1.0] * rest, "shift_u": [-0.25] + [0.0] * rest}
+    ]
 
 
 def test_a_tenth_of_u_or_of_expanded_uncertainty_makes_a_figure_rest_on_the_prior(found: PartMeasurement) -> None:
