@@ -20,7 +20,7 @@ from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_pa
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.maths.inference.field import FieldModel, FieldSizes, sample_sizes
+from cmm_uq.maths.inference.families import FieldModel, FieldSizes, sample_sizes
 from cmm_uq.maths.inference.noise import Sizes
 from tests.part_machines import by_certificate, plate_of
 

@@ -23,7 +23,7 @@ from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import growing_lengths, noise_of
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import PeriodicScale
-from cmm_uq.maths.inference.field import HELD, FieldErrors, FieldModel, sample_sizes
+from cmm_uq.maths.inference.families import HELD, FieldErrors, FieldModel, sample_sizes
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import sample_with_noise
 

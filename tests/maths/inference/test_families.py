@@ -12,8 +12,8 @@ from scipy.stats import halfnorm
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
-from cmm_uq.maths.inference import field
-from cmm_uq.maths.inference.field import FieldErrors, FieldModel, sample_sizes, size_of
+from cmm_uq.maths.inference import families as room
+from cmm_uq.maths.inference.families import FieldErrors, FieldModel, sample_sizes, size_of
 from cmm_uq.maths.inference.linear_model import Freedoms, LinearModel, Unknown, solve
 from cmm_uq.maths.inference.noise import Components, Sizes
 
@@ -120,7 +120,7 @@ def test_sizes_have_their_posterior() -> None:
 def test_a_sampler_draws_them_where_the_approximation_is_not_good_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = families(observed((0.2, 1.0), 4))
     weighed = sample_sizes(whole, 4000, 1, white(SIGMA))
-    monkeypatch.setattr(field, "_LEAST_WORTH", np.inf)
+    monkeypatch.setattr(room, "_LEAST_WORTH", np.inf)
     sampled = sample_sizes(whole, 4000, 1, white(SIGMA))
     assert sampled.chains is not None
     sd = weighed.families.std(axis=0)
