@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import io
 import random
 import re
@@ -20,7 +19,7 @@ from pyhanko.sign.signers.pdf_byterange import DocumentTimestamp
 
 from benchmarks.hostile.authorities import World
 from cmm_uq.certificate.sign import sign_pdf
-from cmm_uq.certificate.sign.found import appending
+from cmm_uq.certificate.sign.found import appending, ran
 from cmm_uq.certificate.sign.pdf_library import Server
 from tests.certificate.sign.authority import SIGNED, curve_key, issued, root
 from tests.certificate.sign.responders import revocations
@@ -268,7 +267,7 @@ def _stamp(world: World, data: bytes, server: str, box: Any = None, **said: str)
         if box is not None:
             append_signature_field(writer, SigFieldSpec("TimeStampSeen", box=box, readable_field_name=TEXT))
         stamper = PdfTimeStamper(Server(f"{world.url}/{server}"), field_name="TimeStampSeen" if box else "TimeStamp9")
-        return asyncio.run(stamper.async_timestamp_pdf(writer, "sha256")).getvalue()  # type: ignore[no-any-return]
+        return ran(stamper.async_timestamp_pdf(writer, "sha256")).getvalue()  # type: ignore[no-any-return]
     finally:
         DocumentTimestamp.__init__ = first  # type: ignore[method-assign]
 

@@ -97,9 +97,9 @@ def of_due(item: str, called: str, due: dt.date, on: dt.date, why: Text, *, beyo
     """Of a machine or an artefact that is to be calibrated by a day: once before it, and once after it."""
     overdue = beyond or due < on
     state = say("overdue since {due}", due=day(due)) if overdue else say("due on {due}", due=day(due))
-    title = say("{state}: {item} {called}", state=state, item=Verbatim(item), called=Verbatim(called))
-    text = say("{item} {called} is {state}: {why}.", item=Verbatim(item.capitalize()), called=Verbatim(called), state=state,
-               why=why)  # fmt: skip
+    capital, name = Verbatim(item.capitalize()), Verbatim(called)
+    title = say("{state}: {item} {called}", state=state, item=Verbatim(item), called=name)
+    text = say("{item} {called} is {state}: {why}.", item=capital, called=name, state=state, why=why)
     return Notice("due", f"{item} {called}", title, text, f"{due.isoformat()} {'overdue' if overdue else 'due'}")
 
 
@@ -120,8 +120,8 @@ def of_missed(last: dt.datetime, begun: dt.datetime, missed: Sequence[dt.datetim
         return Notice("missed", "the clock", say("a wrong clock"), text, last.isoformat())
     listed = times[2:] if len(missed) <= MOST else [*times[2 : MOST // 2], Verbatim("…"), *times[-MOST // 2 :]]
     title = plural(len(missed), one=say("1 run was missed"), many=say("{count} runs were missed", count=len(missed)))
-    pattern = "{count}, after the run of {last}: {times}. What was due then is done and said now."
-    text = say(pattern, count=title, last=times[0], times=commas(listed))
+    text = say("{count}, after the run of {last}: {times}. What was due then is done and said now.",
+               count=title, last=times[0], times=commas(listed))  # fmt: skip
     return Notice("missed", "the runs", title, text, f"{last.isoformat()} {missed[-1].isoformat()}")
 
 
