@@ -103,7 +103,7 @@ def _file(path: Path, create: bool, read_only: bool) -> Engine:
 
 def _check_file(path: Path, create: bool) -> None:
     """The file itself is not looked into: closing it would drop SQLite's locks of this process on it."""
-    if path.is_dir():
+    if os.path.isdir(path):  # noqa: PTH112 - raises nothing below a folder that is closed
         raise CmmUqError("is a folder, and records are a file", where=str(path), fix="Name a file in it: records.db")
     if os.path.exists(path) and not path.is_file():  # noqa: PTH110 - a pipe would be waited for; raises nothing
         raise CmmUqError("is no file, and records are one", where=str(path), fix="Name a file: records.db")
