@@ -233,6 +233,8 @@ def _problems(
         found.append(f"ends with {code} in folders of its own")
     elif place and code in (2, 3) and not allowed and not any(word in said + outcome.stdout for word in ABOUT):
         found.append(f"refused without a word of permissions: {said.strip()[-160:]}")
+    elif place and code in (2, 3) and place.split("/")[0] not in said + outcome.stdout:
+        found.append(f"another place is named: {said.strip()[-160:]}")
     gone = [name for name, seal in before.items() if after.get(name) != seal]
     found += [f"lost: {name}" for name in gone if not (line.own and name.startswith(line.own) and code not in (2, 3))]
     new = [name for name in after if name not in before and not name.endswith(("-wal", "-shm", ".lock"))]

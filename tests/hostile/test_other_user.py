@@ -19,9 +19,15 @@ CASES = (
     ("due", "", "", 0, ""),
     ("due", "reports", CLOSED, 3, "reports/records.db: cannot be opened: Permission denied"),
     ("due", "reports", READ_ONLY, 0, ""),
+    ("qif reports/mount/results.json --out out/results.qif", "reports/mount", CLOSED, 2,
+     "reports/mount/results.json: cannot be read: Permission denied"),
+    ("sign reports/mount/certificate.pdf reports/mount/certificate.xml --key keys/key.p12 --out out --records none",
+     "reports/mount", CLOSED, 2, "reports/mount/certificate.pdf: cannot be read: Permission denied"),
+    ("verify reports/mount --no-rerun", "reports/mount", "one's own, 0400", 2,
+     "manifest.json: cannot be read: Permission denied"),
     ("budget truth/budget.toml --out out", "truth", "one's own, 0400", 2, "Permission denied"),
     ("budget truth/budget.toml --out out", "out", READ_ONLY, 3, "out: cannot be written: Permission denied"),
-)
+)  # fmt: skip
 
 
 def test_every_command_has_cases() -> None:

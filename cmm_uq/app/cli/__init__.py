@@ -60,7 +60,6 @@ def run_command() -> int:
     from cmm_uq.base.output.interruption import written
     from cmm_uq.base.plugins import told_with_package
 
-    error: CmmUqError
     code = NO_OUTPUT
     try:
         from cmm_uq.app.cli.commands import run
@@ -69,15 +68,16 @@ def run_command() -> int:
     except CmmUqError as refusal:
         error, code = refusal, NO_OUTPUT if isinstance(refusal, OutputError) else BAD_INPUT
     except MemoryError:
-        error = CmmUqError(
-            "the memory does not suffice for this input", fix="Split it, or use a machine with more memory"
-        )
+        fix = "Split it, or use a machine with more memory"
+        error = CmmUqError("the memory does not suffice for this input", fix=fix)
     except Exception as fault:
         if (of_package := told_with_package(fault)) is not None:
             error, code = of_package, BAD_INPUT
+        elif isinstance(fault, PermissionError) and fault.filename:  # asked about; who writes refuses in its own words
+            where, fix = str(fault.filename), "Mend the permissions of it and of its folders"
+            error, code = CmmUqError("cannot be read: Permission denied", where=where, fix=fix), BAD_INPUT
         else:
-            there = ", ".join(map(str, written()))
-            state = f"The files are written in {there}" if there else "Nothing was written"
+            state = f"The files are written in {', '.join(map(str, written()))}" if written() else "Nothing was written"
             problem = f"a fault of the program: {type(fault).__name__}: {fault}"
             error = CmmUqError(problem, fix=f"{state}; please report it with the input")
     tell(error, code)

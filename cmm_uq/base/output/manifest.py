@@ -198,7 +198,7 @@ def journal_for(
         in_the_way += [name for name in before if name not in in_the_way and os.path.lexists(folder / name)]
     elif old is not None and MANIFEST in in_the_way:
         in_the_way.remove(MANIFEST)
-    given = [path for path in inputs if path.exists()]
+    given = [path for path in inputs if os.path.exists(path)]  # noqa: PTH110 - raises nothing; who reads it says why not
     for target in [folder / name for name in (*names, *in_the_way)]:
         if target.exists() and any(target.samefile(path) for path in given):
             raise CmmUqError("is an input of this command, and would be replaced", where=str(target),
