@@ -18,6 +18,7 @@ from cmm_uq.certificate.results.provenance import COMPARED, NOT_COMPARED, REBUIL
 from cmm_uq.certificate.sections import results as of_result
 from cmm_uq.certificate.sections.conformity import conformity_section
 from cmm_uq.certificate.sections.method import method, posterior_section, warnings
+from cmm_uq.certificate.sections.regions import regions_data, regions_section
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.tables.identification import Identification, Laboratory
@@ -178,7 +179,8 @@ def certified(result: Result, page: Page) -> Outcome:
     own = (*warnings(result), *stating.warnings())
     warned = (*own, *clauses.formal_warnings(result.job))
     draws = origins.posterior_file(result.draws, result.job.origin) if len(result.draws) else None
-    data = results(result) | of_result.as_found_data(result.job) | clauses.clauses_data(result.job) | stating.data()
+    data = results(result) | regions_data(result) | of_result.as_found_data(result.job)
+    data |= clauses.clauses_data(result.job) | stating.data()
     if draws is not None:
         data["posterior"] = draws.entry
     return Outcome(
@@ -213,7 +215,7 @@ def _ordered(result: Result, own: list[Section]) -> list[Section]:
     before = of_result.as_found_section(result.job, of_result.quantities_left(result), result.verdicts)
     rests_on = traceability(result)
     if figures.blocks:
-        return [figures, decided, before, factors, rests_on, *own]
+        return [figures, decided, before, factors, regions_section(result), rests_on, *own]
     if factors.blocks:
-        return [factors, decided, before, rests_on, *own]
+        return [factors, decided, before, regions_section(result), rests_on, *own]
     return [*own[:1], decided, before, rests_on, *own[1:]]

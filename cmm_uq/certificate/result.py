@@ -14,10 +14,12 @@ from cmm_uq.analysis.conformity.accuracy import Consequences, Costs
 from cmm_uq.analysis.conformity.statement import Statement, by_standard, by_tolerance
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
+from cmm_uq.analysis.parts.machine.state import of_machine
 from cmm_uq.analysis.planning.set_up import NextPlan, Suggestion
+from cmm_uq.analysis.regions import FactorRegions
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Text, at_key, say
+from cmm_uq.base.messages import NOTHING, Text, at_key, say
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Document, Section
 from cmm_uq.certificate.plots.style import lettered_in
@@ -213,6 +215,8 @@ class Result:
     # what the causes make of the model's unknowns; it is in ``values``
     doubt: Doubt = field(default_factory=lambda: Doubt(()))
     contradictions: tuple[Contradiction, ...] = ()  # what denies averaged estimates, which are then not given
+    # what all errors together, computed once when it is first asked for, say of the factors elsewhere, or why nothing
+    all_errors: Callable[[], FactorRegions | Text] = lambda: NOTHING
 
     @property
     def at_least(self) -> AtLeast:
@@ -225,6 +229,11 @@ class Result:
         yield from self.sizes.items()
         yield "u_coordinate_um", self.noise.coordinate
         yield from self.accuracy.items()
+
+    @property
+    def regions(self) -> FactorRegions | Text:
+        """Where the error factors hold, or why that is not stated; empty where nothing is to be said of it."""
+        return self.all_errors() if any(map(of_machine, self.model.effects)) else NOTHING
 
     @property
     def relative_doubt(self) -> float:

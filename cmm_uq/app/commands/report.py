@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.standards import statement
+from cmm_uq.analysis.regions import FactorRegions, factor_regions
 from cmm_uq.app.commands.certificates.release import reissued, with_replaced
 from cmm_uq.app.commands.diagnose import diagnose_model, screened_model
 from cmm_uq.app.commands.estimation import (
@@ -24,7 +25,9 @@ from cmm_uq.app.commands.files import Form, Stage, Told, Written, silent
 from cmm_uq.app.commands.model import OVERFLOW_FIX, recipe_of
 from cmm_uq.app.commands.reading import in_language, read_job
 from cmm_uq.artefacts import kind_of
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code
+from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.certificate import certified
@@ -34,11 +37,11 @@ from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.place import NONE
 from cmm_uq.machine.model.artefact_doubt import causes_of
-from cmm_uq.machine.model.kind import Kind
-from cmm_uq.machine.model.measurement import with_curvature
+from cmm_uq.machine.model.kind import Kind, Observed
+from cmm_uq.machine.model.measurement import RecordingModel, with_curvature
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.maths.inference.ensembles import Progress
-from cmm_uq.maths.inference.posterior import sample_with_noise
+from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior, sample_with_noise
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.signing import Signing
@@ -87,11 +90,21 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
         parameters(model, values), sizes(model, values),
         noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, statements,
         diagnosis, causes=causes, doubt=doubt, contradictions=denied,
+        all_errors=cache(partial(_all_errors, model, posterior, doubt, observe, seed)),
     )  # fmt: skip
     for name, quantity in result.quantities():
         figures_of = (quantity.value, quantity.u, *quantity.interval95)
         must_be_finite(figures_of, f"{job.recording_path}: {name}", OVERFLOW_FIX)
     return result
+
+
+def _all_errors(
+    model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, observe: Observed, seed: int
+) -> FactorRegions | Text:
+    try:
+        return factor_regions(model, posterior, doubt, observe, seed)
+    except CmmUqError as error:
+        return Verbatim(error.problem)
 
 
 def report_recipe(job: Job) -> Recipe:

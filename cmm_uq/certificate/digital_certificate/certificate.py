@@ -184,7 +184,7 @@ _TITLES: Mapping[str, Text] = MappingProxyType({
 # keys that are no results of the machine, or stand elsewhere in the certificate; the attached results.json has them
 _NOT_STATED_THERE = (
     "schema", "software", "job", "import", "acquisition", "sampling", "identifiability", "diagnosis", "screening", "posterior",
-    "accuracy", "conformity", "verdicts", "covariance", "iso17025", "traceability", "replaced", "records",
+    "accuracy", "conformity", "verdicts", "covariance", "iso17025", "traceability", "replaced", "records", "regions",
 )  # fmt: skip
 _MOST = 40  # estimates whose covariance is written out; of more, the attached results.json has it.
 

@@ -22,8 +22,8 @@ from cmm_uq.base.points import Floats
 from cmm_uq.certificate.origin import NAME
 from cmm_uq.certificate.part.measurement import CertificateStatus, FurtherSetUps, PartMeasurement, UnseenError
 from cmm_uq.certificate.part.method import methods_data
-from cmm_uq.certificate.part.priors_section import families_data, priors_data
 from cmm_uq.certificate.results.keys import RESULTS
+from cmm_uq.certificate.sections.priors import families_data, priors_data
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.source import sha256

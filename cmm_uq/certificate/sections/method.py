@@ -9,6 +9,7 @@ from cmm_uq.certificate.diagnosis.overview import VERDICTS
 from cmm_uq.certificate.document import Facts, Paragraph, Section, section
 from cmm_uq.certificate.plots.corner import corner_plot
 from cmm_uq.certificate.result import RecordingNoise, Result
+from cmm_uq.certificate.sections.regions import regions_warnings
 from cmm_uq.certificate.wording import title_of, with_uncertainty
 from cmm_uq.machine.model.artefact_doubt import CALIBRATION
 from cmm_uq.machine.model.measurement import ARTEFACT
@@ -156,7 +157,7 @@ IMPLAUSIBLE = 4.0  # standard deviations of what was known beforehand from which
 
 
 def warnings(result: Result) -> tuple[Text, ...]:
-    each = (_mismatch, _noise, _expansion, _implausible, _undetermined, _contradicted)
+    each = (_mismatch, _noise, _expansion, _implausible, _undetermined, _contradicted, regions_warnings)
     return (
         *not_converged(result.posterior),
         *(text for of in each for text in of(result)),

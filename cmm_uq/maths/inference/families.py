@@ -36,13 +36,26 @@ Drawn = Callable[[np.random.Generator, int], Floats]
 _UNSEEN, _REACHED = (1e-4, 0.02), 1e-4
 _QUADRATIC = 1e8  # above any sum of squares that is not absurd
 _NUMBERS = 2_000_000  # in the matrices that are factorised at once
-# draws of sizes that are weighed, at once and at most; worth with which that ends, and below which a sampler draws them
-_LOOKED_AT, _MOST_LOOKED_AT, _WORTH, _LEAST_WORTH = 4000, 24_000, 200.0, 50.0
+_LEAST_WORTH = 50.0  # of weighed draws of sizes, below which a sampler draws them
 _EFFECTIVE, _STEPS = 400, 40  # sizes are few and smooth: what follows from them needs no more of them
-HELD = 250  # sizes that all draws have among them
-_ADAPTED, _ROUND, _COUNT = 5, 1000, 0.05  # rounds, draws of each, part of them that must count
+HELD = 250  # sizes that all draws of a part's machine have among them
+_COUNT = 0.1  # draws that must count, over those of a round
 _STEP, _MOST_STEPS, _FLATTEST, _WIDER, _NEVER = 0.05, 60, 0.5, 1.3, -1e30
 _SMALLEST = 1e-4  # of a family's size
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How many draws of sizes are made."""
+
+    each: int = 1000  # at once
+    most: int = 24_000
+    worth: float = 200.0  # independent draws that all are worth, with which that ends
+    held: int = HELD  # sizes that all draws have among them
+    sampler: bool = True  # whether emcee, which takes minutes, draws them where weighed ones are worth too little
+
+
+BRIEF = Effort(400, 8000, 150.0, 100, sampler=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,10 +183,16 @@ class FieldModel:
         weights = weights if more is None else np.hstack([weights, more])
         found = (weights @ self._parts[: weights.shape[1]]).reshape(-1, n, n)
         if self.noise.slow.shape[1]:
+            variances = self.noise.variances(sizes)[1]
             for i in np.flatnonzero(sizes.slow > 0):
-                seen = self.shown(self.noise.waves(sizes.at(slice(i, i + 1))))
-                found[i] += seen @ seen.T
+                seen = self._wandering[int(sizes.rate[i] == 0)]
+                found[i] += (seen * variances[i]) @ seen.T
         return np.asarray(found)
+
+    @cached_property
+    def _wandering(self) -> tuple[Floats, Floats]:
+        """(n, c) of the combinations: of slow noise that returns to its mean, and of a walk."""
+        return self.shown(self.noise.slow), self.shown(self.noise.anchored)
 
     def log_likelihood(self, sizes: Sizes, scales: Floats) -> Floats:
         """(w,) up to a constant, of sizes of the noise and of the families (w, F)."""
@@ -283,10 +302,13 @@ class FieldSizes:
     chains: Chains | None  # of emcee, where the approximation by which they are drawn is not good enough
 
 
-def sample_sizes(model: FieldModel, draws: int, seed: int, known: Sizes | None = None) -> FieldSizes:
+def sample_sizes(
+    model: FieldModel, draws: int, seed: int, known: Sizes | None = None, effort: Effort = Effort()
+) -> FieldSizes:
     """Posterior of the sizes of noise and families, ``draws`` of them, of which some hundred are different.
 
-    ``known``: of the noise, one draw, where it is not to be found.
+    ``known``: of the noise, one draw, where it is not to be found. Raises ``CmmUqError`` where they cannot be had with the
+    effort.
     """
     d = 0 if known is not None else model.noise.dimension
     count = len(model.families)
@@ -315,36 +337,47 @@ def sample_sizes(model: FieldModel, draws: int, seed: int, known: Sizes | None =
     inside_of = begin[:d]
     centre, factor = _laplace(density, np.append(begin[:d], np.zeros(count)))
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(29,))))
-    proposal = _adapted(density, centre, _WIDER * factor, random)
-    latent, log, worth, chains = np.zeros((0, d + count)), np.zeros(0), 0.0, None
-    while worth < _WORTH and len(latent) < _MOST_LOOKED_AT:
-        z = proposal.draws(_LOOKED_AT, random)
-        more = proposal.parameters(z)
-        latent, log = np.vstack([latent, more]), np.append(log, density(more) - proposal.log_density(z))
-        weight = weights(log)
-        worth = float(1 / np.sum(weight**2))
+    latent, weight, proposal = _weighed(density, centre, _WIDER * factor, random, effort)
+    worth, chains = float(1 / np.sum(weight**2)), None
     if worth >= _LEAST_WORTH:
         # as many of each as its weight says, evenly spread
-        place = np.searchsorted(np.cumsum(weight), (np.arange(HELD) + 0.5) / HELD * (1 - 1e-12))
+        place = np.searchsorted(np.cumsum(weight), (np.arange(effort.held) + 0.5) / effort.held * (1 - 1e-12))
         latent = latent[np.minimum(place, len(latent) - 1)]
+    elif not effort.sampler:
+        raise CmmUqError("how large its errors are cannot be drawn in a short time", where="the recording")
     else:
         chains = run_ensembles(density, proposal, seed, effective_samples=_EFFECTIVE, steps_at_once=_STEPS)
-        latent, worth = chains.draws[np.linspace(0, len(chains.draws) - 1, HELD).astype(np.int64)], chains.ess_min
+        latent, worth = (
+            chains.draws[np.linspace(0, len(chains.draws) - 1, effort.held).astype(np.int64)],
+            chains.ess_min,
+        )
     latent = latent[np.arange(draws) % len(latent)]
     return FieldSizes(sizes(latent), size_of(latent[:, d:]), worth, chains)
 
 
-def _adapted(density: LogDensity, centre: Floats, factor: Floats, random: Any) -> Proposal:
-    """A t distribution with the moments of the density, let in by degrees: as far as enough draws of a round count."""
-    for _ in range(_ADAPTED):
-        proposal = Proposal.single(centre, factor)
-        z = proposal.draws(_ROUND, random)
-        latent = proposal.parameters(z)
-        log = np.maximum(density(latent) - proposal.log_density(z), _NEVER)
-        power = highest_power(log, np.zeros(_ROUND), 0.0, _COUNT * _ROUND)
+def _weighed(
+    density: LogDensity, centre: Floats, factor: Floats, random: Any, effort: Effort
+) -> tuple[Floats, Floats, Proposal]:
+    """Draws (N, d) with their weights (N,), and the last of the t distributions that they are of.
+
+    Each has the moments of the density, as far as enough of all draws before count, and a draw of any of them is weighed
+    against all (Cornuet, Marin, Mira, Robert 2012, Scand. J. Stat. 39, 798).
+    """
+    proposals, latent, value = list[Proposal](), np.zeros((0, len(centre))), np.zeros(0)
+    while True:
+        proposals.append(Proposal.single(centre, factor))
+        more = proposals[-1].parameters(proposals[-1].draws(effort.each, random))
+        latent, value = np.vstack([latent, more]), np.append(value, density(more))
+        of_all = np.logaddexp.reduce([one.log_probability(latent) for one in proposals], axis=0) - np.log(
+            len(proposals)
+        )
+        log = np.maximum(value - of_all, _NEVER)
+        weight = weights(log)
+        if 1 / np.sum(weight**2) >= effort.worth or len(latent) >= effort.most:
+            return latent, weight, proposals[-1]
+        power = highest_power(log, np.zeros(len(log)), 0.0, _COUNT * effort.each)
         centre, covariance = moments(latent, weights(power * log))
         factor = np.linalg.cholesky(covariance + 1e-9 * np.trace(covariance) * np.eye(len(centre)))
-    return Proposal.single(centre, factor)
 
 
 def _laplace(density: LogDensity, start_at: Floats) -> tuple[Floats, Floats]:

@@ -194,21 +194,21 @@ class Components:
         return np.asarray(np.cumsum(self.frequency == 0) - 1)
 
     @cached_property
-    def _anchored(self) -> Floats:
+    def anchored(self) -> Floats:
         """Columns (m, c) of a random walk: cosines less what they are at the first reading."""
         constants = self.slow[:, self.frequency == 0]
         return np.asarray(self.slow - np.sqrt(2.0) * np.where(self.frequency == 0, 0.0, constants[:, self._axis]))
 
     def waves(self, sizes: Sizes) -> Floats:
         """Columns (m, c), mm, of slow noise as far as the cosines go, with standard normal coefficients."""
-        columns = self.slow if sizes.rate[0] else self._anchored
+        columns = self.slow if sizes.rate[0] else self.anchored
         return np.asarray(columns * np.sqrt(self.variances(sizes)[1][0]))
 
     def slow_along(self, weights: Floats, sizes: Sizes) -> Floats:
         """Variance (w,), mm², of slow noise in a weighted sum (m,) of the observations, as far as the cosines go."""
         slow, walks = self.variances(sizes)[1], sizes.rate == 0
         found = slow @ (self.slow.T @ weights) ** 2
-        return np.where(walks, slow @ (self._anchored.T @ weights) ** 2, found) if np.any(walks) else found
+        return np.where(walks, slow @ (self.anchored.T @ weights) ** 2, found) if np.any(walks) else found
 
     def quick(self, sizes: Sizes) -> Floats:
         """(w,) part that is faster than the cosines of what no other reading shares."""
@@ -250,7 +250,7 @@ class Components:
         if self.slow.shape[1] and np.any(slow):
             waves = np.sqrt(slow)[:, None, :] * random.standard_normal((w, repetitions, slow.shape[1]))
             walks = sizes.rate == 0
-            for chosen, columns in ((~walks, self.slow), (walks, self._anchored)):
+            for chosen, columns in ((~walks, self.slow), (walks, self.anchored)):
                 if np.any(chosen):
                     found[chosen] += waves[chosen] @ columns.T
         return found

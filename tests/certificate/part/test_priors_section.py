@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts.influence import ALL, PriorInfluence
+from cmm_uq.analysis.influence import ALL, PriorInfluence
 from cmm_uq.certificate.document import Paragraph, Section, Table
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.priors_section import families_data, priors_data, priors_section, resting

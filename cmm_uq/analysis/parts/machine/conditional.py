@@ -66,7 +66,9 @@ class RecordedField:
         recorded = model.artefact.points.columns
         which = tuple(i for i, one in enumerate(further) if all(name in recorded for name in one.effect.columns))
         estimate = model.estimate()
-        errors = [_errors(model, further[i].effect, estimate.about, learned) for i in which]
+        # where the artefact stands, not what was read: noise of readings would explain itself
+        points = model.artefact.points.at(model.where(estimate.about))
+        errors = [_errors(model, further[i].effect, points, estimate.about, learned) for i in which]
         components = replace(noise_of(model), known=model.least_noise)
         whole = FieldModel(estimate.linear, components, estimate.least_squares, tuple(errors))
         effects, sds = list[Effect](), [np.zeros(0)]
@@ -76,8 +78,7 @@ class RecordedField:
             if one.impulse is not None and isinstance(effect, PeriodicScale):
                 seen = whole.shown(one.impulse)
                 sds.append(np.ones(len(seen)))
-                readings = model.artefact.points.readings[effect.axis]
-                effects.append(GivenPeriod(effect, readings, seen.T))
+                effects.append(GivenPeriod(effect, points.readings[effect.axis], seen.T))
             else:
                 effects.append(effect)
         return cls(
@@ -96,15 +97,15 @@ def _sd(effect: Effect) -> Floats:
     return np.array([coefficient.prior_sd for coefficient in effect.coefficients])
 
 
-def _errors(model: RecordingModel, effect: Effect, about: Floats, learned: bool) -> FieldErrors:
+def _errors(model: RecordingModel, effect: Effect, points: Points, about: Floats, learned: bool) -> FieldErrors:
     whole = linear(effect)
     family = family_of(effect) if learned else None
     if not isinstance(effect, PeriodicScale):
         columns = model.seen(model.columns(whole, (), about), about) * _sd(whole)
         j = columns.shape[1]
         return FieldErrors(family, columns, lambda random, count: random.standard_normal((count, j)))
-    readings, impulse = model.artefact.points.readings[effect.axis], shown(model, effect)
-    columns = impulse @ whole.basis(model.artefact.points)[:, "xyz".index(effect.axis)] * _sd(whole)
+    readings, impulse = points.readings[effect.axis], shown(model, effect)
+    columns = impulse @ whole.basis(points)[:, "xyz".index(effect.axis)] * _sd(whole)
     beforehand = GivenPeriod(effect, readings, np.zeros((len(readings), 0))).beforehand
     return FieldErrors(family, columns, beforehand, impulse, covariance(effect, readings, readings))
 

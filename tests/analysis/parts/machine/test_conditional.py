@@ -118,7 +118,7 @@ def beside(model: RecordingModel, sigma: float, between: Floats) -> tuple[Floats
     D, y = linear.reduced.design, linear.reduced.observed
     prior = np.linalg.inv(rows.T @ rows)
     start = prior @ rows.T @ given
-    readings = model.artefact.points.readings["y"]
+    readings = model.artefact.points.at(model.where(about)).readings["y"]
     cross = covariance(periodic, between, readings) @ impulse.T
     whole = impulse @ covariance(periodic, readings, readings) @ impulse.T + D @ prior @ D.T + sigma**2 * np.eye(len(y))
     gain = np.linalg.solve(whole, cross.T).T

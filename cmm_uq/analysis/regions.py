@@ -1,0 +1,195 @@
+"""Where an error factor holds: over the recorded set-ups, over the measuring range, and within parts of it.
+
+A model of named errors states of each the mean over the set-ups that were recorded. A machine has other errors besides, and
+elsewhere the same figure would be another: the scale of X above the table is not that below the quill. Here the machine is the
+random field of :mod:`cmm_uq.machine.model.field`, drawn given the recording. What a factor is within a region is what least
+squares of the named errors, and of a displacement as a whole, find of all errors at points that fill it:
+
+    θ(R) = θ + P_R·B_R·c
+
+with θ and c the coefficients of named and other errors, B_R (3n, j) what one unit of each of c does at the points of R, and
+P_R the least-squares operator of the named columns at the same points. Over the recorded set-ups P is the estimator of the
+recording itself. Where the recording leaves the difference open, the draws differ, and U says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+
+import numpy as np
+from scipy.special import ndtri
+
+from cmm_uq.analysis.diagnosis.held_out import thin_out
+from cmm_uq.analysis.influence import PriorInfluence, influence_of
+from cmm_uq.analysis.parts.machine.conditional import RecordedField
+from cmm_uq.analysis.parts.machine.state import Unmodelled, of_machine, unmodelled_errors
+from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
+from cmm_uq.machine.model.field import ALLOWED, curves, family_of
+from cmm_uq.machine.model.kind import Observed
+from cmm_uq.machine.model.measurement import RecordingModel
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.superposition import About
+from cmm_uq.maths.inference.families import BRIEF, sample_sizes
+from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior, gain
+from cmm_uq.maths.uncertainty.quantity import Quantity
+
+DRAWS = 2000
+_MOST = 100  # quantities of a recording, with their repeats: time grows with the cube of what they show
+_EACH = 4  # points along each axis of a region
+_ANYWHERE = ("ppm", "″", "″/m")  # units of what means the same on a part of a travel; a bow is one of the whole travel
+_HALVES = ((0.0, 0.5), (0.5, 1.0))
+EIGHTHS = tuple(product(_HALVES, repeat=3))  # parts of the measuring range, by shares of the travels
+# part of the largest singular value that counts as none; of a named error, that least squares would then take for another
+_RANK, _ANOTHER = 1e-9, 1e-6
+_DISAGREES = 0.001  # probability with which any factor of a model that fits would be found to disagree
+
+Key = tuple[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class FactorRegions:
+    """Error factors within regions, and how large the recording shows the other errors to be."""
+
+    whole: Mapping[Key, Quantity]  # over the measuring range
+    # 95 % interval within which an angle, a ratio or a rate is in all eighths of it
+    eighths: Mapping[Key, tuple[float, float]]
+    recorded: Mapping[Key, Quantity]  # over the recorded set-ups, all errors together
+    disagree: tuple[Key, ...]  # of which the named model says something else of the recorded set-ups
+    scales: Mapping[str, Floats]  # (N,) sizes of each family, of what physics allows
+    influence: tuple[PriorInfluence, ...]  # of other priors on the factors over the measuring range, in their order
+    observations: tuple[int, int]  # reckoned with, and of how many
+
+
+def factor_regions(
+    model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, observe: Observed, seed: int
+) -> FactorRegions:
+    """Of the named errors that need nothing but a place.
+
+    ``posterior``: of the model with no other errors. ``doubt``: what is stated to be in doubt about its unknowns. Raises
+    ``CmmUqError`` where the machine's travel is not stated, or the recording does not allow it.
+    """
+    count, random = int(model.used.sum()), np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(37,)))
+    others = [one for one in unmodelled_errors(_names(model.effects), {}) if family_of(one.effect) not in ALLOWED]
+    others += [Unmodelled(one, np.array([c.prior_sd for c in one.coefficients])) for one in curves()]
+    thinned = thin_out(model, observe, seed, _MOST * count // max(_quantities(model), 1))
+    field = RecordedField.of(thinned, others)
+    sizes = sample_sizes(field.field, DRAWS, seed, effort=BRIEF)
+    drawn = field.coefficients(sizes.noise, sizes.families, random)
+    own, further = drawn[:, : field.modelled], drawn[:, field.modelled :]
+
+    named, placed = _columns(model.effects, _of_place), _columns(field.effects, lambda one: not one.columns)
+    moved = partial(
+        _moved, model.artefact.points.machine, _chosen(model.effects, named), _chosen(field.effects, placed)
+    )
+    whole, *eighths = (moved(ends) for ends in (((0.0, 1.0),) * 3, *EIGHTHS))
+    same = np.logical_and.reduce([np.all(np.isfinite(one), axis=1) for one in (whole, *eighths)])
+    named = named[same]
+    keys = [model.unknowns[i].key for i in named]
+    units = [model.unknowns[i].unit for i in named]
+
+    def within(change: Floats) -> Floats:
+        return np.asarray(own[:, named] + further[:, placed] @ change[same].T)
+
+    doubted = partial(_doubted, doubt, len(model.unknowns), named, posterior.seed)
+    over_all, parts = doubted(within(whole)), np.stack([doubted(within(one)) for one in eighths])
+    low, high = np.quantile(parts.min(axis=0), 0.025, axis=0), np.quantile(parts.max(axis=0), 0.975, axis=0)
+    recorded = own + further @ _as_recorded(model, field, posterior).T
+    quantities = [Quantity.of_draws(each, of) for each, of in zip(over_all.T, units, strict=True)]
+    of_family = np.array([family_of(one) for one in field.effects for _ in one.coefficients])[placed]
+    scales = dict(zip(field.field.families, sizes.families.T, strict=True))
+    influence = influence_of(
+        over_all, np.array([one.u for one in quantities]), scales,
+        lambda name: further[:, placed] @ np.where(of_family == name, whole[same], 0.0).T, {},
+    )  # fmt: skip
+    return FactorRegions(
+        dict(zip(keys, quantities, strict=True)),
+        {key: (float(low[i]), float(high[i])) for i, key in enumerate(keys) if str(units[i]) in _ANYWHERE},
+        {key: Quantity.of_draws(recorded[:, i], of) for i, key, of in zip(named, keys, units, strict=True)},
+        _disagreeing(model, posterior, recorded),
+        scales, influence, (int(thinned.used.sum()), count),
+    )  # fmt: skip
+
+
+def _names(effects: Sequence[Effect]) -> list[str]:
+    return [one.name for one in effects]
+
+
+def _of_place(effect: Effect) -> bool:
+    """Whether an error of the machine follows from the place alone, and is reported as it is."""
+    alike = [one.name for one in effect.reported] == [one.name for one in effect.coefficients]
+    return of_machine(effect) and alike and not (effect.columns or effect.shape)
+
+
+def _columns(effects: Sequence[Effect], which: Callable[[Effect], bool]) -> Ints:
+    """Places of the coefficients of some effects among those of all."""
+    return np.flatnonzero([which(one) for one in effects for _ in one.coefficients])
+
+
+def _chosen(effects: Sequence[Effect], columns: Ints) -> list[Effect]:
+    """The effects that these coefficients are of."""
+    of = [one for one in effects for _ in one.coefficients]
+    return list(dict.fromkeys(of[i] for i in columns))
+
+
+def _moved(
+    machine: Machine, named: Sequence[Effect], others: Sequence[Effect], ends: Sequence[tuple[float, float]]
+) -> Floats:
+    """(k, j) by which named errors, as told of a region, change with a unit of each coefficient of others.
+
+    Not a number for a named error that cannot be told there. ``ends``: of the region, in shares of the travels.
+    """
+    travels = [machine.travel(axis) for axis in AXES]
+    along = [low + (high - low) * np.linspace(*end, _EACH) for (low, high), end in zip(travels, ends, strict=True)]
+    readings = np.array(list(product(*along)))
+    one = np.ones(len(readings), dtype=np.int64)
+    about = About(Points(machine.coordinates(readings), one, np.arange(len(readings)), one, machine))
+
+    def columns(effects: Sequence[Effect]) -> Floats:
+        found = [about.columns(effect).reshape(3 * len(readings), -1) for effect in effects]
+        return np.hstack([np.zeros((3 * len(readings), 0)), *found])
+
+    known, offsets = columns(named), readings - readings.mean(axis=0)
+    turned = np.cross(np.eye(3)[:, None], offsets).transpose(1, 2, 0)
+    rigid = np.concatenate([np.broadcast_to(np.eye(3), turned.shape), turned], axis=2).reshape(len(known), 6)
+    design = np.hstack([known, rigid])
+    length = np.linalg.norm(design, axis=0)
+    length[length == 0] = 1.0
+    inverse = np.linalg.pinv(design / length, rcond=_RANK) / length[:, None]
+    told = np.abs(inverse[: known.shape[1]] @ design - np.eye(*(known.shape[1], design.shape[1])))
+    found = inverse[: known.shape[1]] @ columns(others)
+    found[np.any(told * length[: known.shape[1], None] > _ANOTHER * length, axis=1)] = np.nan
+    return np.asarray(found)
+
+
+def _doubted(doubt: Doubt, count: int, named: Ints, seed: int, draws: Floats) -> Floats:
+    """Draws (N, k) of some of ``count`` unknowns with what is in doubt about all observations together."""
+    if not doubt.carried:
+        return draws
+    whole = np.zeros((len(draws), count))
+    whole[:, named] = draws
+    return doubt.widened(whole, seed)[:, named]
+
+
+def _as_recorded(model: RecordingModel, field: RecordedField, posterior: NoisyPosterior) -> Floats:
+    """(k, j) by which the estimates of the named errors change with a unit of each coefficient of others."""
+    estimate = model.estimate()
+    seen = [model.seen(model.columns(one, (), estimate.about), estimate.about) for one in field.effects]
+    weights = gain(estimate.linear, float(np.median(posterior.sigma)))
+    return np.asarray(weights[: field.modelled] @ np.hstack(seen))
+
+
+def _disagreeing(model: RecordingModel, posterior: NoisyPosterior, recorded: Floats) -> tuple[Key, ...]:
+    """Coefficients of the named model that draws (N, k) of the same from all errors together deny, jointly."""
+    one, k = posterior.draws[:, : recorded.shape[1]], recorded.shape[1]
+    off = np.abs(one.mean(axis=0) - recorded.mean(axis=0))
+    limit = ndtri(1 - 0.5 * _DISAGREES / max(k, 1)) * np.hypot(one.std(axis=0), recorded.std(axis=0))
+    return tuple(model.unknowns[i].key for i in np.flatnonzero(off > limit))
+
+
+def _quantities(model: RecordingModel) -> int:
+    """How many things a recording measures, each with its repeats."""
+    artefact, rows = model.artefact, model.artefact.rows[model.used, 0]
+    return len(np.unique(np.column_stack([artefact.measurement[model.used], artefact.points.point[rows]]), axis=0))

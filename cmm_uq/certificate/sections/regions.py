@@ -1,0 +1,128 @@
+"""Where the error factors hold: over the recorded set-ups, the measuring range and parts of it, with all errors together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.analysis.regions import FactorRegions, Key
+from cmm_uq.base.messages import DASH, NOTHING, Text, listed, say
+from cmm_uq.certificate import wording
+from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
+from cmm_uq.certificate.origin import quantity_data
+from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.sections.priors import changes_table, families_data, priors_data, resting, sizes_table
+from cmm_uq.maths.uncertainty.quantity import Quantity, rounded
+
+_TITLE = say("Where the error factors hold")
+
+
+def over_range(result: Result) -> dict[Key, Quantity]:
+    """Error factors over the whole measuring range, with a U that is not below that of the mean over the recorded set-ups."""
+    regions = result.regions
+    if not isinstance(regions, FactorRegions):
+        return {}
+    return {
+        key: quantity.at_least(result.parameters[key[0]][key[1]].expanded)
+        for key, quantity in regions.whole.items()
+        if key not in result.not_given
+    }
+
+
+def regions_section(result: Result) -> Section:
+    """Without blocks where there are no error factors of a machine."""
+    regions, ranged = result.regions, over_range(result)
+    if not isinstance(regions, FactorRegions):
+        why = say(
+            "They are means over the recorded set-ups; what they are elsewhere is not stated: {why}.", why=regions
+        )
+        return section(_TITLE, Paragraph(why) if regions else None)
+    if not ranged:
+        return section(_TITLE)
+    names = [wording.title_of(key, result) for key in regions.whole]
+    k = np.array([one.coverage_factor or np.inf for one in regions.whole.values()])
+    rests = listed([names[i] for i in resting(regions.influence, k)])
+    words = say(
+        "The error factors are means over the recorded set-ups. The machine has other errors besides, taken as large as this "
+        "recording shows errors of their kind to be; elsewhere a factor is another by what they do."
+    )
+    prior = say("Over the measuring range, these rest on what was taken for the other errors before the recording, so that "
+                "value or U changes by a tenth of U or more with it: {names}.", names=rests) if rests else NOTHING  # fmt: skip
+    return section(
+        _TITLE, Paragraph(words), _table(result, regions, ranged), Paragraph(prior) if prior else None,
+        sizes_table(regions.scales), changes_table(regions.influence, names),
+    )  # fmt: skip
+
+
+def _table(result: Result, regions: FactorRegions, ranged: dict[Key, Quantity]) -> Table | None:
+    heads = (
+        say("Error factor"), Column(say("Over the recorded set-ups")), Column(say("U")),
+        Column(say("Over the measuring range")), Column(say("U")), Column(say("In all eighths of it")), say("Unit"),
+    )  # fmt: skip
+    rows = []
+    for key, quantity in ranged.items():
+        mean, U, _ = wording.expanded(result.parameters[key[0]][key[1]])
+        value, wider, _ = wording.expanded(quantity)
+        parts: Text = DASH
+        if (ends := regions.eighths.get(key)) is not None:
+            low, high = (rounded(end, quantity.expanded)[0] for end in ends)
+            parts = say("{low} to {high}", low=low, high=high)
+        rows.append((wording.title_of(key, result), mean, U, value, wider, parts, quantity.unit))
+    note = say(
+        "In a region a factor is what least squares of all factors find of all errors at points that fill it. An eighth has "
+        "half of each travel; the interval holds all eight with 95 %. A bow is one of the whole travel."
+    )
+    some, count = regions.observations
+    of = say("{some} of {count} observations are reckoned with.", some=some, count=count)
+    return table(_TITLE, heads, rows, note, *([of] if some < count else []))
+
+
+def regions_warnings(result: Result) -> list[Text]:
+    """What all errors together say against the named model, and against a tolerance that it keeps or exceeds."""
+    regions, texts = result.regions, list[Text]()
+    if not isinstance(regions, FactorRegions):
+        return texts
+    if denied := [wording.title_of(key, result) for key in regions.disagree]:
+        texts.append(say(
+            "{names}: with errors beside the named ones the recording says something else of its own set-ups than without "
+            "them, beyond their joint uncertainty. Do not use these figures before it is known why.", names=listed(denied),
+        ))  # fmt: skip
+    for key, quantity in over_range(result).items():
+        tolerance = result.job.facts.model.tolerances.get(key[0])
+        one = result.parameters[key[0]][key[1]]
+        if tolerance is None or _place(one, tolerance) in (None, _place(quantity, tolerance)):
+            continue
+        texts.append(say(
+            "{name} is judged as a mean over the recorded set-ups. Over the measuring range it is {value} {unit}, which "
+            "leaves open whether it keeps its tolerance.", name=wording.title_of(key, result),
+            value=wording.with_uncertainty(quantity), unit=quantity.unit,
+        ))  # fmt: skip
+    return texts
+
+
+def _place(quantity: Quantity, tolerance: float) -> bool | None:
+    """Whether all of its interval lies within a tolerance, or beyond it; ``None`` where neither."""
+    low, high = quantity.interval95
+    if -tolerance <= low and high <= tolerance:
+        return True
+    return False if low > tolerance or high < -tolerance else None
+
+
+def regions_data(result: Result) -> dict[str, Any]:
+    """For results.json."""
+    regions = result.regions
+    if not isinstance(regions, FactorRegions):
+        return {"regions": {"not_stated": str(regions)}} if regions else {}
+    factors: dict[str, dict[str, Any]] = {}
+    for key, quantity in over_range(result).items():
+        factors.setdefault(key[0], {})[key[1]] = {
+            "range": quantity_data(quantity), "recorded": quantity_data(regions.recorded[key]),
+            **({"eighths": list(regions.eighths[key])} if key in regions.eighths else {}),
+        }  # fmt: skip
+    some, count = regions.observations
+    return {"regions": {
+        "observations": some, "of": count, "factors": factors, "disagree": [".".join(key) for key in regions.disagree],
+        "families": families_data(regions.scales), "of_priors": [".".join(key) for key in regions.whole],
+        "priors": priors_data(regions.influence),
+    }} if factors else {}  # fmt: skip
