@@ -1,0 +1,136 @@
+"""Error factors over the measuring range and in its eighths, beside those of machines with smooth curves of all errors.
+
+The machines are those of :mod:`benchmarks.parts.curved`. What a factor truly is in a region is found here from the truth
+alone: least squares of scales, squarenesses and a displacement as a whole, all by differences of the truth's own formula, on a
+grid of 729 points where a certificate has 64.
+
+Run: ``python -m benchmarks.parts.regions FOLDER [--machines N] [--only WORDS]``; a run can be stopped and taken up again;
+``--page`` writes the table of the page.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.coverage.measuring import kept
+from benchmarks.coverage.study import measure, waiting
+from benchmarks.parts import machines, truth
+from benchmarks.parts.curved import CELLS, Cell, drawn
+from cmm_uq.analysis.regions import factor_regions
+from cmm_uq.app.commands.estimation import with_noise
+from cmm_uq.machine.model.measurement import RecordingModel
+from cmm_uq.machine.model.noise import noise_of
+from cmm_uq.maths.inference.posterior import Doubt, sample_with_noise
+
+PAGE = Path(__file__).parents[2] / "docs" / "parts-study.md"
+BEGIN, END = "<!-- written by benchmarks.parts.regions -->", "<!-- end of regions -->"
+NOISE_MM, EACH = 0.7e-3, 9
+KINDS = {"scale": slice(0, 3), "squareness": slice(3, 6)}
+ENDS = (((0.0, 1.0),) * 3, *product(((0.0, 0.5), (0.5, 1.0)), repeat=3))
+
+
+def factors(machine: truth.Truth, ends: tuple[tuple[float, float], ...]) -> np.ndarray:
+    """Scales in ppm and squarenesses in seconds (6,), in a region by shares of the travels."""
+    along = [low + (high - low) * np.linspace(*end, EACH) for (low, high), end in zip(truth.TRAVEL, ends, strict=True)]
+    read, nothing = np.array(list(product(*along))), np.zeros(3)
+
+    def errors(of: truth.Truth) -> np.ndarray:
+        return (of.true(read, nothing, np.zeros_like(read)) - read).ravel()
+
+    own = [errors(truth.Truth.of_six({name: float(name == one) for name in truth.SIX})) for one in truth.SIX]
+    offsets = read - read.mean(axis=0)
+    rigid = [np.tile(axis, len(read)) for axis in np.eye(3)] + [
+        1e-3 * np.cross(axis, offsets).ravel() for axis in np.eye(3)
+    ]
+    return (
+        np.linalg.lstsq(np.column_stack([*(1e3 * one for one in own), *rigid]), errors(machine), rcond=None)[0][:6]
+        * 1e3
+    )
+
+
+def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
+    """One machine: of each factor the truth, value, U and interval over the range; lowest and highest in eighths and told."""
+    cell, seed, number = task
+    random = np.random.default_rng([seed, *cell.key, number, 7])
+    start = time.process_time()
+    try:
+        found: dict[str, Any] = {"factors": _measured(cell, drawn(cell.sort, random), random)}
+    except Exception as fault:  # a study of thousands goes on, and counts it
+        found = {"fault": f"{type(fault).__name__}: {fault}"}
+    return {"cell": cell.name, "number": number, **found, "seconds": round(time.process_time() - start, 3)}
+
+
+def _measured(cell: Cell, hidden: truth.Truth, random: np.random.Generator) -> list[list[float]]:
+    one = machines.Cell(cell.artefact, cell.noise, 0.0)
+    artefact = machines.calibrated(one, hidden, NOISE_MM, 0.0, random)
+    model = RecordingModel(artefact, machines.NAMED, NOISE_MM if cell.noise == "stated" else None)
+    model, estimate, _ = with_noise(model)
+    seed = int(random.integers(2**31))
+    posterior = sample_with_noise(estimate.linear, noise_of(model), estimate.least_squares, seed)
+    regions = factor_regions(model, posterior, Doubt(()), lambda points: artefact, seed)
+    whole, *eighths = (factors(hidden, ends) for ends in ENDS)
+    rows = []
+    for i, name in enumerate(truth.SIX):
+        key = next(key for key in regions.whole if key[0] == name)
+        quantity, stated = regions.whole[key], posterior.draws[:, i]
+        parts = [float(each[i]) for each in eighths]
+        rows.append([
+            float(whole[i]), quantity.value, quantity.u, *quantity.interval95, min(parts), max(parts), *regions.eighths[key],
+            float(stated.mean()), float(stated.std()),
+        ])  # fmt: skip
+    return rows
+
+
+def tables(folder: Path) -> str:
+    """By class: how often intervals hold, and what they are beside the errors that values really had."""
+    records = kept(folder)
+    heads = ("class, calibration, noise", "machines", "over the range", "in all eighths",
+             *(f"{kind}: recorded mean, rms, U/2 over it" for kind in KINDS))  # fmt: skip
+    lines = ["| " + " | ".join(heads) + " |", "| --- " * len(heads) + "|"]
+    for cell in CELLS:
+        done = np.array([r["factors"] for r in records if r["cell"] == cell.name and "factors" in r])
+        if not len(done):
+            continue
+        true, value, _, low, high, least, most, lower, upper, mean, sd = np.moveaxis(done, 2, 0)
+        row = [cell.name, str(len(done)), f"{100 * np.mean((low <= true) & (true <= high)):.1f} %",
+               f"{100 * np.mean((lower <= least) & (most <= upper)):.1f} %"]  # fmt: skip
+        for part in KINDS.values():
+            rms = float(np.sqrt(np.mean((value - true)[:, part] ** 2)))
+            half = np.quantile(0.25 * (high - low)[:, part] / rms, [0.5, 0.9])
+            alone = 100 * np.mean(np.abs(mean - true)[:, part] <= 2 * sd[:, part])
+            row.append(f"{alone:.0f} %, {rms:.2g}; {half[0]:.1f}, {half[1]:.1f}")
+        lines.append("| " + " | ".join(row) + " |")
+    faults = sum("fault" in r for r in records)
+    return "\n".join(
+        [*lines, "", f"{faults} faults; {np.mean([r['seconds'] for r in records]):.2f} s of CPU a machine"]
+    )
+
+
+def main() -> None:
+    """Run, then say what there is."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--machines", type=int, default=100, help="of each cell")
+    parser.add_argument("--only", nargs="*", default=[], help="words of the cells' names")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=2042)
+    parser.add_argument("--page", action="store_true", help="write the table of the page, and run nothing")
+    chosen = parser.parse_args()
+    if chosen.page:
+        before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+        text = f"{before}{BEGIN}\n\n{tables(chosen.folder)}.\n\n{END}{rest.partition(END)[2]}"
+        PAGE.write_text(text, encoding="utf-8")
+    else:
+        some = [cell for cell in CELLS if not chosen.only or any(word in cell.name for word in chosen.only)]
+        measure(waiting(some, chosen.folder, chosen.seed, chosen.machines), chosen.folder, chosen.processes, measured)
+    print(tables(chosen.folder))
+
+
+if __name__ == "__main__":
+    main()
