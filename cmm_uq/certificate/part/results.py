@@ -44,7 +44,7 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
         "part": {"name": facts.part.name, "drawing": facts.part.drawing or None, "serial": facts.part.serial or None,
                  "not_measured": list(facts.part.not_measured)},
         "machine": standing_data(found.standing) | {
-            "families": families_data(found),
+            "families": families_data(found.given.machine.scales),
             "bounds": [one.model_dump() for one in facts.machine_state.bound],
         },
         "simulation": {

@@ -63,7 +63,7 @@ def changes_table(influence: Iterable[PriorInfluence], names: Sequence[Text]) ->
         for one in influence if one.family == ALL or not _little(one)
     )  # fmt: skip
     return table(say("If this were different"), heads, rows, say(
-        "The largest change of all of them, of the value as a part of its u. Errors of a family that the recording "
+        "The largest change of all figures, of the value as a part of its u. Errors of a family that the recording "
         "hardly shows are scaled with its prior. Priors that would change nothing by more than 1 % are left out.",
     ))  # fmt: skip
 

@@ -45,9 +45,9 @@ def regions_section(result: Result) -> Section:
     rests = listed([names[i] for i in resting(regions.influence, k)])
     words = say(
         "The error factors are means over the recorded set-ups. The machine has other errors besides, taken as large as this "
-        "recording shows errors of their kind to be; elsewhere a factor is another by what they do."
+        "recording shows errors of their kind to be; elsewhere a factor differs by what they do."
     )
-    prior = say("Over the measuring range, these rest on what was taken for the other errors before the recording, so that "
+    prior = say("Over the measuring range these rest on what was taken for the other errors before the recording, so that "
                 "value or U changes by a tenth of U or more with it: {names}.", names=rests) if rests else NOTHING  # fmt: skip
     return section(
         _TITLE, Paragraph(words), _table(result, regions, ranged), Paragraph(prior) if prior else None,
