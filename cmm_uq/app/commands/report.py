@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -84,13 +85,15 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
     values, doubt = with_doubt(model, estimate, posterior, posterior.draws if averaged is None else averaged, causes)
     denied = () if averaged is None else contradictions(model, estimate, posterior, averaged)
 
+    # all errors of the machine together: where the factors hold, computed once it is asked for
+    all_errors = regions_of(model, posterior, doubt, observe, seed)
+
     result = Result(
         job, model, findings, estimate, posterior, values,
         named_draws(model, components, posterior, values, mixture=averaged is not None),
         parameters(model, values), sizes(model, values),
         noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, statements,
-        diagnosis, causes=causes, doubt=doubt, contradictions=denied,
-        all_errors=cache(partial(_all_errors, model, posterior, doubt, observe, seed)),
+        diagnosis, causes=causes, doubt=doubt, contradictions=denied, all_errors=all_errors,
     )  # fmt: skip
     for name, quantity in result.quantities():
         figures_of = (quantity.value, quantity.u, *quantity.interval95)
@@ -98,13 +101,19 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
     return result
 
 
-def _all_errors(
+def regions_of(
     model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, observe: Observed, seed: int
-) -> FactorRegions | Text:
-    try:
-        return factor_regions(model, posterior, doubt, observe, seed)
-    except CmmUqError as error:
-        return Verbatim(error.problem)
+) -> Callable[[], FactorRegions | Text]:
+    """What computes once, when it is first asked for, where the error factors hold, or says why that is not to be had."""
+
+    @cache
+    def regions() -> FactorRegions | Text:
+        try:
+            return factor_regions(model, posterior, doubt, observe, seed)
+        except CmmUqError as error:
+            return Verbatim(error.problem)
+
+    return regions
 
 
 def report_recipe(job: Job) -> Recipe:

@@ -15,6 +15,7 @@ from cmm_uq.certificate.document import Column, Paragraph, Section, Table, secti
 from cmm_uq.certificate.part.figures import CharacteristicFigures, by_margin, critical, figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement, UnseenError
 from cmm_uq.certificate.part.plots import shares_plots
+from cmm_uq.certificate.sections.priors import changes_table, resting, sizes_table
 from cmm_uq.certificate.wording import effect_title
 
 DETAILED = 10  # characteristics whose budgets are listed line by line: those of least margin
@@ -221,3 +222,50 @@ def best_words(one: CharacteristicFigures) -> Text:
 def _too(names: list[Text]) -> Text:
     return plural(len(names), one=say("It helps characteristic {names} too.", names=commas(names)),
                   many=say("It helps characteristics {names} too.", names=commas(names)))  # fmt: skip
+
+
+def priors_section(found: PartMeasurement) -> Section:
+    """Sizes of the families, and what would change with other priors."""
+    title = say("What the recording says of the machine's errors, and what it does not")
+    if not found.influence:
+        return section(title, _stated_bounds(found))
+    return section(
+        title,
+        Paragraph(priors_words(found), "warning" if resting_on_priors(found) else "plain"),
+        sizes_table(found.given.machine.scales),
+        _stated_bounds(found),
+        changes_table(found.influence, [Verbatim(one.name) for one in found.characteristics]),
+    )
+
+
+def resting_on_priors(found: PartMeasurement) -> list[str]:
+    """Characteristics that rest on priors."""
+    k = np.array([one.U / one.u if one.u else np.inf for one in found.stated])
+    return [found.characteristics[i].name for i in resting(found.influence, k)]
+
+
+def priors_words(found: PartMeasurement) -> Text:
+    """What rests on priors, in a sentence."""
+    names = resting_on_priors(found)
+    if not names:
+        return say(
+            "Where priors of the machine's errors are half as wide, or twice, no figure changes by a tenth of U."
+        )
+    return say(
+        "{count} of {all} characteristics rest on what was taken for the machine's errors before its recording: their value "
+        "or U changes by a tenth of U or more where a prior is half as wide, or twice.",
+        count=len(names), all=len(found.stated),
+    )  # fmt: skip
+
+
+def _stated_bounds(found: PartMeasurement) -> Table | None:
+    heads = (say("Errors"), Column(say("At most"), unit("µm")), say("Stated by"))
+    rows = (
+        (commas([effect_title(name) for name in one.errors]), number(one.largest_um, "g"), Verbatim(one.source))
+        for one in found.job.facts.machine_state.bound
+    )
+    note = say(
+        "Of play the gap, of a periodic error the amplitude, which 95 of 100 do not exceed. They are taken as stated: the "
+        "recording of the calibration cannot show these errors by itself."
+    )
+    return table(say("Bounds that are stated"), heads, rows, note)

@@ -19,7 +19,6 @@ from cmm_uq.certificate.part import budget_section as causes, results_section as
 from cmm_uq.certificate.part.figures import CharacteristicFigures, critical, figures_of
 from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, Source
 from cmm_uq.certificate.part.method import method_section, methods_section, not_covered_section, program_words
-from cmm_uq.certificate.part.priors_section import priors_section
 from cmm_uq.certificate.wording import probability
 from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.jobs.verdicts import gravest, standing_of
@@ -193,7 +192,8 @@ def part_document(found: PartMeasurement) -> Document:
     facts, measured, lacking = found.job.facts, found.measured is not None, lacking_of(found)
     sections = (
         results.results_section(found), results.conformity_section(found), results.part_section(found),
-        results.errors_section(found), causes.budget_section(found), priors_section(found), causes.unseen_section(found),
+        results.errors_section(found), causes.budget_section(found), causes.priors_section(found),
+        causes.unseen_section(found),
         causes.ways_section(found), methods_section(found.methods), results.correlation_section(found),
         machine_section(found), method_section(found), not_covered_section(found),
     )  # fmt: skip

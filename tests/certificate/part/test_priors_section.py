@@ -10,8 +10,9 @@ import pytest
 
 from cmm_uq.analysis.influence import ALL, PriorInfluence
 from cmm_uq.certificate.document import Paragraph, Section, Table
+from cmm_uq.certificate.part.budget_section import priors_section, resting_on_priors
 from cmm_uq.certificate.part.measurement import PartMeasurement
-from cmm_uq.certificate.part.priors_section import families_data, priors_data, priors_section, resting
+from cmm_uq.certificate.sections.priors import families_data, priors_data
 from cmm_uq.jobs.part.tables import BoundFacts
 from tests.certificate.parts_found import found_of, machine, measured_points
 from tests.jobs.part.parts import plate
@@ -56,7 +57,7 @@ def with_sizes(found: PartMeasurement) -> PartMeasurement:
 def test_sizes_are_those_of_the_draws_times_what_physics_allows(found: PartMeasurement) -> None:
     """30 µm of play; of eight waves of 30″ with weights 1/k the first two have 30″·√((1 + 1/4)/Σ 1/k²) = 27.14″."""
     sized = with_sizes(found)
-    play, rotation = families_data(sized)
+    play, rotation = families_data(sized.given.machine.scales)
     assert (play["allowed"], play["unit"]) == (30.0, "µm")
     assert [play[key] for key in ("low", "size", "high")] == pytest.approx([30 * 0.01, 30 * 0.2, 30 * 0.39])
     assert (
@@ -98,7 +99,7 @@ def test_a_tenth_of_u_or_of_expanded_uncertainty_makes_a_figure_rest_on_the_prio
         (change(found, [0.899]), [names[0]]), (change(found, shift=[0.099 * k]), []),
         (change(found, shift=[-0.101 * k]), [names[0]]),
     ):  # fmt: skip
-        assert resting(replace(found, influence=(one,))) == rests
+        assert resting_on_priors(replace(found, influence=(one,))) == rests
     calm, warned = paragraph(told(found, change(found))), paragraph(told(found, change(found, [1.0, 1.5])))
     assert (calm.tone, warned.tone) == ("plain", "warning")
     assert str(warned.text).startswith(f"1 of {len(names)} characteristics rest on what was taken")

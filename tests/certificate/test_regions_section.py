@@ -1,0 +1,123 @@
+"""What a certificate says of where its error factors hold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cmm_uq.analysis.regions import FactorRegions
+from cmm_uq.base.messages import Verbatim
+from cmm_uq.certificate.certificate import with_capability
+from cmm_uq.certificate.document import Paragraph, Table
+from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.sections.regions import over_range, regions_data, regions_section, regions_warnings
+from cmm_uq.maths.uncertainty.quantity import Quantity
+from tests.artefacts.simulated import analysed, outcome
+
+JOB = "iota-1102-20C"
+KEY = ("scale_x", "ppm")
+
+
+def regions() -> FactorRegions:
+    found = analysed(JOB).regions
+    assert isinstance(found, FactorRegions)
+    return found
+
+
+def told(*, stated: Quantity | None = None, tolerance: float | None = None, **changed: object) -> Result:
+    """The result with another scale of X over the recorded set-ups, a tolerance of it, and other regions."""
+    result, found = analysed(JOB), replace(regions(), **{"influence": (), **changed})  # type: ignore[arg-type]
+    parameters = dict(result.parameters)
+    if stated is not None:
+        parameters[KEY[0]] = {KEY[1]: stated}
+    model = result.job.facts.model.model_copy(update={"tolerances": {} if tolerance is None else {KEY[0]: tolerance}})
+    job = replace(result.job, facts=result.job.facts.model_copy(update={"model": model}))
+    return replace(result, job=job, parameters=parameters, all_errors=lambda: found)
+
+
+def scale(value: float, u: float) -> Quantity:
+    return Quantity(value, u, (value - 2 * u, value + 2 * u), analysed(JOB).parameters[KEY[0]][KEY[1]].unit)
+
+
+def first(result: Result) -> tuple[str, ...]:
+    table = next(block for block in regions_section(result).blocks if isinstance(block, Table))
+    return tuple(map(str, table.rows[0]))
+
+
+def test_a_row_has_the_mean_the_range_and_the_eighths() -> None:
+    result = told(stated=scale(10.2, 1.35), whole={KEY: scale(3.6, 4.0)}, eighths={KEY: (-9.4, 21.2)})
+    assert first(result) == ("Scale error of X", "10.2", "2.7", "3.6", "8.0", "−9.4 to 21.2", "ppm")
+
+
+def test_nothing_is_known_better_everywhere_than_over_the_set_ups() -> None:
+    """U of the mean, 2.7, stands, also where a capability of the laboratory has raised it."""
+    result = told(stated=scale(10.2, 1.35), whole={KEY: scale(3.6, 0.5)}, eighths={})
+    assert over_range(result)[KEY].expanded == pytest.approx(2.7)
+    assert first(result)[3:] == ("3.6", "2.7", "–", "ppm")
+    data = regions_data(result)["regions"]["factors"]["scale_x"]["ppm"]
+    assert data["range"]["u"] == pytest.approx(1.35)
+    assert "eighths" not in data
+
+
+def test_a_factor_that_is_not_given_is_not_given_elsewhere() -> None:
+    free = replace(told(), contradictions=())
+    assert KEY in over_range(free)
+    ls = free.least_squares
+    k = [unknown.key for unknown in ls.unknowns].index(KEY)
+    alone = np.zeros((len(ls.unknowns), 1))
+    alone[k] = 1.0
+    estimate = replace(free.estimate, least_squares=replace(ls, null_space=alone))
+    assert KEY not in over_range(replace(free, estimate=estimate))
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "warned"),
+    [
+        (20.0, False),  # within it everywhere
+        (12.0, True),  # within it over the set-ups, open over the range
+        (10.0, False),  # open already
+        (3.0, True),  # beyond it over the set-ups, open over the range
+    ],
+)
+def test_a_tolerance_that_is_open_over_the_range_is_warned_of(tolerance: float, warned: bool) -> None:
+    """10.2 ± 1.0 over the recorded set-ups; 10 ± 8 over the range, of 2 to 18."""
+    result = told(stated=scale(10.2, 0.5), tolerance=tolerance, whole={KEY: scale(10.0, 4.0)})
+    warnings = [str(text) for text in regions_warnings(result)]
+    assert bool(warnings) == warned
+    if warned:
+        assert warnings == [
+            "Scale error of X is judged as a mean over the recorded set-ups. Over the measuring range it is 10.0 ± 8.0 ppm, "
+            "which leaves open whether it keeps its tolerance."
+        ]
+
+
+def test_a_model_that_all_errors_deny_is_warned_of() -> None:
+    (warning,) = regions_warnings(told(disagree=(KEY,)))
+    assert str(warning).startswith(
+        "Scale error of X: with errors beside the named ones the recording says something else"
+    )
+    assert regions_data(told(disagree=(KEY,)))["regions"]["disagree"] == ["scale_x.ppm"]
+    assert not regions_warnings(told())
+
+
+def test_why_nothing_is_stated_is_said() -> None:
+    result = replace(analysed(JOB), all_errors=lambda: Verbatim("the travel of axis x is needed"))
+    (block,) = regions_section(result).blocks
+    assert isinstance(block, Paragraph)
+    assert str(block.text).endswith("what they are elsewhere is not stated: the travel of axis x is needed.")
+    assert regions_data(result) == {"regions": {"not_stated": "the travel of axis x is needed"}}
+    assert not over_range(result)
+    assert not regions_warnings(result)
+
+
+def test_results_have_what_the_page_has() -> None:
+    data = outcome(JOB).results["regions"]
+    stated, _ = with_capability(analysed(JOB))
+    for (effect, name), quantity in over_range(stated).items():
+        assert data["factors"][effect][name]["range"]["value"] == quantity.value
+    assert data["observations"] == data["of"] == 19
+    assert data["of_priors"] == [".".join(key) for key in regions().whole]
+    assert {row["family"] for row in data["families"]} == set(regions().scales)
+    assert all(len(row["u_ratio"]) == len(data["of_priors"]) for row in data["priors"])
