@@ -101,16 +101,21 @@ def factor_regions(
     of_family = np.array([family_of(one) for one in field.effects for _ in one.coefficients])[placed]
     scales = dict(zip(field.field.families, sizes.families.T, strict=True))
     influence = influence_of(
-        over_all, np.array([one.u for one in quantities]), scales,
-        lambda name: further[:, placed] @ np.where(of_family == name, whole[same], 0.0).T, {},
-    )  # fmt: skip
+        over_all,
+        np.array([one.u for one in quantities]),
+        scales,
+        lambda name: further[:, placed] @ np.where(of_family == name, whole[same], 0.0).T,
+        {},
+    )
     return FactorRegions(
         dict(zip(keys, quantities, strict=True)),
         {key: (float(low[i]), float(high[i])) for i, key in enumerate(keys) if str(units[i]) in _ANYWHERE},
         {key: Quantity.of_draws(recorded[:, i], of) for i, key, of in zip(named, keys, units, strict=True)},
         _disagreeing(model, posterior, recorded),
-        scales, influence, (int(thinned.used.sum()), count),
-    )  # fmt: skip
+        scales,
+        influence,
+        (int(thinned.used.sum()), count),
+    )
 
 
 def _names(effects: Sequence[Effect]) -> list[str]:

@@ -56,8 +56,14 @@ def sizes_table(scales: Mapping[str, Floats]) -> Table | None:
 
 def changes_table(influence: Iterable[PriorInfluence], names: Sequence[Text]) -> Table | None:
     """``names`` of the figures that the changes are of."""
-    heads = (say("Errors"), Column(say("Prior times")), Column(say("u changes by"), unit("%")), say("Of"),
-             Column(say("Value changes by"), unit("%")), say("Of"))  # fmt: skip
+    heads = (
+        say("Errors"),
+        Column(say("Prior times")),
+        Column(say("u changes by"), unit("%")),
+        say("Of"),
+        Column(say("Value changes by"), unit("%")),
+        say("Of"),
+    )
     rows = (
         (family_words(one.family), number(one.times, "g"), *_largest(one.u - 1, names), *_largest(one.shift, names))
         for one in influence if one.family == ALL or not _little(one)

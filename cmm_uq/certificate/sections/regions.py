@@ -47,19 +47,35 @@ def regions_section(result: Result) -> Section:
         "The error factors are means over the recorded set-ups. The machine has other errors besides, taken as large as this "
         "recording shows errors of their kind to be; elsewhere a factor differs by what they do."
     )
-    prior = say("Over the measuring range these rest on what was taken for the other errors before the recording, so that "
-                "value or U changes by a tenth of U or more with it: {names}.", names=rests) if rests else NOTHING  # fmt: skip
+    prior = (
+        say(
+            "Over the measuring range these rest on what was taken for the other errors before the recording, so that "
+            "value or U changes by a tenth of U or more with it: {names}.",
+            names=rests,
+        )
+        if rests
+        else NOTHING
+    )
     return section(
-        _TITLE, Paragraph(words), _table(result, regions, ranged), Paragraph(prior) if prior else None,
-        sizes_table(regions.scales), changes_table(regions.influence, names),
-    )  # fmt: skip
+        _TITLE,
+        Paragraph(words),
+        _table(result, regions, ranged),
+        Paragraph(prior) if prior else None,
+        sizes_table(regions.scales),
+        changes_table(regions.influence, names),
+    )
 
 
 def _table(result: Result, regions: FactorRegions, ranged: dict[Key, Quantity]) -> Table | None:
     heads = (
-        say("Error factor"), Column(say("Over the recorded set-ups")), Column(say("U")),
-        Column(say("Over the measuring range")), Column(say("U")), Column(say("In all eighths of it")), say("Unit"),
-    )  # fmt: skip
+        say("Error factor"),
+        Column(say("Over the recorded set-ups")),
+        Column(say("U")),
+        Column(say("Over the measuring range")),
+        Column(say("U")),
+        Column(say("In all eighths of it")),
+        say("Unit"),
+    )
     rows = []
     for key, quantity in ranged.items():
         mean, U, _ = wording.expanded(result.parameters[key[0]][key[1]])
@@ -84,20 +100,27 @@ def regions_warnings(result: Result) -> list[Text]:
     if not isinstance(regions, FactorRegions):
         return texts
     if denied := [wording.title_of(key, result) for key in regions.disagree]:
-        texts.append(say(
-            "{names}: with errors beside the named ones the recording says something else of its own set-ups than without "
-            "them, beyond their joint uncertainty. Do not use these figures before it is known why.", names=listed(denied),
-        ))  # fmt: skip
+        texts.append(
+            say(
+                "{names}: with errors beside the named ones the recording says something else of its own set-ups than without "
+                "them, beyond their joint uncertainty. Do not use these figures before it is known why.",
+                names=listed(denied),
+            )
+        )
     for key, quantity in over_range(result).items():
         tolerance = result.job.facts.model.tolerances.get(key[0])
         one = result.parameters[key[0]][key[1]]
         if tolerance is None or _place(one, tolerance) in (None, _place(quantity, tolerance)):
             continue
-        texts.append(say(
-            "{name} is judged as a mean over the recorded set-ups. Over the measuring range it is {value} {unit}, which "
-            "leaves open whether it keeps its tolerance.", name=wording.title_of(key, result),
-            value=wording.with_uncertainty(quantity), unit=quantity.unit,
-        ))  # fmt: skip
+        texts.append(
+            say(
+                "{name} is judged as a mean over the recorded set-ups. Over the measuring range it is {value} {unit}, which "
+                "leaves open whether it keeps its tolerance.",
+                name=wording.title_of(key, result),
+                value=wording.with_uncertainty(quantity),
+                unit=quantity.unit,
+            )
+        )
     return texts
 
 
@@ -117,12 +140,23 @@ def regions_data(result: Result) -> dict[str, Any]:
     factors: dict[str, dict[str, Any]] = {}
     for key, quantity in over_range(result).items():
         factors.setdefault(key[0], {})[key[1]] = {
-            "range": quantity_data(quantity), "recorded": quantity_data(regions.recorded[key]),
+            "range": quantity_data(quantity),
+            "recorded": quantity_data(regions.recorded[key]),
             **({"eighths": list(regions.eighths[key])} if key in regions.eighths else {}),
-        }  # fmt: skip
+        }
     some, count = regions.observations
-    return {"regions": {
-        "observations": some, "of": count, "factors": factors, "disagree": [".".join(key) for key in regions.disagree],
-        "families": families_data(regions.scales), "of_priors": [".".join(key) for key in regions.whole],
-        "priors": priors_data(regions.influence),
-    }} if factors else {}  # fmt: skip
+    return (
+        {
+            "regions": {
+                "observations": some,
+                "of": count,
+                "factors": factors,
+                "disagree": [".".join(key) for key in regions.disagree],
+                "families": families_data(regions.scales),
+                "of_priors": [".".join(key) for key in regions.whole],
+                "priors": priors_data(regions.influence),
+            }
+        }
+        if factors
+        else {}
+    )
