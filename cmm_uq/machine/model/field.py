@@ -91,8 +91,8 @@ class AxisFunction(Effect):
         angle = np.pi * (points.readings[axis] - low) / (high - low)
         waves = np.sqrt(2.0) * np.cos(angle[:, None] * self.orders)
         if isinstance(self.of, Rotation):
-            each = [turned(points, axis, self.of.about, ARCSECOND * wave) for wave in waves.T]
-            return np.concatenate(each, axis=2)
+            lever = turned(points, axis, self.of.about, np.ones(len(points)))
+            return np.asarray(lever * (ARCSECOND * waves)[:, None, :])
         return along(self.of.direction if isinstance(self.of, Straightness) else axis, MICROMETRE * waves)
 
 
