@@ -18,7 +18,7 @@ from cmm_uq.certificate.results.provenance import COMPARED, NOT_COMPARED, REBUIL
 from cmm_uq.certificate.sections import results as of_result
 from cmm_uq.certificate.sections.conformity import conformity_section
 from cmm_uq.certificate.sections.method import method, posterior_section, warnings
-from cmm_uq.certificate.sections.regions import regions_data, regions_section
+from cmm_uq.certificate.sections.regions import regions_section, with_regions
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.tables.identification import Identification, Laboratory
@@ -179,12 +179,11 @@ def certified(result: Result, page: Page) -> Outcome:
     own = (*warnings(result), *stating.warnings())
     warned = (*own, *clauses.formal_warnings(result.job))
     draws = origins.posterior_file(result.draws, result.job.origin) if len(result.draws) else None
-    data = results(result) | regions_data(result) | of_result.as_found_data(result.job)
-    data |= clauses.clauses_data(result.job) | stating.data()
+    data = results(result) | of_result.as_found_data(result.job) | clauses.clauses_data(result.job) | stating.data()
     if draws is not None:
         data["posterior"] = draws.entry
     return Outcome(
-        result, lambda: _certificate(result, page, own), page.with_further(result, data),
+        result, lambda: _certificate(result, page, own), with_regions(page.with_further(result, data), result),
         of_result.summary(result, warned), warned, {draws.name: draws.content} if draws else {}, draws=result.draws,
         verdicts=result.verdicts,
         in_order=result.diagnosed.diagnosis.verdict == "consistent",

@@ -94,6 +94,23 @@ def decided(results: Results) -> list[Record]:
     return list(rows.values())
 
 
+def by_region(results: Results) -> list[Record]:
+    """Of each factor the mean over the recorded set-ups, over the range, and the ends in its eighths."""
+    ends = results["regions"]["eighths"]
+    return [
+        [results["estimates"][effect][name], one, ends.get(effect, {}).get(name, [])]
+        for effect, found in results["over_range"].items() for name, one in found.items()
+    ]  # fmt: skip
+
+
+def other_priors(results: Results) -> list[Record]:
+    """Those that change anything by a hundredth, and all together."""
+    return [
+        [{key: one[key] for key in ("times", "u_percent", "value_percent")}] for one in results["regions"]["priors"]
+        if one["family"] == "all" or max(abs(one["u_percent"]), abs(one["value_percent"])) >= 1
+    ]  # fmt: skip
+
+
 def of_test_value(results: Results) -> list[Record]:
     """Lines that contribute, in µm as printed."""
     (stated,) = results["conformity"]
@@ -112,6 +129,9 @@ STATED = (
 RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Figures of performance": lambda r: [[quantity] for quantity in r["accuracy_uncertainty"].values()],
     "Error factors of the machine": parameters,
+    "Where the error factors hold": by_region,
+    "Sizes of errors, root mean square": lambda r: [[family] for family in r["regions"]["families"]],
+    "If this were different": other_priors,
     "Differences that are determined": lambda r: [[one] for one in r["differences"]],
     "What to turn and what to enter": lambda r: [[one] for one in r["adjustments"]],
     "The six factors by the distance equations, a second way":
@@ -258,16 +278,18 @@ def test_no_quantity_has_two_uncertainties_without_a_reason(example: str) -> Non
 
 
 def test_two_uncertainties_of_one_quantity_are_seen() -> None:
-    """Without its reason, the second way to the factors of a ballbar is one."""
+    """Without its reason, the second way to the factors of a ballbar is one, and so are they over the measuring range."""
     results = read_back("iota-1102-20C")
-    assert len(disagreeing({**results, "conditional": {}})) == 6
+    paths = [path.split(".")[0] for path in disagreeing({**results, "conditional": {}})]
+    assert {one: paths.count(one) for one in paths} == {"over_range": 6, "regions": 6, "distance_equations": 6}
     found = document("iota-1102-20C")
     bare = [
         replace(section, blocks=tuple(replace(b, notes=()) if isinstance(b, Table) else b for b in section.blocks))
         for section in found.sections
     ]
-    # 16″ of X–Y are the same as printed
-    expected = [*(f"Scale error of {axis}" for axis in "XYZ"), "Angle Y–Z − 90°", "Angle Z–X − 90°"]
+    # 16″ of the angle X–Y are the same as printed
+    expected = [*(f"Scale error of {axis}" for axis in "XYZ"), *(f"Squareness {plane}" for plane in ("X–Y", "Y–Z", "Z–X")),
+                "Angle Y–Z − 90°", "Angle Z–X − 90°"]  # fmt: skip
     assert two_uncertainties(replace(found, sections=tuple(bare))) == expected
 
 

@@ -178,7 +178,8 @@ def test_results_and_decisions_come_first_and_what_interprets_them_is_in_the_ann
     titles = [(section.title, section.opinion) for section in document.sections]
     assert titles == [
         ("Figures of performance", False), ("Statements of conformity", False), ("Error factors", False),
-        ("Artefact and traceability", False), ("Lengths", False), ("Budget of one length", False), ("Method", False),
+        ("Where the error factors hold", False), ("Artefact and traceability", False), ("Lengths", False),
+        ("Budget of one length", False), ("Method", False),
         ("The adjustment that the machine needs", True), ("Posterior distribution", True),
     ]  # fmt: skip
 

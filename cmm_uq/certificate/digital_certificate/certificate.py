@@ -173,6 +173,7 @@ def _values(
 
 _TITLES: Mapping[str, Text] = MappingProxyType({
     "accuracy_uncertainty": say("Figures of performance"), "estimates": say("Error factors of the machine"),
+    "over_range": say("Error factors over the measuring range"),
     "differences": say("Differences that are determined"), "artefact": say("Sizes of the artefact after the fit"),
     "certified": say("Certified sizes of the artefact"), "tolerances": say("Parameters and tolerances"),
     "noise": say("Noise of a reading"), "least_squares": say("Least squares, for comparison"),

@@ -305,6 +305,8 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "priors[].times": ("", "By which its prior is narrower or wider."),
         "priors[].u_ratio": ("", "u that would follow over u as stated, by characteristic."),
         "priors[].shift_u": ("u", "Change of the value, likewise."),
+        "priors[].u_percent": ("%", "The largest change of u."),
+        "priors[].value_percent": ("%", "The largest change of a value, of its u."),
         "further.effects": ("", "Effects that further set-ups of the calibration's artefact show."),
         "further.setups": ("", "How many set-ups."),
         "further.text": ("", "The same in words."),

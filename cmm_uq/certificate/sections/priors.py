@@ -16,7 +16,7 @@ from cmm_uq.certificate.wording import effect_title
 from cmm_uq.machine.model.field import FAMILIES, allowed
 
 _LITTLE = 0.01  # change that is not worth a line
-_SHOWN = 0.005  # change that is not zero as printed
+_SHOWN = 0.5  # per cent that are not zero as printed
 
 
 def resting(influence: Iterable[PriorInfluence], k: Floats) -> list[int]:
@@ -38,15 +38,16 @@ def family_words(name: str) -> Text:
 
 def sizes_table(scales: Mapping[str, Floats]) -> Table | None:
     """``scales``: draws (N,) of each family's size, over what physics allows."""
-    heads = (say("Errors"), Column(say("Physics allows")), Column(say("As recorded")), Column(say("95 % interval")))
-    rows = []
-    for one in families_data(scales):
-        of_unit = unit(str(one["unit"]))
-        size, low, high, most = (number(one[key], ".2g") for key in ("size", "low", "high", "allowed"))
-        rows.append((
-            family_words(str(one["family"])), say("{value} {unit}", value=most, unit=of_unit),
-            say("{value} {unit}", value=size, unit=of_unit), say("{low} to {high} {unit}", low=low, high=high, unit=of_unit),
-        ))  # fmt: skip
+    figures = (say("Physics allows"), say("As recorded"), say("95 % interval from"), say("to"))
+    heads = (say("Errors"), *map(Column, figures), say("Unit"))
+    rows = (
+        (
+            family_words(str(one["family"])),
+            *(number(one[key], ".2g") for key in ("allowed", "size", "low", "high")),
+            unit(str(one["unit"])),
+        )
+        for one in families_data(scales)
+    )
     return table(say("Sizes of errors, root mean square"), heads, rows, say(
         "A family has one size, half-normal beforehand with what physics allows, and as the recording of the calibration "
         "shows it afterwards; its members of which little is seen are taken as large as the others. Of play the size of the "
@@ -81,10 +82,15 @@ def _little(one: PriorInfluence) -> bool:
 
 def _largest(changes: Floats, names: Sequence[Text]) -> tuple[Text, Text]:
     """The largest of changes (c,) in per cent, and whose it is; a zero is nobody's."""
-    i = int(np.argmax(np.abs(changes)))
-    if abs(changes[i]) < _SHOWN:
+    i, percent = _percent(changes)
+    if abs(percent) < _SHOWN:
         return number(0.0, ".0f"), DASH
-    return signed(100 * changes[i], ".0f"), names[i]
+    return signed(percent, ".0f"), names[i]
+
+
+def _percent(changes: Floats) -> tuple[int, float]:
+    i = int(np.argmax(np.abs(changes)))
+    return i, float(100 * changes[i])
 
 
 def families_data(scales: Mapping[str, Floats]) -> list[dict[str, Any]]:
@@ -99,6 +105,13 @@ def families_data(scales: Mapping[str, Floats]) -> list[dict[str, Any]]:
 
 def priors_data(influence: Iterable[PriorInfluence]) -> list[dict[str, Any]]:
     return [
-        {"family": one.family, "times": one.times, "u_ratio": one.u.tolist(), "shift_u": one.shift.tolist()}
+        {
+            "family": one.family,
+            "times": one.times,
+            "u_ratio": one.u.tolist(),
+            "shift_u": one.shift.tolist(),
+            "u_percent": _percent(one.u - 1)[1],
+            "value_percent": _percent(one.shift)[1],
+        }
         for one in influence
     ]

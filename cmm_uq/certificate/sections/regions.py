@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from cmm_uq.analysis.regions import FactorRegions, Key
-from cmm_uq.base.messages import DASH, NOTHING, Text, listed, say
+from cmm_uq.base.messages import NOTHING, Text, listed, say
 from cmm_uq.certificate import wording
 from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
 from cmm_uq.certificate.origin import quantity_data
@@ -67,27 +68,21 @@ def regions_section(result: Result) -> Section:
 
 
 def _table(result: Result, regions: FactorRegions, ranged: dict[Key, Quantity]) -> Table | None:
-    heads = (
-        say("Error factor"),
-        Column(say("Over the recorded set-ups")),
-        Column(say("U")),
-        Column(say("Over the measuring range")),
-        Column(say("U")),
-        Column(say("In all eighths of it")),
-        say("Unit"),
-    )
+    figures = (say("As recorded"), say("U"), say("In the range"), say("U"), say("Eighths from"), say("to"))
+    heads = (say("Error factor"), *map(Column, figures), say("Unit"))
     rows = []
     for key, quantity in ranged.items():
         mean, U, _ = wording.expanded(result.parameters[key[0]][key[1]])
-        value, wider, _ = wording.expanded(quantity)
-        parts: Text = DASH
-        if (ends := regions.eighths.get(key)) is not None:
-            low, high = (rounded(end, quantity.expanded)[0] for end in ends)
-            parts = say("{low} to {high}", low=low, high=high)
-        rows.append((wording.title_of(key, result), mean, U, value, wider, parts, quantity.unit))
+        value, wider = rounded(quantity.value, quantity.expanded)
+        ends: Sequence[Text] = [rounded(end, quantity.expanded)[0] for end in regions.eighths.get(key, ())]
+        rows.append(
+            (wording.title_of(key, result), mean, U, value, wider, *(ends or (NOTHING, NOTHING)), quantity.unit)
+        )
     note = say(
-        "In a region a factor is what least squares of all factors find of all errors at points that fill it. An eighth has "
-        "half of each travel; the interval holds all eight with 95 %. A bow is one of the whole travel."
+        "As recorded: the mean over the recorded set-ups. In the measuring range, and in an eighth of it with half of each "
+        "travel, a factor is what least squares of all factors find of all errors at points that fill it; its U is "
+        "conditional on other errors as large as stated below. The interval holds all eight with 95 %. A bow is one of the "
+        "whole travel."
     )
     some, count = regions.observations
     of = say("{some} of {count} observations are reckoned with.", some=some, count=count)
@@ -132,31 +127,38 @@ def _place(quantity: Quantity, tolerance: float) -> bool | None:
     return False if low > tolerance or high < -tolerance else None
 
 
+def with_regions(data: Mapping[str, Any], result: Result) -> dict[str, Any]:
+    """Contents of results.json with what is known of the factors elsewhere, and what that is conditional on."""
+    found = regions_data(result)
+    conditional = {**data.get("conditional", {}), **found.pop("conditional", {})}
+    return {**data, **found, **({"conditional": conditional} if conditional else {})}
+
+
 def regions_data(result: Result) -> dict[str, Any]:
-    """For results.json."""
     regions = result.regions
     if not isinstance(regions, FactorRegions):
         return {"regions": {"not_stated": str(regions)}} if regions else {}
-    factors: dict[str, dict[str, Any]] = {}
-    for key, quantity in over_range(result).items():
-        factors.setdefault(key[0], {})[key[1]] = {
-            "range": quantity_data(quantity),
-            "recorded": quantity_data(regions.recorded[key]),
-            **({"eighths": list(regions.eighths[key])} if key in regions.eighths else {}),
-        }
+    by_effect: dict[str, dict[str, dict[str, Any]]] = {"over_range": {}, "recorded": {}, "eighths": {}}
+    for key, quantity in (ranged := over_range(result)).items():
+        effect, name = key
+        by_effect["over_range"].setdefault(effect, {})[name] = quantity_data(quantity)
+        by_effect["recorded"].setdefault(effect, {})[name] = quantity_data(regions.recorded[key])
+        if key in regions.eighths:
+            by_effect["eighths"].setdefault(effect, {})[name] = list(regions.eighths[key])
+    if not ranged:
+        return {}
+    given = "other errors as large as regions.families says"
     some, count = regions.observations
-    return (
-        {
-            "regions": {
-                "observations": some,
-                "of": count,
-                "factors": factors,
-                "disagree": [".".join(key) for key in regions.disagree],
-                "families": families_data(regions.scales),
-                "of_priors": [".".join(key) for key in regions.whole],
-                "priors": priors_data(regions.influence),
-            }
-        }
-        if factors
-        else {}
-    )
+    return {
+        "over_range": by_effect.pop("over_range"),
+        "regions": {
+            "observations": some,
+            "of": count,
+            **by_effect,
+            "disagree": [".".join(key) for key in regions.disagree],
+            "families": families_data(regions.scales),
+            "of_priors": [".".join(key) for key in regions.whole],
+            "priors": priors_data(regions.influence),
+        },
+        "conditional": {"over_range": given, "regions": given},
+    }

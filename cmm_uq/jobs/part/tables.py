@@ -6,7 +6,7 @@ import datetime as dt
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
@@ -23,9 +23,6 @@ from cmm_uq.jobs.tables.origin import MEASURED, Origin
 
 Expansion = Annotated[float, Field(ge=-1e-4, le=1e-3)]  # A coefficient of expansion, 1/K: steel has 11.5e-6.
 SmallExpansion = Annotated[float, Field(ge=0, le=1e-4)]
-BoundedError = Literal[
-    "hysteresis_x", "hysteresis_y", "hysteresis_z", "periodic_scale_x", "periodic_scale_y", "periodic_scale_z"
-]
 Kelvins = Annotated[float, Field(ge=0, le=100)]
 Uncertainties = Annotated[list[Uncertainty], Field(min_length=3, max_length=3)]
 Angles = Annotated[list[Degrees], Field(min_length=3, max_length=3)]
@@ -57,7 +54,7 @@ class PartFacts(JobTable):
 class BoundFacts(JobTable):
     """One ``[[machine_state.bound]]``: what a datasheet or certificate says that errors of the machine do not exceed."""
 
-    errors: Annotated[list[BoundedError], Field(min_length=1)] = required("Effects that it is of.")
+    errors: Annotated[list[Name], Field(min_length=1)] = required("Effects that it is of.")
     largest_um: Annotated[float, Field(gt=0, le=1000)] = required(
         "What 95 of 100 do not exceed: the gap of play, the amplitude of a periodic error."
     )

@@ -44,7 +44,7 @@ MEASURED = "iota-1102-20C"
 STATED_ELSEWHERE = {
     "schema", "software", "job", "sampling", "identifiability", "diagnosis", "screening", "posterior", "accuracy", "iso17025",
     "traceability", "replaced",
-    "verdicts",
+    "verdicts", "regions",
 }  # fmt: skip
 """Keys of results.json that hold no result of the machine, but what was done, or what is thought of it."""
 

@@ -24,7 +24,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.machine.model.field import ALLOWED, bounded, curves, family_of
+from cmm_uq.machine.model.field import ALLOWED, PERIODIC, PLAY, bounded, curves, family_of
 from cmm_uq.machine.physics.catalogue import effects, every
 from cmm_uq.machine.physics.effect import CONTRACT, Effect
 
@@ -225,7 +225,14 @@ def with_curves(state: MachineState) -> MachineState:
 def with_bounds(state: MachineState, largest_um: Mapping[str, float]) -> MachineState:
     """With errors that were not modelled as large as somebody states, by name, µm; what was modelled is known by that."""
     known = {one.effect.name for one in state.unmodelled}
+    may = sorted(one.name for one in every().values() if family_of(one) in (PLAY, PERIODIC))
     for name in largest_um:
+        if name not in may and name in every():
+            raise CmmUqError(
+                f"{name} is neither play nor a periodic error", where=BOUNDS, fix=f"Bound {', '.join(may)}"
+            )
+        if name not in may:
+            raise CmmUqError(f"there is no error {name!r}", where=BOUNDS, fix=suggestion(name, may))
         if name not in known:
             problem = f"the calibration estimates {name}, which no bound says better"
             raise CmmUqError(problem, where=BOUNDS, fix="Leave the bound out")
