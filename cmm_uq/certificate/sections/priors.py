@@ -39,7 +39,7 @@ def family_words(name: str) -> Text:
 def sizes_table(scales: Mapping[str, Floats]) -> Table | None:
     """``scales``: draws (N,) of each family's size, over what physics allows."""
     figures = (say("Physics allows"), say("As recorded"), say("95 % interval from"), say("to"))
-    heads = (say("Errors"), *map(Column, figures), say("Unit"))
+    heads: tuple[Text | Column, ...] = (say("Errors"), *map(Column, figures), say("Unit"))
     rows = (
         (
             family_words(str(one["family"])),

@@ -69,7 +69,7 @@ def regions_section(result: Result) -> Section:
 
 def _table(result: Result, regions: FactorRegions, ranged: dict[Key, Quantity]) -> Table | None:
     figures = (say("As recorded"), say("U"), say("In the range"), say("U"), say("Eighths from"), say("to"))
-    heads = (say("Error factor"), *map(Column, figures), say("Unit"))
+    heads: tuple[Text | Column, ...] = (say("Error factor"), *map(Column, figures), say("Unit"))
     rows = []
     for key, quantity in ranged.items():
         mean, U, _ = wording.expanded(result.parameters[key[0]][key[1]])
