@@ -88,8 +88,8 @@ def test_a_tolerance_that_is_open_over_the_range_is_warned_of(tolerance: float, 
     assert bool(warnings) == warned
     if warned:
         assert warnings == [
-            "Scale error of X is judged as a mean over the recorded set-ups. Over the measuring range it is 10.0 ± 8.0 ppm, "
-            "which leaves open whether it keeps its tolerance."
+            "Tolerances are judged on means over the recorded set-ups. Over the measuring range it is open whether these are "
+            "kept: Scale error of X (10.0 ± 8.0 ppm)."
         ]
 
 

@@ -102,18 +102,18 @@ def regions_warnings(result: Result) -> list[Text]:
                 names=listed(denied),
             )
         )
+    open_there = []
     for key, quantity in over_range(result).items():
-        tolerance = result.job.facts.model.tolerances.get(key[0])
-        one = result.parameters[key[0]][key[1]]
-        if tolerance is None or _place(one, tolerance) in (None, _place(quantity, tolerance)):
-            continue
+        tolerance, one = result.job.facts.model.tolerances.get(key[0]), result.parameters[key[0]][key[1]]
+        if tolerance is not None and _place(one, tolerance) not in (None, _place(quantity, tolerance)):
+            value, name = wording.with_uncertainty(quantity), wording.title_of(key, result)
+            open_there.append(say("{name} ({value} {unit})", name=name, value=value, unit=quantity.unit))
+    if open_there:
         texts.append(
             say(
-                "{name} is judged as a mean over the recorded set-ups. Over the measuring range it is {value} {unit}, which "
-                "leaves open whether it keeps its tolerance.",
-                name=wording.title_of(key, result),
-                value=wording.with_uncertainty(quantity),
-                unit=quantity.unit,
+                "Tolerances are judged on means over the recorded set-ups. Over the measuring range it is open whether these "
+                "are kept: {names}.",
+                names=listed(open_there),
             )
         )
     return texts
