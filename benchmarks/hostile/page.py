@@ -12,7 +12,10 @@ OUTCOMES = {"0": "done", "2": "refused (2)", "3": "output impossible (3)", "4": 
 PARTS = {
     "mutations": ("Mutated inputs", "input"),
     "commands": ("Hostile files for every command", "command"),
+    "programs": ("Hostile files for every command, each a process", "command"),
     "signatures": ("Attacks on signatures", "form"),
+    "acquisitions": ("Live recordings killed while points are accepted", "signal"),
+    "terminals": ("Pseudo-terminals that vanish, are silent or babble", "command"),
     "kills": ("Kills and interruptions", "command and signal"),
     "disk": ("Places that cannot be written to", "command"),
     "collisions": ("Collisions", "second command"),

@@ -92,6 +92,9 @@ def run_all(
     root : folder to work in, in memory where possible.
     part : mutated inputs, or every command.
     """
+    if part != "mutations" and not Path(os.environ.get(every_command.HELD, "")).is_file():
+        root.mkdir(parents=True, exist_ok=True)
+        every_command.keep(root / "files.zip")
     waiting, lock = iter(numbers), threading.Lock()
     records: queue.Queue[dict[str, Any] | None] = queue.Queue()
 
@@ -104,7 +107,7 @@ def run_all(
                 break
             record = worker.run(number)
             if isinstance(record, str):
-                this = (every_command.case if part == "commands" else case)(seed, number)
+                this = (case if part == "mutations" else every_command.case)(seed, number)
                 ran = this.command[0] if this.command else ""
                 record = {"number": number, "target": this.target, "what": this.what, "code": None, "ran": ran,
                           "found": [record], "said": "", "seconds": 0.0}  # fmt: skip

@@ -1,6 +1,6 @@
 """Nothing lost, hung or half-written: ``python benchmarks/hostile/study.py [--cases N] [--kills N] [--workers N] [--seed S]``.
 
-``--part mutations|commands|signatures|kills|disk|collisions`` runs one part; the first three go on where they were stopped;
+``--part NAME`` runs one part; all but kills, disk and collisions go on where they were stopped;
 ``--only PART:NUMBER`` repeats one case and shows what it said.
 The first inputs of every violation are kept under ``--keep`` (reports/hostile), counts beside them, and the page is written
 from the counts.
@@ -24,7 +24,7 @@ from typing import Any
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from benchmarks.hostile import collisions, disk, every_command, kills, pool, signatures
+from benchmarks.hostile import collisions, disk, every_command, kills, pool, programs, signatures, terminals
 from benchmarks.hostile.cases import case, lay_out
 from benchmarks.hostile.invariants import Outcome
 from benchmarks.hostile.page import PARTS, Tally, load, page
@@ -32,6 +32,7 @@ from benchmarks.hostile.processes import COMMANDS, memory
 
 ROOT = Path(__file__).parents[2]
 SAVED_EVERY = 20
+RESUMED = ("mutations", "commands", "programs", "signatures", "acquisitions", "terminals")
 PAGE = ROOT / "docs" / "hostile-study.md"
 RANDOM_SHARES = {"simulate": 6.0, "compensate": 4.0, "budget": 4.0, "plan": 2.0, "diagnose": 1.0, "report": 2.0}
 """How often each command is hit at a random moment: the cheap ones more often."""
@@ -63,9 +64,9 @@ def trials(part: str, options: argparse.Namespace) -> Iterator[Trial]:
 def in_process(tally: Tally, options: argparse.Namespace, work: Path, tick: Callable[[], None]) -> None:
     """Run mutated inputs or attacks; records are lines of a file, from which a study that was stopped goes on."""
     part = tally.part
-    runs = {"mutations": partial(_pooled, options, work, "mutations"), "commands": partial(_pooled, options, work, "commands"),
-            "signatures": partial(signatures.run, options.seed)}  # fmt: skip
-    for record in resumed(f"{part}-{options.seed}", range(count_of(part, options)), options, runs[part]):
+    for record in resumed(
+        f"{part}-{options.seed}", range(count_of(part, options)), options, _runs(tally, options, work)
+    ):
         found: Any = record["found"]
         fields: dict[str, Any] = {name: record[name] for name in ("number", "target", "what", "code", "said", "ran")}
         if tally.add(kind=str(fields.pop("target")), found=found, **fields) and part == "mutations":
@@ -73,12 +74,24 @@ def in_process(tally: Tally, options: argparse.Namespace, work: Path, tick: Call
         tick()
 
 
+def _runs(tally: Tally, options: argparse.Namespace, work: Path) -> Callable[[Sequence[int]], Iterator[dict[str, Any]]]:
+    """What gives the records of cases of a part by their numbers."""
+    runs = {"mutations": partial(_pooled, options, work, "mutations"), "commands": partial(_pooled, options, work, "commands"),
+            "signatures": partial(signatures.run, options.seed), "programs": partial(programs.altered, options.seed, work),
+            "acquisitions": partial(programs.acquisitions, options.seed, work),
+            "terminals": partial(programs.terminals, work)}  # fmt: skip
+    return runs[tally.part]
+
+
 def count_of(part: str, options: argparse.Namespace) -> int:
     return int(
         {
             "mutations": options.cases,
-            "commands": options.each * len(every_command.ARGUMENTS),
+            "commands": options.each * len(every_command.LINES),
             "signatures": options.attacks,
+            "programs": options.programs,
+            "acquisitions": options.acquisitions,
+            "terminals": len(terminals.trials()),
         }[part]
     )
 
@@ -144,7 +157,7 @@ def run_part(part: str, options: argparse.Namespace, progress: Progress) -> Tall
     task = progress.add_task(PARTS[part][0], total=None)
     with tempfile.TemporaryDirectory(prefix="hostile-", dir=memory()) as work:
         tick = partial(progress.advance, task)
-        if part in ("mutations", "commands", "signatures"):
+        if part in RESUMED:
             progress.update(task, total=count_of(part, options))
             in_process(tally, options, Path(work), tick)
         else:
@@ -163,8 +176,9 @@ def repeat(which: str, options: argparse.Namespace) -> None:
         if part == "mutations":
             record: Any = next(iter(pool.run_all([int(number)], options.seed, 1, Path(work))))
             _keep(int(number), dict(record), options)
-        elif part == "signatures":
-            record = next(signatures.run(options.seed, [int(number)]))
+        elif part in RESUMED:
+            tally = Tally(part, options.seed)
+            record = next(iter(_runs(tally, options, Path(work))([int(number)])))
         else:
             kind, what, run = next(itertools.islice(trials(part, options), int(number), None))
             record = (kind, what, *run(Path(work) / "case"))
@@ -177,7 +191,9 @@ def main(arguments: Iterable[str] | None = None) -> int:
     parser.add_argument("--cases", type=int, default=100_000)
     parser.add_argument("--kills", type=int, default=1000)
     parser.add_argument("--attacks", type=int, default=1000)
-    parser.add_argument("--each", type=int, default=100, help="cases of each command")
+    parser.add_argument("--each", type=int, default=50, help="cases of each command line, in process")
+    parser.add_argument("--programs", type=int, default=2000, help="cases of all commands, each a process")
+    parser.add_argument("--acquisitions", type=int, default=1000, help="kills of cmm-uq acquire")
     parser.add_argument("--workers", type=int, default=4)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--part", choices=PARTS, action="append")
@@ -194,7 +210,7 @@ def main(arguments: Iterable[str] | None = None) -> int:
     options.page.write_text(page(load(options.keep)), encoding="utf-8")
     for tally in tallies:
         print(f"{tally.part}: {tally.cases} cases, {tally.violating} with a violation, {tally.seconds:.0f} s")
-    if never := sorted(set(every_command.commands()) - set(every_command.ARGUMENTS)):
+    if never := sorted(set(every_command.commands()) - {line.command for line in every_command.LINES}):
         print(f"never run: {', '.join(never)}", file=sys.stderr)
     return int(bool(never) or any(tally.violating or not tally.cases for tally in tallies))
 

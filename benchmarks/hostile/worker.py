@@ -16,14 +16,25 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable
+from http import HTTPStatus
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from benchmarks.hostile import cases, every_command
 from benchmarks.hostile.cases import Case
 from benchmarks.hostile.invariants import Outcome, lost, problems, set_problems, snapshot
 from benchmarks.hostile.seeds import small_truth
 
+PAGES = (
+    "/",
+    "/machine?id=1",
+    "/certificates",
+    "/certificate?entry=1",
+    "/diagnoses",
+    "/artefacts",
+    "/file",
+    "/integrity",
+)
 MEMORY = 4 * 2**30
 """Bytes of address space: whoever reads an endless file fails within a second or two."""
 
@@ -48,16 +59,28 @@ def read(kind: str, path: Path) -> None:
             maps_of(job)
 
 
+def look_at(server: Any, poll_interval: float = 0.5) -> None:
+    """In place of waiting for browsers: every page once, none of which may end in a fault of the program."""
+    from cmm_uq.app.serve.exchange import WebRequest, read_address
+
+    for page in PAGES:
+        answer = server.answer(WebRequest("GET", *read_address(page)))
+        if answer.status == HTTPStatus.INTERNAL_SERVER_ERROR:
+            raise AssertionError(f"{page}: {answer.body.decode()[-300:]}")
+
+
 class Runner:
     """Runs the command in this process, with what it says caught by descriptor, and a fault shown where it happened."""
 
     def __init__(self, stdout: TextIO, stderr: TextIO, part: str = "mutations") -> None:
         from cmm_uq.app.cli import commands, main
+        from cmm_uq.app.serve.server import RecordsServer
         from cmm_uq.base.errors import CmmUqError
         from cmm_uq.base.output import interruption
 
         if part == "mutations":  # in place of the command that prints a certificate
             commands.app.command("read")(read)
+        RecordsServer.serve_forever = look_at  # type: ignore[assignment]
         inner = commands.run
 
         def shown() -> int:
@@ -107,25 +130,32 @@ class Runner:
         return os.pread(file.fileno(), min(size, 1 << 20), 0).decode("utf-8", "replace")
 
 
-def run_of_command(this: Case, run: Runner, root: Path, begin: Callable[[], None]) -> dict[str, object]:
+def run_of_command(
+    this: Case, run: Callable[[tuple[str, ...]], Outcome], root: Path, begin: Callable[[], None]
+) -> dict[str, object]:
     """Lay a case of any command out, run it, and say what of its words, its end and the files beside does not hold."""
     shutil.rmtree(root, ignore_errors=True)
     root.mkdir(parents=True)
     every_command.lay_out(this, root)
+    here = Path.cwd()
     os.chdir(root)
     before = snapshot(root)
     begin()
     outcome = run(this.command)
+    os.chdir(here)
     allowed = outcome.code in every_command.CODES.get(this.target, ())
-    if this.target in ("check", "batch") and outcome.stdout:  # these say on standard output what is wrong
+    if this.target in ("check", "batch", "report") and outcome.stdout:  # these say on standard output what is wrong
         allowed = allowed or outcome.code == 2
     found = [] if allowed and "Traceback" not in outcome.stderr else problems(outcome, quiet=False)
-    own = frozenset(name for name in before if this.target in ("sign", "release") and name.startswith("job/"))
+    own = tuple(f"job/{name}" for name in every_command.OWN.get(this.target, ()))
     after = {name: seal for name, seal in snapshot(root).items() if not name.endswith(("-wal", "-shm"))}
-    found += lost({name: seal for name, seal in before.items() if not name.endswith("records.db")}, after, own=own)
-    if outcome.code == 2 and {name for name in after if not name.endswith((".lock", "records.db"))} - set(before):
+    held = {name: seal for name, seal in before.items() if not name.endswith("records.db") and not name.startswith(own)}
+    found += lost(held, after)
+    new = {name for name in after if not name.endswith((".lock", "records.db")) and not name.startswith(own)} - set(
+        before
+    )
+    if outcome.code == 2 and new and not allowed:
         found.append("something is written though refused")
-    os.chdir("/")
     return {"number": this.number, "target": this.target, "what": this.what, "code": outcome.code, "ran": this.target,
             "found": found, "said": outcome.stderr[-1500:] if found else "", "seconds": outcome.seconds}  # fmt: skip
 
@@ -160,15 +190,23 @@ def run_case(this: Case, run: Runner, root: Path, begin: Callable[[], None]) -> 
             "said": told, "seconds": outcome.seconds}  # fmt: skip
 
 
+JUDGED = {"mutations": (cases.case, run_case), "commands": (every_command.case, run_of_command),
+          "unaltered": (lambda seed, number: every_command.unaltered(number), run_of_command)}  # fmt: skip
+"""What makes a case by its seed and number, and what runs it, of each part."""
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--root", type=Path, required=True)
     parser.add_argument("--reply", type=int, required=True)
-    parser.add_argument("--part", choices=("mutations", "commands"), default="mutations")
+    parser.add_argument("--part", choices=tuple(JUDGED), default="mutations")
     options = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     reply = os.fdopen(options.reply, "w")
+    asking = os.fdopen(os.dup(0))
+    with open(os.devnull) as nothing:  # noqa: PTH123 - what a command reads from its standard input
+        os.dup2(nothing.fileno(), 0)
     for number, name in ((1, "stdout"), (2, "stderr")):
         os.dup2(os.memfd_create(name), number)
     run = Runner(sys.stdout, sys.stderr, options.part)
@@ -176,8 +214,8 @@ def main() -> None:
     def tell(**message: object) -> None:
         print(json.dumps(message), file=reply, flush=True)
 
-    make, judge = {"mutations": (cases.case, run_case), "commands": (every_command.case, run_of_command)}[options.part]
-    for line in sys.stdin:
+    make, judge = JUDGED[options.part]
+    for line in asking:
         tell(done=judge(make(options.seed, int(line)), run, options.root, lambda: tell(begins=True)))
 
 

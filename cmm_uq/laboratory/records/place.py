@@ -59,7 +59,7 @@ def told(place: str | Path) -> Iterator[None]:
         raise OutputError(f"the database fails: {_first_line(str(error))}", where=shown(place)) from error
     except sqlite3.Error as error:
         raise _in_words(str(error), shown(place)) from error
-    except json.JSONDecodeError as error:
+    except (json.JSONDecodeError, RecursionError) as error:  # altered, perhaps to thousands of lists in each other
         fix = "cmm-uq records verify says which entry"
         raise CmmUqError("an entry is not as it was recorded: it is no JSON", where=shown(place), fix=fix) from error
 
