@@ -32,7 +32,7 @@ def test_each_command_line_ends_well_on_files_that_nobody_altered(number: int, t
     """So that what the study refuses is refused for what was altered; the dear ones have tests of their own."""
     line = LINES[number]
     if line.command in (*DEAR, "serve") and "out" in line.words:
-        pytest.skip("takes seconds: ended well in the study")
+        pytest.skip("takes seconds: of the study alone")
     lay_out(unaltered(number), tmp_path)
     if line.command == "serve":
         done = run_all([number], 3, 1, tmp_path / "work", "unaltered")
