@@ -19,11 +19,14 @@ EXAMPLES = ("gauge-blocks-simulated", "iota-1102-20C")
 KERNELS = ("Prescott", "Nehalem", "Sandybridge", "Haswell", "SkylakeX", "Cooperlake", "Zen")
 RELATIVE = 1e-9
 """Agreement of closed forms: far below the last digit of any printed figure."""
-SAMPLED = (".estimates", ".noise", ".accuracy_uncertainty", ".artefact", ".adjustments", ".differences", ".tolerances")
+SAMPLED = (
+    ".estimates", ".noise", ".accuracy_uncertainty", ".artefact", ".adjustments", ".differences", ".tolerances", ".over_range",
+    ".regions.recorded",
+)  # fmt: skip
 """What follows from a posterior whose noise is sampled."""
 SPREADS = (
     ".u_um", ".guard_band_um", ".prior_share", ".probability_conforming", ".covariance.", ".lengths.", ".length_budget.",
-    ".posterior.", ".k",
+    ".posterior.", ".k", ".regions.",
 )  # fmt: skip
 """Standard deviations and variances of the draws, and what follows from them."""
 OF_SPREAD = 0.04

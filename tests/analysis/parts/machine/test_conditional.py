@@ -326,8 +326,12 @@ def test_a_bound_that_is_stated_holds_what_a_recording_does_not_show() -> None:
     assert isinstance(periodic, GivenPeriod)
     at = periodic.at(np.linspace(300.0, 800.0, 50))
     assert 1e3 * float((drawn.draws[:, 6:] @ at.T).std()) == pytest.approx(0.5 / 2.447747, rel=0.1)
-    with pytest.raises(CmmUqError, match="the calibration estimates scale_x, which no bound says better"):
+    with pytest.raises(CmmUqError, match="scale_x is neither play nor a periodic error"):
         with_bounds(state, {"scale_x": 1.0})
+    with pytest.raises(CmmUqError, match="there is no error 'play_x'"):
+        with_bounds(state, {"play_x": 1.0})
+    with pytest.raises(CmmUqError, match="the calibration estimates hysteresis_x, which no bound says better"):
+        with_bounds(replace(state, unmodelled=()), {"hysteresis_x": 1.0})
 
 
 def test_a_certificate_says_what_it_left_free() -> None:
