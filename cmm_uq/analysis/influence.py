@@ -20,6 +20,7 @@ ALL = "all"
 TIMES = (0.5, 2.0)  # by which a prior is narrower or wider
 MATTERS = 0.1  # part of U by which it or the value then changes, from which on a figure rests on the prior
 _WORTH, _HEAVY = 50.0, 0.5
+_NOTHING = 1e-9  # of u, below which a change is of rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +58,9 @@ def influence_of(
                 more, shift = more + (times**2 - 1) * scaled.var(axis=0), shift + (times - 1) * scaled.mean(axis=0)
             more = more + sum((times**2 - 1) * apart[name] for name in names if name in apart)
             scale = np.where(u > 0, u, 1.0)  # nothing changes what is not uncertain at all
-            yield PriorInfluence(
-                family, times, np.where(u > 0, np.sqrt(np.maximum(u**2 + more, 0.0)) / scale, 1.0), shift / scale
-            )
+            ratio = np.where(u > 0, np.sqrt(np.maximum(u**2 + more, 0.0)) / scale, 1.0)
+            moved = np.where(np.abs(shift) > _NOTHING * scale, shift / scale, 0.0)
+            yield PriorInfluence(family, times, np.where(np.abs(ratio - 1) > _NOTHING, ratio, 1.0), moved)
 
     found = [one for name in (*scales, *apart) for one in changed(name, (name,))]
     return (*found, *(changed(ALL, (*scales, *apart)) if len(found) > len(TIMES) else ()))
