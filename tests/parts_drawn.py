@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
+from cmm_uq.analysis.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, PartPose
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.machine.physics.catalogue import effects

@@ -28,9 +28,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.examples.simulated_jobs import MACHINE, bryan
+from cmm_uq.analysis.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.causes.machine import STYLUS
 from cmm_uq.analysis.parts.causes.surroundings import TEMPERATURE, forms
-from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.methods.of_job import methods_of
 from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, PartPose, Plan
 from cmm_uq.analysis.parts.result import evaluated

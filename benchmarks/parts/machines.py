@@ -25,10 +25,10 @@ from benchmarks.coverage.measuring import kept
 from benchmarks.coverage.study import measure, waiting
 from benchmarks.parts import truth
 from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, as_points, joined, plan
+from cmm_uq.analysis.machine.conditional import given_recording, joint_posterior
+from cmm_uq.analysis.machine.state import MachineState, StatedNoise, unmodelled_errors, with_curves
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.evaluation import Evaluator, Known
-from cmm_uq.analysis.parts.machine.conditional import given_recording, joint_posterior
-from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors, with_curves
 from cmm_uq.analysis.parts.plan import PartPose
 from cmm_uq.analysis.parts.result import evaluated, stated
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual

@@ -21,9 +21,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmm_uq.analysis.machine.state import MachineState, StatedNoise, unmodelled_errors
 from cmm_uq.analysis.parts.causes.machine import MACHINE, STYLUS
 from cmm_uq.analysis.parts.causes.surroundings import TEMPERATURE, Expansion, Surroundings
-from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
 from cmm_uq.analysis.parts.methods.method import (
     CalibratedCharacteristic,
     CalibratedStandard,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
+from cmm_uq.analysis.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, PartPose, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.base.points import Floats, Machine

@@ -22,7 +22,7 @@ from benchmarks.coverage.measuring import kept
 from benchmarks.coverage.study import measure, waiting
 from benchmarks.parts import machines, truth
 from benchmarks.parts.curved import CELLS, Cell, drawn
-from cmm_uq.analysis.regions import factor_regions
+from cmm_uq.analysis.machine.regions import factor_regions
 from cmm_uq.app.commands.estimation import with_noise
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import noise_of

@@ -17,8 +17,8 @@ from contextlib import contextmanager
 import numpy as np
 from scipy.optimize import least_squares
 
+from cmm_uq.analysis.machine.state import StatedNoise, unmodelled_errors
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
-from cmm_uq.analysis.parts.machine.state import StatedNoise, unmodelled_errors
 from cmm_uq.analysis.parts.plan import PartCharacteristic, PartFeature, Plan, Stylus
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.points import Floats

@@ -14,9 +14,9 @@ from cmm_uq.analysis.conformity.accuracy import Consequences, Costs
 from cmm_uq.analysis.conformity.statement import Statement, by_standard, by_tolerance
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
-from cmm_uq.analysis.parts.machine.state import of_machine
+from cmm_uq.analysis.machine.regions import FactorRegions
+from cmm_uq.analysis.machine.state import of_machine
 from cmm_uq.analysis.planning.set_up import NextPlan, Suggestion
-from cmm_uq.analysis.regions import FactorRegions
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, at_key, say

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.regions import FactorRegions
+from cmm_uq.analysis.machine.regions import FactorRegions
 from cmm_uq.base.messages import Verbatim
 from cmm_uq.certificate.certificate import with_capability
 from cmm_uq.certificate.document import Paragraph, Table

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.analysis.influence import PriorInfluence, influence_of
+from cmm_uq.analysis.machine.influence import PriorInfluence, influence_of
+from cmm_uq.analysis.machine.state import MachineState
 from cmm_uq.analysis.parts.causes.cause import Drawn
 from cmm_uq.analysis.parts.causes.machine import MACHINE
-from cmm_uq.analysis.parts.machine.state import MachineState
 from cmm_uq.analysis.parts.virtual import Virtual
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model.field import family_of

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from cmm_uq.analysis.machine.state import MachineState
 from cmm_uq.analysis.parts import plan as plans
 from cmm_uq.analysis.parts.causes import surroundings as causes
 from cmm_uq.analysis.parts.causes.cause import LARGE, PartCause, PointScatter
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, SurfaceForm, Surroundings
 from cmm_uq.analysis.parts.evaluation import characteristics_of
-from cmm_uq.analysis.parts.machine.state import MachineState
 from cmm_uq.analysis.parts.plan import Nominal, PartPose, Plan, around, placed
 from cmm_uq.analysis.parts.virtual import MeasurementConditions
 from cmm_uq.base.errors import CmmUqError

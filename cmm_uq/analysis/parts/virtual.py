@@ -17,6 +17,7 @@ from functools import cache, cached_property, partial
 
 import numpy as np
 
+from cmm_uq.analysis.machine.state import MachineState
 from cmm_uq.analysis.parts.causes.cause import LARGE, CommonCause, Drawn, PartCause, condensed, normal
 from cmm_uq.analysis.parts.causes.machine import Qualified, mean_errors, modelled, noise, not_modelled, styli
 from cmm_uq.analysis.parts.causes.surroundings import (
@@ -30,7 +31,6 @@ from cmm_uq.analysis.parts.causes.surroundings import (
 )
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.evaluation import Evaluator, Known, Movement, characteristics_of
-from cmm_uq.analysis.parts.machine.state import MachineState
 from cmm_uq.analysis.parts.plan import FORMS, PartPose, Plan, placed
 from cmm_uq.analysis.parts.result import Inverse, alike, inverse, nodes_of, trial_parts
 from cmm_uq.base.messages import Text

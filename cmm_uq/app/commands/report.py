@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.standards import statement
-from cmm_uq.analysis.regions import FactorRegions, factor_regions
+from cmm_uq.analysis.machine.regions import FactorRegions, factor_regions
 from cmm_uq.app.commands.certificates.release import reissued, with_replaced
 from cmm_uq.app.commands.diagnose import diagnose_model, screened_model
 from cmm_uq.app.commands.estimation import (

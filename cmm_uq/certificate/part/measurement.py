@@ -12,7 +12,7 @@ import numpy as np
 
 from cmm_uq.analysis.conformity.decision import Outcome, rule_words
 from cmm_uq.analysis.conformity.limits import LimitDecision
-from cmm_uq.analysis.influence import PriorInfluence
+from cmm_uq.analysis.machine.influence import PriorInfluence
 from cmm_uq.analysis.parts.budget import PointErrors, VarianceShares, Way
 from cmm_uq.analysis.parts.methods.method import MethodComparison
 from cmm_uq.analysis.parts.plan import Plan

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.influence import ALL, MATTERS, PriorInfluence
+from cmm_uq.analysis.machine.influence import ALL, MATTERS, PriorInfluence
 from cmm_uq.base.messages import DASH, Text, number, say, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit

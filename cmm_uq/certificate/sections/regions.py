@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.regions import FactorRegions, Key
+from cmm_uq.analysis.machine.regions import FactorRegions, Key
 from cmm_uq.base.messages import NOTHING, Text, listed, say
 from cmm_uq.certificate import wording
 from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.machine.state import unmodelled_errors
 from cmm_uq.analysis.parts.budget import PLACE, mean_of_places, point_errors, variance_shares, ways
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings, of_points, reproducibility
-from cmm_uq.analysis.parts.machine.state import unmodelled_errors
 from cmm_uq.analysis.parts.plan import PartCharacteristic, PartPose, Plan, around
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions, Virtual
 from cmm_uq.base.errors import CmmUqError

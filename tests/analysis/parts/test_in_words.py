@@ -8,10 +8,10 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.machine.state import StatedNoise
 from cmm_uq.analysis.parts import budget as in_words, plan
 from cmm_uq.analysis.parts.budget import PLACE, variance_shares
 from cmm_uq.analysis.parts.causes.surroundings import moving_part
-from cmm_uq.analysis.parts.machine.state import StatedNoise
 from cmm_uq.analysis.parts.setup import circumstances_of, plan_of
 from cmm_uq.analysis.parts.virtual import Virtual
 from cmm_uq.base.messages import Message, Verbatim, say

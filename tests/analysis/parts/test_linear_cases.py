@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from cmm_uq.analysis.machine.state import StatedNoise
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
-from cmm_uq.analysis.parts.machine.state import StatedNoise
 from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan, Stylus
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.units import ARCSECOND

@@ -12,8 +12,8 @@ import pytest
 
 from benchmarks.parts import truth
 from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, joined, parted, plan
+from cmm_uq.analysis.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.evaluation import characteristics_of
-from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.plan import PartPose, WithStyli
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.base.points import AXES, Floats, Points

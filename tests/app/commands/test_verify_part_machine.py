@@ -27,7 +27,7 @@ BRIDGE = {"serial": "", "name": "Simulated bridge machine", "manufacturer": "", 
 
 @pytest.fixture(autouse=True)
 def once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmm_uq.analysis.parts.machine.conditional.sample_sizes", sampled_once)
+    monkeypatch.setattr("cmm_uq.analysis.machine.conditional.sample_sizes", sampled_once)
     monkeypatch.setattr("cmm_uq.app.commands.parts.part.ways", unchanged)
 
 

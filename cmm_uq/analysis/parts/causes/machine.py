@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import eval_legendre
 
+from cmm_uq.analysis.machine.state import MachineState, Unmodelled
 from cmm_uq.analysis.parts.causes.cause import (
     CommonCause,
     Draw,
@@ -33,7 +34,6 @@ from cmm_uq.analysis.parts.causes.cause import (
     field_components,
     normal,
 )
-from cmm_uq.analysis.parts.machine.state import MachineState, Unmodelled
 from cmm_uq.analysis.parts.plan import OWN_COLUMNS, PartPose, Plan, Stylus, probed
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points

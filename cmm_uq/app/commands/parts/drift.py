@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.parts.machine.state import FREE, MachineState, aged
+from cmm_uq.analysis.machine.state import FREE, MachineState, aged
 from cmm_uq.app.commands.plans.planning import MeasurementPlan, make_plan
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError

@@ -15,8 +15,8 @@ import numpy as np
 
 from cmm_uq import __version__
 from cmm_uq.analysis.diagnosis.held_out import thin_out
-from cmm_uq.analysis.parts.machine.conditional import given_recording
-from cmm_uq.analysis.parts.machine.state import MachineState, machine_stated, with_bounds, with_curves
+from cmm_uq.analysis.machine.conditional import given_recording
+from cmm_uq.analysis.machine.state import MachineState, machine_stated, with_bounds, with_curves
 from cmm_uq.app.commands.certificates.verification import Verification, examine_certificate, verify_given
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import with_noise

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.machine.state import StatedNoise, coefficients_of, noise_of_draws, unmodelled_errors
 from cmm_uq.analysis.parts.causes.cause import MANY, PointScatter, components, field_components
 from cmm_uq.analysis.parts.causes.machine import DEGREES, directions, styli
 from cmm_uq.analysis.parts.causes.surroundings import SurfaceForm, elapsed, moving_part
-from cmm_uq.analysis.parts.machine.state import StatedNoise, coefficients_of, noise_of_draws, unmodelled_errors
 from cmm_uq.analysis.parts.plan import PartCharacteristic, PartFeature, PartPose, Plan, Stylus
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.machine.physics.catalogue import CATALOGUE, effects

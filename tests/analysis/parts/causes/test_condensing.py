@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts import virtual
 from cmm_uq.analysis.parts.causes import cause as condensing
 from cmm_uq.analysis.parts.causes.surroundings import SurfaceForm
-from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.plan import Nominal, PartAlignment, PartCharacteristic, PartFeature, Plan
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.points import Floats, Machine

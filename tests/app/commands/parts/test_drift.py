@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts.machine.state import MachineState
+from cmm_uq.analysis.machine.state import MachineState
 from cmm_uq.app.commands.parts.drift import known_of, with_drift
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts import plan
 from cmm_uq.analysis.parts.characteristics import CharacteristicEvaluation
-from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.setup import circumstances_of, forms_of, plan_of, poses_of, refuse_unfit, surroundings_of
 from cmm_uq.analysis.parts.virtual import AtPose
 from cmm_uq.app.commands.jobs.check import check_job

@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 import pytest
 
-from cmm_uq.analysis import regions as room
-from cmm_uq.analysis.parts.machine.conditional import RecordedField
-from cmm_uq.analysis.parts.machine.state import Unmodelled
-from cmm_uq.analysis.regions import FactorRegions, factor_regions
+from cmm_uq.analysis.machine import regions as room
+from cmm_uq.analysis.machine.conditional import RecordedField
+from cmm_uq.analysis.machine.regions import FactorRegions, factor_regions
+from cmm_uq.analysis.machine.state import Unmodelled
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points

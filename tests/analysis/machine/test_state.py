@@ -7,8 +7,8 @@ from datetime import date
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.machine.state import StatedNoise, aged
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
-from cmm_uq.analysis.parts.machine.state import StatedNoise, aged
 from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from tests.parts_drawn import POSE, machine, spot

@@ -23,9 +23,9 @@ import numpy as np
 from scipy.special import ndtri
 
 from cmm_uq.analysis.diagnosis.held_out import thin_out
-from cmm_uq.analysis.influence import PriorInfluence, influence_of
-from cmm_uq.analysis.parts.machine.conditional import RecordedField
-from cmm_uq.analysis.parts.machine.state import Unmodelled, of_machine, unmodelled_errors
+from cmm_uq.analysis.machine.conditional import RecordedField
+from cmm_uq.analysis.machine.influence import PriorInfluence, influence_of
+from cmm_uq.analysis.machine.state import Unmodelled, of_machine, unmodelled_errors
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.machine.model.field import ALLOWED, curves, family_of
 from cmm_uq.machine.model.kind import Observed

@@ -13,14 +13,14 @@ from scipy.special import sici
 from scipy.stats import binom
 
 import cmm_uq
-from cmm_uq.analysis.parts.machine.conditional import (
+from cmm_uq.analysis.machine.conditional import (
     RecordedField,
     given_recording,
     joint_posterior,
     shown,
     stated_noise,
 )
-from cmm_uq.analysis.parts.machine.state import (
+from cmm_uq.analysis.machine.state import (
     MachineState,
     StatedNoise,
     Unmodelled,
@@ -240,7 +240,7 @@ def test_a_noise_that_could_as_well_be_errors_left_out_is_that_of_the_certificat
 ) -> None:
     state = MachineState(BARS.machine, effects(MODELLED), np.zeros((2, 6)), unmodelled=left_out(*CURVED))
     found = given_recording(state, calibration())
-    monkeypatch.setattr("cmm_uq.analysis.parts.machine.conditional._UNTOLD", 1.0)
+    monkeypatch.setattr("cmm_uq.analysis.machine.conditional._UNTOLD", 1.0)
     safe = given_recording(state, calibration())
     estimate = calibration().estimate()
     alone = sample_with_noise(estimate.linear, noise_of(calibration()), estimate.least_squares, 0).sizes.coordinate

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, Unmodelled
+from cmm_uq.analysis.machine.state import MachineState, StatedNoise, Unmodelled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model.field import GivenPeriod, covariance, family_of, linear
