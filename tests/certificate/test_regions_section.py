@@ -61,6 +61,17 @@ def test_nothing_is_known_better_everywhere_than_over_the_set_ups() -> None:
     assert data["regions"]["eighths"] == {}
 
 
+def test_beside_an_average_over_explanations_stands_the_mean_of_all_errors_together() -> None:
+    """The average of a factor beside other explanations, 10.2, is no mean over the recorded set-ups; 7.5 is."""
+    result = told(stated=scale(10.2, 1.35), whole={KEY: scale(3.6, 4.0)}, recorded={KEY: scale(7.5, 1.0)})
+    remaining = replace(result.diagnosed.diagnosis.remaining, rivals=(("one", 0.6), ("other", 0.4)))
+    diagnosis = replace(result.diagnosed.diagnosis, remaining=remaining)
+    averaged = replace(result, diagnosed=replace(result.diagnosed, diagnosis=diagnosis))
+    assert averaged.averaged == 2
+    assert first(averaged)[1:3] == ("7.5", "2.0")
+    assert first(result)[1:3] == ("10.2", "2.7")
+
+
 def test_a_factor_that_is_not_given_is_not_given_elsewhere() -> None:
     free = replace(told(), contradictions=())
     assert KEY in over_range(free)

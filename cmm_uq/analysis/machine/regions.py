@@ -26,6 +26,7 @@ from cmm_uq.analysis.diagnosis.held_out import thin_out
 from cmm_uq.analysis.machine.conditional import RecordedField
 from cmm_uq.analysis.machine.influence import PriorInfluence, influence_of
 from cmm_uq.analysis.machine.state import Unmodelled, of_machine, unmodelled_errors
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.machine.model.field import ALLOWED, curves, family_of
 from cmm_uq.machine.model.kind import Observed
@@ -71,6 +72,8 @@ def factor_regions(
     ``posterior``: of the model with no other errors. ``doubt``: what is stated to be in doubt about its unknowns. Raises
     ``CmmUqError`` where the machine's travel is not stated, or the recording does not allow it.
     """
+    if model.artefact.points.machine.axes != tuple(AXES):
+        raise CmmUqError("the machine has other axes than three straight ones", where="the machine")
     count, random = int(model.used.sum()), np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(37,)))
     others = [one for one in unmodelled_errors(_names(model.effects), {}) if family_of(one.effect) not in ALLOWED]
     others += [Unmodelled(one, np.array([c.prior_sd for c in one.coefficients])) for one in curves()]

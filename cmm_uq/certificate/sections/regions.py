@@ -43,7 +43,8 @@ def regions_section(result: Result) -> Section:
         return section(_TITLE)
     names = [wording.title_of(key, result) for key in regions.whole]
     k = np.array([one.coverage_factor or np.inf for one in regions.whole.values()])
-    rests = listed([names[i] for i in resting(regions.influence, k)])
+    given = [key in ranged for key in regions.whole]
+    rests = listed([names[i] for i in resting(regions.influence, k) if given[i]])
     words = say(
         "The error factors are means over the recorded set-ups. The machine has other errors besides, taken as large as this "
         "recording shows errors of their kind to be; elsewhere a factor differs by what they do."
@@ -72,7 +73,8 @@ def _table(result: Result, regions: FactorRegions, ranged: dict[Key, Quantity]) 
     heads: tuple[Text | Column, ...] = (say("Error factor"), *map(Column, figures), say("Unit"))
     rows = []
     for key, quantity in ranged.items():
-        mean, U, _ = wording.expanded(result.parameters[key[0]][key[1]])
+        # an average over explanations is of each beside other errors, and no mean over the set-ups
+        mean, U, _ = wording.expanded(regions.recorded[key] if result.averaged else result.parameters[key[0]][key[1]])
         value, wider = rounded(quantity.value, quantity.expanded)
         ends: Sequence[Text] = [rounded(end, quantity.expanded)[0] for end in regions.eighths.get(key, ())]
         rows.append(

@@ -149,6 +149,15 @@ def test_without_a_travel_nothing_is_told_of_other_places() -> None:
         factor_regions(model, found.posterior, Doubt(()), partial(observe, found), 0)
 
 
+def test_of_a_machine_with_further_axes_nothing_is_told_yet() -> None:
+    found = analysed("iota-1102-20C")
+    artefact = copy(found.artefact)
+    machine = replace(found.artefact.points.machine, axes=("x", "y", "z", "c"))
+    artefact.points = replace(found.artefact.points, machine=machine)
+    with pytest.raises(CmmUqError, match="other axes than three straight ones"):
+        factor_regions(replace(found.model, artefact=artefact), found.posterior, Doubt(()), partial(observe, found), 0)
+
+
 def test_priors_that_a_recording_outweighs_change_little() -> None:
     """A step gauge on seven lines, some hundred readings, against twenty bars."""
 
