@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -198,26 +198,26 @@ def _holds(rows: np.ndarray) -> np.ndarray:
     return (rows[3] <= rows[0]) & (rows[0] <= rows[4])
 
 
-def main() -> None:
-    """Run, then say what there is."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def study(about: str, cells: Sequence[Any], work: Callable[[Any], dict[str, Any]], table: Callable[[Path], str],
+          ends: tuple[str, str], seed: int) -> None:  # fmt: skip
+    """Run, or write the table between its two marks on the page, then say what there is."""
+    parser = argparse.ArgumentParser(description=about)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--machines", type=int, default=100, help="of each cell")
     parser.add_argument("--only", nargs="*", default=[], help="words of the cells' names")
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=2041)
+    parser.add_argument("--seed", type=int, default=seed)
     parser.add_argument("--page", action="store_true", help="write the table of the page, and run nothing")
     chosen = parser.parse_args()
     if chosen.page:
-        before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-        PAGE.write_text(
-            f"{before}{BEGIN}\n\n{tables(chosen.folder)}.\n\n{END}{rest.partition(END)[2]}", encoding="utf-8"
-        )
+        before, _, rest = PAGE.read_text(encoding="utf-8").partition(ends[0])
+        text = f"{before}{ends[0]}\n\n{table(chosen.folder)}.\n\n{ends[1]}{rest.partition(ends[1])[2]}"
+        PAGE.write_text(text, encoding="utf-8")
     else:
-        some = [cell for cell in CELLS if not chosen.only or any(word in cell.name for word in chosen.only)]
-        measure(waiting(some, chosen.folder, chosen.seed, chosen.machines), chosen.folder, chosen.processes, measured)
-    print(tables(chosen.folder))
+        some = [cell for cell in cells if not chosen.only or any(word in cell.name for word in chosen.only)]
+        measure(waiting(some, chosen.folder, chosen.seed, chosen.machines), chosen.folder, chosen.processes, work)
+    print(table(chosen.folder))
 
 
 if __name__ == "__main__":
-    main()
+    study(str(__doc__), CELLS, measured, tables, (BEGIN, END), 2041)

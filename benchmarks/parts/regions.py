@@ -10,7 +10,6 @@ Run: ``python -m benchmarks.parts.regions FOLDER [--machines N] [--only WORDS]``
 
 from __future__ import annotations
 
-import argparse
 import time
 from itertools import product
 from pathlib import Path
@@ -19,18 +18,20 @@ from typing import Any
 import numpy as np
 
 from benchmarks.coverage.measuring import kept
-from benchmarks.coverage.study import measure, waiting
 from benchmarks.parts import machines, truth
-from benchmarks.parts.curved import CELLS, Cell, drawn
+from benchmarks.parts.curved import CELLS, SORTS, Cell, drawn, study
 from cmm_uq.analysis.machine.regions import factor_regions
 from cmm_uq.app.commands.estimation import with_noise
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.maths.inference.posterior import Doubt, sample_with_noise
 
-PAGE = Path(__file__).parents[2] / "docs" / "parts-study.md"
 BEGIN, END = "<!-- written by benchmarks.parts.regions -->", "<!-- end of regions -->"
 NOISE_MM, EACH = 0.7e-3, 9
+EVERY = (
+    *CELLS,
+    *(Cell(sort, artefact, "set-up") for artefact in ("step gauge", "bars") for sort in (SORTS[0], SORTS[-1])),
+)
 KINDS = {"scale": slice(0, 3), "squareness": slice(3, 6)}
 ENDS = (((0.0, 1.0),) * 3, *product(((0.0, 0.5), (0.5, 1.0)), repeat=3))
 
@@ -68,7 +69,8 @@ def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
 
 def _measured(cell: Cell, hidden: truth.Truth, random: np.random.Generator) -> list[list[float]]:
     one = machines.Cell(cell.artefact, cell.noise, 0.0)
-    artefact = machines.calibrated(one, hidden, NOISE_MM, 0.0, random)
+    offset = NOISE_MM * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
+    artefact = machines.calibrated(one, hidden, NOISE_MM, offset, random)
     model = RecordingModel(artefact, machines.NAMED, NOISE_MM if cell.noise == "stated" else None)
     model, estimate, _ = with_noise(model)
     seed = int(random.integers(2**31))
@@ -93,7 +95,7 @@ def tables(folder: Path) -> str:
     heads = ("class, calibration, noise", "machines", "over the range", "in all eighths",
              *(f"{kind}: recorded mean, rms, U/2 over it" for kind in KINDS))  # fmt: skip
     lines = ["| " + " | ".join(heads) + " |", "| --- " * len(heads) + "|"]
-    for cell in CELLS:
+    for cell in EVERY:
         done = np.array([r["factors"] for r in records if r["cell"] == cell.name and "factors" in r])
         if not len(done):
             continue
@@ -112,25 +114,5 @@ def tables(folder: Path) -> str:
     )
 
 
-def main() -> None:
-    """Run, then say what there is."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--machines", type=int, default=100, help="of each cell")
-    parser.add_argument("--only", nargs="*", default=[], help="words of the cells' names")
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=2042)
-    parser.add_argument("--page", action="store_true", help="write the table of the page, and run nothing")
-    chosen = parser.parse_args()
-    if chosen.page:
-        before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-        text = f"{before}{BEGIN}\n\n{tables(chosen.folder)}.\n\n{END}{rest.partition(END)[2]}"
-        PAGE.write_text(text, encoding="utf-8")
-    else:
-        some = [cell for cell in CELLS if not chosen.only or any(word in cell.name for word in chosen.only)]
-        measure(waiting(some, chosen.folder, chosen.seed, chosen.machines), chosen.folder, chosen.processes, measured)
-    print(tables(chosen.folder))
-
-
 if __name__ == "__main__":
-    main()
+    study(str(__doc__), EVERY, measured, tables, (BEGIN, END), 2042)

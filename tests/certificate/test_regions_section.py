@@ -99,7 +99,7 @@ def test_a_tolerance_that_is_open_over_the_range_is_warned_of(tolerance: float, 
     assert bool(warnings) == warned
     if warned:
         assert warnings == [
-            "Tolerances are judged on means over the recorded set-ups. Over the measuring range it is open whether these are "
+            "Tolerances are judged on the error factors as estimated. Over the measuring range it is open whether these are "
             "kept: Scale error of X (10.0 ± 8.0 ppm)."
         ]
 

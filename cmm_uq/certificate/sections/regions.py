@@ -46,7 +46,7 @@ def regions_section(result: Result) -> Section:
     given = [key in ranged for key in regions.whole]
     rests = listed([names[i] for i in resting(regions.influence, k) if given[i]])
     words = say(
-        "The error factors are means over the recorded set-ups. The machine has other errors besides, taken as large as this "
+        "The first figures are means over the recorded set-ups. The machine has other errors besides, taken as large as this "
         "recording shows errors of their kind to be; elsewhere a factor differs by what they do."
     )
     prior = (
@@ -113,7 +113,7 @@ def regions_warnings(result: Result) -> list[Text]:
     if open_there:
         texts.append(
             say(
-                "Tolerances are judged on means over the recorded set-ups. Over the measuring range it is open whether these "
+                "Tolerances are judged on the error factors as estimated. Over the measuring range it is open whether these "
                 "are kept: {names}.",
                 names=listed(open_there),
             )
