@@ -23,9 +23,8 @@ from cmm_uq.certificate.results.keys import QUANTITY, RESULTS
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS, REQUIRED
 from cmm_uq.jobs.part import dmis as drawing_dmis, qif as drawing_qif
-from cmm_uq.jobs.part.characteristic import ASKS, LIMITS, Asks
 from cmm_uq.jobs.part.dmis import PROGRAM as DMIS
-from cmm_uq.jobs.part.feature import FEWEST, PATTERNS
+from cmm_uq.jobs.part.feature import ASKS, FEWEST, LIMITS, PATTERNS, Asks
 from cmm_uq.jobs.part.qif import PROGRAM as QIF
 from cmm_uq.jobs.schema import keys_of, without_place, written
 from cmm_uq.laboratory.live.instruments.library import profile_named, ready

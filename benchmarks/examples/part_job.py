@@ -22,7 +22,7 @@ from cmm_uq.app.commands.parts.machine import state_machine
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.part.job import TABLES, read_part
-from cmm_uq.jobs.tables.origin import SIMULATED
+from cmm_uq.jobs.tables.identification import SIMULATED
 
 ROOT = Path(__file__).parents[2]
 FOLDER, MACHINE = ROOT / "examples" / "part-plate-simulated", ROOT / "examples" / "step-gauge-simulated"

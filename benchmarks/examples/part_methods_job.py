@@ -39,7 +39,7 @@ from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.part.job import PartJob, part_of
-from cmm_uq.jobs.tables.origin import SIMULATED
+from cmm_uq.jobs.tables.identification import SIMULATED
 from cmm_uq.machine.physics.catalogue import effects
 
 ROOT = Path(__file__).parents[2]

@@ -19,8 +19,7 @@ from scipy.spatial.transform import Rotation
 from cmm_uq.analysis.parts.evaluation import Evaluator, characteristics_of
 from cmm_uq.analysis.parts.plan import FORMS, Nominal, PartCharacteristic, PartFeature, Plan
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.part.characteristic import DIRECTED
-from cmm_uq.jobs.part.feature import Kind as FeatureKind
+from cmm_uq.jobs.part.feature import DIRECTED, Kind as FeatureKind
 from cmm_uq.maths.geometry.association import Association
 from tests.maths.geometry.reference_sets import points_with_known_fit, points_with_known_zone, surface
 

@@ -263,7 +263,7 @@ PLANE_SHIFTED = Beginning(
     effects=(), points=placed_plate,
 )  # fmt: skip
 SHIFT = Kind(
-    "shift", ShiftFacts, plan=f"{_HERE}.shift.plan:PLANNING",
+    "shift", ShiftFacts, plan=f"{_HERE}.shift.analysis:PLANNING",
     begin=Beginning(
         title="Self-calibration of an axis by shifting an uncalibrated gauge",
         numbering="One measurement is one series, at one shift; its points are those of the gauge.",

@@ -21,8 +21,7 @@ from cmm_uq.certificate.sections.method import method, posterior_section, warnin
 from cmm_uq.certificate.sections.regions import regions_section, with_regions
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.logo import logo_of
-from cmm_uq.jobs.tables.identification import Identification, Laboratory
-from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED
+from cmm_uq.jobs.tables.identification import MEASURED, SIMULATED, Identification, Laboratory
 from cmm_uq.maths.uncertainty.quantity import nominal
 
 TEMPERATURES: Mapping[str, Text] = {

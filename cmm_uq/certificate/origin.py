@@ -16,7 +16,7 @@ from cmm_uq.base.messages import Text, Verbatim, after, commas, names, say, toge
 from cmm_uq.base.plugins import KINDS, STANDARDS, versions
 from cmm_uq.certificate.document import Document
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.tables.origin import COMPENSATED, MEASURED, SIMULATED, Origin
+from cmm_uq.jobs.tables.identification import COMPENSATED, MEASURED, SIMULATED, Origin
 from cmm_uq.laboratory.records.facts import ChainHead
 from cmm_uq.machine.physics.catalogue import plugins
 from cmm_uq.maths.inference.draws import Draws

@@ -25,8 +25,7 @@ from cmm_uq.certificate.document import Document, Section
 from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.tables.identification import Capability
-from cmm_uq.jobs.tables.origin import Origin
+from cmm_uq.jobs.tables.identification import Capability, Origin
 from cmm_uq.jobs.verdicts import NO_VERDICTS, Verdicts
 from cmm_uq.machine.model import Estimate, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact

@@ -18,8 +18,8 @@ from pydantic import Field, ValidationError
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, names, plural, say, sentences
 from cmm_uq.jobs.reports import ResultsPart
-from cmm_uq.jobs.tables.circumstances import TestUncertainty
-from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED
+from cmm_uq.jobs.tables.conformity import TestUncertainty
+from cmm_uq.jobs.tables.identification import MEASURED, SIMULATED
 
 SCHEMA = "cmm-uq/acquired/1"
 ARTEFACT, TIME = "temp_artefact_c", "time_s"

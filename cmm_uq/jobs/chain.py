@@ -20,7 +20,7 @@ from cmm_uq.jobs.columns import in_words
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.reports import AS_FOUND
 from cmm_uq.jobs.tables.artefact import ACCREDITED, CONSENSUS, IN_HOUSE, MATERIAL, NATIONAL, OTHER, Traceability
-from cmm_uq.jobs.tables.origin import MEASURED
+from cmm_uq.jobs.tables.identification import MEASURED
 
 # what a statement of traceability says; the last where nothing that is certified enters
 Claim = Literal["traceable", "by evidence", "not shown", "none needed"]

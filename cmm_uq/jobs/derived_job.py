@@ -22,12 +22,12 @@ from cmm_uq.base.files.limits import COLUMNS, EFFECTS
 from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Uncertainty, key, required
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.columns import REQUIRED, largest
-from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys
+from cmm_uq.jobs.importing.format import FileKeys, ImportKeys
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.recording import prediction as predictions
 from cmm_uq.jobs.recording.references import reference_file
 from cmm_uq.jobs.source import sha256
-from cmm_uq.jobs.tables.origin import DERIVING, MEASURED, SIMULATED
+from cmm_uq.jobs.tables.identification import DERIVING, MEASURED, SIMULATED
 
 PROGRAM = f"cmm-uq {__version__}"
 LONGEST_ID = 100

@@ -19,17 +19,24 @@ from cmm_uq.base.messages import html_table
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.acquired import Provenance
-from cmm_uq.jobs.importing.format import Recognition
-from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.format import ImportKeys, Recognition
+from cmm_uq.jobs.recording.beside import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.recording.prediction import Prediction, SimulationFacts
-from cmm_uq.jobs.recording.short_gauge import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.reports import AsFound
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ThermometerFacts
-from cmm_uq.jobs.tables.circumstances import Circumstances, ClausesForm, ProbeFacts, RatedConditions, TestUncertainty
-from cmm_uq.jobs.tables.conformity import ConformityFacts, needed, probe_unfit, standards_in, uncertainty_missing
-from cmm_uq.jobs.tables.identification import Identification, Laboratory
-from cmm_uq.jobs.tables.machine import MachineFacts
-from cmm_uq.jobs.tables.origin import MEASURED, DerivedFrom, Origin
+from cmm_uq.jobs.tables.conformity import (
+    Circumstances,
+    ClausesForm,
+    ConformityFacts,
+    RatedConditions,
+    TestUncertainty,
+    needed,
+    probe_unfit,
+    standards_in,
+    uncertainty_missing,
+)
+from cmm_uq.jobs.tables.identification import MEASURED, DerivedFrom, Identification, Laboratory, Origin
+from cmm_uq.jobs.tables.machine import MachineFacts, ProbeFacts
 from cmm_uq.jobs.tables.plan import AcquireFacts, PlanFacts, ProveFacts
 
 Tolerance = Annotated[float, Field(gt=0, le=1e9), at_least(1e-9)]  # A permissible size of an effect in its own unit

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from pydantic import create_model
 
-from cmm_uq.base.errors import CmmUqError, Gathered
+from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.files.limits import JOB_BYTES, LOGO_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.output import finish_interrupted
@@ -24,16 +24,14 @@ from cmm_uq.jobs.importing.recording import read_recording_file
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logo import checked_logo
 from cmm_uq.jobs.recording import references
+from cmm_uq.jobs.recording.beside import LOG, SHORT_GAUGE, ShortGauge, log_of, short_gauge_of, with_logged
 from cmm_uq.jobs.recording.references import EXPANDED, OF_POINTS, reference_file
-from cmm_uq.jobs.recording.short_gauge import KEY as SHORT_GAUGE, ShortGauge, short_gauge_of
-from cmm_uq.jobs.recording.temperature_log import KEY, log_of, with_logged
 from cmm_uq.jobs.reports import as_found_of, calibration_file, results_named
 from cmm_uq.jobs.source import FilesInFolder, FilesInMemory, JobFiles, check_distinct
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
-from cmm_uq.jobs.tables.conformity import Standards, clause_files, forms_of, needed, uncertainty_missing
-from cmm_uq.jobs.tables.identification import REPLACED
+from cmm_uq.jobs.tables.conformity import ClausesForm, ConformityFacts, Standards, needed, uncertainty_missing
+from cmm_uq.jobs.tables.identification import REPLACED, altered, check_examples, check_mark, is_planned
 from cmm_uq.jobs.tables.machine import MachineFacts
-from cmm_uq.jobs.tables.origin import altered, check_examples, check_mark, is_planned
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.recording.certified import CertifiedValues
@@ -90,7 +88,7 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     logo = [facts.laboratory.logo] if facts.laboratory.logo else []
     recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
     recordings += [facts.short_gauge.file] if facts.short_gauge else []
-    forms = clause_files(facts.conformity)
+    forms = list(dict.fromkeys(wish.clauses for wish in facts.conformity if wish.clauses is not None))
     check_distinct(
         [*recordings, *maps, *logs, *calibrations, *certificate, *predicted, *predicting_maps, *logo, *forms], str(path)
     )
@@ -98,7 +96,7 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     named = None if facts.job.replaces is None else results_named(facts.job.replaces.results)
     others = [*calibrations, *(one for one in (before, named) if one is not None)]
     inputs |= _contents(source, others, TABLE_BYTES, written=True) | _contents(source, forms, JOB_BYTES)
-    clauses = forms_of(facts.conformity, inputs, folder, nameable.standards)
+    clauses = _forms(facts.conformity, inputs, folder, nameable.standards)
     if says is not None:
         inputs |= _contents(source, certificate, TABLE_BYTES)
     inputs |= (pictures := _contents(source, logo, LOGO_BYTES))
@@ -143,6 +141,30 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     prediction = prediction_of(facts.simulation, inputs, folder)
     return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge, prediction, acquired=acquired,
                imported=tuple(filter(None, told)), certified={} if says is None else says.table, clauses=clauses)  # fmt: skip
+
+
+def _forms(
+    wishes: Sequence[ConformityFacts], inputs: Mapping[str, bytes], folder: Path, standards: Standards
+) -> dict[str, ClausesForm]:
+    """The forms that a job names, by their file."""
+    forms: dict[str, ClausesForm] = {}
+    for i, wish in enumerate(wishes, 1):
+        if wish.clauses is None:
+            continue
+        path = folder / wish.clauses
+        form = forms[wish.clauses] = checked(inputs[wish.clauses], path, ClausesForm)
+        if form.standard != wish.standard:
+            raise CmmUqError(
+                f"is the form of {form.standard}, and [[conformity]] {i} states {wish.standard}", where=str(path),
+                fix=f'cmm-uq standards "{wish.standard}" --form FILE writes the one that belongs to it',
+            )  # fmt: skip
+        asked = standards.named(wish.standard)
+        known = () if asked is None else asked.clause_names
+        for name in form.clauses:
+            if name not in known:
+                raise CmmUqError(f"{wish.standard} has no clause {name!r} here", where=f"{path}: [clauses.{name}]",
+                                 fix=suggestion(name, known))  # fmt: skip
+    return forms
 
 
 def _certified_points(
@@ -208,7 +230,7 @@ def _refuse_what_needs_a_recording(facts: JobFile, path: Path) -> None:
     none = f"a job of kind {facts.artefact.kind!r} has no recording of points"
     for given, key, fix in (
         (facts.recording.file, "[recording] file", "Leave [recording] out, and name what is measured under [machine]"),
-        (facts.machine.temperature_log, KEY, "Leave the log out"),
+        (facts.machine.temperature_log, LOG, "Leave the log out"),
         (facts.short_gauge, SHORT_GAUGE, "Leave the short gauge out"),
     ):
         if given:

@@ -18,8 +18,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import LARGEST_UM, SMALLEST_UM
 from cmm_uq.jobs.source import RESULTS
+from cmm_uq.jobs.tables.identification import SIMULATED, Origin
 from cmm_uq.jobs.tables.machine import DigitizerFacts, Pose
-from cmm_uq.jobs.tables.origin import SIMULATED, Origin
 from cmm_uq.jobs.verdicts import Verdicts
 
 

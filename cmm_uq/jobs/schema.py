@@ -19,7 +19,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from cmm_uq.base.files.table import sentences, unit_of
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.jobs.tables.origin import EXAMPLE
+from cmm_uq.jobs.tables.identification import EXAMPLE
 
 Schema = dict[str, Any]
 DRAFT = "http://json-schema.org/draft-07/schema#"

@@ -20,7 +20,7 @@ from cmm_uq.certificate.certificate import conditions
 from cmm_uq.certificate.clauses import claimed, formal_warnings
 from cmm_uq.certificate.document import Document
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.recording.short_gauge import ShortGaugeFacts
+from cmm_uq.jobs.recording.beside import ShortGaugeFacts
 from cmm_uq.jobs.tables.artefact import Traceability
 from tests.artefacts.simulated import document
 from tests.certificate.saying import leaves

@@ -19,7 +19,7 @@ from cmm_uq.certificate.digital_certificate.administration import Languages, for
 from cmm_uq.certificate.document import Paragraph
 from cmm_uq.jobs.acquired import AcquisitionRecord, Provenance
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.recording.short_gauge import ShortGauge, ShortGaugeFacts
+from cmm_uq.jobs.recording.beside import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.tables.artefact import ThermometerFacts, Traceability
 from tests.certificate.test_completeness import changed, measured
 

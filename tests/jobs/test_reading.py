@@ -15,8 +15,7 @@ from cmm_uq.app.commands.reading import NAMEABLE, read_job
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.source import sha256
-from cmm_uq.jobs.tables.circumstances import TestUncertainty
-from cmm_uq.jobs.tables.conformity import ConformityFacts, uncertainty_missing
+from cmm_uq.jobs.tables.conformity import ConformityFacts, TestUncertainty, uncertainty_missing
 
 
 def edit(job: Path, pattern: str, replacement: str) -> Path:

@@ -17,7 +17,7 @@ from cmm_uq.analysis.screening.screening import REVERSED, with_sound_sensors
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Message, Text, commas, number, say
 from cmm_uq.base.points import Floats, Ints, Points
-from cmm_uq.jobs.recording.short_gauge import ShortGauge
+from cmm_uq.jobs.recording.beside import ShortGauge
 from cmm_uq.machine.model.artefact import Artefact, Forms, Indications
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.maths.uncertainty.quantity import nominal, significant

@@ -19,7 +19,7 @@ from cmm_uq.analysis.conformity.uncertainty import Causes, causes_of_lengths, le
 from cmm_uq.base.messages import Text, at_key, plural, say, semicolons
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE, unit
-from cmm_uq.jobs.tables.circumstances import LINE_KEYS, TestUncertainty
+from cmm_uq.jobs.tables.conformity import LINE_KEYS, TestUncertainty
 from cmm_uq.machine.model.artefact import Artefact, Forms, Indications
 from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, BudgetLine
 from cmm_uq.maths.uncertainty.quantity import nominal

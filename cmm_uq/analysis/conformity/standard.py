@@ -19,10 +19,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.jobs.recording.short_gauge import ShortGauge
+from cmm_uq.jobs.recording.beside import ShortGauge
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.jobs.tables.circumstances import Circumstances, TestUncertainty
-from cmm_uq.jobs.tables.conformity import ConformityFacts, needed
+from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts, TestUncertainty, needed
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.budget import Budget, BudgetLine
 from cmm_uq.maths.uncertainty.quantity import Quantity

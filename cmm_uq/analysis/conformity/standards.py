@@ -20,8 +20,7 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.plugins import STANDARDS, Plugin, named, offered
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.jobs.tables.circumstances import Circumstances
-from cmm_uq.jobs.tables.conformity import ConformityFacts
+from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.maths.uncertainty.quantity import Quantity, nominal

@@ -18,8 +18,7 @@ from cmm_uq.analysis.conformity.decision import Decision, Risks
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, say
 from cmm_uq.base.points import Ints
 from cmm_uq.base.units import UNITS
-from cmm_uq.jobs.tables.circumstances import ClausesForm, HeldClause
-from cmm_uq.jobs.tables.conformity import ConformityFacts
+from cmm_uq.jobs.tables.conformity import ClausesForm, ConformityFacts, HeldClause
 from cmm_uq.jobs.verdicts import TOLERANCE_OUTCOMES, Verdict
 from cmm_uq.maths.uncertainty.budget import Budget
 from cmm_uq.maths.uncertainty.quantity import Quantity

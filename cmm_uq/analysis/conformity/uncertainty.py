@@ -16,7 +16,7 @@ from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say, semicolons
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
-from cmm_uq.jobs.tables.circumstances import LINE_KEYS, Circumstances, RatedConditions, TestUncertainty
+from cmm_uq.jobs.tables.conformity import LINE_KEYS, Circumstances, RatedConditions, TestUncertainty
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.budget import Budget
 

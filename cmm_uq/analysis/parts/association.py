@@ -16,8 +16,7 @@ import numpy as np
 from cmm_uq.analysis.parts.plan import PartFeature
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.part.characteristic import DIRECTED
-from cmm_uq.jobs.part.feature import Kind
+from cmm_uq.jobs.part.feature import ORIENTED, Kind
 from cmm_uq.maths.geometry.association import Association
 from cmm_uq.maths.geometry.repeated import MANY, Drawn, Raised, Repeated, one_by_one
 
@@ -154,7 +153,7 @@ class ProbedFeature:
             direction = None if direction is None else direction @ self._plane
         values[:, :3] = position
         nominal = self.feature.nominal.direction
-        if self.feature.kind in DIRECTED and nominal is not None:
+        if self.feature.kind in ORIENTED and nominal is not None:
             sensed = np.broadcast_to(nominal, position.shape) if direction is None else direction
             values[:, 3:6] = sensed * np.sign(sensed @ nominal)[:, None]
         for column, value in ((6, drawn.size), (7, drawn.half_angle)):
@@ -223,7 +222,7 @@ class ProbedFeature:
     def to_first_order(self, change: Floats) -> Features:
         """Features of first-order changes (N, 8) of the values."""
         values = self.base + change
-        if self.feature.kind in DIRECTED:
+        if self.feature.kind in ORIENTED:
             values[:, 3:6] /= np.linalg.norm(values[:, 3:6], axis=1, keepdims=True)
         return Features(values)
 

@@ -23,8 +23,7 @@ from cmm_uq.analysis.parts.association import VALUES, Features, ProbedFeature, c
 from cmm_uq.analysis.parts.plan import PartFeature, as_datum
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.part.characteristic import TURNED
-from cmm_uq.jobs.part.feature import ROUND, Kind
+from cmm_uq.jobs.part.feature import ROUND, TURNED, Kind
 
 # sine of the angle between two datums below which the second says nothing of the rotation about the first, some 6°
 _ACROSS = 0.1

@@ -17,8 +17,7 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points, beyond_travel
-from cmm_uq.jobs.part.characteristic import ASKS, DIRECTED, What
-from cmm_uq.jobs.part.feature import FEWEST, Kind
+from cmm_uq.jobs.part.feature import ASKS, FEWEST, ORIENTED, Kind, What
 from cmm_uq.maths.geometry.association import ASSOCIATIONS, Association
 
 SIZED: tuple[Kind, ...] = ("circle", "sphere", "cylinder")  # features with a diameter
@@ -107,7 +106,7 @@ class PartFeature:
             raise CmmUqError(f"{len(self.points)} points are too few for a {self.kind}", where=where, fix=fix)
         nominal = self.nominal
         for kinds, lacks, what, fix in (
-            (DIRECTED, nominal.direction is None, "direction", "Give its direction"),
+            (ORIENTED, nominal.direction is None, "direction", "Give its direction"),
             ((*SIZED, "cone"), nominal.diameter_mm is None, "diameter", "Give its diameter in mm"),
             (("cone",), nominal.half_angle_rad is None, "angle", "Give half of its angle"),
         ):

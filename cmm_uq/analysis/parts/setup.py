@@ -17,9 +17,8 @@ from cmm_uq.analysis.parts.virtual import MeasurementConditions
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.checks import as_one, members, readings, rotation
-from cmm_uq.jobs.part.feature import FormFacts
+from cmm_uq.jobs.part.feature import CharacteristicFacts, FormFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.part.probed import Probed, probed, whole_surface
 

@@ -194,7 +194,7 @@ def _feature(name: str) -> dict[str, Any]:
 
 
 def _characteristic(name: str) -> dict[str, Any]:
-    from cmm_uq.jobs.part.characteristic import ASKS
+    from cmm_uq.jobs.part.feature import ASKS
 
     what = _ask(f"What it is: {', '.join(ASKS)}", "size", _one_of(tuple(ASKS)))
     asks, features = ASKS[what], "Its feature" if ASKS[what].features == 1 else "Its two features, as A, B"

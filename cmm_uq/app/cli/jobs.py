@@ -18,8 +18,7 @@ from cmm_uq.base.errors import CmmUqError, printable
 if TYPE_CHECKING:
     from cmm_uq.app.commands.jobs.check import JobCheck
     from cmm_uq.certificate.wording import Summary
-    from cmm_uq.jobs.importing.format import Recognition
-    from cmm_uq.jobs.importing.keys import ImportKeys
+    from cmm_uq.jobs.importing.format import ImportKeys, Recognition
     from cmm_uq.jobs.job import Job
 
 _COLUMN = 'Column of the recording and of the file: x_mm="X actual", or its number: x_mm=3.'
@@ -122,7 +121,7 @@ def import_keys(columns: Iterable[str] | None, keys: Iterable[str] | None) -> Im
     """Keys of an import that options say; one that is none, or has a value that it cannot have, is refused."""
     from pydantic import ValidationError
 
-    from cmm_uq.jobs.importing.keys import ImportKeys
+    from cmm_uq.jobs.importing.format import ImportKeys
 
     data: dict[str, Any] = dict(map(_setting, keys or ()))
     if columns:

@@ -171,7 +171,7 @@ def file_rows(files: Mapping[str, Path], *, whole: bool) -> list[tuple[str, str]
 
 
 def _what(name: str) -> str:
-    from cmm_uq.jobs.tables.origin import COMPENSATED, SIMULATED
+    from cmm_uq.jobs.tables.identification import COMPENSATED, SIMULATED
 
     path = PurePosixPath(name)
     plain = path.stem.removesuffix(f"-{SIMULATED}").removesuffix(f"-{COMPENSATED}")

@@ -21,7 +21,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.prediction import KEY, SimulationFacts
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.jobs.tables.origin import MEASURED
+from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import LAST_DIGIT, Artefact
 from cmm_uq.machine.model.kind import Kind, Observe

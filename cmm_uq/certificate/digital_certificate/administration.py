@@ -24,7 +24,7 @@ from cmm_uq.jobs.dcc import certificate as dcc
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.tables.artefact import CertificateFile, Traceability
-from cmm_uq.jobs.tables.origin import MEASURED
+from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.laboratory.records.facts import KEY, ChainHead
 
 NOT_STATED = say("not stated")

@@ -20,7 +20,7 @@ from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, commas, 
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
 from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement
 from cmm_uq.certificate.wording import Figure, Headline, Summary, probability, titles
-from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.feature import CharacteristicFacts
 from cmm_uq.jobs.verdicts import standing_of
 from cmm_uq.maths.uncertainty.quantity import rounded, significant
 

@@ -20,7 +20,7 @@ from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.feature import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.verdicts import gravest
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated

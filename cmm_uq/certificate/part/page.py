@@ -20,7 +20,7 @@ from cmm_uq.certificate.part.figures import CharacteristicFigures, critical, fig
 from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, Source
 from cmm_uq.certificate.part.method import method_section, methods_section, not_covered_section, program_words
 from cmm_uq.certificate.wording import probability
-from cmm_uq.jobs.tables.origin import MEASURED
+from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.jobs.verdicts import gravest, standing_of
 
 

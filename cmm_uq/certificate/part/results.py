@@ -24,7 +24,7 @@ from cmm_uq.certificate.part.measurement import CertificateStatus, FurtherSetUps
 from cmm_uq.certificate.part.method import methods_data
 from cmm_uq.certificate.results.keys import RESULTS
 from cmm_uq.certificate.sections.priors import families_data, priors_data
-from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.feature import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.verdicts import Verdicts

@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.jobs.part.characteristic import ASKS
+from cmm_uq.jobs.part.feature import ASKS
 from cmm_uq.jobs.verdicts import Verdict, Verdicts
 
 QUANTITY = frozenset({"value", "u", "interval95", "U", "k"})  # keys of a quantity

@@ -18,11 +18,10 @@ from cmm_uq.base.files.limits import CELLS, COLUMNS, ROWS
 from cmm_uq.base.messages import Text, Verbatim, commas, names, number, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.columns import COORDINATES
-from cmm_uq.jobs.importing import keys as units
+from cmm_uq.jobs.importing import format as units
 from cmm_uq.jobs.importing.encodings import decimal_sign, is_number, split_units, values_of
-from cmm_uq.jobs.importing.format import Cell, Fact, Sheet
+from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Fact, ImportKeys, Sheet, WrittenUnit, length_named
 from cmm_uq.jobs.importing.header import NAME, Header, understood
-from cmm_uq.jobs.importing.keys import LENGTH, UNITS, ImportKeys, WrittenUnit, length_named
 
 LARGEST_MACHINE_MM = 40_000.0  # longest diagonal of a measuring machine: gantries of 30 m are the largest made
 SIGNS = {".": say("point"), ",": say("comma")}

@@ -17,8 +17,18 @@ from cmm_uq.base.files.limits import ROWS
 from cmm_uq.base.messages import Verbatim, number, say
 from cmm_uq.base.units import UNITS as PRINTED
 from cmm_uq.jobs.importing.encodings import begins_with, local, root_of
-from cmm_uq.jobs.importing.format import Fact, Format, Row, Sheet, sheets_of
-from cmm_uq.jobs.importing.keys import LENGTH, UNITS, ImportKeys, WrittenUnit, length_named
+from cmm_uq.jobs.importing.format import (
+    LENGTH,
+    UNITS,
+    Fact,
+    Format,
+    ImportKeys,
+    Row,
+    Sheet,
+    WrittenUnit,
+    length_named,
+    sheets_of,
+)
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.dcc.figures import QuantityFigures

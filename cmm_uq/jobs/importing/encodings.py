@@ -17,8 +17,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.csv_table import GIVE, LARGEST, number_problem, numbers
 from cmm_uq.base.files.limits import LINES
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.importing.format import Cell
-from cmm_uq.jobs.importing.keys import WrittenUnit, apart, unit_named
+from cmm_uq.jobs.importing.format import Cell, WrittenUnit, apart, unit_named
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig", "UTF-8 with a byte-order mark"),

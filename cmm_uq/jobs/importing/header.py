@@ -17,8 +17,7 @@ from functools import lru_cache
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.columns import COORDINATES, OPTIONAL, REQUIRED
 from cmm_uq.jobs.importing.encodings import is_number
-from cmm_uq.jobs.importing.format import Sheet
-from cmm_uq.jobs.importing.keys import ImportKeys, WrittenUnit, sources_of, unit_named
+from cmm_uq.jobs.importing.format import ImportKeys, Sheet, WrittenUnit, sources_of, unit_named
 
 NAME = "name"  # of the point or feature, by which it may be numbered; no column of a recording
 

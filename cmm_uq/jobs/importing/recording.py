@@ -22,9 +22,8 @@ from cmm_uq.base.messages import Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest
 from cmm_uq.jobs.importing.columns import columns_of
-from cmm_uq.jobs.importing.format import Fact, Recognition, Sheet, format_of
+from cmm_uq.jobs.importing.format import Fact, FileKeys, ImportKeys, Recognition, Sheet, format_of, length_named
 from cmm_uq.jobs.importing.header import POINTS, REFERENCES, Header, header_of, no_header
-from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys, length_named
 
 # lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled
 SHORTEST_NORMAL, LONGEST_NORMAL = 1e-3, 1e3

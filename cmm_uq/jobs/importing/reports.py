@@ -12,8 +12,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LINE, ROWS
 from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.jobs.importing.encodings import decoded, head_text, report_lines
-from cmm_uq.jobs.importing.format import Cell, Fact, Format, Row, Sheet, sheets_of
-from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.format import Cell, Fact, Format, ImportKeys, Row, Sheet, sheets_of
 
 _AXES = ("X", "Y", "Z")
 _WITH_DIRECTION = ["name", "x", "y", "z", "i", "j", "k"]

@@ -25,9 +25,8 @@ from cmm_uq.base.files.csv_table import lines_within
 from cmm_uq.base.files.limits import CELL, COLUMNS, LINE, LINES, ROWS, UNPACKED
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.jobs.importing.encodings import HOSTILE_FIX, decoded, head_text, local
-from cmm_uq.jobs.importing.format import Cell, Fact, Format, Sheet
+from cmm_uq.jobs.importing.format import DELIMITERS, Cell, Fact, Format, ImportKeys, Sheet
 from cmm_uq.jobs.importing.header import LINES_BEFORE, REFERENCES, header_of, understood
-from cmm_uq.jobs.importing.keys import DELIMITERS, ImportKeys
 
 _SEVERAL = "  "  # two blanks or more between cells, so that single ones may stand in headings
 _TITLES: dict[str, Text] = {

@@ -14,8 +14,7 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.points import AXES, Floats, beyond_travel
-from cmm_uq.jobs.part.characteristic import CharacteristicFacts, with_article
-from cmm_uq.jobs.part.feature import ASSOCIATIONS, FEWEST, Kind, material_condition
+from cmm_uq.jobs.part.feature import ASSOCIATIONS, FEWEST, CharacteristicFacts, Kind, material_condition, with_article
 from cmm_uq.jobs.part.probed import Probed
 from cmm_uq.jobs.part.tables import PartFile, Places, PlacingFacts
 

@@ -19,9 +19,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.encodings import decoded, report_lines
 from cmm_uq.jobs.importing.reports import statements
 from cmm_uq.jobs.part import drawing as drawings, feature as refused
-from cmm_uq.jobs.part.characteristic import ASKS, What
 from cmm_uq.jobs.part.checks import BETWEEN
 from cmm_uq.jobs.part.drawing import Drawing, Facts, NotUnderstood, NotUnderstoodError, numbers_of, reference, words_of
+from cmm_uq.jobs.part.feature import ASKS, What
 
 MILLIMETRES = {"MM": 1.0, "CM": 10.0, "M": 1000.0, "INCH": 25.4, "FEET": 304.8}
 DEGREES = {"ANGDEC": 1.0, "ANGRAD": math.degrees(1.0)}

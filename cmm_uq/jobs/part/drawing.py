@@ -24,10 +24,9 @@ from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.jobs.importing.documents import child, length_unit, three
 from cmm_uq.jobs.importing.encodings import local
-from cmm_uq.jobs.importing.keys import UNITS, length_named
-from cmm_uq.jobs.part.characteristic import ASKS, CharacteristicFacts, What
+from cmm_uq.jobs.importing.format import UNITS, length_named
 from cmm_uq.jobs.part.checks import members, unfit
-from cmm_uq.jobs.part.feature import FeatureFacts
+from cmm_uq.jobs.part.feature import ASKS, CharacteristicFacts, FeatureFacts, What
 from cmm_uq.jobs.part.probed import Probed, probed
 
 Facts = dict[str, Any]

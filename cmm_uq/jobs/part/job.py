@@ -22,7 +22,7 @@ from cmm_uq.jobs.part.readings import OtherReadings, measured_points, other_read
 from cmm_uq.jobs.part.tables import MachineStateFacts, PartFile, Places
 from cmm_uq.jobs.reading import PART
 from cmm_uq.jobs.source import RESULTS, FilesInFolder, FilesInMemory, JobFiles
-from cmm_uq.jobs.tables.origin import COMPENSATED, SIMULATED, check_examples, check_mark
+from cmm_uq.jobs.tables.identification import COMPENSATED, SIMULATED, check_examples, check_mark
 
 _FIX = "A part's job is a folder with a job.toml; cmm-uq new part begins one"
 _WHOLE = (".pdf", ".xml")

@@ -18,9 +18,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.documents import child, three
 from cmm_uq.jobs.importing.encodings import local, root_of
 from cmm_uq.jobs.part import drawing as drawings, feature as refused
-from cmm_uq.jobs.part.characteristic import ASKS, What
 from cmm_uq.jobs.part.checks import BETWEEN
 from cmm_uq.jobs.part.drawing import Facts, NotUnderstoodError, inside, listed, number_of, text, whole_text
+from cmm_uq.jobs.part.feature import ASKS, What
 
 PROGRAM = "QIF plan"
 _KINDS = ("Point", "Line", "Plane", "Circle", "Sphere", "Cylinder", "Cone")

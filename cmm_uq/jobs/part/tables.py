@@ -14,12 +14,10 @@ from cmm_uq.base.files.limits import INPUTS, LISTED
 from cmm_uq.base.files.table import JobTable, Length, Limit, Position, Temperature, Triple, Uncertainty, key, required
 from cmm_uq.base.files.toml_file import line_of
 from cmm_uq.base.units import REFERENCE_TEMPERATURE
-from cmm_uq.jobs.part.characteristic import CharacteristicFacts, Degrees
-from cmm_uq.jobs.part.feature import Count, FeatureFacts, FormFacts, Name
+from cmm_uq.jobs.part.feature import CharacteristicFacts, Count, Degrees, FeatureFacts, FormFacts, Name
 from cmm_uq.jobs.tables.conformity import Prior, Rule, needs_prior
-from cmm_uq.jobs.tables.identification import Identification, Laboratory
+from cmm_uq.jobs.tables.identification import MEASURED, Identification, Laboratory, Origin
 from cmm_uq.jobs.tables.machine import Travel, check_carriages
-from cmm_uq.jobs.tables.origin import MEASURED, Origin
 
 Expansion = Annotated[float, Field(ge=-1e-4, le=1e-3)]  # A coefficient of expansion, 1/K: steel has 11.5e-6.
 SmallExpansion = Annotated[float, Field(ge=0, le=1e-4)]

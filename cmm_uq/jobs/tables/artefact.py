@@ -16,7 +16,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Length, key, required
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.jobs.importing.keys import FileKeys
+from cmm_uq.jobs.importing.format import FileKeys
 from cmm_uq.jobs.tables.length_formula import Factor, Freedom, Growing, LengthUncertainty, with_standard_uncertainty
 
 

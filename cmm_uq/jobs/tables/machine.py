@@ -178,3 +178,12 @@ class MachineFacts(JobTable):
         for file in [each.file for each in self.error_map if each.squareness_arcsec and self.squareness_arcsec]:
             yield f"squareness_arcsec is given for the machine and for the map {file!r}: leave out one of the two"
         check_carriages(self.chain)
+
+
+class ProbeFacts(JobTable):
+    """``[probe]``: with what the recording was made; ``sensing`` says whether it touches."""
+
+    sensing: Literal["contacting", "optical"] | None = None
+    """Whether the probe touches; standards are for one or the other."""
+    name: str = key("", "Name of the probe.")
+    stylus: str = key("", "Name of the stylus.")

@@ -25,7 +25,7 @@ from cmm_uq.base.output import finish_interrupted, sha256_of
 from cmm_uq.base.plugins import told_with_package
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.source import device_name
-from cmm_uq.jobs.tables.origin import is_planned
+from cmm_uq.jobs.tables.identification import is_planned
 from cmm_uq.laboratory.schedule import state as states
 from cmm_uq.laboratory.schedule.notices import Notice, decisions, of_results
 from cmm_uq.laboratory.schedule.state import PRIVATE, State, inputs_of

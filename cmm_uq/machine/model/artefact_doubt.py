@@ -24,7 +24,7 @@ from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
-from cmm_uq.jobs.tables.circumstances import Circumstances
+from cmm_uq.jobs.tables.conformity import Circumstances
 from cmm_uq.machine.model.artefact import Artefact, Size
 from cmm_uq.machine.model.recorded import stated_sd
 from cmm_uq.machine.physics.effect import Effect

@@ -12,7 +12,7 @@ from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.artefacts.sphere import SphereArtefact
 from cmm_uq.base.points import Floats, Ints, Machine, Points
-from cmm_uq.jobs.tables.circumstances import Circumstances, Declared, NegligibleLines, RatedConditions, TestUncertainty
+from cmm_uq.jobs.tables.conformity import Circumstances, Declared, NegligibleLines, RatedConditions, TestUncertainty
 from tests.recordings import TRAVEL, bar_facts
 
 MACHINE = Machine("m", "XYZ", TRAVEL)

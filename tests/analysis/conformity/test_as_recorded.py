@@ -18,8 +18,7 @@ from cmm_uq.artefacts import artefact_facts, kind_named
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.job import RecordingFacts
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.jobs.tables.circumstances import Circumstances
-from cmm_uq.jobs.tables.conformity import ConformityFacts
+from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.analysis.conformity import recorded

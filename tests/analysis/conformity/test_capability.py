@@ -9,8 +9,7 @@ from cmm_uq.analysis.conformity.standard import RAISED
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.analysis.conformity.uncertainty import Causes
-from cmm_uq.jobs.tables.circumstances import Circumstances, TestUncertainty
-from cmm_uq.jobs.tables.conformity import ConformityFacts
+from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts, TestUncertainty
 from cmm_uq.jobs.tables.identification import Capability, LengthCapability
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS

@@ -16,8 +16,14 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.tables.circumstances import Circumstances, ProbeFacts, RatedConditions, TestUncertainty
-from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError
+from cmm_uq.jobs.tables.conformity import (
+    Circumstances,
+    ConformityFacts,
+    MaximumPermissibleError,
+    ProbeFacts,
+    RatedConditions,
+    TestUncertainty,
+)
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.maths.uncertainty.quantity import Quantity

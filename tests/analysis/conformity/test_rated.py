@@ -7,7 +7,8 @@ import pytest
 
 from cmm_uq.analysis.conformity.uncertainty import rated_conditions
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.tables.circumstances import Circumstances, Declared, ProbeFacts, RatedConditions
+from cmm_uq.jobs.tables.conformity import Circumstances, Declared, RatedConditions
+from cmm_uq.jobs.tables.machine import ProbeFacts
 
 
 def lacking(rated: RatedConditions, probe: ProbeFacts | None = None, **columns: list[float]) -> list[str]:

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from cmm_uq.analysis.conformity.uncertainty import Causes, causes_of_lengths, length_budget, probability_of_all
-from cmm_uq.jobs.tables.circumstances import Circumstances, TestUncertainty
+from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
 from tests.analysis.conformity.recorded import gauge
 from tests.recordings import with_columns
 

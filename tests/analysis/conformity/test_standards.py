@@ -16,8 +16,14 @@ from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.artefacts.sphere import SphereArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
-from cmm_uq.jobs.tables.circumstances import Circumstances
-from cmm_uq.jobs.tables.conformity import ConformityFacts, FalseAccept, GuardBand, MaximumPermissibleError, Rule
+from cmm_uq.jobs.tables.conformity import (
+    Circumstances,
+    ConformityFacts,
+    FalseAccept,
+    GuardBand,
+    MaximumPermissibleError,
+    Rule,
+)
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import BARS
 from cmm_uq.maths.uncertainty.quantity import Quantity

@@ -14,8 +14,13 @@ from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.analysis.conformity.uncertainty import LENGTH_LINES, u_of_unstated
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.tables.circumstances import Circumstances, NegligibleLines, RatedConditions, TestUncertainty
-from cmm_uq.jobs.tables.conformity import ConformityFacts
+from cmm_uq.jobs.tables.conformity import (
+    Circumstances,
+    ConformityFacts,
+    NegligibleLines,
+    RatedConditions,
+    TestUncertainty,
+)
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.maths.uncertainty.quantity import Quantity

@@ -13,7 +13,8 @@ from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.artefacts.sphere import SphereArtefact
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.jobs.tables.circumstances import Circumstances, ProbeFacts, TestUncertainty
+from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
+from cmm_uq.jobs.tables.machine import ProbeFacts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.analysis.conformity.recorded import BAR_U, DIAGONALS, MACHINE, NEGLIGIBLE, SEVEN, STATED, bars, gauge, sphere

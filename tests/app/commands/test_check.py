@@ -24,7 +24,7 @@ from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.points import Machine
 from cmm_uq.certificate.clauses import formal_warnings, traceability_section
 from cmm_uq.certificate.results.contents import head
-from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import read_recording
 from tests.app.cli.process import run
 from tests.conftest import MACHINE_JOBS, ROOT

@@ -39,7 +39,7 @@ from cmm_uq.certificate.origin import as_json, origin_warnings
 from cmm_uq.certificate.results.keys import RESULTS, described
 from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.tables.origin import SIMULATED
+from cmm_uq.jobs.tables.identification import SIMULATED
 from tests.app.commands.test_budget import dated
 from tests.plugin.packages import OUTSIDE_KINDS, install
 

@@ -15,7 +15,7 @@ from cmm_uq.certificate.origin import as_json
 from cmm_uq.jobs.dcc import Certificate, read, written
 from cmm_uq.jobs.dcc.certificate import Expanded, Real
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.recording.short_gauge import ShortGaugeFacts
+from cmm_uq.jobs.recording.beside import ShortGaugeFacts
 from cmm_uq.jobs.tables.artefact import CertificateFile
 from tests.artefacts.simulated import results
 from tests.certificate.digital_certificate.test_certificate import MEASURED, job_of

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import ImportedTable, imported
 from tests.jobs.importing.exports import EXPORTS, NUMBERS, XYZ
 

@@ -10,7 +10,7 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.plugins import BrokenPluginError
-from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import ImportedTable, imported, imported_references
 from tests.conftest import ROOT
 from tests.plugin.packages import OUTSIDE_IMPORTS, install

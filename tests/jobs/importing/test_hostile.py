@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import imported
 from tests.jobs.importing.exports import EXPORTS, archive, excel, opendocument
 

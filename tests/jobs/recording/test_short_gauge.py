@@ -14,7 +14,7 @@ from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.result import Result
 from cmm_uq.jobs.derived_job import derived_toml
-from cmm_uq.jobs.recording.short_gauge import ShortGauge, ShortGaugeFacts, short_gauge_of
+from cmm_uq.jobs.recording.beside import ShortGauge, ShortGaugeFacts, short_gauge_of
 from tests.analysis.conformity.recorded import MACHINE
 from tests.conftest import ROOT
 

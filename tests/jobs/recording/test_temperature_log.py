@@ -18,7 +18,7 @@ from cmm_uq.app.commands.plans.plan import write_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.recording.temperature_log import parse_temperature_log
+from cmm_uq.jobs.recording.beside import parse_temperature_log
 from tests.app.commands.test_map_squareness import TABLE_7, at, stated, with_maps
 from tests.conftest import ROOT
 

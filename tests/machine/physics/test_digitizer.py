@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.recording.temperature_log import parse_temperature_log
+from cmm_uq.jobs.recording.beside import parse_temperature_log
 from cmm_uq.machine.physics.compensation import BLOCK, Compensation
 from cmm_uq.machine.physics.digitizer import (
     Alignment,

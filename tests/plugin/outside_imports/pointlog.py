@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from cmm_uq.base.messages import say
 from cmm_uq.jobs.importing.format import Format, Sheet
-from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.format import ImportKeys
 
 
 class PointLog(Format):

@@ -27,7 +27,7 @@ from cmm_uq.analysis.parts.plan import PartFeature, PartPose, Plan
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, REFERENCE_TEMPERATURE
-from cmm_uq.jobs.part.characteristic import DIRECTED
+from cmm_uq.jobs.part.feature import ORIENTED
 from cmm_uq.maths.geometry.feature import frame_about
 
 FORM, TEMPERATURE, FIXTURE, OPERATOR = "form", "temperature", "fixture", "operator"
@@ -116,7 +116,7 @@ def _placed(shapes: Floats, plan: Plan, rows: slice) -> Floats:
 def _angles(feature: PartFeature, points: Floats) -> Floats:
     """(n,) about the feature's axis."""
     axis = feature.nominal.direction
-    if feature.kind not in DIRECTED or axis is None:
+    if feature.kind not in ORIENTED or axis is None:
         where, fix = f"form of {feature.name!r}", "Give field_um instead"
         raise CmmUqError("undulations need an axis to go round", where=where, fix=fix)
     across = (points - feature.nominal.point) @ frame_about(axis)[:2].T

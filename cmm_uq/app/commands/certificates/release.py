@@ -26,8 +26,7 @@ from cmm_uq.certificate.wording import OUTCOME_WORDS, with_uncertainty
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reports import results_named
 from cmm_uq.jobs.source import RESULTS
-from cmm_uq.jobs.tables.identification import REPLACED as FILE, denies_a_change
-from cmm_uq.jobs.tables.origin import MEASURED
+from cmm_uq.jobs.tables.identification import MEASURED, REPLACED as FILE, denies_a_change
 from cmm_uq.jobs.verdicts import NONE, Verdicts
 from cmm_uq.laboratory.records.content import values
 from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, spelled

@@ -29,7 +29,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import is_part, read_part
 from cmm_uq.jobs.reading import PART
 from cmm_uq.jobs.source import inside
-from cmm_uq.jobs.tables.origin import MEASURED
+from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.machine.physics.catalogue import effects
 
 _PLACE = re.compile(

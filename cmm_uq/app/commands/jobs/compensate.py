@@ -18,10 +18,10 @@ from cmm_uq.base.output import Owner, sha256_of, staged
 from cmm_uq.base.points import AXES, Points
 from cmm_uq.jobs.derived_job import IN_THE_RECORDING, PROGRAM, derived_toml, is_compensated, kept_inputs, recording_name
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.recording.temperature_log import log_of
+from cmm_uq.jobs.recording.beside import log_of
 from cmm_uq.jobs.reports import DescribedDigitizer, digitizer_of
 from cmm_uq.jobs.source import sha256
-from cmm_uq.jobs.tables.origin import first_line
+from cmm_uq.jobs.tables.identification import first_line
 from cmm_uq.machine.model.predicted_errors import maps_of
 from cmm_uq.machine.physics.compensation import Compensation, compensate_points, machine_compensation
 from cmm_uq.machine.physics.digitizer import DigitizedCloud, Digitizer, columns_for

@@ -19,7 +19,7 @@ from cmm_uq.base.points import Machine
 from cmm_uq.certificate.results.qif_file import qif
 from cmm_uq.jobs.columns import WHOLE
 from cmm_uq.jobs.dcc import Certificate, read
-from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import ImportedTable, imported, points_of
 from cmm_uq.jobs.reports import ReportResults, read_results
 from cmm_uq.jobs.source import RESULTS

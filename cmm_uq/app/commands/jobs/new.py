@@ -32,7 +32,7 @@ from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.derived_job import PROGRAM, Truth
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.schema import commented
-from cmm_uq.jobs.tables.origin import EXAMPLE, MEASURED, SIMULATED, Origin, first_line
+from cmm_uq.jobs.tables.identification import EXAMPLE, MEASURED, SIMULATED, Origin, first_line
 from cmm_uq.machine.model.kind import Kind
 
 RECORDING, SCHEMA, README = "recording.csv", ".cmm-uq/job.schema.json", "README.md"

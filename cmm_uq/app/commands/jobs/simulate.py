@@ -28,7 +28,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.origin import program
 from cmm_uq.jobs.derived_job import IN_THE_RECORDING, NoiseFacts, Truth, derived_toml, kept_inputs, recording_name
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.tables.origin import PLANNED, first_line
+from cmm_uq.jobs.tables.identification import PLANNED, first_line
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import effects

@@ -26,11 +26,11 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.derived_job import PROGRAM
-from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import ImportedTable, imported, is_own, read_recording
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import inside
-from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED
+from cmm_uq.jobs.tables.identification import MEASURED, SIMULATED
 from cmm_uq.laboratory.live.conducting import Conductor
 from cmm_uq.laboratory.live.instruments.instrument import open_source
 from cmm_uq.laboratory.live.instruments.ipp_machine import IppMachine

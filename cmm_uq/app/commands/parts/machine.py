@@ -34,7 +34,7 @@ from cmm_uq.certificate.verify.given import Given, given_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.source import sha256 as hashes
-from cmm_uq.jobs.tables.origin import COMPENSATED, MEASURED, SIMULATED
+from cmm_uq.jobs.tables.identification import COMPENSATED, MEASURED, SIMULATED
 from cmm_uq.maths.inference.draws import Draws
 
 _ORIGINS = {SIMULATED: say("simulated"), COMPENSATED: say("compensated")}

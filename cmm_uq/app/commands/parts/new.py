@@ -21,16 +21,16 @@ from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.jobs.importing.encodings import begins_with, head_text
 from cmm_uq.jobs.importing.format import HEAD
-from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.checks import freedoms, members, unfit
 from cmm_uq.jobs.part.dmis import drawing_of_dmis
 from cmm_uq.jobs.part.drawing import KEY, Drawing, NotUnderstood, probed_of, set_aside_unsound
+from cmm_uq.jobs.part.feature import CharacteristicFacts
 from cmm_uq.jobs.part.job import POSTERIOR, TABLES, part_of
 from cmm_uq.jobs.part.probed import Probed
 from cmm_uq.jobs.part.qif import drawing_of_qif
 from cmm_uq.jobs.schema import commented, written
 from cmm_uq.jobs.source import RESULTS
-from cmm_uq.jobs.tables.origin import EXAMPLE, SIMULATED
+from cmm_uq.jobs.tables.identification import EXAMPLE, SIMULATED
 
 Facts = dict[str, Any]
 FOLDER = "machine"

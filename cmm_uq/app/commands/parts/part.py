@@ -44,9 +44,9 @@ from cmm_uq.certificate.part.measurement import MATTERS, PartMeasurement, Unseen
 from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE, Behind, provenance_of
 from cmm_uq.certificate.wording import effect_title
-from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.feature import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob, read_part
-from cmm_uq.jobs.tables.origin import SIMULATED
+from cmm_uq.jobs.tables.identification import SIMULATED
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, simulate, simulate_adaptively
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from cmm_uq.app.commands.jobs.schemas import shipped
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine
-from cmm_uq.jobs.part import characteristic, feature
+from cmm_uq.jobs.part import feature
 from cmm_uq.jobs.part.job import TABLES, read_part
 from cmm_uq.maths.geometry.association import ASSOCIATIONS
 from tests.jobs.part.parts import feature as probed_feature, plate
@@ -122,7 +122,7 @@ def test_a_feature_that_is_none_is_refused_in_words(tmp_path: Path) -> None:
 
 def test_lists_of_kinds_are_those_of_the_virtual_measurement() -> None:
     assert dict(feature.FEWEST) == plan.FEWEST
-    assert set(characteristic.ASKS) == set(plan.WHATS)
+    assert set(feature.ASKS) == set(plan.WHATS)
     assert set(ASSOCIATIONS) == set(feature.Association.__args__)  # type: ignore[attr-defined]
 
 
@@ -140,14 +140,14 @@ NEEDS: dict[str, dict[str, Any]] = {
     ("what", "kind", "datum"),
     [
         (what, kind, datum)
-        for what, asks in characteristic.ASKS.items()
+        for what, asks in feature.ASKS.items()
         for kind in asks.kinds
         for datum in (asks.datum_kinds if asks.datums else ("plane",))
     ],
 )
 def test_what_a_job_may_ask_the_virtual_measurement_evaluates(what: str, kind: Any, datum: Any) -> None:
     """Of every kind of feature, about every kind of datum, that the job's reader lets through."""
-    asks = characteristic.ASKS[what]  # type: ignore[index]
+    asks = feature.ASKS[what]  # type: ignore[index]
     names = [f"f{i}" for i in range(asks.features)]
     one = plan_feature(kind)
     features = [plan.PartFeature(name, *one) for name in names] + [plan.PartFeature("datum", *plan_feature(datum))]
