@@ -79,8 +79,7 @@ class Ballbar(Artefact):
         return (temperature_of(self._facts, self.points),)
 
     def lengths(self) -> Floats:
-        bars = self._bars(self.points.xyz)
-        return np.asarray(np.linalg.norm(bars, axis=1) / self.expansion, dtype=np.float64)
+        return np.asarray(np.linalg.norm(self._bars(self.points.xyz), axis=1) / self.expansion, dtype=np.float64)
 
     def indications(self) -> Indications | None:
         size = self.sizes[0]

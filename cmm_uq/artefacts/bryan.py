@@ -66,9 +66,7 @@ class Bryan(Radial):
         certified = self.sizes[0].certified
         readings = self.points.xyz if xyz is None else xyz
         centre = self.centres(readings, self.sizes[0].nominal if certified else None)[0]
-        differences = readings - centre
-        length = self.sizes[0].nominal
-        return solve_distances(differences, length * self.expansion), centre
+        return solve_distances(readings - centre, self.sizes[0].nominal * self.expansion), centre
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:

@@ -190,8 +190,7 @@ def shape_of(facts: ReferenceSphereFacts, points: Points) -> ArtefactShape | Non
         return None
     attitude, scan = attitudes(points), scan_of(points)
     if scan is None:
-        everything = (np.arange(len(points)),)
-        return ArtefactShape(everything, offset_misfit, np.nan, 0.0, reference=attitude.reshape(-1, 9))
+        return ArtefactShape((np.arange(len(points)),), offset_misfit, np.nan, 0.0, reference=attitude.reshape(-1, 9))
     rows = shape.rows_by(points.measurement)
     if any(len(one) < 5 for one in rows):
         return None
@@ -248,8 +247,7 @@ def scan_of(points: Points) -> Floats | None:
 def check_angles(points: Points, where: str | None) -> None:
     """Refuse a recording without attitudes, or with several in one measurement."""
     angles = columns_needed(points, ANGLES, "digitizer", where)
-    poses = Placings.of(points.measurement)
-    off = np.any(np.abs(angles - poses.means(angles)) > _SAME, axis=1)
+    off = np.any(np.abs(angles - Placings.of(points.measurement).means(angles)) > _SAME, axis=1)
     if off.any():
         number = points.measurement[np.argmax(off)]
         raise CmmUqError(f"measurement {number} has several attitudes", where=place(points, off, where),

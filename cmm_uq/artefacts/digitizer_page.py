@@ -66,8 +66,7 @@ class DigitizerFigures:
         """Centre of the reference sphere in the recorded frame, mm."""
         values = self.result.values.mean(axis=0)
         model, digitizer = self.result.model, self.digitizer
-        count = len(digitizer.sizes)
-        return tuple(digitizer.centre(model.placed(values), values[len(values) - count :]).tolist())
+        return tuple(digitizer.centre(model.placed(values), values[len(values) - len(digitizer.sizes) :]).tolist())
 
     @cached_property
     def times(self) -> tuple[Floats, float]:
@@ -132,9 +131,8 @@ MEANING = say("The mount lies at [U1 V1 W1] in the digitizer's frame u, v, w, wh
 
 def sections(result: Result) -> list[Section]:
     found = DigitizerFigures(result)
-    offset = (_offset(found), *_assumed(found.digitizer), _two_ways(found))
     return [
-        Section(say("Offset of the mount"), offset),
+        Section(say("Offset of the mount"), (_offset(found), *_assumed(found.digitizer), _two_ways(found))),
         Section(say("Attitudes"), (_attitudes(found), _residuals(result, found.digitizer))),
     ]
 

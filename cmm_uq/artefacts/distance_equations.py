@@ -187,8 +187,7 @@ def refuse_poor_placings(differences: Floats) -> None:
     wanted = missing_placings(differences)
     if not wanted:
         return
-    directions = differences / apart[:, None]
-    spread, count = np.linalg.svd(directions, compute_uv=False), len(differences)
+    spread, count = np.linalg.svd(differences / apart[:, None], compute_uv=False), len(differences)
     if len(differences) < UNKNOWNS:
         problem = say("{count} distances are too few for the six factors of scale and squareness", count=count)
     elif spread[1] < POORLY_POSED * spread[0]:

@@ -180,8 +180,7 @@ class StepGauge(Artefact):
         return self._lines.columns(np.ones((len(xyz), 1)))
 
     def calibration(self) -> Cause | None:
-        change = self.size_change()[:, 0]
-        return self.certificate.beyond(self.sizes[0], *self._ends_of_longest, change, self.expansion)
+        return self.certificate.beyond(self.sizes[0], *self._ends_of_longest, self.size_change()[:, 0], self.expansion)
 
     def indications(self) -> Indications | None:
         """Distances from the first recorded face of each (measurement, repeat), against the certified ones."""

@@ -277,11 +277,10 @@ def _positions(lines: tuple[LineFigures, ...]) -> list[Block]:
         positions = listed(missing)
         texts.append(say("Not measured of the seven positions of ISO 10360-2:2009: {positions}.", positions=positions))
     if short:
-        least = say("{least_share:.0f} %", least_share=100 * ISO_10360_2.least_share)
         texts.append(
             say(
                 "Shorter than the {least} of the travel that ISO 10360-2:2009 asks for: {short}.",
-                least=least,
+                least=say("{least_share:.0f} %", least_share=100 * ISO_10360_2.least_share),
                 short=listed(short),
             )
         )

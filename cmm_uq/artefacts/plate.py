@@ -108,14 +108,12 @@ class Plate(Rigid):
         return found
 
     def calibration(self) -> Cause | None:
-        change = self.size_change()[:, 0]
-        own = self.certificate.beyond(self.sizes[0], *self._ends, change, self.expansion)
+        own = self.certificate.beyond(self.sizes[0], *self._ends, self.size_change()[:, 0], self.expansion)
         return None if self._since_earlier else own
 
     def indications(self) -> Indications | None:
         """Distances between every two balls of a (measurement, repeat), against the certified ones."""
-        size = self.sizes[0]
-        if not size.certified:
+        if not self.sizes[0].certified:
             return None
         runs = Placings.of(self.points.group)
         found, certified, ends = [], [], []

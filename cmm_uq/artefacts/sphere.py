@@ -148,8 +148,7 @@ def sphere(facts: ArtefactFacts, plan: PlanFacts) -> Pattern:
 
 def sphere_places(setting: Setting) -> tuple[SetUp, ...]:
     """Once in the middle of the volume."""
-    pattern = sphere(setting.artefact, setting.plan)
-    return (setting.volume.set_up(pattern, np.eye(3), MIDDLE, say("in the middle")),)
+    return (setting.volume.set_up(sphere(setting.artefact, setting.plan), np.eye(3), MIDDLE, say("in the middle")),)
 
 
 def _shape(setting: Setting) -> PatternFor:
@@ -189,11 +188,10 @@ def _table(result: Result, sphere: SphereArtefact) -> Table:
     notes = [say("Form error: range of the radial distances from the least-squares sphere (ISO 10360-5:2010).")]
     if size.certified:
         errors.append(say("Size error"))
-        u = rounded(0.0, 2 * size.sd / MICROMETRE)[1] if size.sd else Number("0")
         notes.append(
             say(
                 "Size error: diameter of the least-squares sphere minus the certified one, whose U is {u} µm (k = 2).",
-                u=u,
+                u=rounded(0.0, 2 * size.sd / MICROMETRE)[1] if size.sd else Number("0"),
             )
         )
     columns = (*text_columns(say("Sphere")), *figure_columns(say("Points")), *figure_columns(*errors, unit=unit("µm")))

@@ -69,8 +69,7 @@ class TriangleStandard:
     @classmethod
     def of(cls, facts: TriangleFacts) -> TriangleStandard:
         dimensions = np.array([*facts.blocks_mm, *facts.cylinders_mm], dtype=np.float64)
-        u = MICROMETRE * np.repeat([facts.u_blocks_um, facts.u_cylinders_um], 3)
-        return cls(dimensions, u)
+        return cls(dimensions, MICROMETRE * np.repeat([facts.u_blocks_um, facts.u_cylinders_um], 3))
 
     @property
     def sides(self) -> Floats:
@@ -235,8 +234,7 @@ def _refuse_missing_corners(points: Points, where: str | None) -> None:
     if np.any(other := ~np.isin(points.point, (1, 2, 3))):
         raise CmmUqError(f"there is a point {points.point[np.argmax(other)]}: a triangle has 1, 2, 3",
                          where=place(points, other, where), fix="Number the cylinders as in blocks_mm")  # fmt: skip
-    counts = np.bincount(points.group)
-    if np.any(short := counts[points.group] < 3):
+    if np.any(short := np.bincount(points.group)[points.group] < 3):
         row = int(np.argmax(short))
         present = points.point[points.group == points.group[row]]
         missing = sorted({1, 2, 3} - set(present.tolist()))[0]

@@ -312,10 +312,9 @@ def results(result: Result) -> Mapping[str, Any]:
 
 
 def sections(result: Result) -> list[Section]:
-    by_two_ways = (*_two_ways(result, by_equations(result)), *_alike(result))
     return [
         Section(say("The triangle"), (_standard(*standard_figures(result)), _sides(sides_of(result)))),
-        Section(say("Parameters by two ways"), by_two_ways),
+        Section(say("Parameters by two ways"), (*_two_ways(result, by_equations(result)), *_alike(result))),
     ]
 
 

@@ -212,8 +212,7 @@ def _acquired(facts: JobFile, source: JobFiles, inputs: dict[str, bytes]) -> Pro
     if not source.has(name):
         return None
     inputs |= _contents(source, [name], TABLE_BYTES, written=True)
-    where = str(source.toml.parent / name)
-    return provenance_of(inputs[name], inputs[facts.recording.file], facts.job.origin, where)
+    return provenance_of(inputs[name], inputs[facts.recording.file], facts.job.origin, str(source.toml.parent / name))
 
 
 def _short_gauge(facts: JobFile, inputs: Mapping[str, bytes], folder: Path, machine: Machine) -> ShortGauge | None:

@@ -45,8 +45,7 @@ class _Described(GenerateJsonSchema):
 def schema_of(table: type[BaseModel], title: str = "") -> Schema:
     """Schema of a table, with everything in it written out."""
     whole = table.model_json_schema(schema_generator=_Described, mode="validation")
-    inside = whole.pop("$defs", {})
-    found: Schema = _written_out(whole, inside)
+    found: Schema = _written_out(whole, whole.pop("$defs", {}))
     found.pop("description", None)
     return ({"$schema": DRAFT, "title": title} if title else {}) | found
 

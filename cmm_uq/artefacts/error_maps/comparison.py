@@ -94,8 +94,7 @@ class ColumnComparison:
     @cached_property
     def contrasts(self) -> Floats:
         """(k − 1, k) orthonormal."""
-        k = len(self.column.values)
-        return np.asarray(linalg.null_space(np.ones((1, k))).T, dtype=np.float64)
+        return np.asarray(linalg.null_space(np.ones((1, len(self.column.values)))).T, dtype=np.float64)
 
     @cached_property
     def observed(self) -> Floats:
@@ -122,8 +121,7 @@ class ColumnComparison:
         Q = linalg.orth(self.baseline / np.linalg.norm(self.baseline, axis=0).clip(1e-300))
         left = self.observed - Q @ (Q.T @ self.observed)
         sigma = np.geomspace(rough / 10, 4 * max(rough, float(left.std())), _SIGMAS)
-        contrast = np.repeat(np.arange(m // p), p)
-        noises = kinds_along(contrast, _WHITE, _CORRELATIONS)
+        noises = kinds_along(np.repeat(np.arange(m // p), p), _WHITE, _CORRELATIONS)
         explanations = [
             Explanation(
                 rival.name, EFFECT if rival.effect else UNKNOWN,

@@ -86,8 +86,7 @@ def shift_series(setting: Setting) -> tuple[SetUp, ...]:
     if known is None and not plan.lengths_mm:
         raise CmmUqError("the length of the artefact is needed", where="job.toml [plan] length_mm",
                          fix="Give it, with pitch_mm, or all distances as lengths_mm")  # fmt: skip
-    faces = faces_of(facts, plan.model_copy(update={"length_mm": known}))
-    places = np.concatenate([[0.0], faces])
+    places = np.concatenate([[0.0], faces_of(facts, plan.model_copy(update={"length_mm": known}))])
     i = AXES.index(facts.axis)
     reach = float(places[-1] + np.ptp(facts.shifts_mm))
     if reach > volume.size[i]:
@@ -114,8 +113,7 @@ def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
 def free(setting: Setting, points: Points, where: str) -> tuple[Text, ...]:
     """What no reading of these series shows."""
     facts = _facts(setting)
-    series = recorded_series(facts, points, where)
-    left = undetermined(series, scale_known=facts.known is not None)
+    left = undetermined(recorded_series(facts, points, where), scale_known=facts.known is not None)
     found = [
         say(
             "errors that repeat every {period:.4g} mm, or a half, a third … of it: every shift is a multiple of it",

@@ -135,8 +135,7 @@ def _model(series: ShiftedSeries, known: KnownSpan | None, sigma: float | None) 
     low, high = series.span
     cosine = series.cosine[series.series]
     flat = cosine[:, None] * _point_columns(series, known)[series.point]
-    start = series.reading[series.series == 0][0]
-    flat[:, -1] = start - series.reading
+    flat[:, -1] = series.reading[series.series == 0][0] - series.reading
     observed = series.reading - series.shifts[series.series]
     columns, sd = [], []
     if series.u_shift > 0:

@@ -32,8 +32,7 @@ def check_readings(a: Floats, b: Floats) -> None:
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
         raise CmmUqError("a reading is no finite number", fix="Read the point again, or leave it out of both series")
     for name, series in (("first", a), ("shifted", b)):
-        steps = np.diff(series)
-        bad = np.flatnonzero(np.sign(steps) != np.sign(series[-1] - series[0]))
+        bad = np.flatnonzero(np.sign(np.diff(series)) != np.sign(series[-1] - series[0]))
         if bad.size:
             raise CmmUqError(f"the {name} series is out of order at point {bad[0] + 2}",
                              fix="Number the points along the artefact, the same way in both placings")  # fmt: skip

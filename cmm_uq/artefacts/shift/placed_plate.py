@@ -157,8 +157,7 @@ def _check_plane(readings: Floats, placing: Ints, placings: Ints, axes: list[int
             raise CmmUqError(f"placing {number} does not lie in the plane {plane}: {AXES[across]} varies by "
                              f"{np.ptp(rows[:, across]):.3g} mm", where=where or None,
                              fix="Name the plane in which the plate lies, or level it")  # fmt: skip
-        centred = rows[:, axes] - rows[:, axes].mean(axis=0)
-        length, width = np.linalg.svd(centred, compute_uv=False)
+        length, width = np.linalg.svd(rows[:, axes] - rows[:, axes].mean(axis=0), compute_uv=False)
         if width < _LINE * length:
             raise CmmUqError(f"the balls of placing {number} lie on one line", where=where or None,
                              fix='A line calibrates one axis: axis = "x" and shifts_mm instead of plane')  # fmt: skip

@@ -278,8 +278,7 @@ def _plate(result: PlaneShiftResult) -> Section:
         if not free.size_known:
             note = after(note, say("Their common scale is not determined: it is that of the machine."))
         blocks.append(Table(say("The plate's own geometry"), (Column(say("Ball")), *places), cells, (note,)))
-    otherwise = say("Uncalibrated plate, shifted and turned")
-    return shared.artefact_section(result.job, otherwise, say("balls"), (), *blocks)
+    return shared.artefact_section(result.job, say("Uncalibrated plate, shifted and turned"), say("balls"), (), *blocks)
 
 
 def _coordinate(x: float, U: float) -> tuple[Text, Text]:

@@ -59,8 +59,7 @@ class ShiftedSeries:
     def positions(self) -> Floats:
         """Where the axis was read, mm: readings nearer to each other than a tenth of the usual pitch are one place."""
         ordered = np.sort(self.reading)
-        pitch = self.pitch
-        starts = np.flatnonzero(np.diff(ordered, prepend=-np.inf) > 0.1 * pitch)
+        starts = np.flatnonzero(np.diff(ordered, prepend=-np.inf) > 0.1 * self.pitch)
         return np.asarray(np.add.reduceat(ordered, starts) / np.diff([*starts, len(ordered)]))
 
     @cached_property
@@ -124,8 +123,7 @@ def _check_shifts(shifts: Floats, placings: Ints) -> None:
     if len(shifts) != len(placings):
         raise CmmUqError(f"{len(shifts)} shifts for {len(placings)} series", where=where,
                          fix="Give one shift a series, 0.0 for the first")  # fmt: skip
-    order = np.argsort(shifts)
-    for one, other in pairwise(order.tolist()):
+    for one, other in pairwise(np.argsort(shifts).tolist()):
         if shifts[other] - shifts[one] < _ALIKE:
             i, j = sorted((int(one), int(other)))
             raise CmmUqError(

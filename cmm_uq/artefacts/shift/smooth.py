@@ -376,8 +376,7 @@ class Coefficients:
 
     def function(self, index: int, x: Floats) -> Floats:
         """One of the functions at positions (m,): (N, m)."""
-        part = self.model._split(self.coefficients)[index]
-        return self.model.functions[index].values(x, part, self.growth)
+        return self.model.functions[index].values(x, self.model._split(self.coefficients)[index], self.growth)
 
     @property
     def left(self) -> Floats:

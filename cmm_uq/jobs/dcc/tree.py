@@ -68,8 +68,7 @@ def parsed(data: bytes, where: str) -> Node:
     def start(name: str, attributes: dict[str, str]) -> None:
         nonlocal count
         count += 1
-        limits = ((count, XML_ELEMENTS), (len(open_) - 1, XML_DEPTH), (len(attributes), XML_ATTRIBUTES))
-        for number, limit in limits:
+        for number, limit in ((count, XML_ELEMENTS), (len(open_) - 1, XML_DEPTH), (len(attributes), XML_ATTRIBUTES)):
             if number > limit.most:
                 refuse(f"has more than {limit.most} {limit.unit}")
         named = {_named(key): value for key, value in attributes.items()}

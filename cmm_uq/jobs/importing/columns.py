@@ -276,8 +276,7 @@ def numbered(cells: Sequence[Cell], sign: str, at: Callable[[int], str]) -> tupl
         raise CmmUqError("no value", where=at(list(cells).index("")), fix="Complete the row")
     for row, cell in enumerate(cells):
         if is_number(cell):
-            problem = f"{cell!r} among names such as {cells[0]!r}"
-            raise CmmUqError(problem, where=at(row), fix="Number all, or name all")
+            raise CmmUqError(f"{cell!r} among names such as {cells[0]!r}", where=at(row), fix="Number all, or name all")
     known: dict[str, int] = {}
     values = [known.setdefault(str(cell), len(known) + 1) for cell in cells]
     first = list(known.items())[:_NAMED]

@@ -201,8 +201,7 @@ def sheets_of(rows: Sequence[Row], headings: Sequence[str], **of_all: Any) -> li
         lines = [line for of, _, line in rows if of == sort]
         columns = zip(headings, *(cells for of, cells, _ in rows if of == sort), strict=True)
         table = list(zip(*(column for column in columns if any(cell != "" for cell in column[1:])), strict=True))
-        name = f"{sort}s" if sort else ""
-        sheets.append(Sheet(name, table, [lines[0], *lines], listed=True, **of_all))
+        sheets.append(Sheet(f"{sort}s" if sort else "", table, [lines[0], *lines], listed=True, **of_all))
     return sheets
 
 
