@@ -292,9 +292,10 @@ def _certified(data: dict[str, Any], source: JobFiles, nameable: Nameable) -> Ce
 
 
 def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str], list[str]]:
-    """Files of its error maps, of its temperature log, and of its digitizer's calibration."""
+    """Files of its error maps and their covariance, of its temperature log, and of its digitizer's calibration."""
     calibration, log = calibration_file(facts.digitizer), facts.temperature_log
-    return [given.file for given in facts.error_map], [log.file] if log else [], [calibration] if calibration else []
+    maps = [name for given in facts.error_map for name in (given.file, given.covariance) if name is not None]
+    return maps, [log.file] if log else [], [calibration] if calibration else []
 
 
 def _model_for(data: dict[str, Any], nameable: Nameable, path: Path) -> type[JobFile]:

@@ -93,14 +93,18 @@ class Improvement:
     unseen: Text = say("set-ups")
 
 
-def improvement(before: RecordingModel, after: RecordingModel) -> Improvement:
-    """Compare two models of one recording by cross-validation over its set-ups, or the points of few set-ups."""
-    # what is left out together, by its place: set-ups, or of few set-ups, which might leave too much open, their points
-    artefact, used = before.artefact, before.used
+def held_out_groups(model: RecordingModel) -> tuple[Ints, Text]:
+    """What is left out together (m,), by its place: set-ups; or points, of few set-ups, which might leave too much open."""
+    artefact, used = model.artefact, model.used
     group, unseen = artefact.measurement[used], say("set-ups")
     if len(np.unique(group)) < FOLDS:
         group, unseen = np.column_stack([group, artefact.points.point[artefact.rows[:, 0]][used]]), say("points")
-    groups = numbered_by_place(before, group)
+    return numbered_by_place(model, group), unseen
+
+
+def improvement(before: RecordingModel, after: RecordingModel) -> Improvement:
+    """Compare two models of one recording by cross-validation over its set-ups, or the points of few set-ups."""
+    groups, unseen = held_out_groups(before)
     left = [model.estimate().least_squares.residuals for model in (before, after)]
     rms = [float(np.sqrt(np.mean(each**2)) / MICROMETRE) if len(each) else 0.0 for each in left]
     first = _held_out(before, groups)
@@ -122,7 +126,7 @@ def _held_out(model: RecordingModel, groups: NDArray[np.int64]) -> tuple[float, 
     for k in range(folds):
         out = np.isin(groups, numbers[k::folds])
         mean, covariance, _ = Density(replace(linear.at(~out), sigma=sigma)).conditional(float(np.log(sigma)))
-        left, known, open_ = _predicted(placing, every, out)
+        left, known, open_ = predicted(placing, every, out)
         error = left[:, 0] - left[:, 1:] @ mean
         errors.append(float(error @ error) * linear.noise_scale[out].mean() ** 2)
         counts.append(len(error) - open_)
@@ -138,7 +142,7 @@ def _held_out(model: RecordingModel, groups: NDArray[np.int64]) -> tuple[float, 
     return float(np.sqrt(sum(errors) / max(sum(counts), 1)) / MICROMETRE), np.array(densities)
 
 
-def _predicted(placing: Freedoms, every: Floats, out: NDArray[np.bool_]) -> tuple[Floats, Floats, int]:
+def predicted(placing: Freedoms, every: Floats, out: NDArray[np.bool_]) -> tuple[Floats, Floats, int]:
     """Columns (o, b) held out less what other observations tell; (o, r) factor of its covariance; dimensions lost."""
     left, known, open_ = every.copy(), [np.zeros((len(every), 0))], 0
     for rows in placing.rows:

@@ -33,7 +33,7 @@ from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.superposition import About
-from cmm_uq.maths.inference.families import BRIEF, sample_sizes
+from cmm_uq.maths.inference.families import BRIEF, FieldSizes, sample_sizes
 from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior, gain
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
@@ -64,6 +64,39 @@ class FactorRegions:
     observations: tuple[int, int]  # reckoned with, and of how many
 
 
+@dataclass(frozen=True, eq=False)
+class DrawnErrors:
+    """All errors of a machine together, drawn given a recording."""
+
+    model: RecordingModel  # of the observations that are reckoned with
+    field: RecordedField
+    sizes: FieldSizes
+    own: Floats  # (N, k) of the coefficients of the named effects
+    further: Floats  # (N, f) of those of the field's effects
+
+    @classmethod
+    def of(cls, model: RecordingModel, observe: Observed, seed: int, draws: int = DRAWS) -> DrawnErrors:
+        """Raises ``CmmUqError`` where the machine's travel is not stated, or the recording does not allow it."""
+        count, random = int(model.used.sum()), np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(37,)))
+        thinned = thin_out(model, observe, seed, _MOST * count // max(_quantities(model), 1))
+        field = RecordedField.of(thinned, other_errors(model))
+        sizes = sample_sizes(field.field, draws, seed, effort=BRIEF)
+        drawn = field.coefficients(sizes.noise, sizes.families, random)
+        return cls(thinned, field, sizes, drawn[:, : field.modelled], drawn[:, field.modelled :])
+
+    def recorded(self, model: RecordingModel, posterior: NoisyPosterior) -> Floats:
+        """Draws (N, k) of the named effects as means over the recorded set-ups, as an estimate of them alone has them."""
+        return np.asarray(self.own + self.further @ as_recorded(model, self.field, posterior).T)
+
+
+def other_errors(model: RecordingModel) -> list[Unmodelled]:
+    """What a machine may have beside the named errors, curves in place of their simplest forms."""
+    others = unmodelled_errors([one.name for one in model.effects], {})
+    return [one for one in others if family_of(one.effect) not in ALLOWED] + [
+        Unmodelled(one, np.array([c.prior_sd for c in one.coefficients])) for one in curves()
+    ]
+
+
 def factor_regions(
     model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, observe: Observed, seed: int
 ) -> FactorRegions:
@@ -74,16 +107,10 @@ def factor_regions(
     """
     if model.artefact.points.machine.axes != tuple(AXES):
         raise CmmUqError("the machine has other axes than three straight ones", where="the machine")
-    count, random = int(model.used.sum()), np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(37,)))
-    others = [one for one in unmodelled_errors(_names(model.effects), {}) if family_of(one.effect) not in ALLOWED]
-    others += [Unmodelled(one, np.array([c.prior_sd for c in one.coefficients])) for one in curves()]
-    thinned = thin_out(model, observe, seed, _MOST * count // max(_quantities(model), 1))
-    field = RecordedField.of(thinned, others)
-    sizes = sample_sizes(field.field, DRAWS, seed, effort=BRIEF)
-    drawn = field.coefficients(sizes.noise, sizes.families, random)
-    own, further = drawn[:, : field.modelled], drawn[:, field.modelled :]
+    drawn = DrawnErrors.of(model, observe, seed)
+    field, sizes, own, further = drawn.field, drawn.sizes, drawn.own, drawn.further
 
-    named, placed = _columns(model.effects, _of_place), _columns(field.effects, lambda one: not one.columns)
+    named, placed = columns_of(model.effects, _of_place), columns_of(field.effects, lambda one: not one.columns)
     moved = partial(
         _moved, model.artefact.points.machine, _chosen(model.effects, named), _chosen(field.effects, placed)
     )
@@ -96,10 +123,10 @@ def factor_regions(
     def within(change: Floats) -> Floats:
         return np.asarray(own[:, named] + further[:, placed] @ change[same].T)
 
-    doubted = partial(_doubted, doubt, len(model.unknowns), named, posterior.seed)
+    doubted = partial(doubted_draws, doubt, len(model.unknowns), named, posterior.seed)
     over_all, parts = doubted(within(whole)), np.stack([doubted(within(one)) for one in eighths])
     low, high = np.quantile(parts.min(axis=0), 0.025, axis=0), np.quantile(parts.max(axis=0), 0.975, axis=0)
-    recorded = own + further @ _as_recorded(model, field, posterior).T
+    recorded = drawn.recorded(model, posterior)
     quantities = [Quantity.of_draws(each, of) for each, of in zip(over_all.T, units, strict=True)]
     of_family = np.array([family_of(one) for one in field.effects for _ in one.coefficients])[placed]
     scales = dict(zip(field.field.families, sizes.families.T, strict=True))
@@ -114,15 +141,11 @@ def factor_regions(
         dict(zip(keys, quantities, strict=True)),
         {key: (float(low[i]), float(high[i])) for i, key in enumerate(keys) if str(units[i]) in _ANYWHERE},
         {key: Quantity.of_draws(recorded[:, i], of) for i, key, of in zip(named, keys, units, strict=True)},
-        _disagreeing(model, posterior, recorded),
+        disagreeing(model, posterior, recorded),
         scales,
         influence,
-        (int(thinned.used.sum()), count),
+        (int(drawn.model.used.sum()), int(model.used.sum())),
     )
-
-
-def _names(effects: Sequence[Effect]) -> list[str]:
-    return [one.name for one in effects]
 
 
 def _of_place(effect: Effect) -> bool:
@@ -131,7 +154,7 @@ def _of_place(effect: Effect) -> bool:
     return of_machine(effect) and alike and not (effect.columns or effect.shape)
 
 
-def _columns(effects: Sequence[Effect], which: Callable[[Effect], bool]) -> Ints:
+def columns_of(effects: Sequence[Effect], which: Callable[[Effect], bool]) -> Ints:
     """Places of the coefficients of some effects among those of all."""
     return np.flatnonzero([which(one) for one in effects for _ in one.coefficients])
 
@@ -172,7 +195,7 @@ def _moved(
     return np.asarray(found)
 
 
-def _doubted(doubt: Doubt, count: int, named: Ints, seed: int, draws: Floats) -> Floats:
+def doubted_draws(doubt: Doubt, count: int, named: Ints, seed: int, draws: Floats) -> Floats:
     """Draws (N, k) of some of ``count`` unknowns with what is in doubt about all observations together."""
     if not doubt.carried:
         return draws
@@ -181,7 +204,7 @@ def _doubted(doubt: Doubt, count: int, named: Ints, seed: int, draws: Floats) ->
     return doubt.widened(whole, seed)[:, named]
 
 
-def _as_recorded(model: RecordingModel, field: RecordedField, posterior: NoisyPosterior) -> Floats:
+def as_recorded(model: RecordingModel, field: RecordedField, posterior: NoisyPosterior) -> Floats:
     """(k, j) by which the estimates of the named errors change with a unit of each coefficient of others."""
     estimate = model.estimate()
     seen = [model.seen(model.columns(one, (), estimate.about), estimate.about) for one in field.effects]
@@ -189,7 +212,7 @@ def _as_recorded(model: RecordingModel, field: RecordedField, posterior: NoisyPo
     return np.asarray(weights[: field.modelled] @ np.hstack(seen))
 
 
-def _disagreeing(model: RecordingModel, posterior: NoisyPosterior, recorded: Floats) -> tuple[Key, ...]:
+def disagreeing(model: RecordingModel, posterior: NoisyPosterior, recorded: Floats) -> tuple[Key, ...]:
     """Coefficients of the named model that draws (N, k) of the same from all errors together deny, jointly."""
     one, k = posterior.draws[:, : recorded.shape[1]], recorded.shape[1]
     off = np.abs(one.mean(axis=0) - recorded.mean(axis=0))

@@ -228,13 +228,28 @@ def compensate(
     cloud: Path | None = option(
         None, "Cloud of a digitizer to correct instead: .csv, .parquet, .npy or a folder of them.", "FILE",
         "the job's recording"),
+    new_map: bool = option(False, "Write instead an error map of all errors that the job's recording shows."),
     end: Ending = opt.FORCED,
 ) -> None:  # fmt: skip
-    """Correct a recording by its machine's error maps, as a job folder of its own."""
-    from cmm_uq.app.commands.jobs.compensate import write_compensated, write_compensated_cloud
+    """Correct a recording by its machine's error maps, as a job folder of its own, or make such a map of one."""
+    from cmm_uq.app.commands.jobs.compensate import (
+        worth_of,
+        write_compensated,
+        write_compensated_cloud,
+        write_new_map,
+    )
     from cmm_uq.machine.physics.map_interpolation import Beyond
 
     beyond: Beyond = "extrapolate" if extrapolate else "refuse"
+    if new_map:
+        if cloud is not None or map_text is not None or extrapolate:
+            problem = "--new-map makes a map, and goes with none of --cloud, --map-text and --extrapolate"
+            raise CmmUqError(problem, fix="Leave out one of them")
+        with end.progress() as stage:
+            files, found = write_new_map(job, out, force=end.force, stage=stage)
+        what = f"An error map of all errors that the recording of {job} shows"
+        conclude_derived(files, what, end, is_job=False, remarks=worth_of(found))
+        return
     if cloud is None:
         files = write_compensated(job, out, beyond=beyond, map_text_c=map_text, force=end.force)
     elif map_text is not None:

@@ -50,6 +50,10 @@ FILES = {
     "job.toml": "the job",
     "truth.toml": "what it was drawn from",
     "compensation.json": "how the coordinates came about",
+    "points-u.csv": "standard uncertainties of the coordinates",
+    "error-map.csv": "the error map",
+    "error-map-covariance.npy": "the covariance of its figures",
+    "error-map.toml": "the key of a job that names both",
     "fleet.html": "what the machines have in common",
     "fleet.json": "every figure, for other programs",
     "fleet.csv": "every machine and value, for a spreadsheet",
@@ -206,7 +210,9 @@ def conclude(result: Written[Any], end: Ending) -> None:
         raise typer.Exit(NOT_CONFORMING)
 
 
-def conclude_derived(files: Mapping[str, Path], what: str, end: Ending, *, is_job: bool = True) -> None:
+def conclude_derived(
+    files: Mapping[str, Path], what: str, end: Ending, *, is_job: bool = True, remarks: Sequence[str] = ()
+) -> None:
     """How a command ends that wrote a recording made from another one: its manifest, or where it is and what to do next."""
     if end.json:
         put_manifest(files)
@@ -215,7 +221,7 @@ def conclude_derived(files: Mapping[str, Path], what: str, end: Ending, *, is_jo
         from cmm_uq.certificate.wording import Summary
 
         further = (say("Next: cmm-uq report {folder}", folder=Verbatim(folder_of(files))),) if is_job else ()
-        show_summary(Summary(Verbatim(what), remarks=further), files, verbose=end.verbose)
+        show_summary(Summary(Verbatim(what), remarks=(*map(Verbatim, remarks), *further)), files, verbose=end.verbose)
 
 
 def put_manifest(files: Mapping[str, Path]) -> None:

@@ -64,6 +64,8 @@ class SimulationFacts(JobTable):
             yield 'give either file = "predicted.csv", or map = "error_map.csv"'
         if self.refit and not self.effects:
             yield "refit = true says nothing of what: name the effects that the simulation contains"
+        if any(given.covariance is not None for given in self.map):
+            yield "a covariance belongs to a map under [machine], whose corrections are made with it: leave it out"
         for name in ("length_mm", "unit", "columns"):
             if self.map and name in self.model_fields_set:
                 yield f"{name} belongs to a file of predictions, not to a map: leave it out"

@@ -9,7 +9,18 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED, MAPS
-from cmm_uq.base.files.table import Column, JobTable, Number, Positive, Range, Temperature, Triple, key, required
+from cmm_uq.base.files.table import (
+    Column,
+    JobTable,
+    Number,
+    Positive,
+    Range,
+    Temperature,
+    Triple,
+    Uncertainty,
+    key,
+    required,
+)
 
 Method = Literal["fixed", "A3", "S2", "staircase", "control chart", "drift"]
 Months = Annotated[int, Field(ge=1, le=600)]
@@ -87,9 +98,22 @@ class ErrorMapFile(JobTable):
     temperature_c: Annotated[Temperature, AfterValidator(_of_a_workshop)]
     """Temperature of the scales at which the map was taken."""
     squareness_arcsec: SquarenessFacts | None = key(None, "Squareness of the axes at that temperature.")
+    covariance: str | None = None
+    """Factor F of the covariance F·Fᵀ of the map's figures, as an `.npy` file that `compensate --new-map` writes."""
+    u_beside_um: Annotated[list[Uncertainty], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]
+    """Standard uncertainties along x, y and z of errors that the map does not hold, beside its covariance."""
+
+    def problems(self) -> Iterator[str]:
+        if any(self.u_beside_um) and self.covariance is None:
+            yield 'u_beside_um stands beside a covariance: name its file, covariance = "….npy", or leave it out'
 
 
-def _squareness_of_all_or_none(maps: list[ErrorMapFile]) -> list[ErrorMapFile]:
+def _of_all_or_none(maps: list[ErrorMapFile]) -> list[ErrorMapFile]:
+    stated = [given.file for given in maps if given.covariance is not None]
+    if stated and len(maps) > 1:
+        raise ValueError(
+            f"the map {stated[0]!r} has a covariance, which says nothing of maps between two. Name that map alone, or none"
+        )
     without = [given.file for given in maps if given.squareness_arcsec is None]
     if without and len(without) < len(maps):
         raise ValueError(
@@ -164,9 +188,7 @@ class MachineFacts(JobTable):
     travel_mm: Travel = key(Travel(), "Lowest and highest scale reading of each axis.")
     origin_mm: Triple = [0.0, 0.0, 0.0]
     """Scale reading of the recording's origin: scale reading = recorded coordinate + origin."""
-    error_map: Annotated[
-        list[ErrorMapFile], Field(max_length=MAPS.most), AfterValidator(_squareness_of_all_or_none)
-    ] = []
+    error_map: Annotated[list[ErrorMapFile], Field(max_length=MAPS.most), AfterValidator(_of_all_or_none)] = []
     """Error maps of the machine; several are interpolated by the temperature of the scales."""
     squareness_arcsec: SquarenessFacts | None = key(None, "Squareness of the axes beside an error map.")
     temperature_log: TemperatureLogFile | None = None

@@ -21,11 +21,13 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
+from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.prediction import KEY, Prediction
 from cmm_uq.jobs.tables.machine import ErrorMapFile, SquarenessFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings
 from cmm_uq.machine.physics.error_map import ErrorMap, parse_map_file
+from cmm_uq.machine.physics.map_covariance import parse_covariance
 
 # mm from where a point was recorded, within which it is taken to be predicted: no hand sets up much worse, and errors change
 # by less than their own size over it
@@ -244,7 +246,13 @@ def maps_named(
         if not (square or has_squareness):
             without.append(path)
         source = replace(found, source=given.file)  # as the job names it, wherever its folder lies
-        maps.append(source.with_squareness_arcsec(square.xy, square.yz, square.zx) if square else source)
+        if square:
+            source = source.with_squareness_arcsec(square.xy, square.yz, square.zx)
+        if given.covariance is not None:
+            content, file = job.inputs[given.covariance], str(job.folder / given.covariance)
+            beside = MICROMETRE * np.array(given.u_beside_um)
+            source = replace(source, covariance=parse_covariance(content, file, source, beside))
+        maps.append(source)
     if without and len(without) < len(maps):
         raise CmmUqError("has no squareness, and another map has: between them it would fall to zero", where=without[0],
                          fix=f"Give it squareness_arcsec in {where}")  # fmt: skip

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.physics.kinematics import KinematicChain, exact, on_leaning_axes
 from cmm_uq.machine.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.maths.geometry import Plane, fit_plane
@@ -74,6 +75,13 @@ class Compensation:
         e, extrapolated = self.error(indicated, when)
         return indicated + e, extrapolated
 
+    def standard_uncertainty(self, indicated: Floats, when: PointConditions = NOMINAL) -> Floats | None:
+        """Of corrected coordinates (n, 3), mm, by the covariance of the map; ``None`` where nobody states it."""
+        (one, *_), readings = self.maps.maps, indicated + np.asarray(self.origin)
+        if one.covariance is None:
+            return None
+        return one.covariance.standard_uncertainty(one, readings, tip=when.tip, chain=self.chain)
+
     def indicated_from_true(self, true: Floats, when: PointConditions = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
         """Coordinates (n, 3) in mm that the machine indicates at true coordinates; the inverse of :meth:`compensate`."""
         # on the way a point of the edge may lie outside by its own error; where it ends is what counts
@@ -96,7 +104,9 @@ class Compensation:
         return {
             "error_maps": [
                 {"file": m.source, "sha256": m.sha256, "temperature_c": m.temperature,
-                 "squareness_arcsec": m.squareness_arcsec} for m in self.maps.maps
+                 "squareness_arcsec": m.squareness_arcsec,
+                 **({} if m.covariance is None else {"u_beside_um": (m.covariance.beside / MICROMETRE).tolist()})}
+                for m in self.maps.maps
             ],
             "chain": KinematicChain.of(self.chain).letters, "origin_mm": [float(o) for o in self.origin],
             "form": "rigid transformations" if self.rigid else "first order on exact axes",

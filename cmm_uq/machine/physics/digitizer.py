@@ -145,6 +145,10 @@ class Digitizer:
             extrapolated[rows] = looked_up.extrapolated
         return xyz, extrapolated
 
+    def tips(self, scan: Floats) -> Floats:
+        """(n, 3) from the mount to points at u, v (n, 2) of the scan plane, along the machine's axes, mm."""
+        return np.asarray((np.column_stack([scan, np.zeros(len(scan))]) - self.offset) @ self.attitude.T)
+
     def transform(
         self, temperatures_at: Callable[[Floats], Floats] | float | None = None
     ) -> Callable[[Floats], Floats]:

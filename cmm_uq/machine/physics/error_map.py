@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from cmm_uq.base.files.csv_table import csv_table, number_problem
 from cmm_uq.base.files.limits import LINE, MAP_BYTES, MAP_ROWS
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
+
+if TYPE_CHECKING:
+    from cmm_uq.machine.physics.map_covariance import MapCovariance
 
 COLUMNS = ("dx_um", "dy_um", "dz_um", "rx_arcsec", "ry_arcsec", "rz_arcsec")
 UNITS = np.array([MICROMETRE] * 3 + [ARCSECOND] * 3)  # unit of each column, in mm and rad
@@ -50,6 +54,7 @@ class ErrorMap:
     temperature: float = 20.0  # at which it was taken, °C
     source: str = ""  # where it comes from
     sha256: str = ""  # of the file, where it comes from one
+    covariance: MapCovariance | None = None  # of its figures; ``None`` where nobody states it
 
     def with_squareness_arcsec(self, xy: float, yz: float, zx: float) -> ErrorMap:
         """The map with squareness errors in ″, in the project's sign: e_x = −Sxy·y, e_y = −Syz·z, e_x = −Szx·z."""

@@ -78,7 +78,7 @@ def test_over_the_recorded_set_ups_a_factor_is_what_the_recording_without_noise_
         [u.prior_mean for u in found.model.unknowns[field.modelled :]]
     )
     fitted = solve(replace(about.linear, observed=exact + sizes)).value[: field.modelled]
-    told = theta + room._as_recorded(found.model, field, found.posterior) @ c
+    told = theta + room.as_recorded(found.model, field, found.posterior) @ c
     # the estimator has a prior of 300 ppm, where u is 20: it is smaller by (20/300)², 0.4 %
     np.testing.assert_allclose(told, fitted, atol=6e-3 * float(np.abs(fitted).max()))
 
@@ -123,8 +123,8 @@ def test_doubt_of_the_artefact_widens_a_factor_wherever_it_holds() -> None:
     """3 ppm on the first of two unknowns: √(4² + 3²) = 5. 200 000 draws."""
     draws = 4 * np.random.default_rng(1).standard_normal((200_000, 1))
     cause = (np.array([[3.0], [0.0]]), np.zeros((2, 1)))
-    assert room._doubted(Doubt((cause,)), 2, np.array([0]), 0, draws).std() == pytest.approx(5.0, rel=0.01)
-    assert room._doubted(Doubt(()), 2, np.array([0]), 0, draws) is draws
+    assert room.doubted_draws(Doubt((cause,)), 2, np.array([0]), 0, draws).std() == pytest.approx(5.0, rel=0.01)
+    assert room.doubted_draws(Doubt(()), 2, np.array([0]), 0, draws) is draws
 
 
 @pytest.mark.parametrize(("times", "denied"), [(3.0, False), (4.5, True)])
@@ -134,7 +134,7 @@ def test_a_model_is_denied_beyond_its_joint_uncertainty(times: float, denied: bo
     draws = found.posterior.draws[:, :6].copy()
     draws[:, 2] += times * np.sqrt(2) * draws[:, 2].std()
     key = found.model.unknowns[2].key
-    assert room._disagreeing(found.model, found.posterior, draws) == ((key,) if denied else ())
+    assert room.disagreeing(found.model, found.posterior, draws) == ((key,) if denied else ())
 
 
 def test_without_a_travel_nothing_is_told_of_other_places() -> None:

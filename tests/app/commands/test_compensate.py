@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.jobs.compensate import write_compensated
+from cmm_uq.app.commands.jobs.compensate import write_compensated, write_new_map
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import analyse
 from cmm_uq.base.errors import CmmUqError
+from tests.app.cli.process import run
 from tests.conftest import ROOT
 
 
@@ -106,3 +107,84 @@ def test_how_it_came_about_names_files_not_folders(job: Path, tmp_path: Path) ->
     told = [(tmp_path / out / "compensation.json").read_bytes() for out in ("a", "b")]
     assert told[0] == told[1]
     assert json.loads(told[0])["error_maps"][0]["file"] == "map.csv"
+
+
+@pytest.fixture(scope="module")
+def new_map(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Made of the twenty bars of the example."""
+    out = tmp_path_factory.mktemp("map") / "map"
+    write_new_map(ROOT / "examples" / "iota-1102-20C", out)
+    return out
+
+
+def with_new_map(job: Path, new_map: Path) -> Path:
+    for name in ("error-map.csv", "error-map-covariance.npy"):
+        shutil.copy(new_map / name, job / name)
+    keys = (new_map / "error-map.toml").read_text(encoding="utf-8").splitlines()[1]
+    path = job / "job.toml"
+    path.write_text(re.sub(r"(?m)^(chain = .*\n)", rf"\1{keys}\n", path.read_text(encoding="utf-8")), encoding="utf-8")
+    return job
+
+
+def test_a_map_of_a_calibration_corrects_other_recordings_and_says_how_well(
+    job: Path, new_map: Path, tmp_path: Path
+) -> None:
+    """Two columns of the same real machine: corrected by the map, its bars agree far better, and each coordinate has its u."""
+    read = read_job(job)
+    write_compensated(with_new_map(job, new_map), tmp_path / "out")
+    after = read_job(tmp_path / "out").points
+    rows = (tmp_path / "out" / "points-u.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[0] == "measurement,point,repeat,u_x_um,u_y_um,u_z_um"
+    u = np.array([[float(cell) for cell in row.split(",")] for row in rows[1:]])
+    np.testing.assert_array_equal(u[:, :3], np.column_stack([after.measurement, after.point, after.repeat]))
+    assert np.all((u[:, 3:] > 4.7) & (u[:, 3:] < 100))  # no less than what no map holds
+    spread = [np.std(np.linalg.norm(points.xyz[0::2] - points.xyz[1::2], axis=1)) for points in (read.points, after)]
+    assert spread[1] < 0.3 * spread[0]
+    told = json.loads((tmp_path / "out" / "compensation.json").read_text(encoding="utf-8"))
+    assert [row["u_um"] <= row["largest_u_um"] for row in told["distances"]] == [True] * 8
+    assert told["error_maps"][0]["u_beside_um"] == pytest.approx([4.766, 4.853, 4.962], abs=0.3)
+
+
+def test_a_new_map_says_what_it_is_worth(new_map: Path) -> None:
+    told = json.loads((new_map / "compensation.json").read_text(encoding="utf-8"))
+    held = told["held_out_rms_um"]
+    assert held["left_out"] == "set-ups"
+    assert held["corrected"] < held["named_errors"] < held["uncorrected"]
+    assert told["sign"] == "true = indicated + e"
+    assert "hysteresis_x" in told["errors_not_in_it"]
+    assert told["inputs_sha256"].keys() == {"job.toml", "ballbar.csv"}
+
+
+def test_a_map_is_made_of_recordings_that_name_errors_of_a_machine_alone(tmp_path: Path) -> None:
+    for name in ("shift-simulated", "iota-1102-maps"):
+        with pytest.raises(CmmUqError):
+            write_new_map(ROOT / "examples" / name, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("option", [["--extrapolate"], ["--map-text", "20"], ["--cloud", "cloud.csv"]])
+def test_making_a_map_goes_with_no_option_of_correcting(option: list[str], tmp_path: Path) -> None:
+    found = run(
+        "compensate", str(ROOT / "examples" / "iota-1102-20C"), "--new-map", "--out", str(tmp_path / "out"), *option
+    )
+    assert found.returncode == 2
+    assert "--new-map makes a map, and goes with none of" in found.stderr
+
+
+def test_a_covariance_beside_two_maps_or_of_another_map_is_refused(job: Path, new_map: Path, tmp_path: Path) -> None:
+    (job / "map.csv").write_text(straight(), encoding="utf-8")
+    shutil.copy(new_map / "error-map-covariance.npy", job)
+    path, text = job / "job.toml", (job / "job.toml").read_text(encoding="utf-8")
+    one = '{ file = "map.csv", temperature_c = 20.0, covariance = "error-map-covariance.npy" }'
+    for maps, problem in (
+        (f'[{one}, {{ file = "map.csv", temperature_c = 25.0 }}]', "says nothing of maps between two"),
+        (f"[{one}]", "has 1173 rows, the map map.csv has 39 figures with its squareness"),
+        (
+            '[{ file = "map.csv", temperature_c = 20.0, u_beside_um = [1, 1, 1] }]',
+            "u_beside_um stands beside a covariance",
+        ),
+    ):
+        path.write_text(re.sub(r"(?m)^(chain = .*\n)", rf"\1error_map = {maps}\n", text), encoding="utf-8")
+        with pytest.raises(CmmUqError, match=problem):
+            write_compensated(job, tmp_path / "out")
+    assert not (tmp_path / "out").exists()

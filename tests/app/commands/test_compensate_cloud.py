@@ -304,3 +304,23 @@ def test_a_job_without_a_digitizer_says_how_to_describe_it(tmp_path: Path) -> No
     process = run("compensate", job, "--cloud", write_csv(tmp_path / "c.csv", scanned()), "--out", tmp_path / "out")
     assert process.returncode == 2
     assert "the job describes no digitizer" in process.stderr
+
+
+def test_a_cloud_has_u_of_each_coordinate_where_the_map_has_a_covariance(tmp_path: Path) -> None:
+    """A scale of x known to 10 ppm, and 0.2 µm beside it along z: at the mount's reading of x, turned by nothing."""
+    job = machine(tmp_path, 'error_map = [ { file = "map.csv", temperature_c = 20.0, covariance = "u.npy", '
+                            "u_beside_um = [0, 0, 0.2] } ]\n", poses=(1, 2))  # fmt: skip
+    (job / "map.csv").write_text(straight())
+    factor = np.zeros((6 * 6 + 3, 1))
+    factor[6] = 9.0  # µm at x = 900 mm
+    np.save(job / "u.npy", factor)
+    cloud = tmp_path / "cloud.csv"
+    cloud.write_text("u_mm,v_mm,d_mm,e_mm,f_mm,pose\n1,2,100,50,-100,1\n-3,4,450,60,-200,2\n5,6,900,70,-300,1\n")
+    files = write_compensated_cloud(job, cloud, tmp_path / "out")
+    lines = files["cloud-compensated.csv"].read_text(encoding="utf-8").splitlines()
+    assert lines[1] == "x_mm,y_mm,z_mm,u_x_mm,u_y_mm,u_z_mm"
+    u = np.array([[float(cell) for cell in line.split(",")] for line in lines[2:]])[:, 3:]
+    np.testing.assert_allclose(u, [[0.001, 0, 0.0002], [0.0045, 0, 0.0002], [0.009, 0, 0.0002]], atol=1e-9)
+    told = json.loads(files["compensation.json"].read_text(encoding="utf-8"))
+    assert len(told["distances"]) == 3
+    assert told["distances"][-1]["u_um"] == pytest.approx(8.0, rel=0.05)

@@ -5,17 +5,24 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from cmm_uq.analysis.machine.correction import FieldMap, field_map
+from cmm_uq.analysis.machine.state import of_machine
+from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.jobs.simulate import recording
 from cmm_uq.app.commands.model import refuse_planned
 from cmm_uq.app.commands.reading import job_of, read_job, read_machine
+from cmm_uq.app.commands.report import evaluate_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import Owner, sha256_of, staged
-from cmm_uq.base.points import AXES, Points
+from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.certificate.result import Result
 from cmm_uq.jobs.derived_job import IN_THE_RECORDING, PROGRAM, derived_toml, is_compensated, kept_inputs, recording_name
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.beside import log_of
@@ -23,13 +30,17 @@ from cmm_uq.jobs.reports import DescribedDigitizer, digitizer_of
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.tables.identification import first_line
 from cmm_uq.machine.model.predicted_errors import maps_of
-from cmm_uq.machine.physics.compensation import Compensation, compensate_points, machine_compensation
-from cmm_uq.machine.physics.digitizer import DigitizedCloud, Digitizer, columns_for
-from cmm_uq.machine.physics.error_map import error_map_text
+from cmm_uq.machine.physics.compensation import Compensation, circumstances, compensate_points, machine_compensation
+from cmm_uq.machine.physics.digitizer import POSE, DigitizedCloud, Digitizer, columns_for
+from cmm_uq.machine.physics.error_map import ErrorMap, error_map_csv, error_map_text
 from cmm_uq.machine.physics.kinematics import euler_313
+from cmm_uq.machine.physics.map_covariance import MapCovariance, SampledPoints, covariance_file, uncertain_map
 from cmm_uq.machine.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.machine.physics.point_cloud import cloud_files, cloud_header, transform_cloud
 
+NEW_MAP, COVARIANCE, MAP_KEYS = "error-map.csv", "error-map-covariance.npy", "error-map.toml"
+POINTS_U = "points-u.csv"  # standard uncertainties of corrected coordinates
+_LITTLE = 0.5  # part of the error that a map leaves from which on it corrects little
 PROVENANCE = "compensation.json"  # how the coordinates were corrected, in the folder of a compensated job
 
 
@@ -79,8 +90,104 @@ def write_compensated(
         found = ErrorMaps(maps_of(read)).map_at(map_text_c, beyond=beyond)
         text[name] = error_map_text(found, name=name).encode()
     owner = Owner("compensate", read.facts.job.id, read.origin)
-    with staged(out, owner, inputs=read.paths, force=force, expected=(*read.inputs, *text, PROVENANCE)) as place:
+    with staged(
+        out, owner, inputs=read.paths, force=force, expected=(*read.inputs, *text, POINTS_U, PROVENANCE)
+    ) as place:
         return place.write(_files(read, beyond, text))
+
+
+def write_new_map(
+    job: Path, out: Path, *, seed: int = 0, force: bool = False, stage: Stage | None = None
+) -> tuple[dict[str, Path], FieldMap]:
+    """Write the error map of all errors that a calibration shows, its covariance, and what they are good for.
+
+    Returns and raises as :func:`~cmm_uq.app.commands.jobs.simulate.write_simulation`, and the map.
+    """
+    tell, read = stage or silent, read_job(job)
+    _refuse(read)
+    refuse_planned(read)
+    owner = Owner("compensate", read.facts.job.id, read.origin)
+    names = (NEW_MAP, COVARIANCE, MAP_KEYS, PROVENANCE)
+    with staged(out, owner, inputs=read.paths, force=force, expected=names) as place:
+        tell("Estimating the errors", 0.0)
+        result, kind = evaluate_job(read, seed=seed), kind_of(read)
+        if not isinstance(result, Result) or not any(map(of_machine, result.model.effects)):
+            raise kind.refused("made an error map of")
+        observe = partial(kind.observing("reported"), read.facts.artefact, where=read.recording_path)
+        tell("Drawing all errors together", 0.4)
+        try:
+            found = field_map(result.model, result.posterior, result.doubt, observe, seed)
+        except CmmUqError as error:
+            raise CmmUqError(error.problem, where=error.where or str(read.folder), fix=error.fix) from error
+        if found.disagree:
+            names_of = ", ".join(".".join(key) for key in found.disagree)
+            problem = (
+                f"all errors together say something else of {names_of} than the named ones alone: neither makes a map"
+            )
+            raise CmmUqError(
+                problem, where=str(read.folder), fix=f"cmm-uq diagnose {read.folder} says what may be wrong"
+            )
+        return place.write(_map_files(read, found)), found
+
+
+def worth_of(found: FieldMap) -> list[str]:
+    """What a new map is good for, in sentences for who made it."""
+    (before, after), held = found.range_um, found.held_out
+    lines = [f"In the measuring range a coordinate is off by {before:.3g} µm rms, corrected by {after:.3g} µm"]
+    if after > _LITTLE * before:
+        lines.append("The recording leaves most of that open: correct nothing by this map where it was not recorded")
+    if held is None:
+        lines.append("Too little is recorded to hold some of it out: what the map is worth was not tried")
+    else:
+        lines.append(
+            f"{str(held.unseen).capitalize()} held out are off by {held.uncorrected:.3g} µm rms (predicted: "
+            f"{held.predicted[0]:.3g}), corrected by {held.corrected:.3g} ({held.predicted[1]:.3g}), by the named errors "
+            f"alone {held.named:.3g}"
+        )
+        if held.corrected > held.uncorrected:
+            lines.append("The map makes them worse: correct nothing by it")
+    if found.omitted:
+        lines.append(f"Neither in the map nor in its uncertainty: {', '.join(found.omitted)}")
+    lines.append(f"{MAP_KEYS} holds the key by which [machine] of a job names it")
+    return lines
+
+
+def _map_files(read: Job, found: FieldMap) -> dict[str, bytes]:
+    error_map, held = found.error_map, found.held_out
+    assert error_map.covariance is not None  # noqa: S101 - of its own making
+    beside = [round(float(u) / MICROMETRE, 4) for u in error_map.covariance.beside]
+    square = ", ".join(f"{pair} = {angle!r}" for pair, angle in error_map.squareness_arcsec.items())
+    keys = (
+        f'error_map = [{{ file = "{NEW_MAP}", temperature_c = {error_map.temperature!r}, squareness_arcsec = {{ {square} }}, '
+        f'covariance = "{COVARIANCE}", u_beside_um = {beside} }}]\n'
+    )
+    told = {
+        "software": PROGRAM,
+        "inputs_sha256": sha256(read.inputs),
+        "chain": read.facts.machine.chain,
+        "sign": "true = indicated + e",
+        "errors_not_in_it": list(found.omitted),
+        "range_rms_um": dict(zip(("uncorrected", "corrected"), map(_figure, found.range_um), strict=True)),
+        "held_out_rms_um": None
+        if held is None
+        else {
+            "left_out": str(held.unseen),
+            "uncorrected": _figure(held.uncorrected),
+            "named_errors": _figure(held.named),
+            "corrected": _figure(held.corrected),
+            "predicted": dict(zip(("uncorrected", "corrected"), map(_figure, held.predicted), strict=True)),
+        },
+    }
+    return {
+        NEW_MAP: first_line("compensate", PROGRAM, f"; see {PROVENANCE}").encode() + error_map_csv(error_map).encode(),
+        COVARIANCE: covariance_file(error_map.covariance, error_map),
+        MAP_KEYS: ("# for [machine] of a job beside which the other files lie\n" + keys).encode(),
+        PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
+    }
+
+
+def _figure(value: float) -> float:
+    return float(f"{value:.4g}")
 
 
 def compensated_job(job: Job, *, beyond: Beyond = "refuse") -> Job:
@@ -102,6 +209,21 @@ def _refuse(read: Job) -> None:
 def _files(read: Job, beyond: Beyond, text: Mapping[str, bytes]) -> dict[str, bytes]:
     """Every file of the compensated job; ``text`` are maps written in the contractors' form."""
     points, provenance = compensate_job(read, beyond=beyond)
+    with_u = uncertain_map(maps_of(read))
+    if with_u is not None:
+        probe = _with_probe(read)
+        readings = probe.xyz + np.asarray(read.points.machine.origin_mm)
+        tip, chain = circumstances(probe).tip, read.points.machine.chain
+        u = with_u[1].standard_uncertainty(with_u[0], readings, tip=tip, chain=chain) / MICROMETRE
+        places = np.column_stack([points.measurement, points.point, points.repeat])
+        lines = [f"{m},{p},{r},{x:.4f},{y:.4f},{z:.4f}" for (m, p, r), (x, y, z) in zip(places, u, strict=True)]
+        text = {
+            **text,
+            POINTS_U: ("\n".join(["measurement,point,repeat,u_x_um,u_y_um,u_z_um", *lines]) + "\n").encode(),
+        }
+        sample = SampledPoints(200)
+        sample.add(readings, points.xyz, tip)
+        provenance["distances"] = sample.distances(*with_u, chain)
     told = {"software": PROGRAM, "inputs_sha256": sha256(read.inputs), **provenance}
     files = {
         **kept_inputs(read),
@@ -144,13 +266,15 @@ def write_compensated_cloud(
     maps = ErrorMaps(maps_of(read))
     compensation = replace(machine_compensation(read.points, maps, beyond=beyond), origin=np.zeros(3))
     chain, digitizer = _chain(read, cloud, compensation)
+    stated = uncertain_map(maps.maps)
+    transform = chain if stated is None else _WithUncertainty(chain, *stated)
     name = f"{cloud.stem}-compensated{'.npy' if cloud.is_dir() else cloud.suffix}"
     owner = Owner("compensate", read.facts.job.id, read.origin)
     inputs = (*read.paths, *files)
     with staged(out, owner, inputs=inputs, force=force, expected=(name, PROVENANCE)) as place:
         mark = first_line("compensate", PROGRAM, f"; see {PROVENANCE}")
-        count = transform_cloud(cloud, place.room(name), chain, columns=chain.columns, names=chain.names, mark=mark,
-                                progress=progress)  # fmt: skip
+        count = transform_cloud(cloud, place.room(name), transform, columns=chain.columns, names=transform.names,
+                                mark=mark, progress=progress)  # fmt: skip
         machine = read.facts.machine
         told = {
             "software": PROGRAM, "origin": "compensated", "points": count,
@@ -158,7 +282,36 @@ def write_compensated_cloud(
             "columns": list(chain.columns), **compensation.provenance(), "digitizer": digitizer.as_data(),
             "temperature_log": machine.temperature_log.file if machine.temperature_log is not None else None,
         }  # fmt: skip
+        if isinstance(transform, _WithUncertainty):
+            told["distances"] = transform.distances()
         return place.write({PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode()}, [name])
+
+
+class _WithUncertainty:
+    """A cloud's coordinates, beside them the standard uncertainty of each, mm, that the map's covariance makes."""
+
+    def __init__(self, chain: DigitizedCloud, error_map: ErrorMap, covariance: MapCovariance) -> None:
+        self._chain, self._map, self._covariance = chain, error_map, covariance
+        self.columns, self.names = chain.columns, (*chain.names, *(f"u_{axis}_mm" for axis in AXES))
+        self._sample = SampledPoints(200)
+        (self._letters,) = {one.compensation.chain for one in chain.poses.values()}
+
+    def __call__(self, rows: Floats) -> Floats:
+        found = self._chain(rows)
+        tips = np.empty((len(rows), 3))
+        numbers = (
+            rows[:, self.columns.index(POSE)] if POSE in self.columns else np.full(len(rows), min(self._chain.poses))
+        )
+        for number in np.unique(numbers):
+            here, one = numbers == number, self._chain.poses[int(number)]
+            tips[here] = one.tips(rows[here, :2])
+        readings = rows[:, 2:5]
+        u = self._covariance.standard_uncertainty(self._map, readings, tip=tips, chain=self._letters)
+        self._sample.add(readings, found[:, :3], tips)
+        return np.hstack([found, u])
+
+    def distances(self) -> list[dict[str, float]]:
+        return self._sample.distances(self._map, self._covariance, self._letters)
 
 
 def _chain(job: Job, cloud: Path, compensation: Compensation) -> tuple[DigitizedCloud, DescribedDigitizer]:
