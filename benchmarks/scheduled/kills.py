@@ -42,7 +42,7 @@ def begun(run: subprocess.Popen[bytes]) -> None:
 def judged(root: Path, taken: Taken) -> dict[str, int]:
     """What is there in the end."""
     state, jobs = FolderState(root / "reports"), sorted((root / "jobs").iterdir())
-    whole = [job.name for job in jobs if state.reported(job.name) is not None]
+    whole = [job.name for job in jobs if state.results(job.name) is not None]
     failing = {job.name for job in jobs if (job / "points.csv").read_text() == "fail"}
     keys = Counter(headers["Idempotency-Key"] for headers, _ in taken.requests)
     reported = Counter((root / "begun").read_text().split())

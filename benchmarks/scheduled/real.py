@@ -57,7 +57,7 @@ def main(kills: int = 40, count: int = 3, seed: int = 1) -> None:
             state = RecordsState(records, out)
             reports = Counter(entry.data["results_sha256"] for entry in records.entries(kind="report"))
             sent = Counter(entry.data["key"] for entry in records.entries(kind="sent"))
-            whole = sum(state.reported(f"job-{i}") is not None for i in range(count))
+            whole = sum(state.results(f"job-{i}") is not None for i in range(count))
             wrong = records.verify()
         keys = Counter(headers["Idempotency-Key"] for headers, _ in taken.requests)
         about = {json.loads(body)["about"] for _, body in taken.requests}

@@ -16,7 +16,7 @@ from pathlib import Path
 from benchmarks.scheduled.scheduler import begin
 from cmm_uq.base.output import MANIFEST, Manifest, Owner
 from cmm_uq.laboratory.records import open_records
-from cmm_uq.laboratory.schedule.state import FolderState, RecordsState, State
+from cmm_uq.laboratory.schedule.state import FolderState, RecordsState
 from tests.laboratory.records.histories import certificate
 from tests.laboratory.schedule.runs import Jobs
 
@@ -38,7 +38,7 @@ def main(count: int = 10_000) -> None:
             contents.append(("report", certificate(job=job.name, results_sha256=digest, inputs=inputs), None))
         with open_records(out / "records.db", create=True) as records:
             records.append_all(contents)
-            states: dict[str, State] = {"folder": FolderState(out), "records": RecordsState(records, out)}
+            states: dict[str, FolderState] = {"folder": FolderState(out), "records": RecordsState(records, out)}
             for name, state in states.items():
                 jobs = Jobs(root / "jobs", state=state)
                 begun = time.perf_counter()

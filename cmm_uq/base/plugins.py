@@ -142,8 +142,6 @@ def _at_fault(error: Exception) -> tuple[Plugin, ...]:
 
 
 def _broken(plugins: tuple[Plugin, ...], why: str) -> BrokenPluginError:
-    package, what = (
-        f"{plugins[0].package} {plugins[0].version}".rstrip(),
-        " or ".join(plugin.what for plugin in plugins),
-    )
+    package = f"{plugins[0].package} {plugins[0].version}".rstrip()
+    what = " or ".join(plugin.what for plugin in plugins)
     return BrokenPluginError(f"{what} {why}", where=f"package {package}", fix=_FIX)

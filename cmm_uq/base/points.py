@@ -95,9 +95,7 @@ class Points:
     directions: Floats | None = None
     # what ``time_s`` was at the start; by default 0 or, by a clock that began long before, at the first reading
     start_s: float | None = None
-    in_seconds: bool = (
-        False  # whether ``time_s`` was written by this program's own clock, so that its unit is no question
-    )
+    in_seconds: bool = False  # whether ``time_s`` is of this program's own clock, so that its unit is no question
 
     def __len__(self) -> int:
         return len(self.xyz)

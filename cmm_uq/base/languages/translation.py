@@ -165,9 +165,8 @@ def _filled(message: Message, language: Language) -> str:
     joins: list[int] = []
     for literal, name, spec, _ in formatter.parse(pattern):
         value = "" if name is None else arguments[name]
-        text = formatter.format_field(
-            translated(value, language.code) if isinstance(value, Text) else value, spec or ""
-        )
+        value = translated(value, language.code) if isinstance(value, Text) else value
+        text = formatter.format_field(value, spec or "")
         if literal == ", " and parts and _FIGURES.fullmatch(parts[-1]) and _FIGURES.fullmatch(text):
             joins.append(len(parts))
         parts += [literal, text]

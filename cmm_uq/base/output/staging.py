@@ -23,19 +23,8 @@ from pathlib import Path
 from typing import Protocol
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.output import interruption
-from cmm_uq.base.output.manifest import (
-    JOURNAL,
-    MANIFEST,
-    NEW,
-    Journal,
-    Manifest,
-    Owner,
-    journal_for,
-    place,
-    plain_name,
-    rolled_back,
-)
+from cmm_uq.base.output import interruption, manifest
+from cmm_uq.base.output.manifest import JOURNAL, MANIFEST, NEW, Journal, Manifest, Owner, journal_for, place
 from cmm_uq.base.output.new_file import writing_to
 
 
@@ -159,7 +148,7 @@ class Stage:
         return {name: self.folder / name for name in (*hashes, MANIFEST)}
 
     def _check(self, name: str) -> None:
-        if not plain_name(name):
+        if not manifest.plain_name(name):
             raise CmmUqError(f"{name!r} cannot be the name of an output", where=str(self.folder))
 
     def _commit(self, hashes: Mapping[str, str], ledger: Ledger | None) -> None:
@@ -339,7 +328,7 @@ def _finish(folder: Path, placing: Path, journal: Journal, ledger: Ledger | None
     except InDoubtError:
         raise
     except (OSError, CmmUqError):
-        if rolled_back(folder, placing, journal):
+        if manifest.rolled_back(folder, placing, journal):
             _drop(folder, journal.token)
         raise
     _drop(folder, journal.token)

@@ -20,6 +20,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.laboratory.due import drift
 from cmm_uq.laboratory.due.drift_filter import DriftState, filtered
+from cmm_uq.laboratory.records.facts import Series
 
 
 def grid(gaps: int) -> Floats:
@@ -62,9 +63,8 @@ class Crossings:
     def by(self, days: Floats) -> Floats:
         """Probability of having crossed by so many days after the last certificate, (N,)."""
         logs = _log_survival(self.probability)
-        found = [
-            np.interp(day, self.days, row) for day, row in zip(np.broadcast_to(days, len(logs)), logs, strict=True)
-        ]
+        each = zip(np.broadcast_to(days, len(logs)), logs, strict=True)
+        found = [np.interp(day, self.days, row) for day, row in each]
         return np.asarray(-np.expm1(found), dtype=np.float64)
 
     def quantile(self, part: float) -> Floats:
@@ -113,7 +113,7 @@ class Crossing:
 
 
 def crossing(
-    series: drift.RecordedSeries | drift.DriftHistory,
+    series: Series | drift.DriftHistory,
     limit: float,
     prior: drift.DriftPrior | None = None,
     *,

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,10 @@ from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.laboratory.records.facts import Series
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 YEAR = 365.25  # days: rates and spreads are stated per year
 HORIZON = 40.0  # years that are looked ahead; what is later is never
@@ -31,23 +35,6 @@ PARTS = (0.05, 0.5, 0.95)
 
 MOST_SHARED = 0.999
 """Of u, that certificates by one artefact have in common at most: two of one day never agree to the last digit."""
-
-
-class RecordedSeries(Protocol):
-    """A series of n certificates, by day and entry; days are ordinals, 0 or NaN for an unknown adjustment."""
-
-    @property
-    def day(self) -> NDArray[np.generic]: ...
-    @property
-    def value(self) -> NDArray[np.generic]: ...
-    @property
-    def u(self) -> NDArray[np.generic]: ...
-    @property
-    def u_artefact(self) -> NDArray[np.generic]: ...
-    @property
-    def artefact(self) -> NDArray[np.generic]: ...
-    @property
-    def adjusted_since(self) -> NDArray[np.generic]: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +75,12 @@ class DriftHistory:
                              fix="Correct the dates")  # fmt: skip
 
 
-def history(series: RecordedSeries, adjusted_after: float | None = None) -> DriftHistory:
+def history(series: Series | pd.DataFrame, adjusted_after: float | None = None) -> DriftHistory:
     """A series of the records as the model takes it.
 
     Parameters
     ----------
-    series : of the records.
+    series : of the records, or its rows with columns of the same names, by day and entry.
     adjusted_after : ordinal of the machine's newest adjustment; it counts where it is after the last certificate.
 
     Raises
@@ -105,9 +92,7 @@ def history(series: RecordedSeries, adjusted_after: float | None = None) -> Drif
         for column in (series.day, series.value, series.u, series.u_artefact, series.adjusted_since)
     )
     names = tuple(map(str, series.artefact))
-    shared = np.where(
-        [bool(name) for name in names], shared, 0.0
-    )  # by an unknown artefact nothing is known to be common
+    shared = np.where(np.array(names) != "", shared, 0.0)  # by an unknown artefact nothing is known to be common
     known = np.where(adjusted > 0, adjusted, np.nan)
     after = adjusted_after is not None and len(day) > 0 and adjusted_after > day[-1]
     return DriftHistory(day, value, u, shared, names, known, float(adjusted_after or 0) if after else np.nan)

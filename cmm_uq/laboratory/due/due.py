@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Literal
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, day, foreign, number, say
 from cmm_uq.jobs.verdicts import BEYOND, NONE
-from cmm_uq.laboratory.due.checks import InterimCheck, check_standings
-from cmm_uq.laboratory.due.rule import Pool, Rule, calibrations, months_of
+from cmm_uq.laboratory.due.rule import InterimCheck, Pool, Rule, calibrations, check_standings, months_of
 from cmm_uq.laboratory.records.facts import ArtefactRow, RecordedCertificate, RecordedMachine
 
 if TYPE_CHECKING:
@@ -43,7 +42,7 @@ def interval_by(
     """The interval after the last of a machine's calibrations, by day; the drift model takes later checks too."""
     if rule.method == "fixed":
         return _fixed(rule)
-    from cmm_uq.laboratory.due.methods import METHODS  # numpy and scipy: a fixed interval need not wait for them
+    from cmm_uq.laboratory.due.intervals import METHODS  # numpy and scipy: a fixed interval need not wait for them
 
     try:
         days, why = METHODS[rule.method](rule, certificates, pool, priors or {})

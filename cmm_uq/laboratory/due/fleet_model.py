@@ -190,9 +190,7 @@ class FleetPrior:
     def from_data(cls, data: Mapping[str, Any], where: str = "fleet.json") -> FleetPrior:
         """From ``prior`` of a value in ``fleet.json``."""
         try:
-            theta, effects, covariance = (
-                np.array(data[key], dtype=np.float64) for key in ("log", "effects", "covariance")
-            )
+            theta, effects, covariance = (np.array(data[name], float) for name in ("log", "effects", "covariance"))
             models, places = tuple(data["models"]), tuple(data["places"])
             found = FleetPrior(float(data["unit"]), theta, models, places, effects, covariance)
             size = 1 + len(models) + len(places)

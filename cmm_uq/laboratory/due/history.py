@@ -21,8 +21,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, day, plural, say
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.verdicts import BEYOND, NONE
-from cmm_uq.laboratory.due.checks import ComparedValue, ValueChange, change, common_part
-from cmm_uq.laboratory.due.rule import is_of_machine
+from cmm_uq.laboratory.due.rule import ComparedValue, ValueChange, change, common_part, is_of_machine
 from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, RecordedMachine, Series
 
 if TYPE_CHECKING:

@@ -24,40 +24,18 @@ _EXPONENT = 700.0  # of e, within a double's range
 
 class ReliabilityModel(NamedTuple):
     name: Text
-    reliability: Callable[[Floats, Floats], Floats]  # of times (n,) since calibration, and parameters
+    form: Callable[[Floats, Floats], Floats]  # of times (n,) since calibration, and parameters
     starts: tuple[tuple[float, ...], ...]  # parameters that a search begins with
 
-    @property
-    def bounds(self) -> list[tuple[float, float]]:
-        """Of the parameters: none is negative."""
-        return [(0.0, _LARGEST)] * len(self.starts[0])
-
-
-def _exponential(t: Floats, p: Floats) -> Floats:
-    return np.asarray(np.exp(-p[0] * t))
-
-
-def _weibull(t: Floats, p: Floats) -> Floats:
-    with np.errstate(over="ignore"):
-        return np.asarray(np.exp(-((p[0] * t) ** p[1])))
-
-
-def _mixed_exponential(t: Floats, p: Floats) -> Floats:
-    return np.asarray((1 + p[0] * t) ** -p[1])
+    def reliability(self, t: Floats, p: Floats) -> Floats:
+        """At times (n,) in units of the longest interval, with parameters of which none is negative."""
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            return np.asarray(self.form(t, p))
 
 
 def _within_one(variance: Floats) -> Floats:
     """Probability that a normal deviate of this variance lies within ±1."""
-    with np.errstate(divide="ignore"):
-        return np.asarray(2 * special.ndtr(1 / np.sqrt(variance)) - 1)
-
-
-def _random_walk(t: Floats, p: Floats) -> Floats:
-    return _within_one(p[0] + p[1] * t)
-
-
-def _restricted_walk(t: Floats, p: Floats) -> Floats:
-    return _within_one(p[0] - p[1] * np.expm1(-p[2] * t))
+    return np.asarray(2 * special.ndtr(1 / np.sqrt(variance)) - 1)
 
 
 def _modified_gamma(t: Floats, p: Floats) -> Floats:
@@ -65,40 +43,21 @@ def _modified_gamma(t: Floats, p: Floats) -> Floats:
     return np.asarray(np.exp(-x) * (1 + x + x**2 / 2 + x**3 / 6))
 
 
-def _mortality_drift(t: Floats, p: Floats) -> Floats:
-    return np.asarray(np.exp(-(p[0] * t + p[1] * t**2)))
-
-
-def _warranty(t: Floats, p: Floats) -> Floats:
-    return np.asarray(1 / (1 + np.exp(np.clip(p[0] * (t - p[1]), -_EXPONENT, _EXPONENT))))
-
-
-def _drift(t: Floats, p: Floats) -> Floats:
-    return np.asarray(special.ndtr(p[0] + p[2] * t) + special.ndtr(p[1] - p[2] * t) - 1)
-
-
-def _log_normal(t: Floats, p: Floats) -> Floats:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(special.ndtr(-np.log(p[0] * t) / p[1]))
-
-
-MODELS: Mapping[str, ReliabilityModel] = {
-    model.name: model
-    for model in (
-        ReliabilityModel(say("exponential"), _exponential, ((1.0,), (0.1,))),
-        ReliabilityModel(Verbatim("Weibull"), _weibull, ((1.0, 1.0), (0.3, 0.5), (0.3, 2.0))),
-        ReliabilityModel(say("mixed exponential"), _mixed_exponential, ((1.0, 1.0), (10.0, 0.3))),
-        ReliabilityModel(say("random walk"), _random_walk, ((0.3, 1.0), (0.1, 5.0))),
-        ReliabilityModel(
-            say("restricted walk"), _restricted_walk, ((0.3, 1.0, 1.0), (0.1, 3.0, 5.0), (0.1, 20.0, 0.2))
-        ),
-        ReliabilityModel(say("modified gamma"), _modified_gamma, ((3.0,), (1.0,))),
-        ReliabilityModel(say("mortality drift"), _mortality_drift, ((0.5, 0.5), (0.1, 1.0))),
-        ReliabilityModel(say("warranty"), _warranty, ((4.0, 1.0), (1.0, 0.5))),
-        ReliabilityModel(say("drift"), _drift, ((2.0, 2.0, 2.0), (4.0, 1.0, 1.0))),
-        ReliabilityModel(say("log-normal"), _log_normal, ((1.0, 1.0), (1.0, 3.0))),
-    )
-}
+MODELS: Mapping[str, ReliabilityModel] = {model[0]: ReliabilityModel(*model) for model in (
+    (say("exponential"), lambda t, p: np.exp(-p[0] * t), ((1.0,), (0.1,))),
+    (Verbatim("Weibull"), lambda t, p: np.exp(-((p[0] * t) ** p[1])), ((1.0, 1.0), (0.3, 0.5), (0.3, 2.0))),
+    (say("mixed exponential"), lambda t, p: (1 + p[0] * t) ** -p[1], ((1.0, 1.0), (10.0, 0.3))),
+    (say("random walk"), lambda t, p: _within_one(p[0] + p[1] * t), ((0.3, 1.0), (0.1, 5.0))),
+    (say("restricted walk"), lambda t, p: _within_one(p[0] - p[1] * np.expm1(-p[2] * t)),
+     ((0.3, 1.0, 1.0), (0.1, 3.0, 5.0), (0.1, 20.0, 0.2))),
+    (say("modified gamma"), _modified_gamma, ((3.0,), (1.0,))),
+    (say("mortality drift"), lambda t, p: np.exp(-(p[0] * t + p[1] * t**2)), ((0.5, 0.5), (0.1, 1.0))),
+    (say("warranty"), lambda t, p: 1 / (1 + np.exp(np.clip(p[0] * (t - p[1]), -_EXPONENT, _EXPONENT))),
+     ((4.0, 1.0), (1.0, 0.5))),
+    (say("drift"), lambda t, p: special.ndtr(p[0] + p[2] * t) + special.ndtr(p[1] - p[2] * t) - 1,
+     ((2.0, 2.0, 2.0), (4.0, 1.0, 1.0))),
+    (say("log-normal"), lambda t, p: special.ndtr(-np.log(p[0] * t) / p[1]), ((1.0, 1.0), (1.0, 3.0))),
+)}  # fmt: skip
 
 
 LEVEL = 0.95  # of the test of lack of fit, and of the range of the interval
@@ -227,8 +186,9 @@ def _most_likely(model: ReliabilityModel, data: ReliabilityData, scale: float) -
         lacking = fullest - data.in_tolerance * np.log(r) - out * np.log1p(-r)
         return np.asarray(np.sign(data.in_tolerance - data.tested * r) * np.sqrt(2 * np.maximum(lacking, 0)))
 
-    low, high = np.transpose(model.bounds)
-    found = [optimize.least_squares(deviances, start, bounds=(low, high), max_nfev=_SEARCHED) for start in model.starts]
+    found = [
+        optimize.least_squares(deviances, start, bounds=(0.0, _LARGEST), max_nfev=_SEARCHED) for start in model.starts
+    ]
     return np.asarray(min(found, key=lambda one: float(one.cost)).x)
 
 

@@ -211,9 +211,7 @@ class Recorder:
         self.counts[source] = self.counts.get(source, 0) + 1
         if reading.unasked:
             count = self.unasked[source] = self.unasked.get(source, 0) + 1
-            if (
-                count & (count - 1) == 0
-            ):  # the first, then at each power of two, lest they fill the journal; the last at the end
+            if count & (count - 1) == 0:  # at each power of two, lest they fill the journal; the last at the end
                 self.say("unasked", source=source, count=count)
                 self.told.append(say("{source}: {why}", source=Verbatim(source), why=reading.status or NOTHING))
         if reading.status is not None:

@@ -118,9 +118,7 @@ class Acquisition:
     folder: Path  # of the job
     watched: WatchedFolder | None = None  # into which results are dropped
     dropped: Callable[[DroppedFile], None] = lambda file: None  # takes them
-    items: queue.Queue[Event | OperatorLine] = field(
-        default_factory=queue.Queue
-    )  # what they say; the operator's lines too
+    items: queue.Queue[Event | OperatorLine] = field(default_factory=queue.Queue)  # what they and the operator say
 
     def run(self, screen: Screen) -> None:
         """Run it until the operator ends it; between events each thing is done in its own time."""

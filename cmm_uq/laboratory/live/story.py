@@ -170,9 +170,7 @@ class Story:
     skipped: list[tuple[int, int]] = field(default_factory=list)  # set-ups that the operator left out
     asked: list[tuple[int, int]] = field(default_factory=list)  # repeats more that were asked for
     notes: list[tuple[float, str]] = field(default_factory=list)
-    unasked: dict[tuple[str, int], int] = field(
-        default_factory=dict
-    )  # answers not asked for, by instrument and session
+    unasked: dict[tuple[str, int], int] = field(default_factory=dict)  # answers, by instrument and session
     files: dict[str, str] = field(default_factory=dict)  # that were read, by SHA-256, with their names
     damaged: list[str] = field(default_factory=list)  # lines of journals that are not in it
     changes: int = 0  # how many records changed what counts

@@ -121,9 +121,8 @@ def artefact_fault(
     xyz, points = model.placed(values), model.artefact.points
     if what == "length":
         sizes = values[len(values) - len(model.artefact.sizes) :].copy()
-        sizes[next(i for i, s in enumerate(model.artefact.sizes) if s.certified and s.role == "dimension")] += (
-            MICROMETRE
-        )
+        first = next(i for i, s in enumerate(model.artefact.sizes) if s.certified and s.role == "dimension")
+        sizes[first] += MICROMETRE
         moved = model.artefact.fit(xyz, sizes) - xyz
     elif what == "nodes":
         number, frames = nodes(xyz, points)
@@ -143,11 +142,8 @@ def nodes(xyz: Floats, points: Points) -> tuple[Ints, Floats]:
     """Node of the artefact of each point (n,), and its axes there (n, 3, a); those whose points lie otherwise have others."""
     set_ups = [np.flatnonzero(points.measurement == m) for m in np.unique(points.measurement)]
     lines = all(_is_line(xyz[rows]) for rows in set_ups)
-    known, number, frames = (
-        list[Floats](),
-        np.zeros(len(xyz), dtype=np.int64),
-        np.zeros((len(xyz), 3, 1 if lines else 3)),
-    )
+    known, number = list[Floats](), np.zeros(len(xyz), dtype=np.int64)
+    frames = np.zeros((len(xyz), 3, 1 if lines else 3))
     first: tuple[Ints, Floats] | None = None
     for rows in set_ups:
         own = xyz[rows]
@@ -161,11 +157,9 @@ def nodes(xyz: Floats, points: Points) -> tuple[Ints, Floats]:
             first = first or (points.point[rows], place)
         frames[rows] = frame
         for row, here in zip(rows, place, strict=True):
-            near = next(
-                (i for i, there in enumerate(known) if float(np.linalg.norm(here - there)) < _SAME_MM), len(known)
-            )
-            known += [here] if near == len(known) else []
-            number[row] = near
+            near = [i for i, there in enumerate(known) if float(np.linalg.norm(here - there)) < _SAME_MM]
+            number[row] = near[0] if near else len(known)
+            known += [] if near else [here]
     return number, frames
 
 

@@ -29,13 +29,8 @@ _ATTEMPTS = 40
 _AXIS_TIMES, _GROWN_TIMES, _DOF, _STEP_TIMES, _SLOW_PART, _WALKED_TIMES = 3.0, 2.0, 4.0, 3.0, 0.125, 2.0
 
 
-_COMPONENTS = {
-    cases.SET_UP: PLACING,
-    cases.AXIS: AXIS_NOISE,
-    cases.GROWING: GROWTH,
-    cases.SLOWLY: SLOW,
-    cases.WALKING: SLOW,
-}
+_COMPONENTS = {cases.SET_UP: PLACING, cases.AXIS: AXIS_NOISE, cases.GROWING: GROWTH}
+_COMPONENTS |= dict.fromkeys((cases.SLOWLY, cases.WALKING), SLOW)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,10 +155,8 @@ class Design:
             most = min(cases.STRONGEST, ALLOWED * length)
             if most < cases.WEAKEST:
                 return ()
-            strength, prior = (
-                float(random.uniform(cases.WEAKEST, most)),
-                np.array([c.prior_sd for c in effect.coefficients]),
-            )
+            strength = float(random.uniform(cases.WEAKEST, most))
+            prior = np.array([c.prior_sd for c in effect.coefficients])
             coefficients = strength / length * prior * ways[i] * random.choice([-1.0, 1.0])
             reported = effect.to_reported(coefficients, np.array(shapes[i], dtype=np.float64))
             found.append(HiddenEffect(effect.name, {name: float(value) for name, value in reported.items()}, strength))
@@ -267,11 +260,8 @@ def reaches(design: Design) -> tuple[Reach, ...]:
     for effect in every().values():
         if effect.name in named:
             continue
-        first, prior, columns = (
-            effect.reported[0],
-            effect.coefficients[0].prior_sd,
-            cases.unrecorded(design.model, effect),
-        )
+        first, prior = effect.reported[0], effect.coefficients[0].prior_sd
+        columns = cases.unrecorded(design.model, effect)
         if effect.name not in possible:
             standing = UNRECORDED if columns else NO_TRAVEL
             found.append(Reach(effect.name, effect.title, standing, first.name, first.unit, columns=columns))

@@ -172,9 +172,7 @@ class JudgedCase:
     alone: tuple[str, ...] = ()
     wrong: tuple[str, ...] = ()  # effects that were named wrongly
     said: tuple[tuple[float, bool], ...] = ()  # probability of each asserted effect, and whether it acts
-    intervals: tuple[
-        tuple[str, int, int], ...
-    ] = ()  # which, as STATED; how many hold the truth, and how many there are
+    intervals: tuple[tuple[str, int, int], ...] = ()  # which, as STATED; how many hold the truth, of how many
     right: bool = False
     # rms of predictions of what the fit has not seen, before and after; None where nothing was asserted
     heldout_um: tuple[float, float] | None = None
@@ -368,17 +366,12 @@ class AcceptanceFigure:
 
 
 def acceptance_figures(judgement: ProofJudgement, facts: ProveFacts) -> tuple[AcceptanceFigure, ...]:
-    (low, high), wrong, found = (each / 100 for each in facts.coverage_pct), facts.wrong_names_pct, facts.found_pct
-    every = [
-        AcceptanceFigure(
-            "false_alarms", say("False alarms"), judgement.false_alarms, 0.0, facts.false_alarms_pct / 100
-        ),
-        AcceptanceFigure("coverage", say("95 % intervals that hold the truth"), judgement.coverage, low, high),
+    every: list[tuple[str, Text, Rate, float, float]] = [
+        ("false_alarms", say("False alarms"), judgement.false_alarms, 0.0, facts.false_alarms_pct),
+        ("coverage", say("95 % intervals that hold the truth"), judgement.coverage, *facts.coverage_pct),
     ]
-    if wrong is not None:
-        every.append(
-            AcceptanceFigure("wrong_names", say("Cases with a wrong name"), judgement.wrong_names, 0.0, wrong / 100)
-        )
-    if found is not None:
-        every.append(AcceptanceFigure("found", say("Hidden effects found"), judgement.found, found / 100, 1.0))
-    return tuple(every)
+    if facts.wrong_names_pct is not None:
+        every.append(("wrong_names", say("Cases with a wrong name"), judgement.wrong_names, 0.0, facts.wrong_names_pct))
+    if facts.found_pct is not None:
+        every.append(("found", say("Hidden effects found"), judgement.found, facts.found_pct, 100.0))
+    return tuple(AcceptanceFigure(key, what, rate, low / 100, high / 100) for key, what, rate, low, high in every)

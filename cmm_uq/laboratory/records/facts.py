@@ -48,9 +48,8 @@ class Entry:
         try:
             return dict(json.loads(self.content))
         except (ValueError, TypeError, RecursionError):
-            raise CmmUqError(
-                f"entry {self.number} is not as it was recorded", fix="See cmm-uq records verify"
-            ) from None
+            problem = f"entry {self.number} is not as it was recorded"
+            raise CmmUqError(problem, fix="See cmm-uq records verify") from None
 
     @property
     def true(self) -> bool:

@@ -82,13 +82,10 @@ def _file(path: Path, create: bool, read_only: bool) -> Engine:
     def connect() -> sqlite3.Connection:
         made = sqlite3.connect(uri, uri=True, timeout=PATIENCE_S, isolation_level=None, check_same_thread=False)
         with contextlib.suppress(sqlite3.Error):  # what is wrong with the file is told when it is first read
-            for setting in (
-                "foreign_keys = ON",
-                "synchronous = FULL",
-                "recursive_triggers = ON",
-                "cache_size = -65536",
-            ):
-                made.execute(f"PRAGMA {setting}")  # the cache in KiB: pages of the indexes of 10⁵ certificates
+            made.execute("PRAGMA foreign_keys = ON")
+            made.execute("PRAGMA synchronous = FULL")
+            made.execute("PRAGMA recursive_triggers = ON")
+            made.execute("PRAGMA cache_size = -65536")  # in KiB: pages of the indexes of 10⁵ certificates
         return made
 
     engine = create_engine("sqlite://", creator=connect, poolclass=QueuePool)

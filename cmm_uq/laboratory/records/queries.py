@@ -15,18 +15,9 @@ from typing import TYPE_CHECKING, Any
 from sqlalchemy import ColumnElement, Connection, Engine, Select, func, or_, select
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.laboratory.records import facts
+from cmm_uq.laboratory.records import facts, tables
 from cmm_uq.laboratory.records.place import told
-from cmm_uq.laboratory.records.tables import (
-    adjustments,
-    artefacts,
-    certificates,
-    covariances,
-    figures,
-    machines,
-    quantities,
-    signatures,
-)
+from cmm_uq.laboratory.records.tables import artefacts, certificates, figures, machines, quantities
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,19 +54,17 @@ class RecordQueries:
 
     def machines(self) -> list[facts.RecordedMachine]:
         """All machines, by serial."""
-        days: dict[int, list[dt.date]] = defaultdict(list)
         with self.reading() as connection:
-            for row in connection.execute(select(adjustments.c.machine, adjustments.c.day).order_by(adjustments.c.day)):
-                days[row.machine].append(dt.date.fromisoformat(row.day))
-            rows = connection.execute(select(machines).order_by(machines.c.called)).mappings()
-            return [_machine(row, days.get(row["id"], ())) for row in rows]
+            rows = connection.execute(select(machines).order_by(machines.c.called)).mappings().all()
+            days = _adjusted(connection, [row["id"] for row in rows])
+            return [_machine(row, days[row["id"]]) for row in rows]
 
     def machine(self, serial: str) -> facts.RecordedMachine:
         """One machine, by serial however it is spelled, or by name."""
         with self.reading() as connection:
             number = _machine_id(connection, serial)
             row = connection.execute(select(machines).where(machines.c.id == number)).mappings().one()
-            return _machine(row, map(dt.date.fromisoformat, _adjusted(connection, [number])[number]))
+            return _machine(row, _adjusted(connection, [number])[number])
 
     def artefacts(self) -> list[facts.ArtefactRow]:
         """All artefacts, by serial."""
@@ -166,7 +155,8 @@ class RecordQueries:
 
     def signatures(self, certificate: int) -> list[facts.ReleaseSignature]:
         """Who released, withdrew or replaced a certificate, in order."""
-        query = select(signatures).where(signatures.c.certificate == certificate).order_by(signatures.c.entry)
+        table = tables.signatures
+        query = select(table).where(table.c.certificate == certificate).order_by(table.c.entry)
         with self.reading() as connection:
             rows = connection.execute(query).all()
         moment = dt.datetime.fromisoformat
@@ -270,12 +260,13 @@ def blocks(numbers: Sequence[int]) -> Iterable[Sequence[int]]:
     return (numbers[i : i + _TOGETHER] for i in range(0, len(numbers), _TOGETHER))
 
 
-def _machine(row: Mapping[Any, Any], adjusted: Iterable[dt.date]) -> facts.RecordedMachine:
+def _machine(row: Mapping[Any, Any], adjusted: Iterable[str]) -> facts.RecordedMachine:
+    days = tuple(map(dt.date.fromisoformat, adjusted))
     rule = json.loads(row["calibrate"]) if row["calibrate"] else None
+    named = [row[name] for name in ("called", "name", "manufacturer", "model", "place")]
     return facts.RecordedMachine(
-        row["called"], row["name"], row["manufacturer"], row["model"], row["place"], tuple(adjusted),
-        row["recognised"].startswith(facts.BY_NAME), rule,
-    )  # fmt: skip
+        *named, adjusted=days, by_name=row["recognised"].startswith(facts.BY_NAME), calibrate=rule
+    )
 
 
 def _machine_id(connection: Connection, serial: str) -> int:
@@ -309,14 +300,14 @@ def _covariances(
 ) -> dict[int, tuple[tuple[str, ...], tuple[float, ...]]]:
     found = {}
     for block in blocks(entries):
-        for row in connection.execute(select(covariances).where(covariances.c.certificate.in_(block))):
+        for row in connection.execute(select(tables.covariances).where(tables.covariances.c.certificate.in_(block))):
             found[row.certificate] = (tuple(json.loads(row.names)), tuple(json.loads(row.lower)))
     return found
 
 
 def _adjusted(connection: Connection, of: Collection[int]) -> dict[int, list[str]]:
     found: dict[int, list[str]] = defaultdict(list)
-    a = adjustments.c
+    a = tables.adjustments.c
     for block in blocks(sorted(of)):
         for row in connection.execute(select(a.machine, a.day).where(a.machine.in_(block)).order_by(a.day)):
             found[row.machine].append(row.day)

@@ -20,19 +20,8 @@ from sqlalchemy import Connection, Engine, delete, func, insert, select, text
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import MANIFEST, InDoubtError, finish_interrupted, is_pending, sha256_of
-from cmm_uq.laboratory.records.facts import (
-    BEGINNING,
-    ChainFinding,
-    ChainHead,
-    Entry,
-    Heads,
-    Witness,
-    canonical,
-    following,
-    instant,
-    moment_of,
-    now,
-)
+from cmm_uq.laboratory.records import facts
+from cmm_uq.laboratory.records.facts import ChainFinding, ChainHead, Entry, Heads, Witness
 from cmm_uq.laboratory.records.indexing import Indexer, chain, entry_block, in_blocks, verified
 from cmm_uq.laboratory.records.place import APPLICATION, shown, told
 from cmm_uq.laboratory.records.queries import RecordQueries, entry_of_results
@@ -49,7 +38,12 @@ class Records(RecordQueries):
     """The history, opened; see :func:`~cmm_uq.laboratory.records.opening.open_records`."""
 
     def __init__(
-        self, engine: Engine, place: str | Path, *, read_only: bool = False, clock: Callable[[], dt.datetime] = now
+        self,
+        engine: Engine,
+        place: str | Path,
+        *,
+        read_only: bool = False,
+        clock: Callable[[], dt.datetime] = facts.now,
     ) -> None:
         self.engine, self.place, self.read_only, self.clock = engine, place, read_only, clock
 
@@ -91,7 +85,7 @@ class Records(RecordQueries):
         newest = select(e.number, e.hash, e.at).order_by(e.number.desc()).limit(1)
         recorded = select(e.content).join(certificates, c.entry == e.number).order_by(e.number.desc()).limit(most)
         with self.reading() as connection:
-            head = ChainHead(*connection.execute(newest).first() or (0, BEGINNING, None))
+            head = ChainHead(*connection.execute(newest).first() or (0, facts.BEGINNING, None))
             found = connection.execute(recorded.where(c.job == job, c.command == command))
             each = [json.loads(content) for content in found.scalars()]
         return Heads(head, {one["results_sha256"]: at for one in each if (at := ChainHead.of_results(one))})
@@ -101,10 +95,9 @@ class Records(RecordQueries):
         """Latest moment of any entry, whatever clock the last one was written by; ``None`` where there is none."""
         with self.reading() as connection:
             at = connection.execute(select(func.max(entries.c.at))).scalar()
-        if at is not None and (moment := instant(at)) is None:
-            raise CmmUqError(
-                f"an entry is of no time: {at!r}", where=self.shown, fix="cmm-uq records verify says which"
-            )
+        if at is not None and (moment := facts.instant(at)) is None:
+            fix = "cmm-uq records verify says which"
+            raise CmmUqError(f"an entry is of no time: {at!r}", where=self.shown, fix=fix)
         return None if at is None else moment
 
     def entries(self, first: int = 1, kind: str | None = None) -> Iterator[Entry]:
@@ -216,7 +209,7 @@ class Writing:
         number, previous = last(self.connection)
         for kind, content, at in new:
             number += 1
-            entry = following(previous, number, at or self._clock(), kind, content)
+            entry = facts.following(previous, number, at or self._clock(), kind, content)
             previous = entry.hash
             yield entry
 
@@ -225,7 +218,7 @@ def last(connection: Connection) -> tuple[int, str]:
     """Number and hash of the last entry."""
     query = select(entries.c.number, entries.c.hash).order_by(entries.c.number.desc()).limit(1)
     row = connection.execute(query).first()
-    return (0, BEGINNING) if row is None else (row.number, row.hash)
+    return (0, facts.BEGINNING) if row is None else (row.number, row.hash)
 
 
 def _disagreement(connection: Connection, witness: Witness) -> ChainFinding | None:
@@ -253,12 +246,12 @@ class Intended:
     """One entry that is to be added with a set of files; a :class:`~cmm_uq.base.output.staging.Ledger`."""
 
     def __init__(self, records: Records, kind: str, content: Mapping[str, Any]) -> None:
-        self.records, self.kind, self.content = records, kind, canonical(content)
+        self.records, self.kind, self.content = records, kind, facts.canonical(content)
 
     def intend(self, token: str, folder: Path, manifest: str) -> None:
         row = {
             "token": token, "host": socket.gethostname(), "folder": str(folder), "manifest": manifest,
-            "at": moment_of(self.records.clock()), "kind": self.kind, "content": self.content,
+            "at": facts.moment_of(self.records.clock()), "kind": self.kind, "content": self.content,
         }  # fmt: skip
         with self.records.writing() as writing:
             writing.connection.execute(insert(pending), row)

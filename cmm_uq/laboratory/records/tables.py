@@ -76,13 +76,8 @@ certificates = sa.Table(
     sa.Index(None, "artefact", "day"), sa.Index(None, "results_sha256"), sa.Index(None, "job"), sa.Index(None, "number"),
     sa.Index(None, "folder", "entry"),
 )  # fmt: skip
-quantities = sa.Table(
-    "quantities",
-    META,
-    _id(),
-    *_stated(sa.Text, "name", "quantity", "unit"),
-    sa.UniqueConstraint("name", "quantity", "unit"),
-)
+_QUANTITY = ("name", "quantity", "unit")
+quantities = sa.Table("quantities", META, _id(), *_stated(sa.Text, *_QUANTITY), sa.UniqueConstraint(*_QUANTITY))
 figures = sa.Table(
     "figures", META, _entry("certificate", "certificates.entry", key=True),
     sa.Column("place", sa.Integer, primary_key=True, autoincrement=False),
@@ -198,10 +193,7 @@ def _apart(
     sort: str, there: Iterable[str], made: Iterable[str], plain: Callable[[str], str] = str
 ) -> Iterator[ChainFinding]:
     one, other = ({plain(name): name for name in names} for names in (there, made))
-    yield from (
-        ChainFinding("schema", f"the {sort} {other[name]} is missing") for name in sorted(other.keys() - one.keys())
-    )
-    yield from (
-        ChainFinding("schema", f"the {sort} {one[name]} is not of the records")
-        for name in sorted(one.keys() - other.keys())
-    )
+    for name in sorted(other.keys() - one.keys()):
+        yield ChainFinding("schema", f"the {sort} {other[name]} is missing")
+    for name in sorted(one.keys() - other.keys()):
+        yield ChainFinding("schema", f"the {sort} {one[name]} is not of the records")

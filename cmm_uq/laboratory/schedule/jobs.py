@@ -28,7 +28,7 @@ from cmm_uq.jobs.source import device_name
 from cmm_uq.jobs.tables.identification import is_planned
 from cmm_uq.laboratory.schedule import state as states
 from cmm_uq.laboratory.schedule.notices import Notice, decisions, of_results
-from cmm_uq.laboratory.schedule.state import PRIVATE, State, inputs_of
+from cmm_uq.laboratory.schedule.state import PRIVATE, FolderState, inputs_of
 
 JOB_FILE = "job.toml"
 
@@ -174,14 +174,12 @@ class JobOutcome:
 @dataclass(frozen=True)
 class JobReporting:
     out: Path  # folder with a folder for each job
-    state: State  # what earlier runs have done
+    state: FolderState  # what earlier runs have done
     report: Report
     queue: Callable[[Sequence[Notice]], object]  # lets notices go out, before a job counts as done
     further: Callable[[JobFolder], Iterable[Notice]] = lambda job: ()  # of the machine, after a report
     still: Callable[[JobFolder], Iterable[Notice]] = lambda job: ()  # and later, of its newest certificate
-    seen: dict[str, Mapping[str, Any] | None] = field(
-        default_factory=dict
-    )  # results of the job that was looked at last
+    seen: dict[str, Mapping[str, Any] | None] = field(default_factory=dict)  # results of the last job looked at
 
     def lock_of(self, job: JobFolder) -> Path:
         """Its lock file; one for two ids that some systems take for one."""

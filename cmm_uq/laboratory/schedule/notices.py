@@ -23,7 +23,7 @@ from cmm_uq.base.messages import Text, Verbatim, commas, day, plural, say
 from cmm_uq.base.output.new_file import writing_to
 from cmm_uq.base.output.staging import replace_file
 from cmm_uq.jobs.verdicts import Verdicts
-from cmm_uq.laboratory.schedule.state import AHEAD, PRIVATE, Dispatch, State, turn
+from cmm_uq.laboratory.schedule.state import AHEAD, PRIVATE, Dispatch, FolderState, turn
 
 Event = Literal["fail", "incomplete", "undecided", "mismatch", "drift", "due", "missed", "error"]
 EVENTS: tuple[Event, ...] = get_args(Event)
@@ -213,7 +213,7 @@ class Announcement:
 class Outbox:
     out: Path
     channels: Sequence[Channel]
-    state: State
+    state: FolderState
     now: Callable[[], str]
     resumed: bool = False  # whether a run before ended in the middle, so that nobody saw its exit code
 

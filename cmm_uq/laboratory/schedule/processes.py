@@ -25,13 +25,7 @@ from typing import Any, BinaryIO, cast
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.plugins import told_with_package
 
-ONE_THREAD = (
-    "OPENBLAS_NUM_THREADS",
-    "OMP_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-    "NUMEXPR_NUM_THREADS",
-)
+ONE_THREAD = [f"{name}_NUM_THREADS" for name in ("OPENBLAS", "OMP", "MKL", "NUMEXPR")] + ["VECLIB_MAXIMUM_THREADS"]
 
 BEGINNING_S = 300.0
 """How long a process may take to import and to begin: seconds, minutes where a disk is shared by many."""

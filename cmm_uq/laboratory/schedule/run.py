@@ -15,21 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.laboratory.schedule.jobs import (
-    BUSY,
-    FAILED,
-    GONE,
-    UNCHANGED,
-    WAITING,
-    WOULD,
-    JobFolder,
-    JobOutcome,
-    JobReporting,
-    Snapshot,
-    job_folders,
-    quiet_since,
-    snapshot,
-)
+from cmm_uq.laboratory.schedule import jobs as states
+from cmm_uq.laboratory.schedule.jobs import JobFolder, JobOutcome, JobReporting, Snapshot, job_folders, quiet_since
 from cmm_uq.laboratory.schedule.notices import Announcement, Delivery, Notice, Outbox, of_error, of_missed
 from cmm_uq.laboratory.schedule.schedulers import starts
 from cmm_uq.laboratory.schedule.settings import RunTable
@@ -145,26 +132,26 @@ class ScheduledRun:
 
     def _would(self, job: JobFolder) -> JobOutcome:
         if job.planned:
-            return JobOutcome(job, WAITING, "not measured yet")
+            return JobOutcome(job, states.WAITING, "not measured yet")
         try:
             why = self.work.reason(job)
         except CmmUqError as error:
             return JobOutcome.refused(job, error)
         if not why:
-            return JobOutcome(job, UNCHANGED)
-        if quiet_since(snapshot(job.folder), self.clock.now().timestamp()) < self.settings.quiet_s:
-            return JobOutcome(job, WAITING, "changed a moment ago")
-        return JobOutcome(job, WOULD, why)
+            return JobOutcome(job, states.UNCHANGED)
+        if quiet_since(states.snapshot(job.folder), self.clock.now().timestamp()) < self.settings.quiet_s:
+            return JobOutcome(job, states.WAITING, "changed a moment ago")
+        return JobOutcome(job, states.WOULD, why)
 
     def _parted(self, jobs: Iterable[JobFolder]) -> tuple[list[JobFolder], dict[JobFolder, tuple[float, Snapshot]]]:
         """Jobs that can be taken, and those that somebody may still be copying, as they are now."""
         ready, changing = [], {}
         for job in jobs:
             would = self._would(job)
-            if would.state == WOULD or (would.state == UNCHANGED and self.work.was_left(job)):
+            if would.state == states.WOULD or (would.state == states.UNCHANGED and self.work.was_left(job)):
                 ready.append(job)
-            elif would.state == WAITING and not job.planned:
-                changing[job] = (self.clock.passed(), snapshot(job.folder))
+            elif would.state == states.WAITING and not job.planned:
+                changing[job] = (self.clock.passed(), states.snapshot(job.folder))
             else:
                 self._end(would)
         return ready, changing
@@ -178,10 +165,10 @@ class ScheduledRun:
             with contextlib.suppress(CmmUqError):
                 again = replace(next(job_folders(job.folder), job), root=job.root)
             same_id = again.id == job.id or again.id.casefold() not in ids
-            if snapshot(job.folder) == seen and same_id and not again.planned:
+            if states.snapshot(job.folder) == seen and same_id and not again.planned:
                 settled.append(again)
             else:
-                self._end(JobOutcome(job, WAITING, "is still being changed: left for the next run"))
+                self._end(JobOutcome(job, states.WAITING, "is still being changed: left for the next run"))
         return settled
 
     def _report_all(self, jobs: Sequence[JobFolder]) -> None:
@@ -197,7 +184,7 @@ class ScheduledRun:
         again, in_a_row = list[JobFolder](), 0
         for i, job in enumerate(jobs):
             ended = self.work.take(job)
-            if last or ended.state != FAILED:
+            if last or ended.state != states.FAILED:
                 in_a_row = 0
                 self._end(ended)
                 continue
@@ -238,17 +225,17 @@ class ScheduledRun:
             since = self.problems.since(ended.name, ended.why, self.clock.moment())
             age = self._age(dt.datetime.fromisoformat(since))
             self._queue([of_error(ended.error, ended.name, since)])
-        elif ended.state not in (BUSY, WAITING, GONE):
+        elif ended.state not in (states.BUSY, states.WAITING, states.GONE):
             self._mended(ended.name)
             self._mended(str(ended.job.folder))
         self._tell({**ended.line(), **age}, ended.code)
         self.standing.extend(ended.notices)
-        if ended.state == UNCHANGED and not self.dry:
+        if ended.state == states.UNCHANGED and not self.dry:
             try:
                 self._stand(self.work.standing(ended.job))
             except CmmUqError as error:
                 self._line({"standing": ended.name, "event": "error", "why": str(error)}, 2)
-        if ended.state != UNCHANGED:
+        if ended.state != states.UNCHANGED:
             said = ended.why if ended.error is not None else ", ".join(filter(None, (ended.why, *ended.events)))
             self._log(f"{ended.state} {ended.name}" + (f": {said}" if said else ""))
 

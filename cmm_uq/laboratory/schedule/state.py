@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from cmm_uq.base.errors import CmmUqError, OutputError, printable
 from cmm_uq.base.files.content import content_of
@@ -50,38 +50,14 @@ class Dispatch:
     last: dt.datetime
 
 
-class State(Protocol):
-    """What is remembered from run to run; without it everything is new again."""
-
-    def reported(self, job: str) -> Mapping[str, str] | None:
-        """SHA-256 by name of every file that a job's newest certificate was made from; ``None`` where it has none."""
-
-    def results(self, job: str) -> Mapping[str, Any] | None:
-        """What the newest certificate of a job states, as results.json has it; ``None`` where it has none."""
-
-    def released(self, job: str) -> bool:
-        """Whether a person has released the newest certificate of a job, so that it must not be replaced."""
-
-    def is_draft(self, job: str) -> bool:
-        """Whether nobody has released or withdrawn the newest certificate of a job yet."""
-
-    def sent(self, key: str) -> Dispatch | None: ...
-    def add_sent(self, key: str, content: Mapping[str, Any]) -> None: ...
-
-    def claim(self, key: str, content: Mapping[str, Any], again: Callable[[Dispatch | None], bool]) -> bool:
-        """Remember that something goes out now, where it goes out again: of runs at the same time one only is to say it."""
-
-
-@dataclass(frozen=True)
+@dataclass
 class FolderState:
-    """State kept with the reports alone."""
+    """What is remembered from run to run, kept with the reports alone; without it everything is new again."""
 
     out: Path
 
-    def reported(self, job: str) -> Mapping[str, str] | None:
-        return inputs_of(self.results(job))
-
     def results(self, job: str) -> Mapping[str, Any] | None:
+        """What the newest certificate of a job states, as results.json has it; ``None`` where it has none."""
         folder = self.out / job
         manifest = read_manifest(folder)
         if manifest is None or (manifest.owner.command, manifest.owner.job) != (COMMAND, job):
@@ -90,9 +66,11 @@ class FolderState:
         return _results_in(folder) if there and sha256_of(folder / RESULTS) == manifest.files.get(RESULTS) else None
 
     def released(self, job: str) -> bool:
+        """Whether a person has released the newest certificate of a job, so that it must not be replaced."""
         return False
 
     def is_draft(self, job: str) -> bool:
+        """Whether nobody has released or withdrawn the newest certificate of a job yet."""
         return True
 
     def sent(self, key: str) -> Dispatch | None:
@@ -108,6 +86,7 @@ class FolderState:
         replace_file(self._marker(key), json.dumps(content, ensure_ascii=False).encode(), _FIX)
 
     def claim(self, key: str, content: Mapping[str, Any], again: Callable[[Dispatch | None], bool]) -> bool:
+        """Remember that something goes out now, where it goes out again: of runs at the same time one only is to say it."""
         with turn(self.out / PRIVATE / "told.lock", patience_s=_PATIENCE_S):
             before = self.sent(key)
             if again(before):
@@ -119,20 +98,18 @@ class FolderState:
         return self.out / PRIVATE / "sent" / f"{key}.json"
 
 
-class RecordsState:
+class RecordsState(FolderState):
     """State kept in the records; the folder of the reports says what they need not be asked for."""
 
     def __init__(self, records: Records, out: Path) -> None:
-        self.records, self.folder = records, FolderState(out)
+        super().__init__(out)
+        self.records = records
         self._sent: dict[str, Dispatch] = {}
         self._read = 0
 
-    def reported(self, job: str) -> Mapping[str, str] | None:
-        return inputs_of(self.results(job))
-
     def results(self, job: str) -> Mapping[str, Any] | None:
-        if inputs_of(here := self.folder.results(job)) is not None:
-            digest = sha256_of(self.folder.out / job / RESULTS)
+        if inputs_of(here := super().results(job)) is not None:
+            digest = sha256_of(self.out / job / RESULTS)
             if digest is not None and self.records.has_results(digest) is not None:
                 return here
         if (newest := self._newest(job)) is None:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.stats import multivariate_normal, norm
 
-from cmm_uq.laboratory.due.checks import ComparedValue, ValueChange, change, check_standings, each_of, limit_for
+from cmm_uq.laboratory.due.rule import ComparedValue, ValueChange, change, check_standings, each_of, limit_for
 from cmm_uq.laboratory.records.facts import RecordedCertificate
 from tests.laboratory.due.histories import FIRST_of_made, certificate, value
 

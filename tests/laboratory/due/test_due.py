@@ -12,7 +12,7 @@ import pytest
 
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, after_months, artefact_due, in_order, machine_due
 from cmm_uq.laboratory.due.history import YEAR, epochs, machine_history, trend
-from cmm_uq.laboratory.due.methods import series_from
+from cmm_uq.laboratory.due.intervals import series_from
 from cmm_uq.laboratory.due.rule import Rule
 from cmm_uq.laboratory.records.facts import ArtefactRow, RecordedCertificate, RecordedMachine
 from tests.laboratory.due.histories import MACHINE, FIRST_of_made, certificate, series, value

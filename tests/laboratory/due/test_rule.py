@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.jobs.tables.machine import Recalibration
-from cmm_uq.laboratory.due.methods import METHODS
+from cmm_uq.laboratory.due.intervals import METHODS
 from cmm_uq.laboratory.due.rule import DAYS_A_MONTH, Rule
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.content import certificate_content

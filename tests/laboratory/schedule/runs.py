@@ -15,7 +15,7 @@ from cmm_uq.laboratory.schedule.jobs import JobFolder, JobReporting
 from cmm_uq.laboratory.schedule.notices import Notice, Outbox
 from cmm_uq.laboratory.schedule.run import RunClock, ScheduledRun
 from cmm_uq.laboratory.schedule.settings import RunTable
-from cmm_uq.laboratory.schedule.state import FolderState, RecordsState, State
+from cmm_uq.laboratory.schedule.state import FolderState, RecordsState
 from tests.laboratory.schedule.told import Kept
 
 JOB = '[job]\nid = "{id}"\n[recording]\nfile = "points.csv"\n'
@@ -36,7 +36,7 @@ class Jobs:
     before: Callable[[JobFolder], None] = lambda job: None
     settings: dict[str, Any] = field(default_factory=dict)
     now: dt.datetime = field(default_factory=lambda: dt.datetime.now(dt.UTC) + dt.timedelta(minutes=10))
-    state: State | None = None
+    state: FolderState | None = None
     due: Callable[[dt.date], Iterable[Notice]] = lambda on: ()
     folders: list[Path] = field(default_factory=list)
     reported: list[str] = field(default_factory=list)
@@ -90,5 +90,5 @@ class FolderResults:
 
     def __init__(self, state: RecordsState) -> None:
         self.sent, self.add_sent, self.claim = state.sent, state.add_sent, state.claim
-        self.reported, self.results, self.released = state.folder.reported, state.folder.results, state.folder.released
-        self.is_draft = state.folder.is_draft
+        folder = FolderState(state.out)
+        self.results, self.released, self.is_draft = folder.results, folder.released, folder.is_draft

@@ -170,9 +170,6 @@ class Locked:
     failures: int
     keys: set[str] = field(default_factory=set)
 
-    def reported(self, job: str) -> dict[str, str] | None:
-        return None
-
     def released(self, job: str) -> bool:
         return False
 

@@ -172,7 +172,7 @@ def test_a_job_that_was_read_before_it_was_whole_is_read_again(
         made(jobs.root, "b", id=named) if path.read_text() == "[jo" else None
         return snapshot(folder)
 
-    monkeypatch.setattr("cmm_uq.laboratory.schedule.run.snapshot", completed)
+    monkeypatch.setattr("cmm_uq.laboratory.schedule.jobs.snapshot", completed)
     assert jobs.run() == 0
     assert [line["state"] for line in jobs.lines if line.get("folder") == str(jobs.root / "b")] == [state]
     assert jobs.channel.messages == []

@@ -24,6 +24,7 @@ from cmm_uq.laboratory.schedule.state import (
     FolderState,
     Log,
     RecordsState,
+    inputs_of,
     turn,
     turn_at,
     was_left,
@@ -53,21 +54,21 @@ def record(records: Records, digest: str, job: str = "a", inputs: dict[str, str]
 
 def test_a_folder_knows_its_own_whole_reports_alone(tmp_path: Path) -> None:
     state = FolderState(tmp_path)
-    assert state.reported("a") is None
+    assert inputs_of(state.results("a")) is None
     report(tmp_path)
-    assert state.reported("a") == INPUTS
+    assert inputs_of(state.results("a")) == INPUTS
     report(tmp_path, "diagnosed", command="diagnose")
-    assert state.reported("diagnosed") is None
+    assert inputs_of(state.results("diagnosed")) is None
     (tmp_path / "a" / "results.json").write_text('{"job": {"inputs_sha256": {}}}')
-    assert state.reported("a") is None
+    assert inputs_of(state.results("a")) is None
 
 
 def test_what_the_folder_has_and_the_records_have_not_is_to_be_recorded_yet(tmp_path: Path, records: Records) -> None:
     state = RecordsState(records, tmp_path / "reports")
     digest = report(tmp_path / "reports")
-    assert state.reported("a") is None
+    assert inputs_of(state.results("a")) is None
     record(records, digest)
-    assert state.reported("a") == INPUTS
+    assert inputs_of(state.results("a")) == INPUTS
 
 
 def test_a_report_that_was_taken_away_is_not_made_again_and_of_several_the_newest_counts(
@@ -78,7 +79,7 @@ def test_a_report_that_was_taken_away_is_not_made_again_and_of_several_the_newes
     record(records, "a" * 64, inputs={"job.toml": "0" * 64})
     record(records, report(tmp_path / "reports"))
     shutil.rmtree(tmp_path / "reports" / "a")
-    assert state.reported("a") == INPUTS
+    assert inputs_of(state.results("a")) == INPUTS
 
 
 def test_a_released_certificate_is_not_replaced(tmp_path: Path, records: Records) -> None:

@@ -289,24 +289,16 @@ def _members(
     from cmm_uq.laboratory.due.fleet import FleetMember
 
     for machine, of in rows.groupby("machine", sort=True):
-        last, known = of.iloc[-1], history(_Columns(of), adjusted.get(str(machine)))
+        # what certificates take from an artefact is at most their whole uncertainty
+        shared = of["u_artefact"].fillna(0.0).clip(0.0, of["u"])
+        rows_of = of.assign(u_artefact=shared, adjusted_since=np.minimum(of["adjusted_since"], of["day"]))
+        last, known = of.iloc[-1], history(rows_of, adjusted.get(str(machine)))
         limits = of["limit"].dropna()
         yield FleetMember(
             str(machine), str(last["model"] or ""), str(last["place"] or ""), known,
             float(limits.iloc[-1]) if len(limits) and limits.iloc[-1] > 0 else None,
             stated.get(int(last["entry"]), {}).get(str(last["name"]), ""),
         )  # fmt: skip
-
-
-class _Columns:
-    """Rows of the records as a series; what certificates take from an artefact is at most their whole uncertainty."""
-
-    def __init__(self, rows: pd.DataFrame) -> None:
-        self.day, self.value, self.u = (rows[name].to_numpy(dtype=np.float64) for name in ("day", "value", "u"))
-        shared = np.nan_to_num(rows["u_artefact"].to_numpy(dtype=np.float64))
-        self.u_artefact = np.clip(shared, 0.0, self.u)
-        self.artefact = rows["artefact"].to_numpy(dtype=np.str_)
-        self.adjusted_since = np.minimum(rows["adjusted_since"].to_numpy(dtype=np.float64), self.day)
 
 
 def write_fleet(found: FleetResult, folder: Path, *, force: bool = False) -> dict[str, Path]:

@@ -25,9 +25,7 @@ class Conversation:
         self._replayed, self._by_itself = replayed, replayed or send.unasked or not self._polls
         self._due = self._since = self._asked_at = self._heard_at = self._pause = now
         self._open = self._left = 0  # questions without their answer; messages that the last one's still lacks
-        self._kept_since: int | None = (
-            None  # since when answers to nothing keep a question that is due from being asked
-        )
+        self._kept_since: int | None = None  # since when answers to nothing keep a due question from being asked
         self.asked = 0 if replayed else -1
         self.waiting = self.gap = False
 

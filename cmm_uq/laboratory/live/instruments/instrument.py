@@ -301,9 +301,7 @@ def instrument(
     return LiveInstrument(identity, profile, source.opener(port, profile.connection), clock, reopen_when_silent=far)
 
 
-MOST_LINES = (
-    200  # among which an instrument is looked for that says which one it is: each is looked at with all before it
-)
+MOST_LINES = 200  # in which an instrument is to say which one it is: each is looked at with all before it
 
 
 class Introduction:

@@ -31,10 +31,8 @@ from typing import Any, Literal, NamedTuple
 
 MOST_RUNS = 100  # alive at a time
 _MOST_PLACES, _MOST_EDGES, _MOST_STEPS, _MOST_AHEAD = 4_000, 100_000, 500_000, 100
-_CHARACTERS, _START = (
-    256,
-    1 << 256,
-)  # a set of characters is a number with their bits; the beginning of the text is one more
+_CHARACTERS = 256
+_START = 1 << _CHARACTERS  # a set of characters is a number with their bits; the beginning of the text is one more
 _ANY = _START - 1
 _SHOWN = 40  # characters of a pattern that a message shows
 Use = Literal["fullmatch", "search", "split"]
@@ -94,11 +92,8 @@ class _Automaton:
 
     def _joined(self, a: _Part, b: _Part) -> _Part:
         self._link(a.last, b.first)
-        return _Part(
-            _products(a.empty, b.empty),
-            a.first + _with(b.first, a.empty),
-            b.last + _with(a.last, b.empty),
-        )
+        first, last = a.first + _with(b.first, a.empty), b.last + _with(a.last, b.empty)
+        return _Part(_products(a.empty, b.empty), first, last)
 
     def _link(self, last: _Ends, first: _Ends) -> None:
         for (p, out), m in last.items():

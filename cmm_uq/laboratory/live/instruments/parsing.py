@@ -14,8 +14,8 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.table import unit_of
 from cmm_uq.base.messages import Text, Verbatim, number, say, semicolons
 from cmm_uq.base.units import pint_units
+from cmm_uq.laboratory.live.instruments import profile as profiles
 from cmm_uq.laboratory.live.instruments.profile import (
-    Example,
     MessageFrame,
     Parse,
     ProfileFile,
@@ -286,7 +286,7 @@ def check_profile(profile: ProfileFile, where: str) -> None:
         _check_example(profile, parser, example, f"{where}: [[example]] {place}")
 
 
-def _check_example(profile: ProfileFile, parser: Parser, example: Example, at: str) -> None:
+def _check_example(profile: ProfileFile, parser: Parser, example: profiles.Example, at: str) -> None:
     framer, raw = Framer(profile.frame), bytes_of(example.received)
     messages = framer.feed(raw)
     if len(messages) != 1 or framer.waiting:

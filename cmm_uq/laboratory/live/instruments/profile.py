@@ -159,9 +159,8 @@ class Send(JobTable):
     @model_validator(mode="after")
     def _one_question(self) -> Self:
         if self.unasked and len(self.poll) != 1:
-            raise ValueError(
-                "unasked is for an instrument with one question: of several, nobody knows which it answers"
-            )
+            problem = "unasked is for an instrument with one question: of several, nobody knows which it answers"
+            raise ValueError(problem)
         return self
 
 

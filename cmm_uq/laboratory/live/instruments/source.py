@@ -67,9 +67,7 @@ class Identity:
     firmware: str | None = None
     certificate: str | None = None
     units: Mapping[str, str] = field(default_factory=dict)  # by quantity, those that the instrument does not say
-    units_stated: list[str] = field(
-        default_factory=list
-    )  # quantities whose units the job states; the others are assumed
+    units_stated: list[str] = field(default_factory=list)  # quantities whose units the job states, not assumed
 
 
 @dataclass(frozen=True)
@@ -105,28 +103,15 @@ class LiveSource(Protocol):
     def close(self) -> None: ...
 
 
-class Clock(Protocol):
-    """Time, as the system tells it or as a test does."""
+class Clock:
+    """Time, as the system tells it; a test has one of its own."""
 
-    def utc_ns(self) -> int: ...
-    def monotonic_ns(self) -> int: ...
-    def sleep(self, s: float) -> None: ...
-
-
-class SystemClock:
-    def utc_ns(self) -> int:
-        return time.time_ns()
-
-    def monotonic_ns(self) -> int:
-        return time.monotonic_ns()
-
-    def sleep(self, s: float) -> None:
-        time.sleep(s)
+    utc_ns = staticmethod(time.time_ns)
+    monotonic_ns = staticmethod(time.monotonic_ns)
+    sleep = staticmethod(time.sleep)
 
 
-SYSTEM: Clock = SystemClock()
-
-
+SYSTEM = Clock()
 SECOND = 1_000_000_000  # ns
 TICK_S = 0.05  # longest wait for bytes; whoever waits longer looks at the clock in between
 
@@ -337,9 +322,8 @@ def serial_ports() -> list[tuple[str, str]]:
     """Name and description of the serial ports of this computer."""
     from serial.tools import list_ports
 
-    return sorted(
-        (port.device, "" if port.description == "n/a" else str(port.description)) for port in list_ports.comports()
-    )
+    found = ((port.device, str(port.description)) for port in list_ports.comports())
+    return sorted((name, "" if description == "n/a" else description) for name, description in found)
 
 
 def file_named(port: str, folder: Path) -> Path:
