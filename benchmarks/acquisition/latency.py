@@ -22,8 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer
-from cmm_uq.laboratory.live.instruments.simulated_line import SimulatedLine
-from cmm_uq.laboratory.live.instruments.speakers import Lines
+from cmm_uq.laboratory.live.instruments.simulated_line import Lines, SimulatedLine
 from cmm_uq.laboratory.live.story import read_story
 from tests.laboratory.live.session import job_folder
 

@@ -20,7 +20,7 @@ from benchmarks.hostile.invariants import Outcome
 from benchmarks.hostile.warm import Warm
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.live.instruments.speakers import Lines
+from cmm_uq.laboratory.live.instruments.simulated_line import Lines
 from cmm_uq.laboratory.live.story import read_story
 from tests.laboratory.live.instruments.mischief import UnreliableLine
 from tests.laboratory.live.session import job_folder

@@ -8,7 +8,7 @@ count; of the others the one with the largest figure of merit is taken.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -132,10 +132,9 @@ def reliability_regression(data: ReliabilityData, target: float) -> ReliabilityR
     sizes = _alike([found.interval for found, _ in fitted])
     # C in per cent of 100 would be zero for a perfect fit; a thousandth is as good as none
     ranked = [
-        ReliabilityFit(found.name, found.parameters, scale, found.interval, found.rejection, found.accepted,
-               size / max(found.rejection, 1e-3) * reach**0.25)
+        replace(found, merit=size / max(found.rejection, 1e-3) * reach**0.25)
         for (found, reach), size in zip(fitted, sizes, strict=True)
-    ]  # fmt: skip
+    ]
     fit = [found for found in ranked if found.accepted and found.interval]
     if not fit:
         fix = "Take a lower reliability, or a fixed interval"

@@ -6,17 +6,19 @@ import contextlib
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.output.staging import locked
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.output.new_file import writing_to
+from cmm_uq.base.output.staging import locked, replace_file
 from cmm_uq.laboratory.proving.cases import canonical_json
 from cmm_uq.laboratory.schedule.processes import WorkerTask, answers
 
 Record = dict[str, Any]  # what was said of a task: plain data with its ``number``
 TRUTH, RECORDS, LOCK = "truth.json", "cases.jsonl", "lock"
+_MENDED = "Free the disk, mend the permissions, or choose another --out"
 
 
 class AnswersFolder:
@@ -25,7 +27,7 @@ class AnswersFolder:
     def __init__(self, folder: Path, truth: bytes) -> None:
         self.folder = folder
         self._descriptor = -1
-        with _told(folder):
+        with writing_to(folder, _MENDED):
             folder.mkdir(parents=True, exist_ok=True)
             (folder / LOCK).touch()
             descriptor = locked(folder / LOCK, create=False)
@@ -46,11 +48,8 @@ class AnswersFolder:
                              where=str(self.folder),
                              fix="Repeat the command that began it to go on, or remove the folder")  # fmt: skip
         if not sealed.exists():
-            part = self.folder / f"{TRUTH}.part"
-            with part.open("wb") as file:
-                _synced(file, truth)
             (self.folder / RECORDS).unlink(missing_ok=True)
-            part.replace(sealed)
+            replace_file(sealed, truth, _MENDED)
         path = self.folder / RECORDS
         content = path.read_bytes() if path.exists() else b""
         records: dict[int, Record] = {}
@@ -68,8 +67,10 @@ class AnswersFolder:
         return records
 
     def keep(self, record: Record) -> None:
-        with _told(self.folder):
-            _synced(self._file, canonical_json(record))
+        with writing_to(self.folder, _MENDED):
+            self._file.write(canonical_json(record))
+            self._file.flush()
+            os.fsync(self._file.fileno())
         self.records[record["number"]] = record
 
     def close(self) -> None:
@@ -93,21 +94,3 @@ def answer_tasks(
             if answer.failure is not None:
                 raise answer.failure
             keep(answer.value)
-
-
-def _synced(file: Any, content: bytes) -> None:
-    file.write(content)
-    file.flush()
-    os.fsync(file.fileno())
-
-
-@contextlib.contextmanager
-def _told(folder: Path) -> Iterator[None]:
-    try:
-        yield
-    except (OSError, ValueError) as error:
-        if isinstance(error, CmmUqError):
-            raise
-        what = getattr(error, "strerror", None) or error
-        raise OutputError(f"cannot be written: {what}", where=str(folder),
-                          fix="Free the disk, mend the permissions, or choose another --out") from error  # fmt: skip

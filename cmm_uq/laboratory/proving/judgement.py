@@ -366,9 +366,10 @@ class AcceptanceFigure:
 
 
 def acceptance_figures(judgement: ProofJudgement, facts: ProveFacts) -> tuple[AcceptanceFigure, ...]:
+    low, high = facts.coverage_pct
     every: list[tuple[str, Text, Rate, float, float]] = [
         ("false_alarms", say("False alarms"), judgement.false_alarms, 0.0, facts.false_alarms_pct),
-        ("coverage", say("95 % intervals that hold the truth"), judgement.coverage, *facts.coverage_pct),
+        ("coverage", say("95 % intervals that hold the truth"), judgement.coverage, low, high),
     ]
     if facts.wrong_names_pct is not None:
         every.append(("wrong_names", say("Cases with a wrong name"), judgement.wrong_names, 0.0, facts.wrong_names_pct))

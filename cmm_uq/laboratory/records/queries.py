@@ -263,10 +263,8 @@ def blocks(numbers: Sequence[int]) -> Iterable[Sequence[int]]:
 def _machine(row: Mapping[Any, Any], adjusted: Iterable[str]) -> facts.RecordedMachine:
     days = tuple(map(dt.date.fromisoformat, adjusted))
     rule = json.loads(row["calibrate"]) if row["calibrate"] else None
-    named = [row[name] for name in ("called", "name", "manufacturer", "model", "place")]
-    return facts.RecordedMachine(
-        *named, adjusted=days, by_name=row["recognised"].startswith(facts.BY_NAME), calibrate=rule
-    )
+    named = row["called"], row["name"], row["manufacturer"], row["model"], row["place"]
+    return facts.RecordedMachine(*named, days, row["recognised"].startswith(facts.BY_NAME), rule)
 
 
 def _machine_id(connection: Connection, serial: str) -> int:

@@ -17,8 +17,7 @@ import pytest
 
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.laboratory.live.instruments.ipp_server import SimulatedIppServer
-from cmm_uq.laboratory.live.instruments.simulated_line import SimulatedLine
-from cmm_uq.laboratory.live.instruments.speakers import Lines, Readout1502
+from cmm_uq.laboratory.live.instruments.simulated_line import Lines, Readout1502, SimulatedLine
 from cmm_uq.laboratory.live.story import read_story
 from tests.app.cli.process import COMMAND, run
 from tests.app.cli.terminal import until

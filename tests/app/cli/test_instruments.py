@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.laboratory.live.instruments.library import read_profile, ready
-from cmm_uq.laboratory.live.instruments.speakers import Readout1502, Speaker, Thermocouples
+from cmm_uq.laboratory.live.instruments.simulated_line import Readout1502, Speaker, Thermocouples
 from tests.app.cli.process import COMMAND, run
 from tests.app.cli.terminal import everything
 from tests.conftest import ROOT

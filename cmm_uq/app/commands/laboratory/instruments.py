@@ -15,9 +15,8 @@ from cmm_uq.base.output.new_file import write_new
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments import library
 from cmm_uq.laboratory.live.instruments.instrument import open_source
-from cmm_uq.laboratory.live.instruments.simulated_line import WAYS, SimulatedLine
+from cmm_uq.laboratory.live.instruments.simulated_line import SPEAKERS, WAYS, SimulatedLine
 from cmm_uq.laboratory.live.instruments.source import Event, LiveSource
-from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS
 
 
 def ready_profiles() -> list[tuple[str, str, str]]:

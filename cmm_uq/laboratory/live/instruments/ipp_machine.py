@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.laboratory.live.instruments import ipp, source
+from cmm_uq.laboratory.live.instruments import ipp_client as ipp, source
 from cmm_uq.laboratory.live.instruments.ipp_client import ANSWER_WITHIN_S, Client
 from cmm_uq.laboratory.live.instruments.profile import Connection, Positions, ProfileFile, shown
 from cmm_uq.laboratory.live.instruments.source import SECOND, Event, PortLostError

@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from cmm_uq.laboratory.live.instruments import ipp
+from cmm_uq.laboratory.live.instruments import ipp_client as ipp
 from cmm_uq.laboratory.live.instruments.parsing import Framer
 from cmm_uq.laboratory.live.instruments.profile import MessageFrame
 

@@ -16,9 +16,8 @@ from cmm_uq.laboratory.live.instruments.instrument import LiveInstrument, open_s
 from cmm_uq.laboratory.live.instruments.library import profile_of, profile_of_source, unsaid_units
 from cmm_uq.laboratory.live.instruments.parsing import Framer, Parser
 from cmm_uq.laboratory.live.instruments.profile import ProfileFile
-from cmm_uq.laboratory.live.instruments.simulated_line import Way
+from cmm_uq.laboratory.live.instruments.simulated_line import SPEAKERS, Readout1502, Speaker, Thermocouples, Way
 from cmm_uq.laboratory.live.instruments.source import Gap, Identity, Reading, Returned
-from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS, Readout1502, Speaker, Thermocouples
 from tests.laboratory.live.instruments.listening import Listener, hasty, listening, opened
 from tests.laboratory.live.instruments.mischief import UnreliableLine
 from tests.laboratory.live.session import FakeClock

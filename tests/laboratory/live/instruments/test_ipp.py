@@ -12,12 +12,13 @@ from hypothesis import given, strategies as st
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments.instrument import open_source
-from cmm_uq.laboratory.live.instruments.ipp import (
+from cmm_uq.laboratory.live.instruments.ipp_client import (
     ACK,
     DATA,
     DONE,
     ERROR,
     BadLineError,
+    Client,
     FaultError,
     HeardLine,
     NoAnswerError,
@@ -28,7 +29,6 @@ from cmm_uq.laboratory.live.instruments.ipp import (
     response_of,
     terms_of,
 )
-from cmm_uq.laboratory.live.instruments.ipp_client import Client
 from cmm_uq.laboratory.live.instruments.ipp_machine import IppMachine
 from cmm_uq.laboratory.live.instruments.source import SYSTEM, Gap, PortLostError, Reading, Returned, TcpPort
 from tests.laboratory.live.instruments.listening import listening

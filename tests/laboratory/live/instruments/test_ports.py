@@ -19,9 +19,8 @@ from cmm_uq.laboratory.live.instruments.conversation import Conversation
 from cmm_uq.laboratory.live.instruments.instrument import SECOND, open_source
 from cmm_uq.laboratory.live.instruments.library import profile_named
 from cmm_uq.laboratory.live.instruments.profile import Connection, Poll, Send
-from cmm_uq.laboratory.live.instruments.simulated_line import SimulatedLine
+from cmm_uq.laboratory.live.instruments.simulated_line import Lines, SimulatedLine
 from cmm_uq.laboratory.live.instruments.source import Gap, Reading, opener, serial_ports
-from cmm_uq.laboratory.live.instruments.speakers import Lines
 from tests.laboratory.live.instruments.listening import opened
 
 here = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals here")

@@ -23,9 +23,8 @@ from cmm_uq.laboratory.live.instruments.library import (
 )
 from cmm_uq.laboratory.live.instruments.parsing import FramedMessage, Framer, Parser, Understood
 from cmm_uq.laboratory.live.instruments.profile import MessageFrame, ProfileFile, bytes_of, shown
-from cmm_uq.laboratory.live.instruments.simulated_line import SimulatedLine, Way
+from cmm_uq.laboratory.live.instruments.simulated_line import SPEAKERS, SimulatedLine, Way
 from cmm_uq.laboratory.live.instruments.source import Reading
-from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS
 from tests.laboratory.live.instruments.listening import hasty, listening, opened
 
 
