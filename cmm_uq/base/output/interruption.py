@@ -14,9 +14,10 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import FrameType
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 # how long to wait for files that are just being put in place: the process ends within two seconds of a signal
 PATIENCE_S = 1.2
@@ -30,6 +31,7 @@ class Unplaced(Protocol):
         """Remove it."""
 
 
+Held = TypeVar("Held")
 _placing = threading.Lock()
 _stages: list[Unplaced] = []
 _written: list[Path] = []
@@ -42,13 +44,17 @@ _keeping: list[Callable[[], str]] = []
 
 
 @contextlib.contextmanager
-def staged(place: Unplaced) -> Iterator[None]:
-    """While something is staged, a signal removes it."""
-    _stages.append(place)
+def _held(those: list[Held], one: Held) -> Iterator[None]:
+    those.append(one)
     try:
         yield
     finally:
-        _stages.remove(place)
+        those.remove(one)
+
+
+def staged(place: Unplaced) -> AbstractContextManager[None]:
+    """While something is staged, a signal removes it."""
+    return _held(_stages, place)
 
 
 @contextlib.contextmanager
@@ -90,24 +96,14 @@ def placing(folder: Path, staged: Unplaced | None = None) -> Iterator[None]:
         _going_in.remove(folder)
 
 
-@contextlib.contextmanager
-def speaking(hush: Callable[[], None]) -> Iterator[None]:
+def speaking(hush: Callable[[], None]) -> AbstractContextManager[None]:
     """While somebody writes to the terminal by itself, a signal calls ``hush`` before it says anything."""
-    _speaking.append(hush)
-    try:
-        yield
-    finally:
-        _speaking.remove(hush)
+    return _held(_speaking, hush)
 
 
-@contextlib.contextmanager
-def keeping(what: Callable[[], str]) -> Iterator[None]:
+def keeping(what: Callable[[], str]) -> AbstractContextManager[None]:
     """While a command keeps what it has on the disk already, a signal says so; ``what`` follows "interrupted; "."""
-    _keeping.append(what)
-    try:
-        yield
-    finally:
-        _keeping.remove(what)
+    return _held(_keeping, what)
 
 
 def written() -> tuple[Path, ...]:

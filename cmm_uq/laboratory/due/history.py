@@ -15,7 +15,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, day, plural, say
@@ -61,25 +60,18 @@ def epochs(series: Series) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in zip(starts, [*starts[1:], len(series.day)], strict=True)]
 
 
-def covariance_of(u: Floats, u_artefact: Floats, artefact: NDArray[np.str_]) -> Floats:
-    """Covariance (n, n) of values (n,): what the artefact contributes is common to all with the same one."""
-    same = (np.asarray(artefact)[:, None] == np.asarray(artefact)[None, :]) & (np.asarray(artefact) != "")
-    covariance = np.where(same, np.outer(u_artefact, u_artefact), 0.0)
-    np.fill_diagonal(covariance, np.asarray(u, dtype=np.float64) ** 2)
-    return np.asarray(covariance, dtype=np.float64)
-
-
 def trend(series: Series) -> TrendLine | None:
     """The line through the values since the last adjustment; ``None`` where they are of fewer than two days."""
     rows = epochs(series)[-1] if len(series.day) else slice(0, 0)
     day, value = series.day[rows], series.value[rows]
     if len(np.unique(day)) < 2:
         return None
-    pairs = zip(series.u[rows], series.u_artefact[rows], strict=True)
-    common = np.array([common_part(float(u), float(shared)) for u, shared in pairs])
-    covariance = covariance_of(series.u[rows], common, series.artefact[rows])
-    floor = _LEAST * max(float(np.abs(value).max()), 1e-30)
-    covariance += np.diag(np.full(len(day), floor**2))
+    u, artefact = series.u[rows], series.artefact[rows]
+    common = np.array([common_part(*pair) for pair in zip(u.tolist(), series.u_artefact[rows].tolist(), strict=True)])
+    # what the artefact contributes is common to all with the same one
+    same = (artefact[:, None] == artefact) & (artefact != "")
+    covariance = np.where(same, np.outer(common, common), 0.0)
+    np.fill_diagonal(covariance, u**2 + (_LEAST * max(float(np.abs(value).max()), 1e-30)) ** 2)
     terms = np.column_stack([np.ones(len(day)), (day - day[-1]) / YEAR])
     weighed = np.linalg.solve(covariance, terms)
     spread = np.linalg.inv(terms.T @ weighed)

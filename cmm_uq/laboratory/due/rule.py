@@ -156,11 +156,6 @@ def two_sided(z: float) -> float:
     return math.erfc(abs(z) / math.sqrt(2))
 
 
-def two_sided_limit(probability: float) -> float:
-    """The deviate that is exceeded on either side with a probability."""
-    return -NormalDist().inv_cdf(probability / 2)
-
-
 _NOTHING = 1e-9  # part of a variance that is none
 FAMILY = 0.05  # probability that anything at all is called significant where nothing changed
 
@@ -229,7 +224,7 @@ class InterimCheck:
 
 def limit_for(count: int, single: float) -> float:
     """Limit for each of several values with the rate of false alarms that ``single`` has for one."""
-    return two_sided_limit(each_of(count, two_sided(single)))
+    return -NormalDist().inv_cdf(each_of(count, two_sided(single)) / 2)
 
 
 def check_standings(calibration: RecordedCertificate, checks: Sequence[RecordedCertificate]) -> list[InterimCheck]:

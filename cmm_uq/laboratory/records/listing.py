@@ -39,21 +39,10 @@ class ListedCertificate(NamedTuple):
     command: str
 
 
-class Called(NamedTuple):
-    """What a machine is called: fields as in :class:`~cmm_uq.laboratory.records.facts.RecordedMachine`."""
-
-    serial: str
-    name: str
-    manufacturer: str
-    model: str
-    place: str
-    by_name: bool
-
-
 class Newest(NamedTuple):
     """A machine and its newest measured certificate that stands; ``None`` where it has none."""
 
-    machine: Called
+    machine: RecordedMachine
     certificate: ListedCertificate | None
 
 
@@ -96,10 +85,8 @@ def standing_of_all(records: Records) -> list[Newest]:
     with records.reading() as connection:
         rows = connection.execute(query).all()
     return [
-        Newest(
-            Called(serial, name, maker, model, place, key.startswith(BY_NAME)), None if own[0] is None else _listed(own)
-        )
-        for serial, name, maker, model, place, key, *own in rows
+        Newest(RecordedMachine(*row[:5], (), row[5].startswith(BY_NAME)), None if row[6] is None else _listed(row[6:]))
+        for row in rows
     ]
 
 

@@ -149,8 +149,10 @@ def state_of(connection: Connection) -> str:
     if not names and application in (None, 0, APPLICATION):
         return ""
     if not ours or "alembic_version" not in names:
+        named = [row[2] for row in connection.exec_driver_sql("PRAGMA database_list")] if sqlite else []
+        where = next(iter(named), connection.engine.url.render_as_string(hide_password=True))
         fix = "Name another file or database for the records"
-        raise CmmUqError("is the database of another program", where=where_of(connection), fix=fix)
+        raise CmmUqError("is the database of another program", where=where, fix=fix)
     return str(connection.exec_driver_sql("SELECT version_num FROM alembic_version").scalar() or "")
 
 
@@ -192,14 +194,6 @@ def _make(records: Records) -> None:
             connection.execute(versions.insert(), {"version_num": REVISION})
             if engine.dialect.name == "sqlite":
                 connection.exec_driver_sql(f"PRAGMA application_id = {APPLICATION}")
-
-
-def where_of(connection: Connection) -> str:
-    """Of a connection, for messages."""
-    if connection.dialect.name == "sqlite":
-        rows = connection.exec_driver_sql("PRAGMA database_list").all()
-        return str(rows[0][2]) if rows else "records"
-    return str(connection.engine.url.render_as_string(hide_password=True))
 
 
 def _write_ahead(raw: sqlite3.Connection) -> None:

@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sqlalchemy import ColumnElement, Connection, Engine, Select, func, or_, select
+from sqlalchemy import ColumnElement, Connection, Engine, Select, func, select
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.laboratory.records import facts, tables
@@ -78,13 +78,9 @@ class RecordQueries:
 
     def certificates(
         self, machine: str | None = None, *, origin: str | None = "measured", states: Collection[str] | None = None,
-        artefact: str | None = None, since: dt.date | None = None, limit: int | None = None, values: bool = True,
-        command: str | None = "report", job: str | None = None, offset: int = 0, newest_first: bool = False,
+        command: str | None = "report", job: str | None = None, limit: int | None = None, values: bool = True,
     ) -> list[facts.RecordedCertificate]:  # fmt: skip
-        """Certificates and interim checks, by day, then entry; ``None`` for all.
-
-        ``since``: first day; ``limit, offset``: at most so many, the newest, and newest that are left out, for pages.
-        """
+        """Certificates and interim checks, by day, then entry, ``limit`` newest at most; ``None`` for all."""
         wanted = ((_C.command, command), (_C.origin, origin), (_C.job, job))
         where = [column == value for column, value in wanted if value is not None]
         with self.reading() as connection:
@@ -92,15 +88,8 @@ class RecordQueries:
                 where.append(_C.machine == _machine_id(connection, machine))
             if states is not None:
                 where.append(_C.state.in_(tuple(states)))
-            if artefact is not None:
-                key, a = facts.spelled(artefact), artefacts.c
-                way = or_(a.called == artefact, a.recognised.in_((key, f"certificate:{key}")))
-                where.append(_C.artefact.in_(tuple(connection.execute(select(a.id).where(way)).scalars())))
-            if since is not None:
-                where.append(_C.day >= since.isoformat())
-            query = _CERTIFICATES.where(*where).order_by(_C.day.desc(), _C.entry.desc())
-            found = self._certificates(connection, query.limit(limit).offset(offset or None), values=values)
-        return found if newest_first else found[::-1]
+            query = _CERTIFICATES.where(*where).order_by(_C.day.desc(), _C.entry.desc()).limit(limit)
+            return self._certificates(connection, query, values=values)[::-1]
 
     def certificate(self, entry: int) -> facts.RecordedCertificate:
         """One certificate, by the number of its entry."""

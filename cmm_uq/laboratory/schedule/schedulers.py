@@ -106,13 +106,10 @@ def starts(after: dt.datetime, until: dt.datetime, at: str, days: Sequence[str])
     of_day, found = dt.time.fromisoformat(at), []
     for ordinal in range(after.toordinal(), until.toordinal() + 1):
         time = dt.datetime.combine(dt.date.fromordinal(ordinal), of_day)
-        if after < time <= until and (not days or DAYS[time.weekday()] in days) and _exists(time):
+        exists = time.astimezone(dt.UTC).astimezone().replace(tzinfo=None) == time
+        if exists and after < time <= until and (not days or DAYS[time.weekday()] in days):
             found.append(time)
     return found
-
-
-def _exists(time: dt.datetime) -> bool:
-    return time.astimezone(dt.UTC).astimezone().replace(tzinfo=None) == time
 
 
 def encoded(name: str, text: str) -> bytes:

@@ -328,11 +328,8 @@ class Log:
                 self.path, maxBytes=self.largest, backupCount=self.kept, encoding="utf-8", errors="backslashreplace",
                 delay=True,
             )  # fmt: skip
-            handler.handleError = _passed_over  # type: ignore[method-assign]
+            handler.handleError = lambda record: None  # type: ignore[method-assign]
             try:
                 handler.emit(logging.makeLogRecord({"msg": printable(text)}))
             finally:
                 handler.close()
-
-
-def _passed_over(record: logging.LogRecord) -> None: ...

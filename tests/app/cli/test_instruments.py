@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.laboratory.live.instruments.library import read_profile, ready
+from cmm_uq.laboratory.live.instruments.library import profile_named, ready
 from cmm_uq.laboratory.live.instruments.simulated_line import Readout1502, Speaker, Thermocouples
 from tests.app.cli.process import COMMAND, run
 from tests.app.cli.terminal import everything
@@ -140,7 +140,7 @@ def test_on_a_terminal_it_asks_for_what_is_needed(tmp_path: Path) -> None:
         shown = everything(master, time.monotonic() + 60)
     os.close(master)
     assert process.returncode == 0, shown
-    made = read_profile(tmp_path / "own.toml")
+    made = profile_named("own.toml", tmp_path)
     assert (made.title, made.connection.baud, made.connection.parity, made.connection.stop_bits) == (
         "Gauge",
         4800,

@@ -16,8 +16,8 @@ from cmm_uq.app.serve.view import DueDate, MachineStanding, groups, in_order
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.render import render_html, render_pdf
 from cmm_uq.laboratory.records import open_records
-from cmm_uq.laboratory.records.facts import Entry
-from cmm_uq.laboratory.records.listing import Called, ListedCertificate, Newest
+from cmm_uq.laboratory.records.facts import Entry, RecordedMachine
+from cmm_uq.laboratory.records.listing import ListedCertificate, Newest
 from tests.app.serve.laboratory import files
 from tests.certificate.samples import document_of
 
@@ -31,7 +31,7 @@ def newest(
     listed = ListedCertificate(
         1, "j", "n", serial, "", "a", "ballbar", "measured", day, state, decision, diagnosis, False, "report"
     )
-    return Newest(Called(serial, "", "", "", "", False), listed)
+    return Newest(RecordedMachine(serial, "", "", "", ""), listed)
 
 
 def due(days: int) -> DueDate:

@@ -63,7 +63,7 @@ def fits(one: RecordedCertificate, choice: CertificateFilter, names: dict[str, s
 @pytest.fixture(scope="module")
 def every(place: Path) -> Iterator[tuple[Records, list[RecordedCertificate], dict[str, str]]]:
     with open_records(place, read_only=True) as records:
-        found = records.certificates(origin=None, command=None, values=False, newest_first=True)
+        found = records.certificates(origin=None, command=None, values=False)[::-1]
         yield records, found, {one.serial: one.name for one in records.machines()}
 
 

@@ -25,24 +25,14 @@ class Conversation:
         self._replayed, self._by_itself = replayed, replayed or send.unasked or not self._polls
         self._due = self._since = self._asked_at = self._heard_at = self._pause = now
         self._open = self._left = 0  # questions without their answer; messages that the last one's still lacks
-        self._kept_since: int | None = None  # since when answers to nothing keep a due question from being asked
+        self.kept_since: int | None = None  # since when answers to nothing keep a due question from being asked
         self.asked = 0 if replayed else -1
         self.waiting = self.gap = False
 
     @property
-    def asks_next(self) -> bool:
-        """Whether what comes now comes before a question."""
-        return not self.waiting and not self._by_itself
-
-    @property
     def expects(self) -> bool:
-        """Whether a message with values may come now."""
+        """Whether a message with values may come now; else it comes before a question."""
         return self.waiting or self._by_itself
-
-    @property
-    def disturbed(self) -> bool:
-        """Whether it cannot be asked because it sends without being asked."""
-        return self._kept_since is not None
 
     def question(self, now: int) -> bytes | None:
         """What to send now; ``None``: nothing yet."""
@@ -56,7 +46,7 @@ class Conversation:
         if following == 0 and now < self._due and not self.gap:
             return None
         if now < self._pause:
-            self._kept_since = now if self._kept_since is None else self._kept_since
+            self.kept_since = now if self.kept_since is None else self.kept_since
             return None
         if following == 0:
             self._due += self._every * max(1, 1 + (now - self._due) // self._every)
@@ -65,7 +55,7 @@ class Conversation:
 
     def _sent(self, now: int) -> bytes:
         question, self._left = self._polls[self.asked]
-        self._asked_at, self._kept_since = now, None
+        self._asked_at, self.kept_since = now, None
         self._open += 1
         return question
 
@@ -96,8 +86,8 @@ class Conversation:
             self.waiting = False
             self._pause = now + PAUSE if len(self._polls) > 1 else now
             return True
-        if self._kept_since is not None and now - self._kept_since >= self._patience + PAUSE:
-            self._kept_since = now
+        if self.kept_since is not None and now - self.kept_since >= self._patience + PAUSE:
+            self.kept_since = now
             return True
         if self._silence is not None:
             allowed = min(self._silence, SECOND) if self.gap else self._silence

@@ -86,7 +86,7 @@ class LiveInstrument:
         yield from self._rest()
 
     def _step(self, port: source.Port) -> Iterator[source.Event]:
-        if self._conversation.asks_next:
+        if not self._conversation.expects:
             yield from self._heard(port.read(wait=False), port)  # what is there before a question is no answer to it
         now = self._clock.monotonic_ns()
         question = self._conversation.question(now) if self._quiet() and self._port is port else None
@@ -184,7 +184,7 @@ class LiveInstrument:
         yield from self._rest()
         asked = bool(self._profile.send.poll)
         why = say("no answer within {s:g} s", s=self._profile.send.answer_within_s) if asked else say("nothing comes")
-        if self._conversation.disturbed:
+        if self._conversation.kept_since is not None:
             why = say("it sends without being asked, so that nothing can be asked")
         if self._reopen_when_silent and self._gap_at >= 0:
             yield from self._lost(why)

@@ -28,7 +28,10 @@ def ready() -> tuple[str, ...]:
 
 
 def profile_named(name: str, folder: Path = Path()) -> ProfileFile:
-    return read_profile(folder / name) if name.endswith(ENDING) else _ready(name)
+    if not name.endswith(ENDING):
+        return _ready(name)
+    fix = "Name a profile: cmm-uq instruments list shows those that are ready"
+    return profile_of(content_of(folder / name, JOB_BYTES, fix), folder / name)
 
 
 @cache
@@ -39,13 +42,8 @@ def _ready(name: str) -> ProfileFile:
     return profile_of((_folder() / f"{name}{ENDING}").read_bytes(), Path(f"{name}{ENDING}"))
 
 
-def read_profile(path: Path) -> ProfileFile:
-    content = content_of(path, JOB_BYTES, "Name a profile: cmm-uq instruments list shows those that are ready")
-    return profile_of(content, path)
-
-
 def profile_of(content: bytes, path: Path) -> ProfileFile:
-    """A profile of a file's bytes; see :func:`read_profile`."""
+    """A profile of a file's bytes."""
     found = checked(content, path, ProfileFile, most_word=TEXT.most)
     check_profile(found, str(path))
     return found

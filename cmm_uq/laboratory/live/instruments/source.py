@@ -326,11 +326,6 @@ def serial_ports() -> list[tuple[str, str]]:
     return sorted((name, "" if description == "n/a" else description) for name, description in found)
 
 
-def file_named(port: str, folder: Path) -> Path:
-    """File of a port that replays one."""
-    return folder / port.removeprefix(FILE).partition("?")[0]
-
-
 class EndOfFileError(PortLostError):
     """The file has been replayed."""
 
@@ -339,7 +334,8 @@ class ReplayedFile:
     """A file as a port, ``file:NAME?every_s=S`` a line in that time; what is written to it goes nowhere."""
 
     def __init__(self, port: str, folder: Path, clock: Clock) -> None:
-        path, options = file_named(port, folder), parse_qs(port.removeprefix(FILE).partition("?")[2])
+        name, _, query = port.removeprefix(FILE).partition("?")
+        path, options = folder / name, parse_qs(query)
         check_file(path, "Name a file of received bytes: file:NAME")
         try:
             (text,) = options.pop("every_s", ["0"])
