@@ -269,7 +269,14 @@ class Result:
     def not_given(self) -> frozenset[tuple[str, str]]:
         """Keys of parameters without a value: the recording leaves them free, or contradicts them."""
         free = (key for combination in self.undetermined for key in combination)
-        return frozenset((*free, *(one.key for one in self.contradictions)))
+        return frozenset((*free, *(one.key for one in self.contradictions), *self.denied))
+
+    @cached_property
+    def denied(self) -> tuple[tuple[str, str], ...]:
+        """Keys of parameters of which all errors together say something else of the recorded set-ups than the named ones."""
+        regions = self.regions
+        effects = {effect for effect, _ in regions.disagree} if isinstance(regions, FactorRegions) else set()
+        return tuple((effect, name) for effect, named in self.parameters.items() if effect in effects for name in named)
 
     @cached_property
     def free(self) -> frozenset[str]:

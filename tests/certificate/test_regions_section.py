@@ -12,7 +12,9 @@ from cmm_uq.base.messages import Verbatim
 from cmm_uq.certificate.certificate import with_capability
 from cmm_uq.certificate.document import Paragraph, Table
 from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.results.contents import _identifiability
 from cmm_uq.certificate.sections.regions import over_range, regions_data, regions_section, regions_warnings
+from cmm_uq.certificate.sections.results import error_factors
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.artefacts.simulated import analysed, outcome
 
@@ -104,13 +106,30 @@ def test_a_tolerance_that_is_open_over_the_range_is_warned_of(tolerance: float, 
         ]
 
 
-def test_a_model_that_all_errors_deny_is_warned_of() -> None:
-    (warning,) = regions_warnings(told(disagree=(KEY,)))
-    assert str(warning).startswith(
-        "Scale error of X: with errors beside the named ones the recording says something else"
+def test_a_factor_that_all_errors_deny_is_withdrawn_with_both_figures_shown() -> None:
+    """10.2 ± 1.0 by the named errors, 16 ± 1 by all together: no value in the table, none over the range, no tolerance."""
+    kept = told(stated=scale(10.2, 0.5), tolerance=20.0, whole={KEY: scale(10.0, 4.0)})
+    result = told(
+        stated=scale(10.2, 0.5), tolerance=20.0, whole={KEY: scale(10.0, 4.0)}, recorded={KEY: scale(16.0, 0.5)},
+        disagree=(KEY,),
+    )  # fmt: skip
+    assert KEY in result.not_given
+    (warning,) = regions_warnings(result)
+    assert str(warning) == (
+        "Scale error of X is not given: 10.2 ± 1.0 ppm by the named errors alone, 16.0 ± 1.0 ppm of the same set-ups by all "
+        "errors together, which their joint uncertainty does not allow."
     )
-    assert regions_data(told(disagree=(KEY,)))["regions"]["disagree"] == ["scale_x.ppm"]
-    assert not regions_warnings(told())
+    assert not over_range(result)
+    (row,) = [row for row in error_factors(result).blocks[0].rows if str(row[0]) == "Scale error of X"]
+    assert str(row[1]) == "not given"
+    (verdict,) = [one for one in result.verdicts if one.name == "scale_x.ppm"]
+    (without,) = [one for one in kept.verdicts if one.name == "scale_x.ppm"]
+    assert (verdict.outcome, without.outcome) == ("undecided", "pass")
+    assert {"scale_x.ppm": 1.0} in _identifiability(result)["undetermined"]
+    data = regions_data(result)["regions"]
+    assert (data["disagree"], data["recorded"]["scale_x"]["ppm"]["value"]) == (["scale_x.ppm"], 16.0)
+    assert KEY not in kept.not_given
+    assert not regions_warnings(kept)
 
 
 def test_why_nothing_is_stated_is_said() -> None:

@@ -297,10 +297,11 @@ def _identifiability(result: Result) -> dict[str, Any]:
     ls = result.least_squares
     names = [".".join(u.key) for u in ls.unknowns]
     free = [{name: float(part) for name, part in zip(names, column, strict=True) if part} for column in ls.null_space.T]
+    denied = (*(one.key for one in result.contradictions), *result.denied)
     return {
         "parameters": int(ls.rank + ls.null_space.shape[1]), "rank": ls.rank,
         "condition_number": ls.condition if np.isfinite(ls.condition) else None,
-        "undetermined": free + [{".".join(one.key): 1.0} for one in result.contradictions],
+        "undetermined": free + [{".".join(key): 1.0} for key in denied],
         "prior_share": {name: result.prior_share(u.key) for name, u in zip(names, ls.unknowns, strict=True)},
     }  # fmt: skip
 

@@ -96,14 +96,18 @@ def regions_warnings(result: Result) -> list[Text]:
     regions, texts = result.regions, list[Text]()
     if not isinstance(regions, FactorRegions):
         return texts
-    if denied := [wording.title_of(key, result) for key in regions.disagree]:
+    for key in result.denied:
+        one, together = result.parameters[key[0]][key[1]], regions.recorded.get(key)
+        name, alone = wording.title_of(key, result), wording.with_uncertainty(one)
         texts.append(
-            say(
-                "{names}: with errors beside the named ones the recording says something else of its own set-ups than without "
-                "them, beyond their joint uncertainty. Do not use these figures before it is known why.",
-                names=listed(denied),
+            say("{name} is not given: with errors beside the named ones the recording contradicts it.", name=name)
+            if together is None
+            else say(
+                "{name} is not given: {alone} {unit} by the named errors alone, {together} {unit} of the same set-ups by all "
+                "errors together, which their joint uncertainty does not allow.",
+                name=name, alone=alone, together=wording.with_uncertainty(together), unit=one.unit,
             )
-        )
+        )  # fmt: skip
     open_there = []
     for key, quantity in over_range(result).items():
         tolerance, one = result.job.facts.model.tolerances.get(key[0]), result.parameters[key[0]][key[1]]
@@ -147,7 +151,10 @@ def regions_data(result: Result) -> dict[str, Any]:
         by_effect["recorded"].setdefault(effect, {})[name] = quantity_data(regions.recorded[key])
         if key in regions.eighths:
             by_effect["eighths"].setdefault(effect, {})[name] = list(regions.eighths[key])
-    if not ranged:
+    for effect, name in result.denied:
+        if (together := regions.recorded.get((effect, name))) is not None:
+            by_effect["recorded"].setdefault(effect, {})[name] = quantity_data(together)
+    if not (ranged or result.denied):
         return {}
     given = "other errors as large as regions.families says"
     some, count = regions.observations

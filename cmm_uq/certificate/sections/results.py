@@ -52,7 +52,7 @@ def performance(result: Result) -> Section:
 def error_factors(result: Result) -> Section:
     """Error factors: what is determined with its uncertainty, what is not with what is known of it instead."""
     ls = result.least_squares
-    contradicted = {one.key for one in result.contradictions}
+    contradicted = {*result.denied, *(one.key for one in result.contradictions)}
     fitted = {unknown.key: value for unknown, value in zip(ls.unknowns, ls.value, strict=True)}
     rows: list[tuple[Text, ...]] = []
     for key, quantity in reported(result):
