@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -51,6 +52,7 @@ def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict
     """
     maps = maps_of(job)
     refuse_planned(job)
+    _refuse_own_map(job)
     if not job.facts.artefact.with_recording:
         raise kind_of(job).refused("compensated")
     log = log_of(job.facts.machine, job.inputs, job.folder)
@@ -163,6 +165,7 @@ def _map_files(read: Job, found: FieldMap) -> dict[str, bytes]:
     )
     told = {
         "software": PROGRAM,
+        "recording": read.origin,
         "inputs_sha256": sha256(read.inputs),
         "chain": read.facts.machine.chain,
         "sign": "true = indicated + e",
@@ -179,11 +182,17 @@ def _map_files(read: Job, found: FieldMap) -> dict[str, bytes]:
         },
     }
     return {
-        NEW_MAP: first_line("compensate", PROGRAM, f"; see {PROVENANCE}").encode() + error_map_csv(error_map).encode(),
+        NEW_MAP: (_made_of(read) + error_map_csv(error_map)).encode(),
         COVARIANCE: covariance_file(error_map.covariance, error_map),
         MAP_KEYS: ("# for [machine] of a job beside which the other files lie\n" + keys).encode(),
         PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
     }
+
+
+def _made_of(read: Job) -> str:
+    """The line that a new map begins with, by which the recording that it was made of is known."""
+    digest = hashlib.sha256(read.inputs[read.facts.recording.file]).hexdigest()
+    return f"# error map by {PROGRAM} of a {read.origin} recording, sha256 {digest}; see {PROVENANCE}\n"
 
 
 def _figure(value: float) -> float:
@@ -204,6 +213,17 @@ def _refuse(read: Job) -> None:
         raise CmmUqError("the recordings of two dates are not compensated together",
                          where=f"{read.folder / 'job.toml'} [recording] earlier",
                          fix="Compensate each as a job of its own, then name the earlier result")  # fmt: skip
+
+
+def _refuse_own_map(job: Job) -> None:
+    """Refuse a map that was made of this very recording, whose errors would then seem smaller than they are."""
+    name = job.facts.recording.file
+    digest = hashlib.sha256(job.inputs.get(name, b"")).hexdigest().encode()
+    for one in job.facts.machine.error_map:
+        if digest in job.inputs[one.file].partition(b"\n")[0]:
+            problem = f"the error map {one.file} was made of this very recording"
+            fix = f"Compensate another recording of the machine; {PROVENANCE} beside the map says what it is worth to others"
+            raise CmmUqError(problem, where=str(job.folder / name), fix=fix)
 
 
 def _files(read: Job, beyond: Beyond, text: Mapping[str, bytes]) -> dict[str, bytes]:
