@@ -48,10 +48,8 @@ class Crossings:
 
     @staticmethod
     def joined(parts: Sequence[Crossings]) -> Crossings:
-        last, *rest = (
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("last", "probability", "level", "u_level", "rate", "u_rate")
-        )
+        names = ("last", "probability", "level", "u_level", "rate", "u_rate")
+        last, *rest = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
         return Crossings(last, parts[0].days, *rest)
 
     def one(self, i: int) -> Crossing:
@@ -113,12 +111,7 @@ class Crossing:
 
 
 def crossing(
-    series: Series | drift.DriftHistory,
-    limit: float,
-    prior: drift.DriftPrior | None = None,
-    *,
-    one_sided: bool = False,
-    paths: int = PATHS,
+    series: Series | drift.DriftHistory, limit: float, prior: drift.DriftPrior | None = None, *, one_sided: bool = False
 ) -> Crossing:
     """When one machine's error will first be beyond its limit.
 
@@ -128,7 +121,6 @@ def crossing(
     limit : the error conforms while |error| ≤ limit, or error ≤ limit.
     prior : of the machine's fleet (:meth:`cmm_uq.laboratory.due.fleet_model.FleetPrior.prior`), or none.
     one_sided : only what is above the limit is beyond it.
-    paths : how many are drawn.
 
     Raises
     ------
@@ -139,7 +131,7 @@ def crossing(
     known = series if isinstance(series, drift.DriftHistory) else drift.history(series)
     prior = prior or drift.default_prior(drift.limit_for(limit, known.u))
     machines = drift.side_by_side([known])
-    many = crossings(machines, prior, filtered(machines, prior), limit, one_sided=one_sided, paths=paths, days=FINE)
+    many = crossings(machines, prior, filtered(machines, prior), limit, one_sided=one_sided, days=FINE)
     return many.one(0)
 
 

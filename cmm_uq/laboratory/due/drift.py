@@ -87,10 +87,8 @@ def history(series: Series | pd.DataFrame, adjusted_after: float | None = None) 
     ------
     CmmUqError : as :class:`DriftHistory`.
     """
-    day, value, u, shared, adjusted = (
-        np.asarray(column, dtype=np.float64)
-        for column in (series.day, series.value, series.u, series.u_artefact, series.adjusted_since)
-    )
+    columns = (series.day, series.value, series.u, series.u_artefact, series.adjusted_since)
+    day, value, u, shared, adjusted = (np.asarray(column, dtype=np.float64) for column in columns)
     names = tuple(map(str, series.artefact))
     shared = np.where(np.array(names) != "", shared, 0.0)  # by an unknown artefact nothing is known to be common
     known = np.where(adjusted > 0, adjusted, np.nan)

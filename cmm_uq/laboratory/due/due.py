@@ -142,9 +142,8 @@ def machine_due(of: CalibrationRecord, artefacts: Mapping[str, ArtefactRow], on:
                 artefact=artefact, due=until,
             )  # fmt: skip
         else:
-            remarks.append(
-                say("Its artefact {artefact} is itself due on {due}, before that.", artefact=artefact, due=until)
-            )
+            text = say("Its artefact {artefact} is itself due on {due}, before that.", artefact=artefact, due=until)
+            remarks.append(text)
     return item(last.day, due, reason, tuple(remarks), last.artefact, blocked, last.decision in BEYOND and not adjusted)
 
 
@@ -183,13 +182,11 @@ def _checked(
         reason = say("the interim check of {day} is out of control ({what})", day=at, what=_furthest(one))
         return one.certificate.day, reason
     if one.standing == "warning":
-        return planned, say(
-            "{why}; the interim check of {day} warns ({what}): repeat it", why=why, day=at, what=_furthest(one)
-        )
+        what = _furthest(one)
+        return planned, say("{why}; the interim check of {day} warns ({what}): repeat it", why=why, day=at, what=what)
     if one.standing == "nothing compared":
-        return planned, say(
-            "{why}; the interim check of {day} has no value in common with the calibration", why=why, day=at
-        )
+        why = say("{why}; the interim check of {day} has no value in common with the calibration", why=why, day=at)
+        return planned, why
     extended = planned
     if rule.method == "fixed" and rule.longest_months is not None:
         carried = RecalibrationInterval((planned - last.day).days, None, why)

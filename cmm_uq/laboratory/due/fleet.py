@@ -33,6 +33,7 @@ FALSE_DISCOVERIES = 0.05  # part of the machines said not to belong that may wel
 _WALKERS, _STEPS = 16, 50  # of each of the four ensembles, and between two looks at how well they have mixed
 _AT_ONCE = 8000
 _FILTERED_AT_ONCE = 6000
+PATHS = 512  # of each machine until it crosses its limit
 _LEAST_SHIFT = 0.02
 """Of the variance of a rate: a machine that tells less of its own rate cannot show that it does not belong."""
 
@@ -98,11 +99,8 @@ class Fleet(fleet_model.FleetPrior):
     chains: Chains
 
 
-def fit_fleet(
-    members: Sequence[FleetMember], seed: int = 1, progress: Progress | None = None, *, learnt_from: int = LEARNT_FROM,
-    crossing_paths: int = 512,
-) -> Fleet:  # fmt: skip
-    """Learn from a fleet: hyper-parameters from machines drawn by lot where there are more than ``learnt_from``."""
+def fit_fleet(members: Sequence[FleetMember], seed: int = 1, progress: Progress | None = None) -> Fleet:
+    """Learn from a fleet: hyper-parameters from machines drawn by lot where there are more than :data:`LEARNT_FROM`."""
     if not members:
         fix = "Record certificates, or choose another --name"
         raise CmmUqError("no machine has a certificate that states this value", fix=fix)
@@ -110,7 +108,7 @@ def fit_fleet(
     limits = [each.limit for each in members if each.limit]
     unit = drift.limit_for(float(np.median(limits)) if limits else None, np.concatenate([m.history.u for m in members]))
     shared = fleet_model.shared_by(machines, [each.model for each in members], [each.place for each in members])
-    chains, count = _sampled(machines, shared, unit, seed, progress, learnt_from)
+    chains, count = _sampled(machines, shared, unit, seed, progress)
     count_of_draws = int(np.clip(MANY // len(members), LEAST_DRAWS, DRAWS))
     theta = chains.draws[np.linspace(0, len(chains.draws) - 1, count_of_draws).astype(np.intp)]
     said = fleet_model.messages(machines, shared, theta, unit)
@@ -118,7 +116,7 @@ def fit_fleet(
     covariance = np.asarray(np.linalg.inv(all_together.precision), dtype=np.float64)
     mean = (covariance @ all_together.linear[..., None])[..., 0]
     start = fleet_model.others(said, all_together, shared, theta, unit)
-    estimates = _estimated(machines, start, theta, unit, [each.limit for each in members], crossing_paths)
+    estimates = _estimated(machines, start, theta, unit, [each.limit for each in members])
     effects = 1 + len(shared.models) + len(shared.places)
     return Fleet(
         unit, theta, shared.models, shared.places, mean[:, :effects], covariance[:, :effects, :effects],
@@ -128,17 +126,12 @@ def fit_fleet(
 
 
 def _sampled(
-    machines: drift.Histories,
-    shared: fleet_model.SharedEffects,
-    unit: float,
-    seed: int,
-    progress: Progress | None,
-    most: int,
+    machines: drift.Histories, shared: fleet_model.SharedEffects, unit: float, seed: int, progress: Progress | None
 ) -> tuple[Chains, int]:
     which = np.arange(len(machines))
-    if len(which) > most:
+    if len(which) > LEARNT_FROM:
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(3,)))
-        which = np.sort(random.choice(which, most, replace=False))
+        which = np.sort(random.choice(which, LEARNT_FROM, replace=False))
     some, common = machines.some(which), shared.some(which)
     at_once = max(1, _AT_ONCE // len(which))
 
@@ -180,14 +173,12 @@ def _moments(kind: str, name: str, count: int, row: Floats, mean: Floats, covari
 def _spreads(draws: Floats, unit: float) -> tuple[HyperParameter, ...]:
     quantiles = np.exp(np.quantile(draws, [0.5, 0.025, 0.975], axis=0))
     scales = [1.0 if name == "steps_per_year" else unit for name in drift.NAMES]
-    return tuple(
-        HyperParameter(name, *(float(scale * q) for q in column))
-        for name, scale, column in zip(drift.NAMES, scales, quantiles.T, strict=True)
-    )
+    each = zip(drift.NAMES, scales, quantiles.T, strict=True)
+    return tuple(HyperParameter(name, *(float(scale * q) for q in column)) for name, scale, column in each)
 
 
 def _estimated(
-    machines: drift.Histories, start: DriftStart, theta: Floats, unit: float, limits: Sequence[float | None], paths: int
+    machines: drift.Histories, start: DriftStart, theta: Floats, unit: float, limits: Sequence[float | None]
 ) -> Estimates:
     prior = drift.learnt_prior(theta, np.zeros(len(theta)), np.ones(len(theta)), unit)
     limit = np.array([np.inf if each is None else each for each in limits])
@@ -198,7 +189,7 @@ def _estimated(
         some = DriftStart(start.mean[:, which][..., prior.group], start.covariance[:, :, which][..., prior.group])
         few = machines.some(which)
         state = filtered(few, prior, some)
-        parts.append((_rates(state, prior, some), crossings(few, prior, state, limit[which], paths=paths)))
+        parts.append((_rates(state, prior, some), crossings(few, prior, state, limit[which], paths=PATHS)))
     rate, u, expected, u_expected, p = np.concatenate([part for part, _ in parts], axis=1)
     crossing = Crossings.joined([part for _, part in parts]) if np.isfinite(limit).any() else None
     return Estimates(rate, u, expected, u_expected, p, crossing)

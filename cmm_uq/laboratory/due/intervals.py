@@ -18,7 +18,7 @@ limits falls to the target. Source: suncal 1.7.1 and its tests, which quote NASA
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -268,9 +268,6 @@ LIKE_DAYS, LIKE_PART = 56.0, 0.5
 
 Priors = Mapping[str, DriftPrior]
 
-Method = Callable[[Rule, Sequence[RecordedCertificate], Pool, Priors], tuple[float, Text]]
-"""Days and the reason, from the rule, certificates, intervals of the model and priors of the fleet; refuses in words."""
-
 
 def _a3(rule: Rule, certificates: Sequence[RecordedCertificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
     assigned = rule.days
@@ -363,10 +360,5 @@ def _percent(part: float) -> Text:
     return number(100 * part, ".3g")
 
 
-METHODS: Mapping[str, Method] = {
-    "A3": _a3,
-    "S2": _s2,
-    "staircase": _staircase,
-    "control chart": _control_chart,
-    "drift": _drift,
-}
+METHODS = {"A3": _a3, "S2": _s2, "staircase": _staircase, "control chart": _control_chart, "drift": _drift}
+"""Days and the reason, from the rule, certificates, intervals of the model and priors of the fleet; refuses in words."""

@@ -26,6 +26,7 @@ _SHOWN = 50  # lines of what happened that a screen may show
 _PASTED_S = 0.6  # between two points that are typed: in less nobody measures
 _NUMBERS = ("measurement", "point", "repeat")
 _NOTHING_LEFT = say("nothing is left of the plan")
+_Measured = tuple[PlannedPoint, Mapping[str, float]]  # a point of the plan, and what was measured of it by column
 _UNTIMED = {"timed": False}  # of points that share a moment which is none of theirs
 
 
@@ -213,13 +214,7 @@ class Conductor:
             points = [(point, dict(zip(COORDINATES, xyz.tolist(), strict=True))) for point, xyz in places]
             self._accept(points, now, f"{TYPED} length", {"raw": typed.text, **_UNTIMED})
 
-    def _accept(
-        self,
-        points: Sequence[tuple[PlannedPoint, Mapping[str, float]]],
-        moment: Moment,
-        how: str,
-        of: Mapping[str, Any],
-    ) -> None:
+    def _accept(self, points: Sequence[_Measured], moment: Moment, how: str, of: Mapping[str, Any]) -> None:
         """Keep points, and say so; where there is no room they wait, and it is said when they are kept."""
         for step, columns in points:
             self.recorder.accept(step.place, columns, moment, how, of)

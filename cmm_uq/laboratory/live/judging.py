@@ -238,10 +238,8 @@ class Judge:
         model = RecordingModel(artefact, acting, self.sigma)
         prediction = predicted(model)
         if prediction is None:
-            unknown = say(
-                "what to expect is said once repeats show the scatter, or with u_coordinate_um in [recording]"
-            )
-            return (unknown,), None
+            why = say("what to expect is said once repeats show the scatter, or with u_coordinate_um in [recording]")
+            return (why,), None
         own = (artefact.measurement == run[0]) & (artefact.repeat == run[1])
         shown, odd = _against(prediction, np.flatnonzero(own))
         if run[1] >= repeats_most:

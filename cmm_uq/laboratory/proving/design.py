@@ -110,10 +110,8 @@ class Design:
         noise_kind = self.noises[rank % len(self.noises)]
         noise = self.noise_of_kind(noise_kind, random)
         own, draws = self.values[len(self.coefficients) :], random.standard_normal(len(self.model.artefact.sizes))
-        sizes = (
-            float(size.nominal + size.sd * z if size.certified else value)
-            for size, value, z in zip(self.model.artefact.sizes, own, draws, strict=True)
-        )
+        each = zip(self.model.artefact.sizes, own, draws, strict=True)
+        sizes = (float(size.nominal + size.sd * z if size.certified else value) for size, value, z in each)
         case = Case(number, kind, noise_kind, noise, tuple(sizes))
         sight = self.sight(noise)
         if kind in (cases.OUTSIDE, cases.ARTEFACT):

@@ -21,7 +21,7 @@ from sqlalchemy import Connection, Engine, delete, func, insert, select, text
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import MANIFEST, InDoubtError, finish_interrupted, is_pending, sha256_of
 from cmm_uq.laboratory.records import facts
-from cmm_uq.laboratory.records.facts import ChainFinding, ChainHead, Entry, Heads, Witness
+from cmm_uq.laboratory.records.facts import ChainFinding, ChainHead, Entry, Heads, Witness, now
 from cmm_uq.laboratory.records.indexing import Indexer, chain, entry_block, in_blocks, verified
 from cmm_uq.laboratory.records.place import APPLICATION, shown, told
 from cmm_uq.laboratory.records.queries import RecordQueries, entry_of_results
@@ -38,12 +38,7 @@ class Records(RecordQueries):
     """The history, opened; see :func:`~cmm_uq.laboratory.records.opening.open_records`."""
 
     def __init__(
-        self,
-        engine: Engine,
-        place: str | Path,
-        *,
-        read_only: bool = False,
-        clock: Callable[[], dt.datetime] = facts.now,
+        self, engine: Engine, place: str | Path, *, read_only: bool = False, clock: Callable[[], dt.datetime] = now
     ) -> None:
         self.engine, self.place, self.read_only, self.clock = engine, place, read_only, clock
 

@@ -66,23 +66,20 @@ def of_results(results: Mapping[str, Any], inputs: str, where: str) -> list[Noti
     for one in Verdicts.of_results(results):
         if one.standing != "good":
             standard, called, said = Verbatim(one.by), Verbatim(one.name), Verbatim(one.outcome)
+            text = say(
+                "{standard} {characteristic}: {decision}", standard=standard, characteristic=called, decision=said
+            )
             if not one.by:
                 text = say("{name}, tolerance: {decision}", name=Verbatim(one.title or one.name), decision=said)
             elif not one.name:
                 text = say("{standard}: {decision}", standard=standard, decision=said)
-            else:
-                text = say(
-                    "{standard} {characteristic}: {decision}", standard=standard, characteristic=called, decision=said
-                )
             told.setdefault(_OF_OUTCOME.get(one.outcome, "undecided"), []).append(text)
     verdict = str((results.get("diagnosis") or {}).get("verdict") or "consistent")
     if verdict != "consistent":
         told.setdefault("mismatch", []).append(_OF_VERDICT.get(verdict, _CONTRADICTS))
     return [
-        Notice(
-            event, str(name), say("{event}: {of}", event=Verbatim(event), of=of),
-            say("{of}: {said}.", of=of, said=commas(said)), inputs, where,
-        )
+        Notice(event, str(name), say("{event}: {of}", event=Verbatim(event), of=of),
+               say("{of}: {said}.", of=of, said=commas(said)), inputs, where)
         for event, said in told.items()
     ]  # fmt: skip
 
@@ -106,9 +103,8 @@ def of_due(item: str, called: str, due: dt.date, on: dt.date, why: Text, *, beyo
 def of_drift(machine: str, changed: Sequence[Text], entry: int) -> Notice:
     """What has to be said of a machine that changed by more than chance since the recording before."""
     of = say("machine {machine}", machine=Verbatim(machine))
-    text = say(
-        "{of} changed by more than chance since the recording before: {changed}.", of=of, changed=commas(changed)
-    )
+    said = commas(changed)
+    text = say("{of} changed by more than chance since the recording before: {changed}.", of=of, changed=said)
     return Notice("drift", f"machine {machine}", say("drift: {of}", of=of), text, str(entry))
 
 

@@ -223,6 +223,8 @@ def _given(stream: BinaryIO) -> Iterator[Any]:
 
 MOST_WORKERS = 256
 _AHEAD = 2  # tasks for each process that are ready before it asks
+_Tasks = queue.SimpleQueue[tuple[int, Any] | None]
+_Answers = queue.SimpleQueue[TaskAnswer | BaseException]
 
 
 def check_workers(workers: int) -> None:
@@ -242,8 +244,7 @@ def processes() -> int:
 def answers(work: WorkerTask, tasks: Iterable[tuple[int, Any]], workers: int) -> Generator[TaskAnswer, None, None]:
     """Have every numbered task answered, in the order in which they are done; no process is begun without a task."""
     todo, asked = iter(tasks), 0
-    waiting: queue.SimpleQueue[tuple[int, Any] | None] = queue.SimpleQueue()
-    done: queue.SimpleQueue[TaskAnswer | BaseException] = queue.SimpleQueue()
+    waiting, done = _Tasks(), _Answers()
     talks: list[WorkerProcess] = []
     threads: list[threading.Thread] = []
 
@@ -273,11 +274,7 @@ def answers(work: WorkerTask, tasks: Iterable[tuple[int, Any]], workers: int) ->
             thread.join()
 
 
-def _converse(
-    talk: WorkerProcess,
-    waiting: queue.SimpleQueue[tuple[int, Any] | None],
-    done: queue.SimpleQueue[TaskAnswer | BaseException],
-) -> None:
+def _converse(talk: WorkerProcess, waiting: _Tasks, done: _Answers) -> None:
     try:
         while (task := waiting.get()) is not None:
             done.put(talk.ask(*task))
