@@ -16,8 +16,7 @@ from cmm_uq.analysis.planning.set_up import SetUp, direction_words, planned_leng
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start, Volume
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, ball_misfit, no_references
 from cmm_uq.artefacts import adjustment
-from cmm_uq.artefacts.adjustment import Lengths, lengths_of
-from cmm_uq.artefacts.distance_equations import FACTORS, DistanceSolution, solve_distances
+from cmm_uq.artefacts.adjustment import FACTORS, DistanceSolution, Lengths, lengths_of, solve_distances
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, number, say
 from cmm_uq.base.points import Floats, Points
@@ -170,7 +169,7 @@ def _second_way(result: Result, bar: Bryan) -> DistanceSolution | Text:
     true = np.array([model[key][0][0] if key in model else 0.0 for key in FACTORS])
     size = bar.sizes[0]
     return replace(
-        solution, bias=np.array([*exact.scales_ppm, *exact.squareness_arcsec]) - true, open_scales=not size.certified,
+        solution, bias=exact.factors - true, open_scales=not size.certified,
         relative_length_u=float(np.hypot(size.sd / size.nominal, result.relative_doubt)) if size.certified else 0.0,
     )  # fmt: skip
 

@@ -51,7 +51,7 @@ def test_two_steps_lose_what_the_centre_takes_up() -> None:
     points = indicated(EXACT, swept(), ["squareness_zx"], [80.0])
     two_steps, _ = Bryan(EXACT, points).in_two_steps()
     assert estimated(EXACT, points, SIX).value[5] == pytest.approx(80.0, abs=1e-8)
-    assert 15 < two_steps.squareness_arcsec[2] < 40
+    assert 15 < two_steps.factors[5] < 40
     assert two_steps.residual_sd > 5e-3
 
 
@@ -64,8 +64,8 @@ def test_two_steps_are_right_when_the_sweep_is_even_about_the_fixed_ball() -> No
         np.ones(80, dtype=np.int64), half.machine,
     )  # fmt: skip
     two_steps, _ = Bryan(EXACT, indicated(EXACT, even, SIX, TRUTH)).in_two_steps()
-    np.testing.assert_allclose(two_steps.squareness_arcsec, TRUTH[3:], atol=0.05)
-    np.testing.assert_allclose(two_steps.scales_ppm, TRUTH[:3], atol=0.3)
+    np.testing.assert_allclose(two_steps.factors[3:], TRUTH[3:], atol=0.05)
+    np.testing.assert_allclose(two_steps.factors[:3], TRUTH[:3], atol=0.3)
 
 
 def test_intervals_cover_the_truth_as_often_as_they_say() -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import linalg
 
-from cmm_uq.artefacts.distance_equations import PLACINGS, missing_placings, quadratic_terms, solve_distances
+from cmm_uq.artefacts.adjustment import PLACINGS, missing_placings, quadratic_terms, solve_distances
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, PPM
@@ -43,8 +43,8 @@ def recorded_by_the_iota() -> Floats:
 def test_the_real_recording_gives_the_machines_own_calibration() -> None:
     """Squareness −174.8″, −16.9″, +18.1″, residual 12.7 µm; the machine's calibration has −173″, −19″, +21″ (its table 7)."""
     found = solve_distances(recorded_by_the_iota(), 404.2357)
-    np.testing.assert_allclose(found.squareness_arcsec, [-174.75, -16.89, 18.08], atol=0.01)
-    np.testing.assert_allclose(found.squareness_arcsec, [-173, -19, 21], atol=3)
+    np.testing.assert_allclose(found.factors[3:], [-174.75, -16.89, 18.08], atol=0.01)
+    np.testing.assert_allclose(found.factors[3:], [-173, -19, 21], atol=3)
     assert found.residual_sd == pytest.approx(12.7e-3, abs=0.05e-3)
 
 
@@ -66,15 +66,15 @@ def test_exact_readings_give_the_metric_of_the_machine() -> None:
         xy**2 + s[1] ** 2 - 1, xy * zx - s[1] * yz, zx**2 + yz**2 + s[2] ** 2 - 1,
     ]  # fmt: skip
     np.testing.assert_allclose(found.e, expected, atol=1e-13)
-    np.testing.assert_allclose(found.scales_ppm, SCALES, atol=0.4)  # second order: Sxy² / 2 = 0.35 ppm of Y
-    np.testing.assert_allclose(found.squareness_arcsec, SQUARENESS, atol=0.03)
+    np.testing.assert_allclose(found.factors[:3], SCALES, atol=0.4)  # second order: Sxy² / 2 = 0.35 ppm of Y
+    np.testing.assert_allclose(found.factors[3:], SQUARENESS, atol=0.03)
 
 
 def test_uncertainties_are_those_of_repeated_recordings() -> None:
     """400 recordings of forty bars with noise of 1 µm: the scatter of every factor, within 4 standard errors of a scatter."""
     random, true = np.random.default_rng(5), read_by(bars(2, 40))
     found = [solve_distances(true + 1e-3 * random.standard_normal(true.shape), 404.2357) for _ in range(400)]
-    scatter = np.std([np.append(f.scales_ppm, f.squareness_arcsec) for f in found], axis=0)
+    scatter = np.std([f.factors for f in found], axis=0)
     stated = np.sqrt(np.mean([f.u**2 for f in found], axis=0))
     np.testing.assert_allclose(scatter, stated, rtol=4 / np.sqrt(2 * 400))
 
@@ -82,7 +82,7 @@ def test_uncertainties_are_those_of_repeated_recordings() -> None:
 def test_each_distance_may_have_its_own_certified_length() -> None:
     true = bars(3) * np.linspace(0.5, 1.5, 20)[:, None]
     found = solve_distances(read_by(true), np.linalg.norm(true, axis=1))
-    np.testing.assert_allclose(found.squareness_arcsec, SQUARENESS, atol=0.03)
+    np.testing.assert_allclose(found.factors[3:], SQUARENESS, atol=0.03)
 
 
 def test_normal_equations_square_the_condition_number() -> None:
