@@ -7,9 +7,9 @@ are twice the scale errors, and e2, e3, e5 the squareness errors XY, ZX, YZ with
 equations, whose condition number is the square; here they are solved by an orthogonal factorisation.
 
 By claim 1 e the machine is adjusted. X stays where it is; Y is turned square to it, then Z square to both: about X first, from
-where it stands once Y is turned. The turns are those of the unit vectors along the axes. The signs follow from *true = indicated
-+ e*: with e_x = −S·y the Y axis leans towards −X by S, and turning its guide by −S about Z sets it upright; Z has −Syz about X,
-but for a product of angles.
+where it stands once Y is turned. The turns are those of the unit vectors along the axes. The signs follow from *true =
+indicated + e*: with e_x = −S·y the Y axis leans towards −X by S, and turning its guide by −S about Z sets it upright; Z has
+−Syz about X, but for a product of angles.
 """
 
 from __future__ import annotations

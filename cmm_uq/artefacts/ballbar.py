@@ -208,13 +208,10 @@ def _sections(volume: Volume) -> list[Volume]:
     return found
 
 
-def _shape(setting: Setting) -> candidates.PatternFor:
-    pattern = ballbar(setting.artefact, setting.plan)
-    return lambda _: pattern
-
-
 _LINES = candidates.along_lines
-_PLACES = candidates.VolumeCandidates(_LINES, _shape, candidates.RelocatedCandidates(_LINES))
+_PLACES = candidates.VolumeCandidates(
+    _LINES, lambda setting: ballbar(setting.artefact, setting.plan), candidates.RelocatedCandidates(_LINES)
+)
 PLANNING = Planning({"ASME B89.4.1": ballbar_positions}, _PLACES.candidates, _PLACES.elsewhere)
 
 

@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.planning.candidates import PatternFor, RelocatedCandidates, VolumeCandidates, across_planes
+from cmm_uq.analysis.planning.candidates import RelocatedCandidates, VolumeCandidates, across_planes
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, flat_misfit, no_references, spread
@@ -217,12 +217,11 @@ def surface_places(setting: Setting) -> tuple[SetUp, ...]:
     return (setting.volume.set_up(pattern, np.eye(3), (0.5, 0.5, 0.0), say("flat")),)
 
 
-def _shape(setting: Setting) -> PatternFor:
-    pattern = surface(setting.artefact, setting.plan, np.full(2, 0.5 * setting.volume.size.min()))
-    return lambda _: pattern
+def _pattern(setting: Setting) -> Pattern:
+    return surface(setting.artefact, setting.plan, np.full(2, 0.5 * setting.volume.size.min()))
 
 
-_PLACES = VolumeCandidates(across_planes, _shape, RelocatedCandidates(across_planes))
+_PLACES = VolumeCandidates(across_planes, _pattern, RelocatedCandidates(across_planes))
 PLANNING = Planning({"surface plate": surface_places}, _PLACES.candidates, _PLACES.elsewhere)
 
 

@@ -169,27 +169,23 @@ def plate(facts: ArtefactFacts, plan: PlanFacts, size: float) -> Pattern:
     return one.repeated(plan.repeats)
 
 
+def _pattern(setting: Setting) -> Pattern:
+    return plate(setting.artefact, setting.plan, float(setting.volume.size.min()))
+
+
 def plate_placings(setting: Setting) -> tuple[SetUp, ...]:
     """Flat at two heights, upright along X front and back, upright along Y left and right."""
-    volume = setting.volume
-    pattern = plate(setting.artefact, setting.plan, float(volume.size.min()))
-    found = []
+    pattern, found = _pattern(setting), []
     for (title, attitude), places in zip(PRINCIPAL_PLANES, (
         ((0.5, 0.5, 0.0), (0.5, 0.5, 1.0)), ((0.5, 0.0, 0.5), (0.5, 1.0, 0.5)), ((0.0, 0.5, 0.5), (1.0, 0.5, 0.5)),
     ), strict=True):  # fmt: skip
         candidates.check_allowed(setting, attitude[:, 2], candidates.ACROSS)
-        found += [volume.set_up(pattern, attitude, place, title) for place in places]
+        found += [setting.volume.set_up(pattern, attitude, place, title) for place in places]
     return tuple(found)
 
 
-def _shape(setting: Setting) -> candidates.PatternFor:
-    pattern = plate(setting.artefact, setting.plan, float(setting.volume.size.min()))
-    return lambda _: pattern
-
-
-_PLACES = candidates.VolumeCandidates(
-    candidates.across_planes, _shape, candidates.RelocatedCandidates(candidates.across_planes)
-)
+_PLANES = candidates.across_planes
+_PLACES = candidates.VolumeCandidates(_PLANES, _pattern, candidates.RelocatedCandidates(_PLANES))
 PLANNING = Planning({"plate placings": plate_placings}, _PLACES.candidates, _PLACES.elsewhere)
 
 STEEL = 11.5e-6  # expansion of a plate whose own is not stated, 1/K

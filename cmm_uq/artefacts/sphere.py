@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from cmm_uq.analysis.planning.candidates import MIDDLE, PatternFor, RelocatedCandidates, VolumeCandidates, upright
+from cmm_uq.analysis.planning.candidates import MIDDLE, RelocatedCandidates, VolumeCandidates, upright
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp, planned_length
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.screening import shape
@@ -151,12 +151,9 @@ def sphere_places(setting: Setting) -> tuple[SetUp, ...]:
     return (setting.volume.set_up(sphere(setting.artefact, setting.plan), np.eye(3), MIDDLE, say("in the middle")),)
 
 
-def _shape(setting: Setting) -> PatternFor:
-    pattern = sphere(setting.artefact, setting.plan)
-    return lambda _: pattern
-
-
-_PLACES = VolumeCandidates(upright, _shape, RelocatedCandidates(lambda volume: []))
+_PLACES = VolumeCandidates(
+    upright, lambda setting: sphere(setting.artefact, setting.plan), RelocatedCandidates(lambda volume: [])
+)
 PLANNING = Planning({"ISO 10360-5": sphere_places}, _PLACES.candidates, _PLACES.elsewhere)
 
 

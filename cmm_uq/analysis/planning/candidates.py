@@ -36,7 +36,7 @@ class RelocatedCandidates:
     def like(self, pattern: Pattern, recorded: Floats, volume: Volume, count: int) -> tuple[SetUp, ...]:
         """A pattern in other places; first of all in the recorded attitude (3, 3)."""
         ways = [(say("as recorded"), recorded), *self.attitudes(volume)]
-        return thinned(everywhere(volume, ways, lambda _: pattern), count, volume)
+        return thinned(everywhere(volume, ways, pattern), count, volume)
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class VolumeCandidates:
     """Candidates of an artefact that stands by itself in each set-up."""
 
     attitudes: Attitudes  # in which it is set up
-    shape: Callable[[Setting], PatternFor]  # what is measured of it in one set-up
+    shape: Callable[[Setting], Pattern | PatternFor]  # what is measured of it in one set-up
     elsewhere: RelocatedCandidates  # of a recorded one
 
     def candidates(self, setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
@@ -91,11 +91,11 @@ def thinned(placings: Iterator[SetUp], count: int, volume: Volume) -> tuple[SetU
     )
 
 
-def everywhere(volume: Volume, ways: Sequence[tuple[Text, Floats]], shape: PatternFor) -> Iterator[SetUp]:
+def everywhere(volume: Volume, ways: Sequence[tuple[Text, Floats]], shape: Pattern | PatternFor) -> Iterator[SetUp]:
     """Every attitude in the corners, on the edges and in the middle of the room that it has."""
     steps = _FIFTHS if len(ways) < 4 else THIRDS
     for title, attitude in ways:
-        pattern = shape(attitude)
+        pattern = shape if isinstance(shape, Pattern) else shape(attitude)
         room = None if pattern is None else volume.room(pattern.turned(attitude))
         if pattern is None or room is None:
             continue
