@@ -29,7 +29,7 @@ from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.vectors import vector_plot
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import expanded
-from cmm_uq.jobs.recording.references import NOISE_RATIO
+from cmm_uq.jobs.recording.compared import NOISE_RATIO
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Indications, Placings, Size
@@ -52,7 +52,7 @@ class Plate(Rigid):
 
     ``facts`` what the job says of the plate; ``length_mm`` is that of the farthest ball from the first by its number
     where it is not stated; ``points`` the recording, with ``reference_x_mm``, ``reference_y_mm``, ``reference_z_mm``.
-    An earlier recording in place of references (:mod:`cmm_uq.jobs.recording.references`) adds its own noise.
+    An earlier recording in place of references (:mod:`cmm_uq.jobs.recording.compared`) adds its own noise.
     """
 
     kind = "plate"

@@ -35,7 +35,7 @@ from cmm_uq.certificate.wording import NO_FACTOR, expanded
 from cmm_uq.jobs.chain import TraceabilityChain, certified_on_this_machine, chain_of, dates_out_of_order
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.recording.beside import ShortGaugeFacts
-from cmm_uq.jobs.recording.references import OF_POINTS
+from cmm_uq.jobs.recording.compared import OF_POINTS
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts, Traceability
 from cmm_uq.jobs.tables.identification import MEASURED, Identification, Laboratory, ReplacedCertificate
 from cmm_uq.jobs.tables.length_formula import Growing, factor_of

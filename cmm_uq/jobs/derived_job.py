@@ -24,8 +24,8 @@ from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.columns import REQUIRED, largest
 from cmm_uq.jobs.importing.format import FileKeys, ImportKeys
 from cmm_uq.jobs.job import Job, JobFile
-from cmm_uq.jobs.recording import prediction as predictions
-from cmm_uq.jobs.recording.references import reference_file
+from cmm_uq.jobs.recording import compared
+from cmm_uq.jobs.recording.compared import reference_file
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.tables.identification import DERIVING, MEASURED, SIMULATED
 
@@ -139,8 +139,8 @@ def is_compensated(job: Job) -> bool:
 def against(job: Job, content: bytes, name: str, path: Path | None = None) -> Job:
     """A job that is compared with what a simulation predicts, whatever its ``[simulation]`` says."""
     where = str(path or name)
-    is_map, predicted = predictions.is_error_map(content, where), {"file": name, "temperature_c": predictions.NOMINAL_C}
-    simulation = predictions.SimulationFacts.model_validate({"map": predicted} if is_map else {"file": name})
+    is_map, predicted = compared.is_error_map(content, where), {"file": name, "temperature_c": compared.NOMINAL_C}
+    simulation = compared.SimulationFacts.model_validate({"map": predicted} if is_map else {"file": name})
     facts, before = job.facts.model_copy(update={"simulation": simulation}), job.facts.simulation
     _refuse_beside_a_simulation(facts, where)
     left = set() if before is None else {before.file, *(each.file for each in before.map)}
@@ -148,25 +148,25 @@ def against(job: Job, content: bytes, name: str, path: Path | None = None) -> Jo
     inputs = {of: each for of, each in job.inputs.items() if of not in left}
     if inputs.get(name, content) != content:
         raise CmmUqError(f"the job has another file {name!r}", where=where, fix="Rename the prediction")
-    prediction = None if is_map else predictions.read_prediction(content, where, simulation)
+    prediction = None if is_map else compared.read_prediction(content, where, simulation)
     beside = job.beside if path is None else (*job.beside, path)
     return replace(job, facts=facts, inputs={**inputs, name: content}, prediction=prediction, beside=beside)
 
 
 def prediction_of(
-    facts: predictions.SimulationFacts | None, inputs: Mapping[str, bytes], folder: Path
-) -> predictions.Prediction | None:
+    facts: compared.SimulationFacts | None, inputs: Mapping[str, bytes], folder: Path
+) -> compared.Prediction | None:
     """What a job's simulation predicts, from the contents of its files; ``None`` without a file of points."""
     if facts is None or facts.file is None:
         return None
-    return predictions.read_prediction(inputs[facts.file], str(folder / facts.file), facts)
+    return compared.read_prediction(inputs[facts.file], str(folder / facts.file), facts)
 
 
 def files_of(facts: JobFile, path: Path) -> tuple[list[str], list[str]]:
     """Files of predicted coordinates, and of maps that predict."""
     if facts.simulation is None:
         return [], []
-    _refuse_beside_a_simulation(facts, f"{path}: {predictions.KEY}")
+    _refuse_beside_a_simulation(facts, f"{path}: {compared.KEY}")
     file = facts.simulation.file
     return [] if file is None else [file], [given.file for given in facts.simulation.map]
 

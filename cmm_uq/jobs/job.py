@@ -21,7 +21,7 @@ from cmm_uq.base.points import Points
 from cmm_uq.jobs.acquired import Provenance
 from cmm_uq.jobs.importing.format import ImportKeys, Recognition
 from cmm_uq.jobs.recording.beside import ShortGauge, ShortGaugeFacts
-from cmm_uq.jobs.recording.prediction import Prediction, SimulationFacts
+from cmm_uq.jobs.recording.compared import Prediction, SimulationFacts
 from cmm_uq.jobs.reports import AsFound
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ThermometerFacts
 from cmm_uq.jobs.tables.conformity import (

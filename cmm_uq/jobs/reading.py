@@ -23,9 +23,9 @@ from cmm_uq.jobs.importing.format import HEAD, Recognition
 from cmm_uq.jobs.importing.recording import read_recording_file
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logo import checked_logo
-from cmm_uq.jobs.recording import references
+from cmm_uq.jobs.recording import compared
 from cmm_uq.jobs.recording.beside import LOG, SHORT_GAUGE, ShortGauge, log_of, short_gauge_of, with_logged
-from cmm_uq.jobs.recording.references import EXPANDED, OF_POINTS, reference_file
+from cmm_uq.jobs.recording.compared import EXPANDED, OF_POINTS, reference_file
 from cmm_uq.jobs.reports import as_found_of, calibration_file, results_named
 from cmm_uq.jobs.source import FilesInFolder, FilesInMemory, JobFiles, check_distinct
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
@@ -135,7 +135,7 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     if earlier is not None:
         then, recognised = read_recording_file(inputs[earlier], str(folder / earlier), machine, facts.recording)
         told.append(recognised)
-        points = references.against_earlier(points, then, facts.artefact.cte_per_k, where)
+        points = compared.against_earlier(points, then, facts.artefact.cte_per_k, where)
     found = as_found_of(before, inputs, folder, facts.job.origin, facts.machine.name, facts.machine.serial)
     gauge = _short_gauge(facts, inputs, folder, machine)
     prediction = prediction_of(facts.simulation, inputs, folder)
@@ -180,7 +180,7 @@ def _certified_points(
                              where=where, fix="Give U_um and k in [artefact], and leave the column out")  # fmt: skip
         return facts, points, None
     if reference_file(artefact):
-        points, recognised = references.with_references(points, artefact, inputs, folder, where)
+        points, recognised = compared.with_references(points, artefact, inputs, folder, where)
     if says is not None and says.places is not None:
         points, artefact = says.places.beside(points, artefact)
         facts = facts.model_copy(update={"artefact": artefact})
@@ -188,7 +188,7 @@ def _certified_points(
         where = str(folder / recognised.file)
     read = (recognised,) if recognised is not None else told
     unread = [heading for one in read if one is not None for heading in one.unused]
-    points = references.with_uncertainties(points, artefact, where, unread)
+    points = compared.with_uncertainties(points, artefact, where, unread)
     stated = [float(points.columns[name].max()) for name in OF_POINTS if name in points.columns]
     if stated and isinstance(artefact, ReferencedFacts):
         facts = facts.model_copy(update={"artefact": artefact.with_largest(max(stated))})

@@ -18,7 +18,7 @@ from cmm_uq.artefacts.plate import Plate
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.recording.references import against_earlier
+from cmm_uq.jobs.recording.compared import against_earlier
 from cmm_uq.machine.model import RecordingModel
 from tests.artefacts.constructions import estimated, free, indicated, plate
 from tests.conftest import ROOT

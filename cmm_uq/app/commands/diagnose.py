@@ -36,7 +36,7 @@ from cmm_uq.certificate.diagnosis.page import diagnosed_outcome
 from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
 from cmm_uq.certificate.result import AnalysisResult, JobDiagnosis, Outcome, Recipe
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.recording.prediction import KEY
+from cmm_uq.jobs.recording.compared import KEY
 from cmm_uq.laboratory.records.place import NONE
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.ensembles import Progress

@@ -18,7 +18,7 @@ from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.result import OwnAnalysis, Recipe, SimulatedTwin
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.recording.prediction import KEY, SimulationFacts
+from cmm_uq.jobs.recording.compared import KEY, SimulationFacts
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.identification import MEASURED

@@ -33,7 +33,7 @@ from cmm_uq.base.points import Floats, Points
 from cmm_uq.certificate.proof.sections import DiagnosisProof
 from cmm_uq.certificate.result import JobDiagnosis, Outcome, OwnAnalysis
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.recording.prediction import KEY
+from cmm_uq.jobs.recording.compared import KEY
 from cmm_uq.jobs.source import sha256
 from cmm_uq.laboratory.proving.answers import RECORDS, AnswersFolder, Record, answer_tasks
 from cmm_uq.laboratory.proving.cases import Case, sha256_of, truth_file

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -250,17 +251,6 @@ def title_of(axis: str, component: int) -> Text:
     return say("straightness of {axis} along {along}", axis=carriage, along=along)
 
 
-@dataclass(frozen=True, eq=False)
-class _Looked:
-    """One error of one carriage as it stands in all maps: what of it can be compared, and what is odd."""
-
-    title: Text
-    column: MapColumn | None  # is ``None`` where too little is left
-    copied: tuple[tuple[int, ...], ...]  # are the groups of maps with the same figures
-    findings: tuple[Finding, ...]
-    measured: bool
-
-
 def columns_of(maps: Sequence[ErrorMap]) -> tuple[list[MapColumn], list[Finding]]:
     """Errors that at least two maps give with figures of their own, and all that is odd; spikes are left out.
 
@@ -272,14 +262,20 @@ def columns_of(maps: Sequence[ErrorMap]) -> tuple[list[MapColumn], list[Finding]
     same: dict[tuple[float, ...], list[Text]] = {}
     unmeasured: list[Text] = []
     for axis, carriage in enumerate(AXES):
-        shared = _shared([m.axes[axis].positions for m in maps])
+        shared = reduce(lambda one, other: one[np.isin(one, other)], (m.axes[axis].positions for m in maps))
         for component in range(6):
-            looked = _looked_at(maps, axis, component, shared)
-            for group in looked.copied:
-                same.setdefault(tuple(maps[k].temperature for k in group), []).append(looked.title)
-            unmeasured += [] if looked.measured else [looked.title]
-            columns += [] if looked.column is None else [looked.column]
-            findings += looked.findings
+            title, size = title_of(carriage, component), MICROMETRE if component < 3 else ARCSECOND * METRE
+            values = _values(maps, axis, component, shared)
+            copied, measured = copies(values, size), np.flatnonzero(values.any(axis=1)).tolist()
+            for group in copied:
+                same.setdefault(tuple(maps[k].temperature for k in group), []).append(title)
+            unmeasured += [] if measured else [title]
+            again = {k for group in copied for k in (group if component == axis else group[1:])}
+            own = np.array([k for k in measured if k not in again], dtype=np.int64)
+            if len(own) >= 2 and len(shared) >= LEAST_POSITIONS:
+                column, odd = _looked_at([maps[k] for k in own], values[own], axis, component, shared)
+                columns += [] if column is None else [column]
+                findings += odd
         if (count := len(shared)) < LEAST_POSITIONS:
             why = say(
                 "the maps share {count} positions of axis {carriage}: they are not compared. Map the same positions",
@@ -289,31 +285,30 @@ def columns_of(maps: Sequence[ErrorMap]) -> tuple[list[MapColumn], list[Finding]
     return columns, [*_alike(same, unmeasured), *findings]
 
 
-def _looked_at(maps: Sequence[ErrorMap], axis: int, component: int, shared: Floats) -> _Looked:
-    carriage, size = AXES[axis], MICROMETRE if component < 3 else ARCSECOND * METRE
-    title, lever = title_of(carriage, component), 1.0 if component < 3 else METRE
-    values = np.array(
-        [lever * m.axes[axis].errors[np.isin(m.axes[axis].positions, shared), component] for m in maps]
-    ).reshape(len(maps), -1)
-    measured = [k for k in range(len(maps)) if np.any(values[k])]
-    copied = tuple(copies(values, size))
-    again = {k for group in copied for k in (group if component == axis else group[1:])}
-    own = np.array([k for k in measured if k not in again], dtype=np.int64)
-    if len(own) < 2 or len(shared) < LEAST_POSITIONS:
-        return _Looked(title, None, copied, (), bool(measured))
-    found = spikes(shared, values[own], size)
+def _values(maps: Sequence[ErrorMap], axis: int, component: int, shared: Floats) -> Floats:
+    """(k, p) of one error of one carriage at the positions that the maps share, mm; of rotations at a lever of one metre."""
+    lever, axes = 1.0 if component < 3 else METRE, [m.axes[axis] for m in maps]
+    shown = [lever * one.errors[np.isin(one.positions, shared), component] for one in axes]
+    return np.array(shown).reshape(len(maps), -1)
+
+
+def _looked_at(
+    maps: Sequence[ErrorMap], values: Floats, axis: int, component: int, shared: Floats
+) -> tuple[MapColumn | None, list[Finding]]:
+    """What of an error can be compared, ``None`` where too little is left, and what is odd."""
+    title, size = title_of(AXES[axis], component), MICROMETRE if component < 3 else ARCSECOND * METRE
+    found = spikes(shared, values, size)
     damaged = found.mean(axis=1) > DAMAGED
-    findings = [_damaged(title, maps[k]) for k in own[damaged]]
+    findings = [_damaged(title, maps[k]) for k in np.flatnonzero(damaged)]
     findings += [
-        _stray(title, shared[i], maps[own[k]], values[own[k], i] / size, COLUMNS[component])
+        _stray(title, shared[i], maps[k], values[k, i] / size, COLUMNS[component])
         for k, i in zip(*np.nonzero(found & ~damaged[:, None]), strict=True)
     ]
-    kept, left = ~found[~damaged].any(axis=0), own[~damaged]
-    column = None
-    if len(left) > 1 and kept.sum() >= LEAST_POSITIONS:
-        temperatures = np.array([maps[k].temperature for k in left])
-        column = MapColumn(carriage, component, shared[kept], values[left][:, kept], temperatures)
-    return _Looked(title, column, copied, tuple(findings), bool(measured))
+    kept, left = ~found[~damaged].any(axis=0), np.flatnonzero(~damaged)
+    if len(left) < 2 or kept.sum() < LEAST_POSITIONS:
+        return None, findings
+    temperatures = np.array([maps[k].temperature for k in left])
+    return MapColumn(AXES[axis], component, shared[kept], values[left][:, kept], temperatures), findings
 
 
 def turned(column: MapColumn, k: int) -> bool:
@@ -328,13 +323,6 @@ def roughness(column: MapColumn) -> float:
     differences = np.diff(column.values - column.values.mean(axis=0), 2, axis=1)
     freedom = 1 - 1 / len(column.values)
     return float(np.sqrt(np.mean(differences**2) / 6 / freedom)) or MICROMETRE / 100
-
-
-def _shared(positions: Sequence[Floats]) -> Floats:
-    shared = positions[0]
-    for others in positions[1:]:
-        shared = shared[np.isin(shared, others)]
-    return shared
 
 
 def _stray(title: Text, position: float, error_map: ErrorMap, value: float, column: str) -> Finding:

@@ -23,7 +23,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.recording.prediction import KEY, Prediction
+from cmm_uq.jobs.recording.compared import KEY, Prediction
 from cmm_uq.jobs.tables.machine import ErrorMapFile, SquarenessFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings
 from cmm_uq.machine.physics.error_map import ErrorMap, parse_map_file

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.jobs.recording.references import against_earlier
+from cmm_uq.jobs.recording.compared import against_earlier
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects

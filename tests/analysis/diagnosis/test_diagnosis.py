@@ -26,7 +26,7 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.plate import Plate
 from cmm_uq.base.points import Floats, Machine, Points
-from cmm_uq.jobs.recording.references import against_earlier
+from cmm_uq.jobs.recording.compared import against_earlier
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.artefacts.constructions import indicated, plate
