@@ -227,7 +227,9 @@ def _attitudes(found: DigitizerFigures) -> Table:
 
 def _residuals(result: Result, digitizer: DigitizerArtefact) -> Plot:
     after = result.residuals / MICROMETRE
-    before = _before(digitizer) / MICROMETRE
+    xyz = digitizer.points.xyz  # before: about the offset from the centres, without any effect of the machine
+    fitted = digitizer.fit(xyz, np.array([size.nominal for size in digitizer.sizes]))
+    before = digitizer.project(fitted, (xyz - fitted)[:, :, None])[:, 0] / MICROMETRE
     expanded_um = result.noise.expanded
     radial, each = say("radial distance of each point of the sphere"), say("each coordinate of the centre")
     what = radial if digitizer.scanned else each
@@ -245,14 +247,6 @@ def _residuals(result: Result, digitizer: DigitizerArtefact) -> Plot:
             count=len(after), low=low, high=high, low_after=low_after, high_after=high_after,
         ),
     )  # fmt: skip
-
-
-def _before(digitizer: DigitizerArtefact) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Residuals (m,), mm, about the offset from the centres, without any effect of the machine."""
-    nominal = np.array([size.nominal for size in digitizer.sizes])
-    xyz = digitizer.points.xyz
-    fitted = digitizer.fit(xyz, nominal)
-    return digitizer.project(fitted, (xyz - fitted)[:, :, None])[:, 0]
 
 
 PAGE = Page(sections, results)

@@ -274,11 +274,6 @@ def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
     return places.thinned(_everywhere(setting), setting.plan.candidates, setting.volume)
 
 
-def _title(plane: str, *, longer: bool) -> Text:
-    named = Verbatim(plane)
-    return say("in the plane {plane}, longer tip", plane=named) if longer else say("in the plane {plane}", plane=named)
-
-
 def _everywhere(setting: Setting) -> Iterator[SetUp]:
     volume = setting.volume
     sides = TriangleStandard.of(cast("TriangleFacts", setting.artefact)).sides
@@ -287,8 +282,10 @@ def _everywhere(setting: Setting) -> Iterator[SetUp]:
     for plane, normal in normals.items():
         if not volume.allows(normal):
             continue
+        named = Verbatim(plane)
+        titles = say("in the plane {plane}", plane=named), say("in the plane {plane}, longer tip", plane=named)
         tipped = [
-            Placing(_title(plane, longer=long), plane, (x, y, z), long)
+            Placing(titles[long], plane, (x, y, z), long)
             for x, y, z in product(places.THIRDS, repeat=3)
             for long in (False, True)
         ]

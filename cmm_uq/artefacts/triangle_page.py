@@ -212,15 +212,9 @@ def standard_figures(result: Result) -> tuple[list[Figure], list[Figure], Figure
     return stated(figures.sides, draws.sides), stated(figures.angles, draws.angles), height
 
 
-@dataclass(frozen=True, eq=False)
-class Sides:
-    """Sides 1–2, 2–3, 3–1 of every placing against the certified ones, µm."""
-
-    measurement: Ints  # (r,) of each (measurement, repeat)
-    before_um: Floats  # before_um, after_um: (r, 3) as recorded, and after the fitted model
-    after_um: Floats
-    expanded_um: float  # expanded_um, coverage_factor: U of a side for the noise of its ends, and its k
-    coverage_factor: float
+Sides = tuple[Ints, Floats, Floats, float, float]
+"""Of every (measurement, repeat): number (r,), sides 1–2, 2–3, 3–1 against the certified ones, µm, as recorded (r, 3) and
+after the fitted model (r, 3); U of a side for the noise of its ends, and its k."""
 
 
 def sides_of(result: Result) -> Sides:
@@ -239,18 +233,11 @@ def sides_of(result: Result) -> Sides:
     noise, longest = result.noise, float(np.max(triangle.standard.sides))
     U = float(np.sqrt(2)) * noise.expanded
     stated = result.at_least("sides.U_um", U, noise.coverage_factor, unit("µm"), longest)
-    return Sides(points.measurement[order].reshape(-1, 3)[:, 0], before, after, *stated)
+    return points.measurement[order].reshape(-1, 3)[:, 0], before, after, *stated
 
 
-@dataclass(frozen=True)
-class ByEquations:
-    """A parameter of an effect by the source's equations, in its unit, with u, U and k for 95 % as stated."""
-
-    effect: Effect
-    value: float
-    u: float
-    expanded: float
-    coverage_factor: float
+ByEquations = tuple[Effect, float, float, float, float]
+"""An effect, its parameter by the source's equations, in its unit, with u, U and k for 95 % as stated."""
 
 
 def by_equations(result: Result) -> tuple[ByEquations, ...] | Text:
@@ -266,7 +253,7 @@ def by_equations(result: Result) -> tuple[ByEquations, ...] | Text:
     for name, value, one, other in zip(PARAMETERS, solution.values, by_noise, known, strict=True):
         effect, u, k = every()[name], float(np.hypot(one, other)), factor_of_noise(noise, one, other)
         stated = result.at_least(f"equations.{name}", k * u, k, effect.reported[0].unit)
-        found.append(ByEquations(effect, float(value), u, *stated))
+        found.append((effect, float(value), u, *stated))
     return tuple(found)
 
 
@@ -279,7 +266,7 @@ def hardly_told_apart(result: Result) -> tuple[tuple[str, str, float], ...]:
 
 
 def results(result: Result) -> Mapping[str, Any]:
-    equations, found, (sides, angles, height) = by_equations(result), sides_of(result), standard_figures(result)
+    equations, (sides, angles, height) = by_equations(result), standard_figures(result)
     refused = isinstance(equations, str)
     return {
         "standard": {
@@ -292,16 +279,12 @@ def results(result: Result) -> Mapping[str, Any]:
             "draws": DRAWS,
         },
         "sides": [
-            {"measurement": measurement, "before_um": before, "after_um": after}
-            for measurement, before, after in zip(
-                found.measurement.tolist(), found.before_um.tolist(), found.after_um.tolist(), strict=True
-            )
+            dict(zip(("measurement", "before_um", "after_um"), side, strict=True))
+            for side in zip(*(each.tolist() for each in sides_of(result)[:3]), strict=True)
         ],
         "equations": {"refused": equations} if isinstance(equations, str) else {
-            one.effect.name: {
-                one.effect.reported[0].name: {"value": one.value, "u": one.u, "U": one.expanded, "k": one.coverage_factor}
-            }
-            for one in equations
+            effect.name: {effect.reported[0].name: dict(zip(("value", "u", "U", "k"), figures, strict=True))}
+            for effect, *figures in equations
         },
         **({} if refused else {"conditional": {"equations": "white noise, and a few observations each"}}),
         "hardly_told_apart": [
@@ -313,7 +296,7 @@ def results(result: Result) -> Mapping[str, Any]:
 
 def sections(result: Result) -> list[Section]:
     return [
-        Section(say("The triangle"), (_standard(*standard_figures(result)), _sides(sides_of(result)))),
+        Section(say("The triangle"), (_standard(*standard_figures(result)), _sides(*sides_of(result)))),
         Section(say("Parameters by two ways"), (*_two_ways(result, by_equations(result)), *_alike(result))),
     ]
 
@@ -336,20 +319,20 @@ def _standard(sides: list[Figure], angles: list[Figure], height: Figure) -> Tabl
     return Table(say("Sides and angles of the standard at 20 °C"), columns, tuple(rows), (note,))
 
 
-def _sides(sides: Sides) -> Plot:
-    before, after = sides.before_um.ravel(), sides.after_um.ravel()
+def _sides(measurement: Ints, sides: Floats, left: Floats, expanded_um: float, k: float) -> Plot:
+    before, after = sides.ravel(), left.ravel()
     what = say("{count} sides: as recorded they deviate", count=len(before))
     return length_plot(
-        sides.measurement.repeat(3).astype(float),
+        measurement.repeat(3).astype(float),
         before,
         after,
-        expanded_before_um=sides.expanded_um,
-        expanded_after_um=sides.expanded_um,
+        expanded_before_um=expanded_um,
+        expanded_after_um=expanded_um,
         reference=say("certified side"),
         position_label=say("Placing (its three sides side by side)"),
         caption=say(
             "Each side minus its certified length, as recorded and after the fitted model, with U (k = {k}).",
-            k=number(sides.coverage_factor, ".2f"),
+            k=number(k, ".2f"),
         ),
         alternative=deviating(what, NOTHING, before, after),
     )
@@ -360,12 +343,12 @@ def _two_ways(result: Result, equations: tuple[ByEquations, ...] | Text) -> list
         text = say("The source's equations have no solution here. {equations}", equations=equations)
         return [Paragraph(text, tone="note")]
     rows = []
-    for one in equations:
+    for effect, value, _, U, _ in equations:
         fitted: tuple[Text, ...] = (NOTHING, NOTHING)
-        if (name := one.effect.name) in result.parameters:
+        if (name := effect.name) in result.parameters:
             quantity = next(iter(result.parameters[name].values()))
             fitted = (say("not determined"), NOTHING) if name in result.free else expanded(quantity)[:2]
-        rows.append((one.effect.title, *rounded(one.value, one.expanded), *fitted, one.effect.reported[0].unit))
+        rows.append((effect.title, *rounded(value, U), *fitted, effect.reported[0].unit))
     figures = figure_columns(say("Equations"), say("U"), say("Fitted model"), say("U"))
     columns = (*text_columns(say("Parameter")), *figures, *text_columns(say("Unit")))
     note = say(

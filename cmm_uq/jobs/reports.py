@@ -78,7 +78,7 @@ class ConformityDecision(ResultsPart):
     decision: str
 
 
-class _JobAsFound(ResultsPart):
+class _JobOfResults(ResultsPart):
     id: str
     origin: Origin
     date: Annotated[dt.date, Field(strict=False)] | None = None
@@ -89,7 +89,7 @@ class _JobAsFound(ResultsPart):
 class AsFound(ResultsFile):
     """What a machine showed before it was adjusted: estimates, figures of lengths, and decisions."""
 
-    job: _JobAsFound
+    job: _JobOfResults
     estimates: dict[str, dict[str, EstimateWithInterval]]
     accuracy_uncertainty: dict[str, EstimateWithInterval] = {}
     conformity: list[ConformityDecision] = []
@@ -132,11 +132,6 @@ class _NoiseComponent(ResultsPart):
     value: _Size
     u: _Size
 
-    @property
-    def mean_square_root(self) -> float:
-        """Root of the mean square: variances are what observations add, and their posterior mean is value² + u²."""
-        return hypot(self.value, self.u)
-
 
 class _Reading(ResultsPart):
     value: Annotated[float, Field(ge=SMALLEST_UM, le=LARGEST_UM)]
@@ -171,7 +166,10 @@ def noise_found(content: bytes, where: str) -> EarlierNoise:
         "Name the results.json that cmm-uq report wrote of an earlier recording of such an artefact",
     ).noise  # fmt: skip
     x, y, z = (noise.coordinate_um if axis is None else axis for axis in (noise.x_um, noise.y_um, noise.z_um))
-    placing, growth = (None if part is None else part.mean_square_root for part in (noise.placing_um, noise.growth_um))
+    # root of the mean square: variances are what observations add, and their posterior mean is value² + u²
+    placing, growth = (
+        None if part is None else hypot(part.value, part.u) for part in (noise.placing_um, noise.growth_um)
+    )
     return EarlierNoise((x.value, y.value, z.value), placing, growth)
 
 
@@ -247,13 +245,8 @@ class _Digitizer(ResultsPart):
     poses: Annotated[list[_Pose], Field(min_length=1, max_length=LISTED.most)]
 
 
-class _CalibratedJob(ResultsPart):
-    id: str
-    origin: Origin
-
-
 class _DigitizerResults(ResultsFile):
-    job: _CalibratedJob
+    job: _JobOfResults
     digitizer: _Digitizer
 
 

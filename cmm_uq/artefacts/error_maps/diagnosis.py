@@ -225,15 +225,15 @@ def squareness_findings(maps: Sequence[ErrorMap]) -> list[Finding]:
     same: dict[tuple[float, ...], list[float]] = {}
     for m in _stated(maps):
         same.setdefault(tuple(m.squareness.tolist()), []).append(m.temperature)
-    return [Finding("copied", (), (), _same_squareness(some)) for some in same.values() if len(some) > 1]
-
-
-def _same_squareness(temperatures: Sequence[float]) -> Text:
-    return say(
-        "squareness: the maps at {temperatures} °C give the same figures. They were measured once, and say "
-        "nothing of how it changes; measure it at each temperature",
-        temperatures=commas(number(t, "g") for t in temperatures),
-    )
+    found = []
+    for each in (commas(number(t, "g") for t in some) for some in same.values() if len(some) > 1):
+        why = say(
+            "squareness: the maps at {temperatures} °C give the same figures. They were measured once, and say "
+            "nothing of how it changes; measure it at each temperature",
+            temperatures=each,
+        )
+        found.append(Finding("copied", (), (), why))
+    return found
 
 
 def squareness_sections(maps: Sequence[ErrorMap]) -> tuple[Section, ...]:
