@@ -9,6 +9,7 @@ from decimal import Decimal
 from cmm_uq.jobs.dcc import Certificate, certificate as dcc, written
 from tests.conftest import ROOT
 from tests.jobs.dcc.certificates import certificate
+from tests.jobs.dcc.texts import words
 
 K, P, MM = Decimal(2), Decimal("0.95"), r"\milli\metre"
 DUE = dcc.StatementMetadata(ref_type=("basic_recalibration",), date=dt.date(2028, 3, 2))
@@ -20,7 +21,7 @@ def value(
     """One value with its expanded uncertainty in the same unit."""
     stated = None if U is None else dcc.Expanded(uncertainty=Decimal(U), factor=K, probability=P)
     return dcc.DccQuantity(
-        name=dcc.words(name), ref_type=(ref_type,), value=dcc.Real(value=Decimal(number), unit=unit, uncertainty=stated)
+        name=words(name), ref_type=(ref_type,), value=dcc.Real(value=Decimal(number), unit=unit, uncertainty=stated)
     )
 
 
@@ -42,7 +43,7 @@ def listed(
         )
         region = dcc.EllipsoidalRegion(columns=columns, factor=K, probability=P)
     found = dcc.RealList(values=_decimals(numbers), units=(unit,), uncertainty=stated, region=region)
-    return dcc.DccQuantity(name=dcc.words(name), value=found)
+    return dcc.DccQuantity(name=words(name), value=found)
 
 
 def issued(
@@ -52,13 +53,13 @@ def issued(
     held = (dcc.QuantityList(parts=parts),) if table else parts
     made = certificate()
     (old,) = made.administrative.items.items
-    items = made.administrative.items.with_changes(items=(old.with_changes(name=dcc.words(item)),))
+    items = made.administrative.items.with_changes(items=(old.with_changes(name=words(item)),))
     core = made.administrative.core.with_changes(identifier="D-K-4711", issued=dt.date(2026, 3, 5))
-    found = dcc.DccResult(name=dcc.words(result), data=dcc.Data(parts=held))
+    found = dcc.DccResult(name=words(result), data=dcc.Data(parts=held))
     administrative = made.administrative.with_changes(
-        items=items, core=core, statements=(DUE,), persons=(dcc.Person(person=dcc.Somebody(name=dcc.words("A. Huber"))),)
+        items=items, core=core, statements=(DUE,), persons=(dcc.Person(person=dcc.Somebody(name=words("A. Huber"))),)
     )  # fmt: skip
-    measurement = dcc.Measurement(name=dcc.words("Calibration"), results=(found,))
+    measurement = dcc.Measurement(name=words("Calibration"), results=(found,))
     return made.with_changes(administrative=administrative, measurements=(measurement,), document=None)
 
 

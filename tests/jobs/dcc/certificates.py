@@ -7,6 +7,7 @@ from decimal import Decimal
 
 from cmm_uq.jobs.dcc import Certificate, certificate as dcc
 from cmm_uq.jobs.dcc.certificate import Expanded, Real
+from tests.jobs.dcc.texts import rich, words
 
 LENGTH = Real(
     label="L",
@@ -21,14 +22,14 @@ LENGTH = Real(
 def certificate(value: Real = LENGTH) -> Certificate:
     """Of a ball bar with one length."""
     somebody = dcc.Contact(
-        name=dcc.words({"en": "Laboratory", "de": "Labor"}), location=dcc.Location(city=("Braunschweig",))
+        name=words({"en": "Laboratory", "de": "Labor"}), location=dcc.Location(city=("Braunschweig",))
     )
-    method = dcc.Method(name=dcc.words("Comparison"), norms=("ISO 10360-2:2009",))
-    data = dcc.Data(parts=(dcc.DccQuantity(name=dcc.words("Length"), value=value, ref_type=("basic_measuredValue",)),))
-    result = dcc.DccResult(name=dcc.words("Length"), data=data)
+    method = dcc.Method(name=words("Comparison"), norms=("ISO 10360-2:2009",))
+    data = dcc.Data(parts=(dcc.DccQuantity(name=words("Length"), value=value, ref_type=("basic_measuredValue",)),))
+    result = dcc.DccResult(name=words("Length"), data=data)
     return Certificate(
         administrative=dcc.Administrative(
-            software=(dcc.Software(name=dcc.words("cmm-uq"), release="1"),),
+            software=(dcc.Software(name=words("cmm-uq"), release="1"),),
             core=dcc.CoreData(
                 country="DE",
                 languages=("en", "de"),
@@ -41,20 +42,20 @@ def certificate(value: Real = LENGTH) -> Certificate:
             items=dcc.Items(
                 items=(
                     dcc.Item(
-                        name=dcc.words("Ball bar"),
+                        name=words("Ball bar"),
                         identifications=(dcc.IdentificationNumber(issuer="manufacturer", value="12"),),
                         id="bar",
                     ),
                 )
             ),
             laboratory=dcc.CalibrationLaboratory(contact=somebody),
-            persons=(dcc.Person(person=dcc.Somebody(name=dcc.words('A < B & "C"'))),),
+            persons=(dcc.Person(person=dcc.Somebody(name=words('A < B & "C"'))),),
             customer=somebody,
         ),
         measurements=(
-            dcc.Measurement(name=dcc.words("Calibration"), methods=(method,), results=(result,), ref_id=("bar",)),
+            dcc.Measurement(name=words("Calibration"), methods=(method,), results=(result,), ref_id=("bar",)),
         ),
         document=dcc.Attached(
-            file_name="a.html", mime_type="text/html", data=bytes(range(256)), description=dcc.rich("a", "b")
+            file_name="a.html", mime_type="text/html", data=bytes(range(256)), description=rich("a", "b")
         ),
     )

@@ -9,11 +9,12 @@ import lxml.etree
 import pytest
 
 from cmm_uq.jobs.dcc import Certificate, certificate as dcc, read, written
-from cmm_uq.jobs.dcc.certificate import DccQuantity, QuantityList, StatementMetadata, rich, words
+from cmm_uq.jobs.dcc.certificate import DccQuantity, QuantityList, StatementMetadata
 from cmm_uq.jobs.dcc.figures import QuantityFigures, data, figures, shown, statements, unit_shown
 from cmm_uq.jobs.dcc.xml_file import checked_by_schema
 from tests.conftest import ROOT
 from tests.jobs.dcc.artefacts import BALL_BAR, MM, PLATE, SPHERE, STEP_GAUGE, TRIANGLE, issued, value
+from tests.jobs.dcc.texts import rich, words
 
 SCHEMAS = ROOT.parent / "shared" / "schemas"
 D = Decimal

@@ -17,11 +17,12 @@ from cmm_uq.artefacts import kind_named
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.clauses import claimed
 from cmm_uq.jobs.dcc import Certificate, written
-from cmm_uq.jobs.dcc.certificate import StatementMetadata, rich
+from cmm_uq.jobs.dcc.certificate import StatementMetadata
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model.artefact import Artefact
 from tests.conftest import ROOT
 from tests.jobs.dcc.artefacts import BALL_BAR, PLATE, SPHERE, STEP_GAUGE, TRIANGLE, issued, listed, value
+from tests.jobs.dcc.texts import rich
 from tests.jobs.recording.test_references import GAUGE, PLATE as PLATE_RECORDING
 
 EXAMPLE = {
