@@ -299,12 +299,12 @@ def _looked_at(
     title, size = title_of(AXES[axis], component), MICROMETRE if component < 3 else ARCSECOND * METRE
     found = spikes(shared, values, size)
     damaged = found.mean(axis=1) > DAMAGED
-    findings = [_damaged(title, maps[k]) for k in np.flatnonzero(damaged)]
+    findings = [_damaged(title, maps[k]) for k in np.flatnonzero(damaged).tolist()]
     findings += [
         _stray(title, shared[i], maps[k], values[k, i] / size, COLUMNS[component])
         for k, i in zip(*np.nonzero(found & ~damaged[:, None]), strict=True)
     ]
-    kept, left = ~found[~damaged].any(axis=0), np.flatnonzero(~damaged)
+    kept, left = ~found[~damaged].any(axis=0), np.flatnonzero(~damaged).tolist()
     if len(left) < 2 or kept.sum() < LEAST_POSITIONS:
         return None, findings
     temperatures = np.array([maps[k].temperature for k in left])
