@@ -72,10 +72,8 @@ def interval_test(
     calculated = interval * ratio
     changed = rejection > changing.confidence and abs(calculated - interval) >= changing.least_days
     low, high = reliability_range(in_tolerance, tested, changing.confidence)
-    return IntervalTest(
-        in_tolerance, tested, observed, low, high, rejection, calculated,
-        changing.bounded(calculated) if changed else interval,
-    )  # fmt: skip
+    recommended = changing.bounded(calculated) if changed else interval
+    return IntervalTest(in_tolerance, tested, observed, low, high, rejection, calculated, recommended)
 
 
 def _rejection(passed: int, tested: int, target: float) -> float:

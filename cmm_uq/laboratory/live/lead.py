@@ -241,9 +241,7 @@ class LiveRecording:
 
     def _provenance(self, story: Story, rows: Sequence[Row], hashes: Sequence[str]) -> dict[str, Any]:
         return {
-            "program": PROGRAM,
-            "simulated": self._simulated,
-            "recording_sha256": hashes,
+            "program": PROGRAM, "simulated": self._simulated, "recording_sha256": hashes,
             "sessions": [
                 {"number": session.number, "begin_utc": _utc(session.start.utc_ns), "journal": f"{FOLDER}/{path.name}",
                  "sha256": sha256_of(path) or ""}
@@ -255,8 +253,7 @@ class LiveRecording:
                 | {"unasked": sum(n for (source, _), n in story.unasked.items() if source == name)}
                 for name, identity in story.identities.items()
             ],
-            "typed": sum(row.point.how.startswith(TYPED) for row in rows),
-            "files": dict(story.files),
+            "typed": sum(row.point.how.startswith(TYPED) for row in rows), "files": dict(story.files),
             "columns": _columns(rows),
             "gaps": [
                 dict(zip(("instrument", "since_s", "lasted_s", "why"), gap, strict=True)) for gap in story.gaps
@@ -265,8 +262,7 @@ class LiveRecording:
                 dict(zip(("measurement", "point", "repeat", "reason"), (*point.place, reason), strict=True))
                 for point, reason in story.undone
             ],
-            "clock_jumps_s": [by_s for _, by_s in story.clocks],
-            "damaged": list(story.damaged),
+            "clock_jumps_s": [by_s for _, by_s in story.clocks], "damaged": list(story.damaged),
             "left_out": len(story.points) - len(rows),
         }  # fmt: skip
 

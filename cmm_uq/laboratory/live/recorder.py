@@ -43,15 +43,12 @@ def _as_data(source: str, readings: list[Reading]) -> dict[str, Any]:
     names = list(readings[0].values)
     alike = all(list(reading.values) == names for reading in readings)
     return {
-        "source": source,
-        "first": readings[0].number,
-        "utc_ns": [reading.utc_ns for reading in readings],
+        "source": source, "first": readings[0].number, "utc_ns": [reading.utc_ns for reading in readings],
         "monotonic_ns": [reading.monotonic_ns for reading in readings],
         "raw": [reading.raw.decode("latin-1") for reading in readings],
         **({"names": names, "values": [list(reading.values.values()) for reading in readings]} if alike
            else {"values": [dict(reading.values) for reading in readings]}),
-        **({"status": status} if status else {}),
-        **({"point": probed} if probed else {}),
+        **({"status": status} if status else {}), **({"point": probed} if probed else {}),
     }  # fmt: skip
 
 

@@ -11,15 +11,9 @@ from sqlalchemy.schema import CreateTable
 
 from cmm_uq.laboratory.records.facts import ChainFinding
 
-META = sa.MetaData(
-    naming_convention={
-        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
-        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
-        "ck": "ck_%(table_name)s_%(constraint_name)s",
-        "fk": "fk_%(table_name)s_%(column_0_name)s",
-        "pk": "pk_%(table_name)s",
-    }
-)
+_BY = {"ix": "column_0_N_name", "uq": "column_0_N_name", "ck": "constraint_name", "fk": "column_0_name"}
+_NAMES = {kind: f"{kind}_%(table_name)s_%({of})s" for kind, of in _BY.items()} | {"pk": "pk_%(table_name)s"}
+META = sa.MetaData(naming_convention=_NAMES)
 
 DAY = sa.String(10)  # ISO 8601, which sorts as days do
 
