@@ -17,9 +17,6 @@ from cmm_uq.app.commands.jobs.new import known
 from cmm_uq.app.commands.jobs.schemas import SCHEMAS, as_text, schema_named
 from cmm_uq.artefacts import kind_named
 from cmm_uq.base.files.table import unit_of
-from cmm_uq.certificate.part.results import PART_RESULTS
-from cmm_uq.certificate.proof.page import KEYS as PROOF, RATE
-from cmm_uq.certificate.results.keys import QUANTITY, RESULTS
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS, REQUIRED
 from cmm_uq.jobs.part import dmis as drawing_dmis, qif as drawing_qif
@@ -33,6 +30,7 @@ from cmm_uq.machine.physics.catalogue import EVERY
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES
 from cmm_uq.maths.uncertainty.models.input_keys import KINDS as DISTRIBUTIONS
 from tests.conftest import ROOT
+from tests.result_keys import PART_RESULTS, PROOF, QUANTITY, RATE, RESULTS
 
 SHIPPED, PAGES = ROOT / "cmm_uq" / "schemas", ROOT / "docs" / "reference"
 WRITTEN = "<!-- written by python -m tests.reference_pages from what the program reads: edit that instead -->"

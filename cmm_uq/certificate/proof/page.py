@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -159,71 +158,6 @@ def often_words(proof: DiagnosisProof) -> Text:
 
 
 SCHEMA = "cmm-uq/prove/1"
-
-# Below every key that is said to be a rate
-RATE: Mapping[str, str] = {
-    "count": "How many.",
-    "of": "Of how many.",
-    "rate": "Their quotient; null of none.",
-    "interval95": "Exact 95 % interval (Clopper and Pearson); of intervals for as many as would be independent.",
-}
-
-# By dotted name; a part in capitals stands for any name, [] for each entry of a list
-KEYS: Mapping[str, str] = {
-    "schema": "Name of the layout.",
-    "software.KEY": "The program and what took part, as in results of a report.",
-    "job.KEY": "The job, with the hashes of its inputs.",
-    "cases": "Number of cases.",
-    "seed": "Seed of the cases.",
-    "alpha": "Rate of false alarms that the diagnosis was asked for.",
-    "truth_sha256": "SHA-256 of truth.json, written and told before the first diagnosis.",
-    "noise.KEY": "The job's own noise: reading along each axis, set-up offset, growing and slow part, display.",
-    "verdicts.KIND.VERDICT": "How often each verdict was given of cases that hide this.",
-    "rates.false_alarms": "Rate: other verdicts than consistent, of cases that hide nothing.",
-    "rates.right": "Rate: right verdicts.",
-    "rates.found": "Rate: hidden effects that are found, alone or in a group.",
-    "rates.found_alone": "Rate: those told from all others.",
-    "rates.wrong_names": "Rate: cases in which an effect is named that does not act.",
-    "rates.recognised": "Rate: of detected functions outside the catalogue, those taken for no effect.",
-    "rates.machine_blamed": "Rate: faults of the artefact for which an effect of the machine is named.",
-    "rates.predicts_better": "Rate: cases with an assertion that predicts better what the fit has not seen.",
-    "rates.refused": "Rate: cases without an answer.",
-    "held_out_ratio": "Median rms of predictions of what was held out, after over before; null without assertions.",
-    "coverage.pooled": "Rate: 95 % intervals that hold the truth, where all that acts was named or found.",
-    "coverage.SORT": "Rate: the same of effects that were found, and of those that the job names by what was hidden.",
-    "probabilities[].from": "Lower end of a tenth of probabilities that were said.",
-    "probabilities[].to": "Its upper end.",
-    "probabilities[].said": "Mean of the probabilities in it.",
-    "probabilities[].right": "Rate: of these assertions, those whose effect acts.",
-    "strength[].from": "Lower end of strengths √λ.",
-    "strength[].to": "Upper end.",
-    "strength[].found": "Rate: effects of such a strength that are found.",
-    "found_in_nine_of_ten.strength": "Strength √λ from which on an effect is found in nine of ten; null if none.",
-    "found_in_nine_of_ten.interval95": "Its 95 % interval; an end that is not reached is null, both are of too few cases.",
-    "effects[].effect": "An effect that the job does not name.",
-    "effects[].standing": "drawn, or why no case hides it: unrecorded, taken, too small, no travel.",
-    "effects[].parameter": "Its first parameter.",
-    "effects[].unit": "The parameter's unit.",
-    "effects[].strength_per_unit": "√λ of one unit under the job's noise.",
-    "effects[].allowed": "Largest size that physics allows.",
-    "effects[].found": "Rate: how often it was found where it was hidden.",
-    "effects[].wrongly_named": "How often it was named where it did not act.",
-    "effects[].found_in_nine_of_ten": "Size from which on it is found in nine of ten; null beyond what physics allows.",
-    "effects[].columns": "Columns that it goes by and that were not recorded.",
-    "effects[].alike": "Another effect that these set-ups hardly tell from it; null where there is none.",
-    "artefact_faults[].what": "A fault of the artefact.",
-    "artefact_faults[].shows": "Whether it shows in these set-ups.",
-    "artefact_faults[].left": "Part of it that the nearest effect of the machine leaves.",
-    "artefact_faults[].like": "That effect; null where there is none.",
-    "by_noise.KIND.false_alarms": "Rate: under one kind of noise.",
-    "by_noise.KIND.found": "Rate: the same of hidden effects.",
-    "by_noise.KIND.coverage": "Rate: the same of intervals.",
-    "acceptance[].figure": "A figure that the laboratory accepts the method by.",
-    "acceptance[].lowest": "Lowest rate asked for.",
-    "acceptance[].highest": "Highest.",
-    "acceptance[].rate": "Rate: counted.",
-    "acceptance[].standing": "met, missed, or open where so many cases do not decide it.",
-}
 
 
 def proof_outcome(proof: DiagnosisProof) -> Outcome:

@@ -36,12 +36,12 @@ from cmm_uq.app.commands.report import report_outcome
 from cmm_uq.artefacts import BUILT_IN, kind_named
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.origin import as_json, origin_warnings
-from cmm_uq.certificate.results.keys import RESULTS, described
 from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.identification import SIMULATED
 from tests.app.commands.test_budget import dated
 from tests.plugin.packages import OUTSIDE_KINDS, install
+from tests.result_keys import RESULTS, described
 
 NAMES = (*BUILT_IN, "shift_plate")
 

@@ -28,7 +28,7 @@ from cmm_uq.app.commands.jobs.check import check_job
 from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
-from cmm_uq.certificate.part.results import PART_RESULTS, part_results
+from cmm_uq.certificate.part.results import part_results
 from cmm_uq.jobs.part.job import part_of, read_part
 from tests.jobs.part.other_methods import (
     ACROSS,
@@ -45,6 +45,7 @@ from tests.jobs.part.other_methods import (
 )
 from tests.jobs.part.parts import plate
 from tests.part_machines import by_results, plate_files, results_keys
+from tests.result_keys import PART_RESULTS
 
 STATE = {"certificate": "machine", "travel_mm": {"x": [0.0, 900.0], "y": [0.0, 1200.0], "z": [-600.0, 0.0]}}
 

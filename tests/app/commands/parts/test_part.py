@@ -22,10 +22,11 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.part.measurement import PartMeasurement
-from cmm_uq.certificate.part.results import PART_RESULTS, part_results
+from cmm_uq.certificate.part.results import part_results
 from cmm_uq.jobs.part.job import TABLES
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_certificate, by_results, plate_of, report, results_keys
+from tests.result_keys import PART_RESULTS
 
 TRIALS = 4000
 
