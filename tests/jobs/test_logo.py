@@ -14,7 +14,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.render import render_html, render_pdf
-from cmm_uq.certificate.verify.html_page import read_html
+from cmm_uq.certificate.verify.opened import read_html
 from cmm_uq.jobs.logo import checked_logo
 from tests.conftest import ROOT
 

@@ -19,8 +19,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import html_table
 from cmm_uq.base.units import printed_unit
 from cmm_uq.certificate.part.figures import part_summary
-from cmm_uq.certificate.part.measurement import PartMeasurement
-from cmm_uq.certificate.part.results import part_results
+from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
 from cmm_uq.certificate.result import Outcome
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob

@@ -55,7 +55,7 @@ def verify(
 
     Exit code 4 where something is wrong. Files that are gone are told; they may only have been moved.
     """
-    from cmm_uq.certificate.verify.witness import witnesses_of
+    from cmm_uq.certificate.verify.sources import witnesses_of
 
     stated, without = witnesses_of(witness) if witness else ([], [])
     with _opened(records, read_only=True) as opened:

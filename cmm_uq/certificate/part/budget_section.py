@@ -15,7 +15,7 @@ from cmm_uq.certificate.document import Column, Paragraph, Section, Table, secti
 from cmm_uq.certificate.part.figures import CharacteristicFigures, by_margin, critical, figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement, UnseenError
 from cmm_uq.certificate.part.plots import shares_plots
-from cmm_uq.certificate.sections.priors import changes_table, resting, sizes_table
+from cmm_uq.certificate.sections.regions import changes_table, resting, sizes_table
 from cmm_uq.certificate.wording import effect_title
 
 DETAILED = 10  # characteristics whose budgets are listed line by line: those of least margin

@@ -6,23 +6,31 @@ import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from math import degrees, isfinite
+from typing import Any, Literal
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.decision import Outcome, rule_words
+from cmm_uq import __version__
+from cmm_uq.analysis.conformity.decision import Outcome, rule_name, rule_words
 from cmm_uq.analysis.conformity.limits import LimitDecision
 from cmm_uq.analysis.machine.influence import PriorInfluence
 from cmm_uq.analysis.parts.budget import PointErrors, VarianceShares, Way
+from cmm_uq.analysis.parts.characteristics import never_negative
+from cmm_uq.analysis.parts.methods import method as other_methods
 from cmm_uq.analysis.parts.methods.method import MethodComparison
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
+from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
+from cmm_uq.certificate.origin import NAME
+from cmm_uq.certificate.sections.regions import families_data, priors_data
 from cmm_uq.jobs.part.feature import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.jobs.verdicts import gravest
+from cmm_uq.jobs.source import sha256
+from cmm_uq.jobs.verdicts import Verdicts, gravest
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated
 
 # what states the machine: a certificate with its inputs inside, the figures and draws alone, or a job that was analysed
@@ -119,9 +127,7 @@ class PartMeasurement:
     # where the part's origin lies in coordinates of the machine, or about which place it does
     origin_mm: tuple[float, float, float]
     standing: CertificateStatus  # the machine's certificate
-    methods: MethodComparison | None = (
-        None  # other methods on this part beside this one; ``None`` where the job has none
-    )
+    methods: MethodComparison | None = None  # other methods on this part; ``None`` where the job has none
     digits: int | None = None  # of u that were asked for; ``None`` where the number of draws was
     seed: int = 0  # of everything random
     asked: int = 0  # virtual measurements that were asked for, of which ``digits`` may need more
@@ -176,3 +182,160 @@ class PartMeasurement:
     def conforming(self) -> bool:
         """Whether nothing that was decided is anything but a pass."""
         return self.outcome in (None, "pass")
+
+
+SCHEMA = "cmm-uq/part/1"
+_plain = str.__str__
+
+
+def part_results(found: PartMeasurement) -> dict[str, Any]:
+    """Contents of ``results.json``."""
+    simulated, facts, further, job = found.simulated, found.job.facts, found.further, found.job.facts.job
+    names, shares = [one.name for one in found.characteristics], found.budget
+    stated = [_characteristic(found, i) for i in range(len(names))]
+    factors = np.array([_in(one, 1.0) for one in found.characteristics])
+    return {
+        "schema": SCHEMA,
+        "software": {"name": NAME, "version": __version__},
+        "job": {
+            "id": job.id, **({"number": job.number} if job.number else {}), "origin": job.origin, "date": job.date.isoformat(),
+            **({"language": job.language} if job.language != ENGLISH else {}), "inputs_sha256": sha256(found.job.inputs),
+        },
+        "part": {"name": facts.part.name, "drawing": facts.part.drawing or None, "serial": facts.part.serial or None,
+                 "not_measured": list(facts.part.not_measured)},
+        "machine": standing_data(found.standing) | {
+            "families": families_data(found.given.machine.scales),
+            "bounds": [one.model_dump() for one in facts.machine_state.bound],
+        },
+        "simulation": {
+            "virtual_measurements": simulated.trials, "asked": found.asked, "seed": found.seed, "coverage": simulated.coverage,
+            "digits": found.digits, "settled": simulated.stable, "first_order": not found.virtual.exact,
+            "places": len(found.virtual.places), "points": len(found.plan.points),
+            "coefficients": sum(len(cause.factors) for cause in found.virtual.places[0].causes),
+            "not_drawn": [{"effect": name, "lacks": column} for name, column in found.virtual.places[0].lacking.items()],
+        },
+        "characteristics": stated,
+        "correlation": {"characteristics": names, "matrix": found.correlation.tolist()},
+        "covariance": {"characteristics": names, "units": [unit_of(one) for one in found.characteristics],
+                       "matrix": (simulated.covariance * factors * factors[:, None]).tolist()},
+        "decision": {
+            "rule": rule_name(facts.decision.rule), "words": _plain(found.judged_by),
+            "prior": None if facts.decision.prior is None else facts.decision.prior.model_dump(),
+            "outcome": found.outcome, "probability_all_conform": found.together,
+        },
+        "verdicts": Verdicts.of_results({"characteristics": stated}).data(),
+        "budget": {
+            "characteristics": list(shares.characteristics),
+            "causes": [
+                {"cause": name, "first": first, "total": total}
+                for name, first, total in zip(shares.causes, shares.first.tolist(), shares.total.tolist(), strict=True)
+            ],
+            "factors": [
+                {"factor": name, "share": part} for name, part in zip(shares.factors, shares.within.tolist(), strict=True)
+            ],
+        },
+        "unseen": [
+            {"characteristic": one.characteristic, "effect": one.effect or None, "line": one.line, "title": _plain(one.title),
+             "share": one.share, "why": _plain(one.why)}
+            for one in found.unseen
+        ],
+        "priors": priors_data(found.influence),
+        "further": further and {
+            "effects": list(further.effects), "setups": further.setups, "text": _plain(further.text),
+            "command": further.command or None, "file": further.file or None, "missed": list(further.missed),
+        },
+        "ways": [
+            {"way": _plain(way.name), "u": list(map(_in, found.characteristics, way.u.tolist()))} for way in found.ways
+        ],
+        "other_methods": methods_data(found.methods),
+        "warnings": [_plain(text) for text in found.warnings],
+    }  # fmt: skip
+
+
+def unit_of(one: CharacteristicFacts) -> str:
+    """Of a characteristic in ``results.json``."""
+    return "°" if one.asks.limits == "angles" else "mm"
+
+
+def standing_data(one: CertificateStatus) -> dict[str, Any]:
+    """The machine's certificate."""
+    return {
+        "source": one.source, "files": list(one.files), "number": one.number or None, "laboratory": one.laboratory or None,
+        "machine": one.machine, "serial": one.serial or None, "origin": one.origin, "date": one.date.isoformat(),
+        "age_days": one.age.days, "valid_until": None if one.valid_until is None else one.valid_until.isoformat(),
+        "verdict": one.verdict,
+        "checked": [{"what": each.what, "count": each.count} for each in one.checked if not each.why],
+        "not_checked": [{"what": each.what, "why": each.why} for each in one.checked if each.why],
+        "computed_again": one.again, "signatures_held_to_trusted": one.trusted, "draft": one.draft,
+        "given_recording": one.given_recording, "drawn": _plain(one.path), "drift": _plain(one.drift),
+        "changes": None if one.changes is None else [
+            {"parameter": name, "change": change} for name, change in one.changes.items()
+        ],
+        "temperature_c": one.temperature_c, "inputs_sha256": dict(one.inputs_sha256),
+    }  # fmt: skip
+
+
+def _characteristic(found: PartMeasurement, i: int) -> dict[str, Any]:
+    facts, stated, judged = found.characteristics[i], found.stated[i], found.judged[i]
+    sided = bool(never_negative(found.plan)[i])
+
+    def inside(value: float | None) -> float | None:
+        return None if value is None else _in(facts, value)
+
+    return {
+        "name": facts.name, "what": facts.what, "features": list(facts.features), "datums": list(facts.datums),
+        "association": found.plan.characteristics[i].association, "unit": unit_of(facts),
+        "measured": None if found.measured is None else _in(facts, float(found.measured[i])),
+        "mean_error": _in(facts, stated.error), "value": inside(stated.value), "value_is": "median" if sided else "mean",
+        "stated_by": "interval" if stated.value is not None and sided else "U",
+        "u": _in(facts, stated.u), "U": _in(facts, stated.U), "k": stated.k if isfinite(stated.k) else None,
+        "interval95": list(map(inside, stated.interval)), "worst_cause": found.budget.worst(facts.name),
+        "limits": judged and {
+            "lower": inside(judged.lower), "upper": inside(judged.upper),
+            "accepted": judged.accepted and list(map(inside, judged.accepted)),
+        },
+        "decision": None if judged is None or judged.outcome is None else {
+            "outcome": judged.outcome, "probability_conforming": judged.probability, "probability_beyond": judged.beyond,
+            "margin_u": float(found.margins[i]) if isfinite(found.margins[i]) else None,
+        },
+    }  # fmt: skip
+
+
+def _in(one: CharacteristicFacts, value: float) -> float:
+    """A value of a characteristic in its unit."""
+    return degrees(value) if one.asks.limits == "angles" else value
+
+
+def methods_data(comparison: other_methods.MethodComparison | None) -> dict[str, Any] | None:
+    """All of it; ``None`` where the job has no other method."""
+    if comparison is None:
+        return None
+    methods = [
+        {"method": one.method, "characteristics": [_figure(each) for each in one.figures],
+         "conditions": [{"asked": _plain(each.text), "met": each.met} for each in one.conditions],
+         "seen": dict(one.seen)}
+        for one in comparison.methods
+    ]  # fmt: skip
+    compared = [
+        {"name": one.name,
+         "normalised_errors": [{"one": pair.one, "other": pair.other, "E_n": pair.normalised} for pair in one.pairs],
+         "why": list(map(_plain, one.why))}
+        for one in comparison.characteristics
+    ]  # fmt: skip
+    return {"methods": methods, "compared": compared}
+
+
+def _figure(one: other_methods.MethodFigure) -> dict[str, Any]:
+    def given(value: float | None) -> float | None:
+        return degrees(value) if one.angle and value is not None else value
+
+    budget = one.budget
+    return {
+        "name": one.name, "unit": "°" if one.angle else "mm", "value": given(one.value), "u": given(one.u), "U": given(one.U),
+        "k": budget.k, "dof": budget.dof if isfinite(budget.dof) else None, "systematic_error": given(one.systematic),
+        "corrected": one.corrected, "u_one_measurement": given(one.single), "scatter": given(one.scatter),
+        "budget": [
+            {"line": _plain(line.name), "depth": depth, "share": share, "dof": line.dof if isfinite(line.dof) else None}
+            for depth, line, share in budget.flat()
+        ],
+    }  # fmt: skip

@@ -7,8 +7,7 @@ values and uncertainties in mm or °, shares from 0 to 1.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import degrees, isfinite, log
-from typing import Any
+from math import isfinite, log
 
 from cmm_uq import __version__
 from cmm_uq.analysis.parts.budget import FAMILIES, family_of
@@ -16,12 +15,12 @@ from cmm_uq.analysis.parts.methods import method as other_methods
 from cmm_uq.analysis.parts.methods.of_job import METHODS
 from cmm_uq.analysis.parts.virtual import AGREES, CHECKED
 from cmm_uq.base import messages
-from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, number, plural, say
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, number, plural, say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.origin import NAME
 from cmm_uq.certificate.part.figures import ANGLES, LENGTHS, figures_of
-from cmm_uq.certificate.part.measurement import PartMeasurement
+from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, Source
 from cmm_uq.certificate.wording import titles
 from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 
@@ -218,9 +217,8 @@ def _most_apart(comparison: other_methods.MethodComparison) -> list[other_method
         positive = [stated.u for stated in one.stated if stated.u > 0]
         return log(max(positive) / min(positive)) if positive else 0.0
 
-    every = list(comparison.characteristics)
-    kept = sorted(every, key=factor, reverse=True)[:EXPLAINED]
-    return [one for one in every if one in kept]
+    kept = sorted(comparison.characteristics, key=factor, reverse=True)[:EXPLAINED]
+    return [one for one in comparison.characteristics if one in kept]
 
 
 def _figures(own: Sequence[other_methods.ComparedCharacteristic], *, angle: bool) -> Table | None:
@@ -308,37 +306,64 @@ def _notes(method: other_methods.MethodResult, told: Sequence[str]) -> list[Text
     return notes
 
 
-def methods_data(comparison: other_methods.MethodComparison | None) -> dict[str, Any] | None:
-    """All of it; ``None`` where the job has no other method."""
-    if comparison is None:
-        return None
-    methods = [
-        {"method": one.method, "characteristics": [_figure(each) for each in one.figures],
-         "conditions": [{"asked": str.__str__(each.text), "met": each.met} for each in one.conditions],
-         "seen": dict(one.seen)}
-        for one in comparison.methods
-    ]  # fmt: skip
-    compared = [
-        {"name": one.name,
-         "normalised_errors": [{"one": pair.one, "other": pair.other, "E_n": pair.normalised} for pair in one.pairs],
-         "why": [str.__str__(text) for text in one.why]}
-        for one in comparison.characteristics
-    ]  # fmt: skip
-    return {"methods": methods, "compared": compared}
+_SOURCES: Mapping[Source, Text] = {
+    "certificate": say("its certificate, with the recording of the calibration inside"),
+    "results": say("the figures and draws of its certificate, without the recording of the calibration"),
+    "job": say("the job of its calibration, analysed anew; no certificate is verified"),
+}
 
 
-def _figure(one: other_methods.MethodFigure) -> dict[str, Any]:
-    def given(value: float | None) -> float | None:
-        return degrees(value) if one.angle and value is not None else value
+def machine_section(found: PartMeasurement) -> Section:
+    """What states the machine, and what of it was verified."""
+    standing, celsius = found.standing, NOTHING
+    if standing.temperature_c is not None:
+        celsius = say("{value} °C", value=messages.number(standing.temperature_c, ".2f"))
+    rows = (
+        (say("Taken from"), _SOURCES[standing.source]),
+        *certificate_rows(standing),
+        (say("Files"), commas(messages.names(standing.files))),
+        (say("Verified"), verified_words(standing)),
+        (say("Signatures"), say("by trusted certificates") if standing.trusted else say("not asked for")),
+        (say("Temperature of the scales at the calibration"), celsius),
+        (say("Noise of a coordinate"), _noise(found)),
+    )
+    told = (Paragraph(text) for text in (standing.path, standing.drift) if text)
+    return section(say("The machine and its certificate"), Facts(tuple(row for row in rows if row[1])), *told)
 
-    budget = one.budget
-    return {
-        "name": one.name, "unit": "°" if one.angle else "mm", "value": given(one.value), "u": given(one.u), "U": given(one.U),
-        "k": budget.k, "dof": budget.dof if isfinite(budget.dof) else None, "systematic_error": given(one.systematic),
-        "corrected": one.corrected, "u_one_measurement": given(one.single), "scatter": given(one.scatter),
-        "budget": [
-            {"line": str.__str__(line.name), "depth": depth, "share": share,
-             "dof": line.dof if isfinite(line.dof) else None}
-            for depth, line, share in budget.flat()
-        ],
-    }  # fmt: skip
+
+def certificate_rows(standing: CertificateStatus) -> tuple[tuple[Text, Text], ...]:
+    """Machine, number, issuer, date with its age, validity of the certificate."""
+    serial = say("serial number {serial}", serial=Verbatim(standing.serial)) if standing.serial else NOTHING
+    number_of: Text = Verbatim(standing.number)
+    if standing.draft:
+        number_of = say("{number}, a draft", number=number_of)
+    days, date = standing.age.days, messages.day(standing.date)
+    calibrated = say("{date}, the day of the measurement", date=date)
+    if days:
+        age = plural(days, one=say("one day"), many=say("{count} days", count=days))
+        calibrated = say("{date}, {age} before", date=date, age=age)
+    return (
+        (say("Machine"), commas(text for text in (Verbatim(standing.machine), serial) if text)),
+        (say("Certificate of the machine"), number_of),
+        (say("Issued by"), Verbatim(standing.laboratory)),
+        (say("Calibrated on"), calibrated),
+        (say("Valid until"), messages.day(standing.valid_until) if standing.valid_until else NOTHING),
+    )
+
+
+def verified_words(standing: CertificateStatus) -> Text:
+    """What was compared and what was not."""
+    done = [one for one in standing.checked if one.count]
+    if not done:
+        return say("no: analysed anew") if standing.source == "job" else say("no")
+    again = say("computed again from its inputs") if standing.again else say("not computed again")
+    return say("{told}; {again}", again=again, told=say(
+        "{count} comparisons of {sorts} sorts between its documents, figures, decisions and inputs, none of which failed",
+        count=sum(one.count for one in done), sorts=len(done),
+    ))  # fmt: skip
+
+
+def _noise(found: PartMeasurement) -> Text:
+    usual = found.given.machine.noise.usual_mm * 1e3
+    x, y, z = (number(one, ".2g") for one in usual)
+    return say("{x}, {y}, {z} µm along x, y, z", x=x, y=y, z=z) if usual.any() else NOTHING

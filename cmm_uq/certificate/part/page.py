@@ -7,24 +7,34 @@ The page of a part: its characteristics with their uncertainty, what the limits 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+
+import numpy as np
 
 from cmm_uq.analysis.conformity.decision import Outcome
+from cmm_uq.analysis.parts.budget import ASSOCIATIONS, KINDS
+from cmm_uq.analysis.parts.evaluation import characteristics_of
+from cmm_uq.analysis.parts.plan import Plan, Stylus
+from cmm_uq.analysis.parts.result import deviations_of
 from cmm_uq.base import messages
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, plural, say
-from cmm_uq.certificate import certificate
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, number, say
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.certificate import certificate, document as doc
 from cmm_uq.certificate.clauses import Requirement, asked, not_stated, of_every_report
-from cmm_uq.certificate.document import Document, Facts, Overview, Paragraph, Section, section
-from cmm_uq.certificate.part import budget_section as causes, results_section as results
+from cmm_uq.certificate.document import Column, Paragraph, Section, Table, columns, section, table
+from cmm_uq.certificate.part import budget_section as causes, method
 from cmm_uq.certificate.part.figures import CharacteristicFigures, critical, figures_of
-from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, Source
-from cmm_uq.certificate.part.method import method_section, methods_section, not_covered_section, program_words
-from cmm_uq.certificate.wording import probability
+from cmm_uq.certificate.part.measurement import PartMeasurement
+from cmm_uq.certificate.part.pictures import errors_picture, form_picture, part_picture
+from cmm_uq.certificate.part.plots import Margin, correlation_section, margin_plots
+from cmm_uq.certificate.wording import OUTCOME_WORDS, probability
 from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.jobs.verdicts import gravest, standing_of
+from cmm_uq.maths.uncertainty.quantity import nominal
 
 
-def overview_of(found: PartMeasurement) -> Overview:
+def overview_of(found: PartMeasurement) -> doc.Overview:
     one = critical(found)
     rows = (
         (say("Part"), part_words(found)),
@@ -36,7 +46,7 @@ def overview_of(found: PartMeasurement) -> Overview:
         (say("Not seen"), causes.unseen_words(found) if found.unseen else NOTHING),
         (say("Not covered"), _not_covered(found)),
     )
-    return Overview(
+    return doc.Overview(
         verdict_words(found.outcomes, measured=found.measured is not None),
         "unknown" if found.outcome is None else standing_of(found.outcome),
         tuple(row for row in rows if row[1]),
@@ -50,14 +60,15 @@ def verdict_words(outcomes: Sequence[Outcome], *, measured: bool) -> Text:
     """
     outcome = gravest(outcomes)
     if not outcomes:
-        return say("Measured: no limits to decide on") if measured else _UNMEASURED
+        planned = say("Uncertainty of a planned measurement: nothing was measured")
+        return say("Measured: no limits to decide on") if measured else planned
     all_ = len(outcomes)
     if outcome == "pass":
-        return plural(all_, one=say("Conforms: its one limited characteristic is within its limits"),
+        return messages.plural(all_, one=say("Conforms: its one limited characteristic is within its limits"),
                       many=say("Conforms: all {count} limited characteristics are within limits", count=all_))  # fmt: skip
     if outcome in ("fail", "conditional fail"):
         out = sum(one in ("fail", "conditional fail") for one in outcomes)
-        told = plural(out, one=say("one of {all} characteristics is not", all=all_),
+        told = messages.plural(out, one=say("one of {all} characteristics is not", all=all_),
                       many=say("{count} of {all} characteristics are not", count=out, all=all_))  # fmt: skip
         if outcome == "conditional fail":
             return say("Conditionally rejected: {told} within its limits with certainty", told=told)
@@ -65,13 +76,10 @@ def verdict_words(outcomes: Sequence[Outcome], *, measured: bool) -> Text:
     if outcome == "conditional pass":
         return say("Conditionally accepted: all values are within their limits, not all with their uncertainty")
     open_ = sum(one == "undecided" for one in outcomes)
-    return plural(
+    return messages.plural(
         open_, one=say("Undecided: one of {all} characteristics is too near to a limit", all=all_),
         many=say("Undecided: {count} of {all} characteristics are too near to a limit", count=open_, all=all_),
     )  # fmt: skip
-
-
-_UNMEASURED = say("Uncertainty of a planned measurement: nothing was measured")
 
 
 def part_words(found: PartMeasurement) -> Text:
@@ -111,91 +119,18 @@ def _not_covered(found: PartMeasurement) -> Text:
     return messages.sentences([text for holds, text in told if holds])
 
 
-_SOURCES: Mapping[Source, Text] = {
-    "certificate": say("its certificate, with the recording of the calibration inside"),
-    "results": say("the figures and draws of its certificate, without the recording of the calibration"),
-    "job": say("the job of its calibration, analysed anew; no certificate is verified"),
-}
-
-
-def machine_section(found: PartMeasurement) -> Section:
-    """What states the machine, and what of it was verified."""
-    standing, celsius = found.standing, NOTHING
-    if standing.temperature_c is not None:
-        celsius = say("{value} °C", value=messages.number(standing.temperature_c, ".2f"))
-    rows = (
-        (say("Taken from"), _SOURCES[standing.source]),
-        *certificate_rows(standing),
-        (say("Files"), commas(messages.names(standing.files))),
-        (say("Verified"), verified_words(standing)),
-        (say("Signatures"), say("by trusted certificates") if standing.trusted else say("not asked for")),
-        (
-            say("Temperature of the scales at the calibration"),
-            celsius,
-        ),
-        (say("Noise of a coordinate"), _noise(found)),
-    )
-    told = (Paragraph(text) for text in (standing.path, standing.drift) if text)
-    return section(say("The machine and its certificate"), Facts(tuple(row for row in rows if row[1])), *told)
-
-
-def certificate_rows(standing: CertificateStatus) -> tuple[tuple[Text, Text], ...]:
-    """Machine, number, issuer, date with its age, validity of the certificate."""
-    serial = say("serial number {serial}", serial=Verbatim(standing.serial)) if standing.serial else NOTHING
-    number_of = (
-        say("{number}, a draft", number=Verbatim(standing.number)) if standing.draft else Verbatim(standing.number)
-    )
-    return (
-        (say("Machine"), commas(text for text in (Verbatim(standing.machine), serial) if text)),
-        (say("Certificate of the machine"), number_of),
-        (say("Issued by"), Verbatim(standing.laboratory)),
-        (say("Calibrated on"), _calibrated(standing)),
-        (say("Valid until"), messages.day(standing.valid_until) if standing.valid_until else NOTHING),
-    )
-
-
-def _calibrated(standing: CertificateStatus) -> Text:
-    days, date = standing.age.days, messages.day(standing.date)
-    age = plural(days, one=say("one day"), many=say("{count} days", count=days))
-    return (
-        say("{date}, {age} before", date=date, age=age)
-        if days
-        else say("{date}, the day of the measurement", date=date)
-    )
-
-
-def verified_words(standing: CertificateStatus) -> Text:
-    """What was compared and what was not."""
-    done = [one for one in standing.checked if one.count]
-    if not done:
-        return say("no: analysed anew") if standing.source == "job" else say("no")
-    again = say("computed again from its inputs") if standing.again else say("not computed again")
-    return say("{told}; {again}", again=again, told=say(
-        "{count} comparisons of {sorts} sorts between its documents, figures, decisions and inputs, none of which failed",
-        count=sum(one.count for one in done), sorts=len(done),
-    ))  # fmt: skip
-
-
-def _noise(found: PartMeasurement) -> Text:
-    usual = found.given.machine.noise.usual_mm * 1e3
-    if not usual.any():
-        return NOTHING
-    return say("{x}, {y}, {z} µm along x, y, z", x=messages.number(usual[0], ".2g"), y=messages.number(usual[1], ".2g"),
-               z=messages.number(usual[2], ".2g"))  # fmt: skip
-
-
 TITLE = say("Measurement report")
 PLANNED = say("Measurement uncertainty")
 
 
-def part_document(found: PartMeasurement) -> Document:
+def part_document(found: PartMeasurement) -> doc.Document:
     facts, measured, lacking = found.job.facts, found.measured is not None, lacking_of(found)
     sections = (
-        results.results_section(found), results.conformity_section(found), results.part_section(found),
-        results.errors_section(found), causes.budget_section(found), causes.priors_section(found),
+        results_section(found), conformity_section(found), part_section(found),
+        errors_section(found), causes.budget_section(found), causes.priors_section(found),
         causes.unseen_section(found),
-        causes.ways_section(found), methods_section(found.methods), results.correlation_section(found),
-        machine_section(found), method_section(found), not_covered_section(found),
+        causes.ways_section(found), method.methods_section(found.methods), correlation_section(found),
+        method.machine_section(found), method.method_section(found), method.not_covered_section(found),
     )  # fmt: skip
     date = messages.day(facts.job.date)
     came = say("measured on {date}", date=date) if measured else say("planned for {date}", date=date)
@@ -204,7 +139,7 @@ def part_document(found: PartMeasurement) -> Document:
         title=TITLE if measured else PLANNED, subject=say("{part}, {came}", part=part_words(found), came=came),
         particulars=_particulars(found), warnings=(*found.warnings, *not_stated(lacking)),
         sections=tuple(section for section in sections if section.blocks),
-        produced_by=say("{program}, seed {seed}", program=program_words(), seed=found.seed), end=say("End of report"),
+        produced_by=say("{program}, seed {seed}", program=method.program_words(), seed=found.seed), end=say("End of report"),
         overview=overview_of(found),
     )  # fmt: skip
 
@@ -222,7 +157,7 @@ def lacking_of(found: PartMeasurement) -> tuple[Requirement, ...]:
     return tuple(one for one in every if one.status == "missing")
 
 
-def _particulars(found: PartMeasurement) -> tuple[Facts, ...]:
+def _particulars(found: PartMeasurement) -> tuple[doc.Facts, ...]:
     facts = found.job.facts
     job, part = facts.job, facts.part
     expansion = say("{cte:g} × 10⁻⁶ /K", cte=part.cte_per_k * 1e6) if part.cte_per_k else NOTHING
@@ -233,6 +168,197 @@ def _particulars(found: PartMeasurement) -> tuple[Facts, ...]:
         ((say("Part"), part.name), (say("Drawing"), part.drawing), (say("Serial number"), part.serial),
          (say("Owner"), part.owner), (say("Material"), part.material), (say("Thermal expansion"), expansion),
          (say("Place"), job.place)),
-        certificate_rows(found.standing),
+        method.certificate_rows(found.standing),
         (*certificate.performed(job), (say("Conditions"), job.conditions)),
     )  # fmt: skip
+
+
+def results_section(found: PartMeasurement) -> Section:
+    """Every characteristic with its value, if anything was measured, and its uncertainty."""
+    measured = found.measured is not None
+    tables = (_table(part, measured=measured) for part in _parts(figures_of(found)))
+    return section(say("Results"), None if measured else Paragraph(_UNMEASURED), *tables)
+
+
+def _parts(every: Sequence[CharacteristicFigures]) -> list[list[CharacteristicFigures]]:
+    """Lengths and then angles, those that there are."""
+    parts = ([one for one in every if one.angular == angular] for angular in (False, True))
+    return [part for part in parts if part]
+
+
+_UNMEASURED = say(
+    "Nothing was measured: what follows is how surely this measurement, done as it is planned, will know the part."
+)
+
+
+def _table(every: Sequence[CharacteristicFigures], *, measured: bool) -> Table | None:
+    scale = every[0].scale
+    heads = (
+        Column(say("No.")), say("Characteristic"), *((Column(say("Value"), scale.value),) if measured else ()),
+        Column(say("U"), scale.small), Column(say("k")),
+        Column(say("95 % interval"), scale.value if measured else scale.small, numeric=False),
+        *(() if measured else (Column(say("Mean error"), scale.small),)),
+    )  # fmt: skip
+    rows = (
+        (one.number, one.beside, *(() if one.stated.value is None else (one.at(one.stated.value),)),
+         *one.with_factor(one.stated.k), one.interval, *(() if measured else (one.error(one.stated.error),)))
+        for one in every
+    )  # fmt: skip
+    notes = (
+        (True, say(
+            "95 % interval: the shortest that holds 95 % of the virtual measurements. U = k · u is half of it, u the standard "
+            "uncertainty; the value lies in the middle only where errors to both sides are alike.")),
+        (any(one.one_sided for one in every), say(
+            "A measured form, orientation or location has one side and is stated by its interval, which is never below "
+            "zero and as likely to hold a small width as a large one (Feldman and Cousins, 1998); its value is the median.")),
+        (True, say("All other values are stated less the mean of their errors.") if every[0].stated.value is not None else
+         say("The interval is that of the true value less the indicated one.")),
+    )  # fmt: skip
+    caption = say("Angles") if every[0].angular else say("Lengths, forms and places")
+    return table(caption, heads, rows, *(text for holds, text in notes if holds))
+
+
+def conformity_section(found: PartMeasurement) -> Section:
+    """Limits, what the rule accepts, decisions, and their picture; nothing where the drawing has no limits."""
+    limited = [one for one in figures_of(found) if one.judged is not None]
+    if not limited:
+        return section(say("Conformity"))
+    nominal, measured = characteristics_of(found.plan, found.plan.points).tolist(), found.measured is not None
+    return section(
+        say("Conformity with the drawing"), Paragraph(_rule(found, limited)),
+        *margin_plots([_margin(one) for one in limited if measured or one.width > 0]),
+        *(_decisions(part, nominal, measured=measured) for part in _parts(limited)),
+    )  # fmt: skip
+
+
+def _rule(found: PartMeasurement, limited: Sequence[CharacteristicFigures]) -> Text:
+    told = say("Decision rule: {rule}.", rule=found.judged_by)
+    if found.together is None or len(limited) < 2:
+        return told
+    return say(
+        "{rule} Probability that all {count} limits are kept at once, with what the characteristics have in common: {chance}.",
+        rule=told, count=len(limited), chance=probability(found.together),
+    )  # fmt: skip
+
+
+def _decisions(every: Sequence[CharacteristicFigures], nominal: Sequence[float], *, measured: bool) -> Table | None:
+    value = every[0].scale.value
+    heads = (
+        Column(say("No.")), say("Characteristic"), Column(say("Nominal"), value), Column(say("Lower limit"), value),
+        Column(say("Upper limit"), value), Column(say("Accepted"), value, numeric=False),
+        *((say("Decision"), say("P")) if measured else ()),
+    )  # fmt: skip
+    notes = (
+        (True, say("Accepted: values that the rule accepts with this uncertainty.")),
+        (measured, say("P: probability that the true value is within its limits, by the virtual measurements.")),
+        (any(one.judged is not None and one.judged.accepted is None for one in every),
+         say("None: the uncertainty is too large for any value to be accepted.")),
+    )  # fmt: skip
+    if measured:
+        caption = say("Decisions on angles") if every[0].angular else say("Decisions")
+    else:
+        caption = say("Angles that the rule will accept") if every[0].angular else say("What the rule will accept")
+    rows = (_decision(one, nominal[one.place], measured=measured) for one in every)
+    return table(caption, heads, rows, *(text for holds, text in notes if holds))
+
+
+def _decision(one: CharacteristicFigures, nominal: float, *, measured: bool) -> tuple[Text, ...]:
+    judged, (low, high), decided = one.judged, one.limits, tuple[Text, ...]()
+    if measured and judged is not None:
+        decided = (
+            DASH if judged.outcome is None else OUTCOME_WORDS[judged.outcome],
+            DASH if judged.probability is None else probability(judged.probability),
+        )
+    return (one.number, one.beside, DASH if one.zone else one.limit(nominal), one.limit(low), one.limit(high),
+            one.accepted_of(None if judged is None else judged.accepted), *decided)  # fmt: skip
+
+
+def _margin(one: CharacteristicFigures) -> Margin:
+    judged, (low, high) = one.judged, one.limits
+    low = 0.0 if one.zone else low
+    accepted, outcome = (None, None) if judged is None else (judged.accepted, judged.outcome)
+    if (value := one.stated.value) is None:
+        middle = 0.5 * ((low or 0.0) + (high or 0.0))
+        return Margin(one.titled, middle, (middle - one.expanded, middle + one.expanded), low, high, None, accepted)
+    return Margin(one.titled, value, one.stated.interval, low, high, outcome, accepted)
+
+
+_SHORT = 8  # letters up to which features are lettered in pictures by their names, else by their numbers
+
+
+def lettered_names(plan: Plan) -> list[Text]:
+    """What features are called in pictures: their names where all are short, else their numbers."""
+    if all(len(feature.name) <= _SHORT for feature in plan.features):
+        return [Verbatim(feature.name) for feature in plan.features]
+    return [number(i + 1) for i in range(len(plan.features))]
+
+
+def part_section(found: PartMeasurement) -> Section:
+    """What is probed, with which styli, and where the part lies."""
+    plan, several = found.plan, len(found.plan.styli) > 1
+    heads: tuple[Text | Column, ...] = (
+        Column(say("No.")), say("Feature"), say("Kind"), Column(say("Points")), *((say("Stylus"),) if several else ()),
+        say("Association"),
+    )  # fmt: skip
+    rows = (
+        (number(i + 1), Verbatim(feature.name), KINDS[feature.kind], number(len(feature.points)),
+         *((Verbatim(feature.stylus),) if several else ()),
+         ASSOCIATIONS[feature.association] if len(feature.points) > 1 else DASH)
+        for i, feature in enumerate(plan.features)
+    )  # fmt: skip
+    note = say("Association: how a feature is made of its points, where a characteristic says nothing else.")
+    return section(
+        say("The part as it is probed"), part_picture(plan, found.given.poses[0], lettered_names(plan)),
+        table(say("Features"), heads, rows, note), doc.Facts(tuple(row for row in _lies(found) if row[1])),
+    )  # fmt: skip
+
+
+def _lies(found: PartMeasurement) -> list[tuple[Text, Text]]:
+    facts, given = found.job.facts, found.job.facts.placing
+    varied = len(found.given.poses)
+    placed = say("origin at {origin} mm, turned by {angles}° about x, y, z of the machine",
+                 origin=_three(found.origin_mm), angles=_three(given.rotation_deg))  # fmt: skip
+    if varied > 1:
+        placed = say("{placed}; drawn in {count} places about it", placed=placed, count=varied)
+    datums = commas(messages.names(facts.alignment.datums))
+    alignment = say("best fit of all points") if facts.alignment.best_fit else datums
+    repeats = facts.probing.repeats
+    return [
+        (say("Place in the machine"), placed),
+        (say("Alignment"), alignment),
+        (say("Styli"), messages.semicolons(_stylus(one) for one in found.plan.styli)),
+        (say("Repeats of each point"), number(repeats) if repeats > 1 else NOTHING),
+    ]
+
+
+def _stylus(one: Stylus) -> Text:
+    return say("{name}: tip of {diameter} mm, offset {offset} mm", name=Verbatim(one.name), diameter=nominal(one.diameter_mm),
+               offset=_three(one.offset_mm.tolist()))  # fmt: skip
+
+
+def _three(values: Sequence[float]) -> Text:
+    return messages.in_a_row(nominal(value) for value in values)
+
+
+def errors_section(found: PartMeasurement) -> Section:
+    """The errors of the points, and the form that was measured."""
+    title, errors = say("Errors of the points"), errors_picture(found.plan, found.displaced)
+    deviations = None if found.job.measured is None else deviations_of(found.plan, found.job.measured)
+    if deviations is not None and np.isfinite(deviations).any():
+        return section(title, errors, form_picture(found.plan, deviations), _forms(found.plan, deviations))
+    none = Paragraph(say("No feature has more points than determine it: no form was measured."), "note")
+    return section(title, errors, none if found.measured is not None else None)
+
+
+def _forms(plan: Plan, deviations: Floats) -> Table:
+    """Range of the measured deviations of each feature that has some."""
+    figures = (Column(head, unit("µm")) for head in (say("From"), say("To"), say("Root mean square")))
+    rows = []
+    for i, feature in enumerate(plan.features):
+        own = deviations[plan.rows[feature.name]] / MICROMETRE
+        if np.isfinite(own).all():
+            ends = (float(own.min()), float(own.max()), float(np.sqrt(np.mean(own**2))))
+            rows.append((number(i + 1), Verbatim(feature.name), *(messages.signed(each, ".1f") for each in ends)))
+    note = say("Noise of the machine and its errors are in these distances too; no form is stated here.")
+    heads = columns((Column(say("No.")), say("Feature"), *figures))
+    return Table(say("Distances of the points from their features"), heads, tuple(rows), (note,))

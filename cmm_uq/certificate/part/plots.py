@@ -13,13 +13,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmm_uq.base.messages import Text, commas, number, say, semicolons, signed
+from cmm_uq.base.messages import DASH, Text, commas, number, say, semicolons, signed
 from cmm_uq.base.points import Floats
-from cmm_uq.certificate.document import Outcome, Plot
+from cmm_uq.certificate.document import Column, Outcome, Paragraph, Plot, Section, section, table
+from cmm_uq.certificate.part.figures import figures_of
+from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.plots import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
 
 _FARTHEST = 0.45  # of the distance of the limits, how far the picture goes beyond either
 _TIMES = 2.0  # A single limit stands so many intervals from where its picture ends, or as far as the value needs
@@ -245,3 +248,33 @@ def _told_of_correlation_plot(numbers: Sequence[Text], sizes: Floats, below: np.
         count=int((np.abs(sizes) >= LEAST).sum()), all=len(sizes), least=LEAST, r=signed(float(sizes[most]), ".2f"),
         one=numbers[int(left[most])], other=numbers[int(below[most])],
     )  # fmt: skip
+
+
+FEW = 8  # characteristics up to which their correlations are a table
+
+
+def correlation_section(found: PartMeasurement) -> Section:
+    """What characteristics have in common: a table of few, a picture of many; nothing of one."""
+    every, title = figures_of(found), say("Correlations")
+    if len(every) < 2:
+        return section(title)
+    told = Paragraph(
+        say("Errors that several characteristics have in common make them correlated; what is computed from several of them "
+            "needs this. results.json has all figures."), "note",
+    )  # fmt: skip
+    if len(every) > FEW:
+        return section(title, told, correlation_plot([one.number for one in every], found.correlation))
+    rows = (
+        (one.number, one.beside, *(_r(float(found.correlation[one.place, j]), one.place, j) for j in range(len(every))))
+        for one in every
+    )
+    numbers = (Column(say("No. {number}", number=one.number)) for one in every)
+    heads: tuple[Text | Column, ...] = (Column(say("No.")), say("Characteristic"), *numbers)
+    return section(title, told, table(say("Correlations between the characteristics"), heads, rows))
+
+
+def _r(value: float, row: int, column: int) -> Text:
+    """Of a matrix that is the same below and above its diagonal, the lower half."""
+    if column > row:
+        return DASH
+    return number(1) if column == row else signed(round(value, 2) + 0.0, ".2f")

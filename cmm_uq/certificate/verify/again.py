@@ -1,8 +1,9 @@
-"""The inputs of a certificate, and it beside what they give when they are computed again: every figure, every form.
+"""A certificate beside what its inputs give when they are computed again: every figure, every form.
 
 Equal to the byte by the same version on the same kernels of linear algebra. Other kernels change the last bits, and with them
 which draws a sampler takes: then nearly every sampled figure differs a little, all within Monte Carlo error and printed
-digits. A single figure that differs where its neighbours do not is no such thing.
+digits. A single figure that differs where its neighbours do not is no such thing. Pages of an earlier version are made again
+to the byte by that version, and by no other: of it figures and decisions are compared.
 """
 
 from __future__ import annotations
@@ -11,27 +12,15 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from hashlib import sha256
-from typing import TYPE_CHECKING, Any
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
-from cmm_uq.analysis.conformity.decision import rule_name
-from cmm_uq.analysis.parts.plan import Plan
-from cmm_uq.certificate.part.results import standing_data
 from cmm_uq.certificate.verify.figures import quantities
-from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.certificate.verify.given import JOB, RESULTS, Given, canonical, strict_json
-from cmm_uq.certificate.verify.html_page import read_html
+from cmm_uq.certificate.verify.found import AGAIN, Inquiry
+from cmm_uq.certificate.verify.given import RESULTS, Given, canonical, strict_json
+from cmm_uq.certificate.verify.opened import read_html
 from cmm_uq.certificate.verify.views import Difference, differing_parts, first_difference
-from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
-from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.maths.uncertainty.quantity import rounded
-
-if TYPE_CHECKING:
-    from cmm_uq.base.points import Floats
-    from cmm_uq.certificate.part.measurement import CertificateStatus
-
-Stated = tuple[str, object, object]  # JSON path, what stands there, what should
 
 
 def check_results(inquiry: Inquiry, given: Given) -> None:
@@ -50,138 +39,6 @@ def check_results(inquiry: Inquiry, given: Given) -> None:
     elif inside != content:
         place = f"attachment {RESULTS}: line {_first_line(inside, content)[0]}"
         inquiry.wrong("forms", given.pdf[0], place, f"is not {name}")
-
-
-def inputs_of(inquiry: Inquiry, given: Given) -> dict[str, bytes] | None:
-    """The inputs by name, each with the hash that results.json says; ``None`` where one is missing or another."""
-    if given.results is None:
-        return None
-    name, data, _ = given.results
-    wanted, files = data["job"]["inputs_sha256"], given.files
-
-    def is_sound(file: str, digest: str, source: str, missing: str) -> bool:
-        if file not in files:
-            if given.pdf is not None:
-                inquiry.wrong("inputs", given.pdf[0], f"attachment {file}", missing)
-            return False
-        stands = sha256(files[file]).hexdigest()
-        if stands != digest:
-            where = f"{file} in {given.pdf[0]}" if given.pdf is not None and file in given.pdf[1].files else file
-            inquiry.wrong("inputs", where, "", f"is not the file whose hash {source} has", stands, digest)
-        return stands == digest
-
-    inquiry.looked("inputs", len(wanted))
-    missing = f"is missing, and {name} names it as an input"
-    sound = sum(is_sound(file, digest, name, missing) for file, digest in wanted.items()) == len(wanted)
-    if given.pdf is None and not sound and not (wanted.keys() & files.keys()):
-        inquiry.left("inputs", "neither a PDF that has them inside nor the files themselves are given")
-    elif given.pdf is None and not sound:
-        inquiry.left("inputs", f"not given: {', '.join(sorted(wanted.keys() - files.keys()))}")
-    if entry := data.get("posterior"):
-        draws = str(entry["file"])
-        inquiry.looked("inputs", draws in files)
-        is_sound(draws, entry["sha256"], RESULTS, f"is missing, and {RESULTS} names it")
-    return {file: files[file] for file in wanted} if sound and JOB in wanted else None
-
-
-def check_job(inquiry: Inquiry, job: Job, data: Mapping[str, Any], file: str) -> None:
-    """Whether results.json speaks of this job: its name, dates, machine, and what it wishes to be decided."""
-    said, facts = data["job"], job.facts
-    stated: list[Stated] = [
-        ("job.id", said.get("id"), facts.job.id), ("job.origin", said.get("origin"), facts.job.origin),
-        ("job.date", said.get("date"), facts.job.date.isoformat()), ("job.machine", said.get("machine"), facts.machine.name),
-        ("job.serial", said.get("serial") or "", facts.machine.serial or ""),
-        ("job.altered", said.get("altered") or [], list(job.altered)),
-        ("job.inputs_sha256", sorted(said["inputs_sha256"]), sorted(job.inputs)),
-    ]  # fmt: skip
-    entries = data.get("conformity") or ()
-    if "estimates" in data and len(entries) != len(facts.conformity):
-        stated.append(("conformity", len(entries), len(facts.conformity)))
-    for i, (entry, wish) in enumerate(zip(entries, facts.conformity, strict=False)):
-        wished: dict[str, object] = {
-            "standard": wish.standard, "rule": rule_name(wish.rule), "mpe": wish.mpe and wish.mpe.model_dump(),
-            "prior": wish.prior and wish.prior.model_dump(),
-        }  # fmt: skip
-        if wish.characteristic is not None:
-            wished["characteristic"] = wish.characteristic
-        if wish.limit_um is not None:
-            wished["limit_um"] = float(f"{wish.limit_um:.10g}")
-        stated += [(f"conformity[{i}].{key}", entry.get(key), should) for key, should in wished.items()]
-    _compare_stated(inquiry, stated, file, f"is not what {JOB} says")
-
-
-def check_dates(inquiry: Inquiry, job: Job) -> None:
-    """Whether every artefact was in date on the day of the measurement, and the other dates are in order."""
-    inquiry.looked("dates")
-    for text in dates_out_of_order(job):
-        inquiry.wrong("dates", JOB, "", str.__str__(text))
-    chain = job.facts.artefact.certificate
-    if certified_on_this_machine(job.facts):
-        inquiry.notes.append("The artefact was certified on the machine that it tests; the certificate says so.")
-    if chain is not None and chain.number and chain.until is None:
-        note = "The artefact's certificate has no date by which it is due: that it was in date is not shown."
-        inquiry.notes.append(note)
-
-
-_OF_THE_MACHINE = (
-    "source", "files", "number", "laboratory", "machine", "serial", "origin", "date", "age_days", "valid_until", "draft",
-    "inputs_sha256",
-)  # fmt: skip
-"""Of ``machine``, what its certificate says; what was verified of it depends on the version that did."""
-
-_SAME = 1e-9
-_NEAR_MM = 1e-7  # features that are found by going on from a start agree so well on any processor
-
-
-def check_part_job(
-    inquiry: Inquiry, job: PartJob, plan: Plan, measured: Floats | None, data: Mapping[str, Any], file: str
-) -> None:
-    """Keep what the job says otherwise; ``measured``: (c,) values of the measured points, mm and rad."""
-    facts, said, problem = job.facts, data["job"], f"is not what {JOB} says"
-    part, decision, prior = data["part"], data["decision"], facts.decision.prior
-    stated: list[Stated] = [
-        ("job.id", said["id"], facts.job.id), ("job.number", said.get("number") or "", facts.job.number or ""),
-        ("job.origin", said["origin"], facts.job.origin), ("job.date", said["date"], facts.job.date.isoformat()),
-        ("part.name", part["name"], facts.part.name), ("part.drawing", part["drawing"] or "", facts.part.drawing),
-        ("part.serial", part["serial"] or "", facts.part.serial),
-        ("part.not_measured", part["not_measured"], list(facts.part.not_measured)),
-        ("decision.rule", decision["rule"], rule_name(facts.decision.rule)),
-        ("decision.prior", decision["prior"], prior and prior.model_dump()),
-        ("simulation.points", data["simulation"]["points"], len(plan.points)),
-        ("characteristics", len(data["characteristics"]), len(facts.characteristic)),
-    ]  # fmt: skip
-    each = zip(data["characteristics"], facts.characteristic, plan.characteristics, strict=False)
-    for i, (one, wish, known) in enumerate(each):
-        where, angle = f"characteristics[{i}]", wish.asks.limits == "angles"
-        wished = {"name": wish.name, "what": wish.what, "features": list(wish.features), "datums": list(wish.datums),
-                  "association": known.association, "unit": "°" if angle else "mm"}  # fmt: skip
-        stated += [(f"{where}.{key}", one[key], should) for key, should in wished.items()]
-        limits = one["limits"] or {"lower": None, "upper": None}
-        value = None if measured is None else float(measured[i])
-        for key, stands, should, room, otherwise in (
-            ("limits.lower", limits["lower"], known.lower, _SAME, problem),
-            ("limits.upper", limits["upper"], known.upper, _SAME, problem),
-            ("measured", one["measured"], value, _NEAR_MM, "is not the value of the measured points"),
-        ):
-            inquiry.looked("inputs")
-            inside = None if should is None else math.degrees(should) if angle else should
-            near = stands is inside if stands is None or inside is None else (
-                abs(stands - inside) <= room * max(1.0, abs(inside)))  # fmt: skip
-            if not near:
-                inquiry.wrong("inputs", file, f"{where}.{key}", otherwise, stands, f"{inside}")
-    _compare_stated(inquiry, stated, file, problem)
-
-
-def check_standing(inquiry: Inquiry, standing: CertificateStatus, data: Mapping[str, Any], file: str) -> None:
-    """Keep what the machine's certificate says otherwise."""
-    should, said = standing_data(standing), data["machine"]
-    stated = [(f"machine.{key}", said[key], should[key]) for key in _OF_THE_MACHINE]
-    _compare_stated(inquiry, stated, file, "is not what the machine's certificate says")
-
-
-def _compare_stated(inquiry: Inquiry, stated: Sequence[Stated], file: str, problem: str) -> None:
-    for place, stands, should in stated:
-        inquiry.compare("inputs", file, place, problem, stands, should)
 
 
 _NUMBER = re.compile(r"[−-]?\d+(?:[.,]\d+)*")
@@ -383,3 +240,63 @@ def _compare_pdf(inquiry: Inquiry, given: Given, again: Again) -> bool:
         problem = "was written anew, or changed where nothing is stated: it is not the file that was made"
         inquiry.wrong("again", name, f"byte {first_difference(stands, should)}", problem)
     return False
+
+
+_STATED = re.compile(
+    r"(?:accuracy|accuracy_uncertainty|estimates|differences|conformity|verdicts|characteristics|decision)\b|diagnosis\.verdict$"
+)
+_DECIDED = re.compile(r"(?:^|[.])(?:decision|outcome|overall|verdict)$")
+_NAMED = 6  # figures that a sentence names
+
+
+def compare_figures(inquiry: Inquiry, given: Given, again: Again, made: str) -> None:
+    """Keep every figure and decision of a certificate by an earlier version that its inputs do not give by this one."""
+    if given.results is None:
+        return
+    name, data, _ = given.results
+    new = strict_json(again.files[RESULTS], RESULTS)
+    stated, computed = _figures(data), _figures(new)
+    both = [path for path in stated if path in computed]
+    inquiry.looked("again", len(both))
+    found = [(path, stated[path], computed[path]) for path in both if stated[path] != computed[path]]
+    sampled = 2 * len(found) > len(both)  # by other kernels or draws, not of one that was altered
+    beyond = list(beyond_sampling(data, new, found, sampled=sampled))
+    for path, stands, should in beyond:
+        inquiry.wrong("again", name, path, "is not what its inputs give", stands, should)
+    moved = [path for path, *_ in found if path not in {place for place, *_ in beyond}]
+    if moved:
+        how = "within Monte Carlo error" if sampled else "within their last digit"
+        inquiry.notes.append(f"{len(moved)} of {len(both)} figures moved {how} since version {made}: {_some(moved)}.")
+    for only, other in ((stated, computed), (computed, stated)):
+        if further := [path for path in only if path not in other]:
+            of = f"version {made}" if only is stated else "this version"
+            inquiry.left(f"{len(further)} figures", f"only {of} states them: {_some(further)}")
+
+
+def _figures(data: Any) -> dict[str, Any]:
+    """Figures and decisions by their path; no words, and nothing of how they were computed."""
+    return {
+        path: value
+        for path, value in leaves(data)
+        if _STATED.match(path)
+        and (_DECIDED.search(path) if isinstance(value, str) else isinstance(value, (int, float)))
+    }
+
+
+def _some(paths: Sequence[str]) -> str:
+    return ", ".join([*paths[:_NAMED], *(["…"] if len(paths) > _NAMED else [])])
+
+
+def plugins_missing(inquiry: Inquiry, data: Mapping[str, Any]) -> bool:
+    """Packages that took part and are not here as they were then."""
+    missing = False
+    for package, wanted in (data["software"].get("plugins") or {}).items():
+        try:
+            here = version(str(package))
+        except PackageNotFoundError:
+            here = ""
+        if here != wanted:
+            missing = True
+            told = f"version {here} is installed" if here else "it is not installed"
+            inquiry.left(AGAIN, f"{package} {wanted} took part, and {told}")
+    return missing

@@ -1,6 +1,7 @@
 """Whether the figures of a ``results.json`` agree with each other: U with its interval, k with U and u, u with the covariance.
 
-Of a part also shares and margins. Numbers there have ten digits, and each rule is kept to what these allow.
+Of a part also shares and margins, and whether they are those of its job and of its machine's certificate. Numbers there have
+ten digits, and each rule is kept to what these allow.
 """
 
 from __future__ import annotations
@@ -8,11 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from cmm_uq.analysis.conformity.decision import rule_name
+from cmm_uq.analysis.parts.plan import Plan
+from cmm_uq.certificate.part.measurement import CertificateStatus, standing_data
 from cmm_uq.certificate.verify.found import Inquiry
+from cmm_uq.certificate.verify.given import JOB
 from cmm_uq.jobs.part.feature import ASKS
+from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.verdicts import Verdict, Verdicts
+
+if TYPE_CHECKING:
+    from cmm_uq.base.points import Floats
+
 
 QUANTITY = frozenset({"value", "u", "interval95", "U", "k"})  # keys of a quantity
 DIGITS = 2e-9  # of numbers of ten digits: what a difference of two of them may be off, of the larger
@@ -257,3 +267,60 @@ def _check_budget(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> None:
         inquiry.looked("figures")
         if line["characteristic"] not in names or not line["share"] <= 1.0 + 0.05:
             wrong(f"unseen[{i}]", "is no share of a characteristic", line["share"])
+
+
+_OF_THE_MACHINE = (
+    "source", "files", "number", "laboratory", "machine", "serial", "origin", "date", "age_days", "valid_until", "draft",
+    "inputs_sha256",
+)  # fmt: skip
+"""Of ``machine``, what its certificate says; what was verified of it depends on the version that did."""
+
+_SAME = 1e-9
+_NEAR_MM = 1e-7  # features that are found by going on from a start agree so well on any processor
+
+
+def check_part_job(
+    inquiry: Inquiry, job: PartJob, plan: Plan, measured: Floats | None, data: Mapping[str, Any], file: str
+) -> None:
+    """Keep what the job says otherwise; ``measured``: (c,) values of the measured points, mm and rad."""
+    facts, said, problem = job.facts, data["job"], f"is not what {JOB} says"
+    part, decision, prior = data["part"], data["decision"], facts.decision.prior
+    stated: list[tuple[str, object, object]] = [
+        ("job.id", said["id"], facts.job.id), ("job.number", said.get("number") or "", facts.job.number or ""),
+        ("job.origin", said["origin"], facts.job.origin), ("job.date", said["date"], facts.job.date.isoformat()),
+        ("part.name", part["name"], facts.part.name), ("part.drawing", part["drawing"] or "", facts.part.drawing),
+        ("part.serial", part["serial"] or "", facts.part.serial),
+        ("part.not_measured", part["not_measured"], list(facts.part.not_measured)),
+        ("decision.rule", decision["rule"], rule_name(facts.decision.rule)),
+        ("decision.prior", decision["prior"], prior and prior.model_dump()),
+        ("simulation.points", data["simulation"]["points"], len(plan.points)),
+        ("characteristics", len(data["characteristics"]), len(facts.characteristic)),
+    ]  # fmt: skip
+    each = zip(data["characteristics"], facts.characteristic, plan.characteristics, strict=False)
+    for i, (one, wish, known) in enumerate(each):
+        where, angle = f"characteristics[{i}]", wish.asks.limits == "angles"
+        wished = {"name": wish.name, "what": wish.what, "features": list(wish.features), "datums": list(wish.datums),
+                  "association": known.association, "unit": "°" if angle else "mm"}  # fmt: skip
+        stated += [(f"{where}.{key}", one[key], should) for key, should in wished.items()]
+        limits = one["limits"] or {"lower": None, "upper": None}
+        value = None if measured is None else float(measured[i])
+        for key, stands, should, room, otherwise in (
+            ("limits.lower", limits["lower"], known.lower, _SAME, problem),
+            ("limits.upper", limits["upper"], known.upper, _SAME, problem),
+            ("measured", one["measured"], value, _NEAR_MM, "is not the value of the measured points"),
+        ):
+            inquiry.looked("inputs")
+            inside = None if should is None else math.degrees(should) if angle else should
+            near = stands is inside if stands is None or inside is None else (
+                abs(stands - inside) <= room * max(1.0, abs(inside)))  # fmt: skip
+            if not near:
+                inquiry.wrong("inputs", file, f"{where}.{key}", otherwise, stands, f"{inside}")
+    for place, at_hand, agreed in stated:
+        inquiry.compare("inputs", file, place, problem, at_hand, agreed)
+
+
+def check_standing(inquiry: Inquiry, standing: CertificateStatus, data: Mapping[str, Any], file: str) -> None:
+    """Keep what the machine's certificate says otherwise."""
+    should, said, problem = standing_data(standing), data["machine"], "is not what the machine's certificate says"
+    for key in _OF_THE_MACHINE:
+        inquiry.compare("inputs", file, f"machine.{key}", problem, said[key], should[key])

@@ -22,8 +22,7 @@ from cmm_uq.base.output import MANIFEST
 from cmm_uq.base.output.manifest import Manifest, parsed, plain_name
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.certificate.verify.html_page import HtmlPage, read_html
-from cmm_uq.certificate.verify.pdf_file import PdfFile, read_pdf
+from cmm_uq.certificate.verify.opened import HtmlPage, PdfFile, read_html, read_pdf
 
 RESULTS, JOB = "results.json", "job.toml"
 RESULTS_SCHEMA, PART_SCHEMA = "cmm-uq/results/1", "cmm-uq/part/1"

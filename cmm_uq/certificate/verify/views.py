@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.base.errors import CmmUqError, NotInstalledError
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.given import Given
-from cmm_uq.certificate.verify.html_page import read_html
-from cmm_uq.certificate.verify.pdf_file import reading
+from cmm_uq.certificate.verify.opened import read_html, reading
 from cmm_uq.laboratory.records.facts import ChainHead
 
 if TYPE_CHECKING:

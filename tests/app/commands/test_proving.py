@@ -20,13 +20,14 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.proof.page import KEYS, RATE, proof_document, proof_outcome, proof_results
+from cmm_uq.certificate.proof.page import proof_document, proof_outcome, proof_results
 from cmm_uq.certificate.proof.sections import DiagnosisProof
 from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH
 from cmm_uq.machine.physics.catalogue import every
 from tests.app.cli.process import run
 from tests.certificate.saying import strangers
 from tests.conftest import ROOT
+from tests.result_keys import PROOF, RATE
 
 JOB = ROOT / "examples" / "plane-simulated"
 CASES = 2
@@ -136,7 +137,7 @@ def paths(data: Any, here: str = "") -> Iterator[str]:
 
 
 def described(path: str) -> bool:
-    return any(covers(pattern.split("."), told, path.split(".")) for pattern, told in KEYS.items())
+    return any(covers(pattern.split("."), told, path.split(".")) for pattern, told in PROOF.items())
 
 
 def covers(names: list[str], told: str, parts: list[str]) -> bool:

@@ -22,19 +22,10 @@ from cmm_uq.app.commands.certificates.verify_part import to_rerun
 from cmm_uq.app.commands.parts.machine import state_machine
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part, write_part, written
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.part.measurement import PartMeasurement
-from cmm_uq.certificate.part.results import standing_data
+from cmm_uq.certificate.part.measurement import PartMeasurement, standing_data
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_results, plate_files, plate_of
-from tests.part_reports import (
-    TRIALS,
-    found_again_once,
-    plate_found,
-    plate_report,
-    put,
-    unchanged,
-    with_inputs,
-)
+from tests.part_reports import TRIALS, found_again_once, plate_found, plate_report, put, unchanged, with_inputs
 
 PDF, PAGE = "part-simulated.pdf", "part-simulated.html"
 OTHER = ROOT / "examples" / "part-plate-simulated" / "machine" / "certificate-simulated.pdf"

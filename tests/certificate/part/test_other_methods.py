@@ -19,7 +19,8 @@ from cmm_uq.analysis.parts.methods.of_job import compare_methods, methods_of
 from cmm_uq.base.messages import say
 from cmm_uq.base.units import ARCSECOND, unit
 from cmm_uq.certificate.document import Paragraph, Section, Table
-from cmm_uq.certificate.part.method import methods_data, methods_section
+from cmm_uq.certificate.part.measurement import methods_data
+from cmm_uq.certificate.part.method import methods_section
 from cmm_uq.certificate.part.page import part_document
 from cmm_uq.maths.uncertainty.budget import REPEATS, Budget, BudgetLine
 from tests.certificate.parts_found import found_of, measured_points

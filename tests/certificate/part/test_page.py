@@ -27,9 +27,8 @@ from cmm_uq.certificate.document import Document, Overview, Section, Table
 from cmm_uq.certificate.part.budget_section import by_family, unseen_section, ways_section
 from cmm_uq.certificate.part.figures import _remarks
 from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement, UnseenError
-from cmm_uq.certificate.part.method import method_section
-from cmm_uq.certificate.part.page import lacking_of, machine_section, overview_of, part_document
-from cmm_uq.certificate.part.results_section import errors_section, results_section
+from cmm_uq.certificate.part.method import machine_section, method_section
+from cmm_uq.certificate.part.page import errors_section, lacking_of, overview_of, part_document, results_section
 from cmm_uq.certificate.render import render_html, render_pdf
 from cmm_uq.certificate.wording import effect_title
 from cmm_uq.jobs.part.job import TABLES

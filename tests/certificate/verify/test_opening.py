@@ -14,11 +14,10 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import PDF_UNPACKED
-from cmm_uq.certificate.verify import pdf_file
+from cmm_uq.certificate.verify import opened
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.given import Given, canonical, check_files, read_given, strict_json
-from cmm_uq.certificate.verify.html_page import read_html
-from cmm_uq.certificate.verify.pdf_file import PdfFile, read_pdf
+from cmm_uq.certificate.verify.opened import PdfFile, read_html, read_pdf
 
 
 @pytest.mark.parametrize(("content", "told"), [
@@ -122,7 +121,7 @@ def test_an_encrypted_pdf_is_refused(made: Path) -> None:
 
 def test_a_stream_that_unpacks_without_end_is_refused(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A thousand times as large as it is packed; here with a lower limit, so that it is soon reached."""
-    monkeypatch.setattr(pdf_file, "PDF_UNPACKED", replace(PDF_UNPACKED, most=30_000_000))
+    monkeypatch.setattr(opened, "PDF_UNPACKED", replace(PDF_UNPACKED, most=30_000_000))
     packing = zlib.compressobj()
     bomb = b"".join(packing.compress(bytes(10**6)) for _ in range(40)) + packing.flush()
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.verify import given as files, views, witness
+from cmm_uq.certificate.verify import given as files, sources, views
 from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Inquiry
 from cmm_uq.certificate.verify.given import RESULTS, Given
 from cmm_uq.laboratory.records.facts import ChainHead, Heads
@@ -39,8 +39,7 @@ def compute_again(
     By the version that made it everything is compared; of an earlier one figures and decisions, where no correction since
     then touches what a ``command`` makes of a ``job``, whatever it is where none is given.
     """
-    from cmm_uq.certificate.verify.again import compare_again
-    from cmm_uq.certificate.verify.other_version import compare_figures, plugins_missing
+    from cmm_uq.certificate.verify.again import compare_again, compare_figures, plugins_missing
 
     if given.results is None or plugins_missing(inquiry, given.results[1]):
         return False
@@ -189,7 +188,7 @@ def verify_given(
     signed = views.check_signatures(inquiry, given, trusted, issued)
     if records is not None:
         with open_records(records, read_only=True) as history:
-            witness.check_records(inquiry, given, history, signed)
+            sources.check_records(inquiry, given, history, signed)
     if schema is not None:
         views.check_schema(inquiry, given, schema)
     alike = False
@@ -261,8 +260,8 @@ def _compare(inquiry: Inquiry, given: Given) -> Job | None:
         figures.check_verdicts(inquiry, data, name)
     job = job_of_inputs(inquiry, given, _job, "dates")
     if job is not None:
-        again.check_job(inquiry, job, data, name)
-        again.check_dates(inquiry, job)
+        sources.check_job(inquiry, job, data, name)
+        sources.check_dates(inquiry, job)
         if given.xml is not None and (made := _version(given)) != __version__:
             inquiry.left(f"{given.xml[0]} element by element", f"made by version {made}, and this is {__version__}")
         else:
@@ -277,7 +276,7 @@ def job_of_inputs(
     inquiry: Inquiry, given: Given, read: Callable[[Mapping[str, bytes], Mapping[str, Any]], _T], further: str
 ) -> _T | None:
     """The job of sound inputs, read with results.json; ``further``: what besides computing again needs them."""
-    from cmm_uq.certificate.verify.again import inputs_of
+    from cmm_uq.certificate.verify.sources import inputs_of
 
     inputs = inputs_of(inquiry, given)
     if inputs is None or given.results is None:

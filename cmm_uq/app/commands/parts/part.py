@@ -266,7 +266,7 @@ def written(
 def contents_of(found: PartMeasurement, stage: Stage = silent, *, finished: Finished = unchanged) -> dict[str, bytes]:
     """Bytes of every file, by name."""
     from cmm_uq.certificate.origin import as_json
-    from cmm_uq.certificate.part.results import part_results
+    from cmm_uq.certificate.part.measurement import part_results
     from cmm_uq.certificate.render import render_html, render_pdf
 
     job = found.job

@@ -28,7 +28,7 @@ from cmm_uq.app.commands.jobs.check import check_job
 from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
-from cmm_uq.certificate.part.results import part_results
+from cmm_uq.certificate.part.measurement import part_results
 from cmm_uq.jobs.part.job import part_of, read_part
 from tests.jobs.part.other_methods import (
     ACROSS,

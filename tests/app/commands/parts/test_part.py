@@ -21,8 +21,7 @@ from cmm_uq.app.commands.parts.part import PartOptions, affordable, decide_limit
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.origin import as_json
-from cmm_uq.certificate.part.measurement import PartMeasurement
-from cmm_uq.certificate.part.results import part_results
+from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
 from cmm_uq.jobs.part.job import TABLES
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_certificate, by_results, plate_of, report, results_keys

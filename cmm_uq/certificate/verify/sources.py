@@ -1,32 +1,37 @@
-"""The head of the laboratory's records that a certificate states, looked for in the records; its form is compared elsewhere.
+"""Whether a certificate says what it rests on says: its inputs and its job, a machine's certificate, the laboratory's records.
 
-It brackets the signatures, too: a file that states an entry was signed after it, and before the entry that has its hash.
+The head of the records that it states, whose form is compared elsewhere, brackets the signatures, too: a file that states an
+entry was signed after it, and before the entry that has its hash.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import PDF_BYTES
 from cmm_uq.certificate.sign.found import AFTER
 from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.certificate.verify.given import RESULTS, Given, given_of, strict_json
+from cmm_uq.certificate.verify.given import JOB, RESULTS, Given, given_of, strict_json
 from cmm_uq.certificate.verify.views import AHEAD, Signed
+from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
 from cmm_uq.jobs.dcc import read
+from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.facts import ChainHead, Witness, instant
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.sign import FileSignature
     from cmm_uq.laboratory.records.facts import Entry
     from cmm_uq.laboratory.records.store import Records
+
 
 _FIX = "Give certificates of cmm-uq (PDF, XML), their results.json, or folders that hold some"
 
@@ -126,3 +131,75 @@ def _check_bracket(
     late = end is not None and signature.time is not None and signature.time > end + AHEAD
     if late or (early and first is not ends[0]):  # the printed head was looked at with the signatures
         inquiry.wrong("signatures", name, "", f"says {signature.time:%Y-%m-%d %H:%M} UTC, not between these entries")
+
+
+def inputs_of(inquiry: Inquiry, given: Given) -> dict[str, bytes] | None:
+    """The inputs by name, each with the hash that results.json says; ``None`` where one is missing or another."""
+    if given.results is None:
+        return None
+    name, data, _ = given.results
+    wanted, files = data["job"]["inputs_sha256"], given.files
+
+    def is_sound(file: str, digest: str, source: str, missing: str) -> bool:
+        if file not in files:
+            if given.pdf is not None:
+                inquiry.wrong("inputs", given.pdf[0], f"attachment {file}", missing)
+            return False
+        stands = sha256(files[file]).hexdigest()
+        if stands != digest:
+            where = f"{file} in {given.pdf[0]}" if given.pdf is not None and file in given.pdf[1].files else file
+            inquiry.wrong("inputs", where, "", f"is not the file whose hash {source} has", stands, digest)
+        return stands == digest
+
+    inquiry.looked("inputs", len(wanted))
+    missing = f"is missing, and {name} names it as an input"
+    sound = sum(is_sound(file, digest, name, missing) for file, digest in wanted.items()) == len(wanted)
+    if given.pdf is None and not sound and not (wanted.keys() & files.keys()):
+        inquiry.left("inputs", "neither a PDF that has them inside nor the files themselves are given")
+    elif given.pdf is None and not sound:
+        inquiry.left("inputs", f"not given: {', '.join(sorted(wanted.keys() - files.keys()))}")
+    if entry := data.get("posterior"):
+        draws = str(entry["file"])
+        inquiry.looked("inputs", draws in files)
+        is_sound(draws, entry["sha256"], RESULTS, f"is missing, and {RESULTS} names it")
+    return {file: files[file] for file in wanted} if sound and JOB in wanted else None
+
+
+def check_job(inquiry: Inquiry, job: Job, data: Mapping[str, Any], file: str) -> None:
+    """Whether results.json speaks of this job: its name, dates, machine, and what it wishes to be decided."""
+    said, facts = data["job"], job.facts
+    stated: list[tuple[str, object, object]] = [
+        ("job.id", said.get("id"), facts.job.id), ("job.origin", said.get("origin"), facts.job.origin),
+        ("job.date", said.get("date"), facts.job.date.isoformat()), ("job.machine", said.get("machine"), facts.machine.name),
+        ("job.serial", said.get("serial") or "", facts.machine.serial or ""),
+        ("job.altered", said.get("altered") or [], list(job.altered)),
+        ("job.inputs_sha256", sorted(said["inputs_sha256"]), sorted(job.inputs)),
+    ]  # fmt: skip
+    entries = data.get("conformity") or ()
+    if "estimates" in data and len(entries) != len(facts.conformity):
+        stated.append(("conformity", len(entries), len(facts.conformity)))
+    for i, (entry, wish) in enumerate(zip(entries, facts.conformity, strict=False)):
+        wished: dict[str, object] = {
+            "standard": wish.standard, "rule": rule_name(wish.rule), "mpe": wish.mpe and wish.mpe.model_dump(),
+            "prior": wish.prior and wish.prior.model_dump(),
+        }  # fmt: skip
+        if wish.characteristic is not None:
+            wished["characteristic"] = wish.characteristic
+        if wish.limit_um is not None:
+            wished["limit_um"] = float(f"{wish.limit_um:.10g}")
+        stated += [(f"conformity[{i}].{key}", entry.get(key), should) for key, should in wished.items()]
+    for place, stands, should in stated:
+        inquiry.compare("inputs", file, place, f"is not what {JOB} says", stands, should)
+
+
+def check_dates(inquiry: Inquiry, job: Job) -> None:
+    """Whether every artefact was in date on the day of the measurement, and the other dates are in order."""
+    inquiry.looked("dates")
+    for text in dates_out_of_order(job):
+        inquiry.wrong("dates", JOB, "", str.__str__(text))
+    chain = job.facts.artefact.certificate
+    if certified_on_this_machine(job.facts):
+        inquiry.notes.append("The artefact was certified on the machine that it tests; the certificate says so.")
+    if chain is not None and chain.number and chain.until is None:
+        note = "The artefact's certificate has no date by which it is due: that it was in date is not shown."
+        inquiry.notes.append(note)
