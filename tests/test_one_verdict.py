@@ -44,7 +44,7 @@ from cmm_uq.certificate.results.qif_file import qif
 from cmm_uq.certificate.sections import results as first_page
 from cmm_uq.certificate.sections.results import subject_of
 from cmm_uq.certificate.verify.figures import check_verdicts
-from cmm_uq.certificate.verify.found import Inquiry
+from cmm_uq.certificate.verify.given import Inquiry
 from cmm_uq.jobs.dcc import written
 from cmm_uq.jobs.reports import ReportResults as Reported
 from cmm_uq.jobs.tables.conformity import ConformityFacts

@@ -26,7 +26,7 @@ from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, PPM, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, text_columns
 from cmm_uq.certificate.origin import quantity_data
-from cmm_uq.certificate.plots.vectors import vector_plot
+from cmm_uq.certificate.plots.volume import vector_plot
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import expanded
 from cmm_uq.jobs.recording.compared import NOISE_RATIO

@@ -205,13 +205,9 @@ def _certificate(result: Result, page: Page, warned: tuple[Text, ...]) -> Docume
 
 def _ordered(result: Result, own: list[Section]) -> list[Section]:
     """Results first (figures of lengths, else error factors, else the first of ``own``), then decisions and their basis."""
-    figures, factors, decided = (
-        of_result.performance(result),
-        of_result.error_factors(result),
-        conformity_section(result.statements),
-    )
+    figures, factors = of_result.performance(result), of_result.error_factors(result)
+    decided, rests_on = conformity_section(result.statements), traceability(result)
     before = of_result.as_found_section(result.job, of_result.quantities_left(result), result.verdicts)
-    rests_on = traceability(result)
     if figures.blocks:
         return [figures, decided, before, factors, regions_section(result), rests_on, *own]
     if factors.blocks:

@@ -13,20 +13,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from cmm_uq.analysis.conformity.decision import rule_name
-from cmm_uq.base.messages import (
-    NOTHING,
-    Key,
-    Text,
-    Verbatim,
-    at_key,
-    commas,
-    day,
-    foreign,
-    names,
-    say,
-    semicolons,
-    sentences,
-)
+from cmm_uq.base import messages
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, semicolons, sentences
 from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE, Unit, unit
 from cmm_uq.certificate.document import Block, Facts, Paragraph, Section, section
@@ -168,7 +156,8 @@ def _short_gauge(gauge: ShortGaugeFacts | None) -> list[tuple[Text, Text]]:
     shown = say("{length} at 20 °C", length=_with_u(nominal(gauge.length_mm), unit("mm"), gauge.u_um))
     what = commas((*names(filter(None, (gauge.name, gauge.serial))), shown))
     chain = _listed(gauge.certificate)
-    return [(say("Short gauge"), what), (say("Certificate of the short gauge"), sentences(chain) if chain else NOTHING)]
+    certificate = sentences(chain) if chain else NOTHING
+    return [(say("Short gauge"), what), (say("Certificate of the short gauge"), certificate)]
 
 
 def _with_u(value: Text, of: Unit, u_um: float) -> Text:
@@ -340,11 +329,8 @@ def _of_a_calibration(of: Job) -> tuple[Requirement, ...]:
 
 def _statements(facts: JobFile) -> tuple[Requirement, ...]:
     decided = bool(facts.conformity or facts.model.tolerances)
-    named = (
-        *(rule_name(wish.rule) for wish in facts.conformity),
-        *((TOLERANCE_RULE,) if facts.model.tolerances else ()),
-    )
-    rules = "; ".join(dict.fromkeys(named))
+    tolerances = [TOLERANCE_RULE] if facts.model.tolerances else []
+    rules = "; ".join(dict.fromkeys([*(rule_name(wish.rule) for wish in facts.conformity), *tolerances]))
     stated = "value, measurement and length named with each statement" if decided else ""
     return (
         _where("7.8.6.1", "a decision rule, with the risk that it takes",
@@ -364,7 +350,7 @@ def _standards(facts: JobFile) -> str:
 
 
 _INTERIM = say(
-    "An interim check{key}: no calibration certificate, whatever the title says.", key=at_key("[job] interim")
+    "An interim check{key}: no calibration certificate, whatever the title says.", key=messages.at_key("[job] interim")
 )
 
 
@@ -381,7 +367,7 @@ def contradictions(job: Job) -> tuple[Text, ...]:
     """Dates out of their order, and an artefact that was certified on the machine which it tests."""
     circular = say(
         "The artefact was certified on the machine that it now tests{key}: errors that both "
-        "measurements have in common are not seen here.", key=at_key("[artefact.certificate] machine"),
+        "measurements have in common are not seen here.", key=messages.at_key("[artefact.certificate] machine"),
     )  # fmt: skip
     return (*((circular,) if certified_on_this_machine(job.facts) else ()), *dates_out_of_order(job))
 
@@ -389,9 +375,8 @@ def contradictions(job: Job) -> tuple[Text, ...]:
 def not_stated(lacking: Iterable[Requirement]) -> list[Text]:
     """That a certificate is not complete, and by which keys it would be; nothing of one that is."""
     wanted = [
-        say("{what} ({clause}){key}", what=foreign(one.asks), clause=Verbatim(one.clause), key=Key(f": {one.key}"))
-        for one in lacking
+        say("{what} ({clause}){key}", what=foreign(what), clause=Verbatim(clause), key=messages.Key(f": {key}"))
+        for what, clause, key in ((one.asks, one.clause, one.key) for one in lacking)
     ]
-    if not wanted:
-        return []
-    return [say("Not complete by ISO/IEC 17025:2017; the job does not state: {missing}.", missing=semicolons(wanted))]
+    told = say("Not complete by ISO/IEC 17025:2017; the job does not state: {missing}.", missing=semicolons(wanted))
+    return [told] if wanted else []

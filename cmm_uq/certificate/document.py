@@ -51,17 +51,6 @@ def view_words(language: Code) -> dict[str, Any]:
     return {name: text.split(_BREAK) if _BREAK in text else text for name, text in said.items()}
 
 
-def block_label(kind: str, number: int) -> Text:
-    """What a table or a picture is called: ``Table 2``."""
-    return say("Table {number}", number=number) if kind == "table" else say("Figure {number}", number=number)
-
-
-def attachment_title(name: str, *, outcome: bool) -> Text:
-    if outcome:
-        return say("Results in machine-readable form: {name}", name=Verbatim(name))
-    return say("Input of this document: {name}", name=Verbatim(name))
-
-
 Outcome = Literal["pass", "conditional pass", "incomplete", "undecided", "conditional fail", "remeasure", "fail"]
 
 
@@ -203,9 +192,7 @@ class Document:
     signatures: tuple[Signature, ...] = ()
     attachments: tuple[Text, ...] = ()  # names of the files that travel with the document
     produced_by: Text  # program and version, seed and whatever else is needed to run it again
-    records: Text = (
-        NOTHING  # how the laboratory's records stood when it was made; empty where it is kept in none by its nature
-    )
+    records: Text = NOTHING  # how the laboratory's records stood when it was made; empty where it is kept in none
     date: dt.date | None = None  # of issue, which is also the PDF's date; the clock is never read
     language: str = "en"  # BCP 47 tag, for screen readers and hyphenation
     end: Text = say("End of certificate")  # the mark after the last line
@@ -232,7 +219,10 @@ class Document:
                 plain_block.pop("lettering", None)
                 if block.kind in _NUMBERED:
                     counted[block.kind] += 1
-                    plain_block["label"] = str.__str__(said_in(block_label(block.kind, counted[block.kind]), language))
+                    number = counted[block.kind]
+                    table, figure = say("Table {number}", number=number), say("Figure {number}", number=number)
+                    label = table if block.kind == "table" else figure
+                    plain_block["label"] = str.__str__(said_in(label, language))
                 if block.kind == "table":
                     _measure(plain_block, english=language == ENGLISH)
         return data

@@ -15,7 +15,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from itertools import chain
 from math import ceil
 from pathlib import Path, PurePosixPath
@@ -81,8 +81,7 @@ def _inline_svg(plot: Mapping[str, Any], prefix: str) -> str:
 
 def _css_string(text: str) -> str:
     """A CSS string literal that no text can break out of: everything but letters and digits is escaped."""
-    escaped = re.sub(r"[^A-Za-z0-9]", lambda found: f"\\{ord(found[0]):06x} ", text)
-    return f'"{escaped}"'
+    return '"' + re.sub(r"[^A-Za-z0-9]", lambda found: f"\\{ord(found[0]):06x} ", text) + '"'
 
 
 SMALLEST = 0.66  # of a picture's width: its lettering is 5 pt then
@@ -144,8 +143,7 @@ def _warnings_behind(document: Document) -> Document:
         return document
     alike: dict[str, list[Text]] = {}
     for text in document.warnings:
-        source = getattr(text, "source", text)
-        alike.setdefault(_pattern(source), []).append(text)
+        alike.setdefault(_pattern(getattr(text, "source", text)), []).append(text)
     named = [
         _beginning(texts[0]) if len(texts) == 1
         else _said(document, say("{shown}; {count} more behind this page", shown=_beginning(texts[0]), count=len(texts) - 1))
@@ -254,26 +252,26 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
         "document": fitted(document).as_data(),
         "smallest": SMALLEST,
         "words": doc.view_words(language),
-        "fonts": [FACE, JAPANESE] if language == "ja" else [FACE],
         "colour": COLOURS,
         "date": document.date.isoformat() if document.date else EPOCH,
         "attachments": [_attachment(name, data, language) for name, data in attachments.items()],
         "logo": document.logo and {"format": document.logo.format, "data": list(document.logo.content)},
         "missing": "",
     }
-    return _with_fallback(content, [str(file.parent) for file in fonts_of(language)])
+    return _with_fallback(content, language)
 
 
 def picture(template: str, content: Mapping[str, Any], language: Code = "en") -> bytes:
     """A template alone as a PDF page without tags, to be shown inside another; characters that no font has become □."""
-    compiled = partial(_compile, template=template, standards=("a-3b",), tagged=False)
-    shown = {"document": content, "colour": COLOURS, "fonts": [FACE, JAPANESE] if language == "ja" else [FACE]}
-    return _with_fallback(shown, [str(file.parent) for file in fonts_of(language)], compiled)
+    how = {"template": template, "standards": ("a-3b",), "tagged": False}
+    return _with_fallback({"document": content, "colour": COLOURS}, language, **how)
 
 
 def _attachment(name: str, data: bytes, language: Code) -> dict[str, Any]:
     suffix = PurePosixPath(name).suffix.lower()
-    outcome = suffix in {".json", ".npz", ".xml"}
+    outcome, title = suffix in {".json", ".npz", ".xml"}, say("Input of this document: {name}", name=Verbatim(name))
+    if outcome:
+        title = say("Results in machine-readable form: {name}", name=Verbatim(name))
     try:
         body: str | list[int] = data.decode("utf-8")
     except UnicodeDecodeError:
@@ -283,18 +281,20 @@ def _attachment(name: str, data: bytes, language: Code) -> dict[str, Any]:
         "data": body,
         "relationship": "data" if outcome else "source",
         "type": _TYPES.get(suffix, "application/octet-stream"),
-        "description": str.__str__(said_in(doc.attachment_title(name, outcome=outcome), language)),
+        "description": str.__str__(said_in(title, language)),
     }
 
 
-def _with_fallback(content: dict[str, Any], folders: list[str], compiled: Callable[..., bytes] | None = None) -> bytes:
+def _with_fallback(content: dict[str, Any], language: Code, **how: Any) -> bytes:
     """Compile with the embedded fonts; then with the machine's too; then without the characters that both lack."""
     from typst import TypstError
 
-    make, missing = compiled or _compile, list[str]()
+    folders, missing = [str(file.parent) for file in fonts_of(language)], list[str]()
+    content = {**content, "fonts": [FACE, JAPANESE] if language == "ja" else [FACE]}
     for system_fonts in (False, True, True):
         try:
-            return make(_without(content, missing) if missing else content, folders, system_fonts=system_fonts)
+            shown = _without(content, missing) if missing else content
+            return _compile(shown, folders, system_fonts=system_fonts, **how)
         except TypstError as error:
             # characters that no font had or PDF/A forbids; Typst names all at once, each in quotes or as its code
             texts = re.findall(r'(?:the text|codepoint) `"(.+?)"`', error.diagnostic)
@@ -348,18 +348,14 @@ SEALS = 2
 _POINTS = 72 / 25.4
 
 
-def same(text: Text) -> Text:
-    return text
-
-
 def seal(
     signer: Signer, at: dt.datetime, laboratory: Text, accreditation: Text, *, language: str = "en",
-    said: Callable[[Text], Text] = same,
+    said: Callable[[Text], Text] | None = None,
 ) -> Seal:  # fmt: skip
     time = Verbatim(at.astimezone(dt.UTC).strftime("%Y-%m-%d %H:%M UTC"))
     head = say("Electronically signed by {name}", name=Verbatim(signer.name))
     facts = commas([part for part in (laboratory, accreditation, time) if part])
-    mark = [say("TEST KEY: {note}.", note=TEST_NOTE)] if signer.test_key else []
+    mark, said = [say("TEST KEY: {note}.", note=TEST_NOTE)] if signer.test_key else [], said or (lambda text: text)
     shown = picture("seal.typ", {
         "width": WIDTH_MM, "height": HEIGHT_MM, "language": language.split("-")[0].lower(),
         "lines": [str.__str__(said(head)), str.__str__(said(facts))],

@@ -98,12 +98,10 @@ def title_of(key: tuple[str, str], result: Result) -> Text:
     owner, name = key
     if owner == ARTEFACT:
         return next(size.title for size in result.artefact.sizes if size.name == name)
-    return title_of_parameter(next(effect for effect in result.model.effects if effect.name == owner), name)
-
-
-def title_of_parameter(effect: Effect, name: str) -> Text:
-    alone = len(effect.reported) == 1
-    return effect.title if alone else say("{title}, {name}", title=effect.title, name=Verbatim(name))
+    effect = next(effect for effect in result.model.effects if effect.name == owner)
+    return (
+        effect.title if len(effect.reported) == 1 else say("{title}, {name}", title=effect.title, name=Verbatim(name))
+    )
 
 
 def refusal(error: CmmUqError) -> Text:

@@ -10,7 +10,6 @@ import pytest
 
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plots.corner import corner_plot
 from cmm_uq.certificate.plots.residuals import length_plot, tolerance_plot, trumpet, volume_plot
 from cmm_uq.certificate.plots.style import ACCENT, BAND, DIVERGING, INK, MUTED
 from tests.certificate.svg import Drawing, outlines
@@ -96,14 +95,3 @@ def test_a_parameter_outside_its_tolerance_is_a_cross() -> None:
     outside = grey(tolerance_plot(names, [0.2, 2.0], [0.1, 1.5], [0.3, 2.5], **WORDS))
     assert "cross: outside" in " ".join(outside.texts)
     assert len(outside.marks) == len(inside.marks) + 1
-
-
-def test_a_prior_is_dashed_beside_the_posterior() -> None:
-    draws = np.random.default_rng(7).standard_normal((400, 2))
-    x = np.linspace(-3, 3, 50)
-    prior = {0: (x, np.exp(-0.5 * x**2))}
-    names, units = [say("one"), say("two")], [say("µm"), say("µm")]
-    with_it = grey(corner_plot(draws, names=names, units=units, priors=prior, **WORDS))
-    without = grey(corner_plot(draws, names=names, units=units, **WORDS))
-    assert sum("stroke-dasharray" in style for style, _ in without.paths) == 0
-    assert sum("stroke-dasharray" in style for style, _ in with_it.paths) == 1

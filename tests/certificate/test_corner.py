@@ -15,13 +15,11 @@ from cmm_uq.base.messages import say
 from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.plots.corner import corner_plot
 from cmm_uq.certificate.plots.style import ACCENT, BAND, DIVERGING, INK, MUTED, farthest_right
-from cmm_uq.certificate.plots.vectors import profile_plot, residual_field_plot
+from cmm_uq.certificate.plots.volume import profile_plot, residual_field_plot
 from tests.certificate.svg import Drawing, area, outlines, strokes
 
 WORDS = {"caption": "Posterior.", "alternative": "a"}
 NORMAL = np.random.default_rng(11).standard_normal((200_000, 2))
-X = np.linspace(-6, 6, 400)
-DENSITY = np.exp(-0.5 * X**2) / np.sqrt(2 * np.pi)
 
 
 def test_contours_hold_95_and_50_percent() -> None:
@@ -33,15 +31,16 @@ def test_contours_hold_95_and_50_percent() -> None:
     assert outer / inner == pytest.approx(5.991 / 1.386, rel=0.05)
 
 
-def test_the_interval_is_shaded_about_the_estimate() -> None:
-    plot = corner_plot(NORMAL[:, :1], ["a"], estimates=[0.5], intervals95=[[-1.0, 2.0]], **WORDS)
-    drawing = Drawing(plot.svg)
+def test_the_interval_is_shaded_and_the_estimate_a_line() -> None:
+    """From −1.96 to 1.96 about the mode, where the draws are normal; the line stands at 1."""
+    drawing = Drawing(corner_plot(NORMAL[:, :1], ["a"], estimates=[1.0], **WORDS).svg)
     [shade] = [outlines(d)[0][:, 0] for d in drawing.drawn(fill=ACCENT)]
     [estimate] = [s[0, 0] for d in drawing.drawn(stroke=INK) for s in strokes(d) if np.ptp(s[:, 1]) > 20]
-    assert (shade.min() + shade.max()) / 2 == pytest.approx(estimate, abs=0.02)
+    middle = (shade.min() + shade.max()) / 2
     [curve] = [outlines(d)[0] for d in drawing.drawn(stroke=ACCENT, fill="none")]
-    sixth = curve[np.argmin(curve[:, 1]), 0]  # the mode, at zero
-    assert (estimate - sixth) / np.ptp(shade) == pytest.approx(0.5 / 3.0, abs=0.05)
+    mode = curve[np.argmin(curve[:, 1]), 0]
+    assert (middle - mode) / np.ptp(shade) == pytest.approx(0.0, abs=0.05)
+    assert (estimate - middle) / np.ptp(shade) == pytest.approx(1.0 / 3.92, abs=0.02)
 
 
 @pytest.mark.parametrize("text", ["12.5", "−3.10", "Scale X / 10⁻⁶", "Squareness YZ / ″", "C", "Ω%&@Sß 8", "ç∂é"])
@@ -49,15 +48,6 @@ def test_the_interval_is_shaded_about_the_estimate() -> None:
 def test_words_are_as_wide_as_matplotlib_measures_them(text: str, weight: str) -> None:
     path = TextPath((0, 0), text, size=6.8, prop=FontProperties(family="DejaVu Sans", weight=weight))
     assert farthest_right(path) == pytest.approx(path.get_extents().x1, rel=1e-12)
-
-
-def test_a_prior_is_drawn_to_the_posteriors_scale() -> None:
-    """A prior that equals the posterior lies on it."""
-    drawing = Drawing(corner_plot(NORMAL[:, :1], ["a"], priors={0: (X, DENSITY)}, **WORDS).svg)
-    [prior] = [outlines(d)[0] for s, d in drawing.paths if "stroke-dasharray" in s and s.get("stroke") == MUTED]
-    [posterior] = [outlines(d)[0] for d in drawing.drawn(stroke=ACCENT, fill="none")]
-    high = [float(np.ptp(curve[:, 1])) for curve in (prior, posterior)]
-    assert high[0] == pytest.approx(high[1], rel=0.04)
 
 
 def test_names_carry_their_units() -> None:

@@ -23,9 +23,9 @@ from cmm_uq.base.messages import Day, Message, Number, Text, Verbatim, commas, s
 from cmm_uq.certificate import render as fitting
 from cmm_uq.certificate.document import Document, Paragraph, Plot, Section, translated
 from cmm_uq.certificate.plots import style as fonts
-from cmm_uq.certificate.plots.plans import _edge, _size, _title
 from cmm_uq.certificate.plots.residuals import budget_bars
 from cmm_uq.certificate.plots.style import NAMES_MM, SMALL, TINY, lettered_in, width_mm
+from cmm_uq.certificate.plots.volume import _edge, _size, _title
 from cmm_uq.certificate.render import render_html, render_pdf
 from cmm_uq.certificate.results.contents import head
 from tests.artefacts.simulated import outcome

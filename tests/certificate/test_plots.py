@@ -27,7 +27,7 @@ from cmm_uq.certificate.plots.style import (
     new_figure,
     told_apart,
 )
-from cmm_uq.certificate.plots.vectors import vector_plot
+from cmm_uq.certificate.plots.volume import vector_plot
 from tests.certificate.samples import plots
 from tests.certificate.svg import Drawing, outlines, strokes
 

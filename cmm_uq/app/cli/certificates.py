@@ -61,7 +61,7 @@ def verify(
 
 
 def _verified(found: Verification, *, verbose: bool) -> list[str]:
-    from cmm_uq.certificate.verify.found import CHECKS
+    from cmm_uq.certificate.verify.given import CHECKS
 
     inquiry = found.inquiry
     shown = inquiry.findings if verbose else inquiry.findings[:FINDINGS_SHOWN]

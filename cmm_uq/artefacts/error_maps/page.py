@@ -13,13 +13,13 @@ from cmm_uq.base import messages
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, plural, say, semicolons, sentences, signed
 from cmm_uq.certificate import document as parts
 from cmm_uq.certificate.diagnosis.overview import STANDING, gained, held_out, share_of, summary_of, sure
+from cmm_uq.certificate.diagnosis.page import improvement_table
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Overview, Paragraph, Section, Table
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.residuals import curve_with_band
 from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.result import Outcome, OwnAnalysis, Recipe
 from cmm_uq.certificate.results.contents import effect_data, false_alarms, finding_data, head, improvement_data
-from cmm_uq.certificate.sections.findings import improvement_table
 from cmm_uq.certificate.wording import effect_of, effect_title, probability, size_of, titles
 
 # a verdict as the title of its overview, and in a sentence

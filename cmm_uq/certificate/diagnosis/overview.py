@@ -8,17 +8,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from cmm_uq.analysis.diagnosis.comparison.search import ASSERTED
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
+from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, day, lines, say, semicolons
-from cmm_uq.certificate.diagnosis.sections import explanation, next_sentence, without_power
+from cmm_uq.certificate.diagnosis.sections import by_columns, explanation, next_sentence, place_words, without_power
 from cmm_uq.certificate.document import Overview, Standing
-from cmm_uq.certificate.result import JobDiagnosis
-from cmm_uq.certificate.sections import findings
-from cmm_uq.certificate.sections.findings import contained, other_periods
+from cmm_uq.certificate.result import JobDiagnosis, SimulatedTwin
 from cmm_uq.certificate.wording import Headline, Summary, effect_of, effect_title, probability, size_of, titles
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.maths.uncertainty.quantity import alike
+from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 # What a verdict means for who is to act
 STANDING: Mapping[str, Standing] = {"consistent": "good", "explained": "open", "partial": "open", "unexplained": "bad"}
@@ -45,11 +44,6 @@ VERDICT_WORDS: Mapping[str, Text] = {
     "unexplained": say("unexplained"),
 }  # fmt: skip
 
-# The same, to begin a summary with
-VERDICTS_IN_SHORT: Mapping[str, Text] = {
-    "consistent": say("CONSISTENT"), "explained": say("EXPLAINED"), "partial": say("PARTIAL"),
-    "unexplained": say("UNEXPLAINED"),
-}  # fmt: skip
 _RAREST = 1e-4  # probability below which only this is told
 _TOLD = 0.05  # probability from which another explanation is told beside what is asserted
 _SAME = 0.01  # difference of two probabilities that is not worth telling
@@ -76,7 +70,7 @@ def _found(result: JobDiagnosis) -> Text:
             return say("Nothing beyond the effects that the job names: what they leave is noise.")
         return say("Nothing beyond the simulation: what it leaves is noise.")
     if not d.effects:
-        return lines((say("A misfit that no known effect accounts for."), *findings.withheld_words(d.withheld)))
+        return lines((say("A misfit that no known effect accounts for."), *withheld_words(d.withheld)))
     texts: list[Text] = []
     for item in d.effects:
         size = size_of(effect_of(item.effect, d.after.effects), item.parameters, factors=False)
@@ -101,8 +95,8 @@ def _where(d: Diagnosis) -> Text:
     if d.verdict == "consistent":
         return say("No place, direction or time stands out.")
     if not d.where:
-        return findings.by_columns(d) or say("Spread over the recording: no reading or direction by itself stands out.")
-    return say("{places:capital}.", places=semicolons([findings.place_words(place) for place in d.where[:2]]))
+        return by_columns(d) or say("Spread over the recording: no reading or direction by itself stands out.")
+    return say("{places:capital}.", places=semicolons([place_words(place) for place in d.where[:2]]))
 
 
 def _sure(result: JobDiagnosis) -> Text:
@@ -183,7 +177,7 @@ def _look_at(d: Diagnosis, item: OmittedEffect) -> Text:
 
 
 def verdict_of(result: JobDiagnosis) -> Text:
-    return (VERDICTS if result.simulated is None else findings.VERDICTS)[result.diagnosis.verdict]
+    return (VERDICTS if result.simulated is None else AGAINST_SIMULATION)[result.diagnosis.verdict]
 
 
 def summary_lines(result: JobDiagnosis) -> list[Text]:
@@ -191,7 +185,7 @@ def summary_lines(result: JobDiagnosis) -> list[Text]:
     said = [
         verdict_of(result),
         *(say("{label}: {text}", label=label, text=text) for label, text in overview_of(result).rows),
-        *findings.withheld_words(d.withheld),
+        *withheld_words(d.withheld),
         *(ambiguous(titles(group, d.after.effects)) for group in d.indistinguishable),
     ]
     return [*said, *filter(None, (next_sentence(result),)), *noise_words(d, stated_um(result))]
@@ -260,7 +254,58 @@ def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[Text, ..
 
 def summary_of(facts: JobFile, verdict: str, sentences: Sequence[Text], found: Iterable[Finding]) -> Summary:
     """Verdict and everything that follows from it, and what the screening found, for the end of a command."""
-    first = Headline(VERDICTS_IN_SHORT[verdict], STANDING[verdict], sentences[0], ())
+    first = Headline(verdict.upper(), STANDING[verdict], sentences[0], ())
     warned = tuple(say("{why:capital}.", why=one.why) for one in found)
     machine = Verbatim(facts.machine.name)
     return Summary(machine, day(facts.job.date), (first,), remarks=tuple(sentences[1:]), warnings=warned)
+
+
+_PERIODS = 8  # periods that a sentence tells; results.json has all.
+
+
+def withheld_words(withheld: Sequence[WithheldEffect]) -> list[Text]:
+    return [
+        say("{title} (probability {probability}) is not asserted: {why}.", title=item.title,
+            probability=probability(item.probability),
+            why=say("{why} ({periods})", why=item.why, periods=_listed(item.modes)) if item.modes else item.why)
+        for item in withheld
+    ]  # fmt: skip
+
+
+def other_periods(item: OmittedEffect) -> Text:
+    """A sentence on further periods that fit, to follow that on an effect; nothing where there are none."""
+    if not item.modes:
+        return NOTHING
+    if item.settled:
+        return say("Other periods that fit: {periods}.", periods=_listed(item.modes))
+    return say(
+        "The positions do not tell its period; a correction would hold where was measured, not between. "
+        "Periods that fit: {periods}.",
+        periods=_listed(item.modes),
+    )
+
+
+def _listed(modes: Sequence[Mode]) -> Text:
+    periods: list[Text] = []
+    for mode in modes[:_PERIODS]:
+        value, U = rounded(mode.period.value, mode.period.expanded)
+        periods.append(say("{value} ± {U} {unit}: {probability}", value=value, U=U, unit=mode.period.unit,
+                           probability=probability(mode.probability)))  # fmt: skip
+    return commas(
+        [*periods, *([say("and {count} more", count=len(modes) - _PERIODS)] if len(modes) > _PERIODS else [])]
+    )
+
+
+AGAINST_SIMULATION: Mapping[str, Text] = {
+    "consistent": say("The recording agrees with the simulation."),
+    "explained": say("The recording does not agree with the simulation; what differs is found."),
+    "partial": say("Something that differs is found, but structure remains that no known effect accounts for."),
+    "unexplained": say("The recording does not agree with the simulation, and no known effect accounts for it."),
+}
+
+
+def contained(simulated: SimulatedTwin | None, effect: str) -> Text:
+    """To follow the sentence on an effect that the simulation contains: what was found is what it lacks of it."""
+    if simulated is None or effect not in simulated.contains:
+        return NOTHING
+    return say("The simulation contains it: this is by how much the machine's differs.")

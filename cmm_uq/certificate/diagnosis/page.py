@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from cmm_uq.analysis.conformity.accuracy import TITLES, UNITS
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, OmittedEffect
-from cmm_uq.base.messages import Text, Verbatim, commas, day, names, number, say, sentences
-from cmm_uq.base.units import MICROMETRE
+from cmm_uq.analysis.diagnosis.held_out import Improvement
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, names, number, say, sentences
+from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate import document as doc, wording
 from cmm_uq.certificate.diagnosis import overview as words
-from cmm_uq.certificate.diagnosis.sections import costs_section, next_section, unseen_section
-from cmm_uq.certificate.document import Section, section, table
+from cmm_uq.certificate.diagnosis.sections import costs_section, next_section, unseen_section, where_section
+from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.origin import came_about, program
 from cmm_uq.certificate.plots.residuals import length_plot
 from cmm_uq.certificate.plots.style import lettered_in
-from cmm_uq.certificate.result import JobDiagnosis, Outcome
+from cmm_uq.certificate.result import JobDiagnosis, Outcome, SimulatedTwin
 from cmm_uq.certificate.results.contents import corrections, diagnosis_data, head
-from cmm_uq.certificate.sections import findings
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import ARTEFACT
-from cmm_uq.maths.uncertainty.quantity import alike, figure
+from cmm_uq.maths.uncertainty.quantity import Quantity, alike, figure
 from cmm_uq.maths.uncertainty.type_a import factor_of_noise
 
 
@@ -74,9 +75,9 @@ def diagnosis_sections(result: JobDiagnosis) -> tuple[Section, ...]:
 def _sections(result: JobDiagnosis) -> tuple[Section, ...]:
     d, simulated = result.diagnosis, result.simulated
     noise = words.noise_words(d, words.stated_um(result))
-    compared = () if simulated is None else (findings.simulation_section(simulated, corrections(result, simulated)),)
+    compared = () if simulated is None else (simulation_section(simulated, corrections(result, simulated)),)
     sections = (
-        Section(say("What was left out"), _left_out(result)), findings.where_section(d),
+        Section(say("What was left out"), _left_out(result)), where_section(d),
         Section(say("What remains"), _consistent(result)), next_section(result),
         section(say("Before and after"), *_before_after(result)),
         section(say("What a correction would change"), *_consequences(result)),
@@ -94,7 +95,7 @@ def _left_out(result: JobDiagnosis) -> tuple[doc.Block, ...]:
         doc.Paragraph(words.ambiguous(wording.titles(group, d.after.effects)), tone="warning")
         for group in d.indistinguishable
     )
-    withheld = map(doc.Paragraph, findings.withheld_words(d.withheld))
+    withheld = map(doc.Paragraph, words.withheld_words(d.withheld))
     return doc.Paragraph(words.verdict_of(result)), *(_effect(result, item) for item in d.effects), *withheld, *alike
 
 
@@ -103,7 +104,7 @@ def _effect(result: JobDiagnosis, item: OmittedEffect) -> doc.Facts:
     size = say(
         "{size:capital}.", size=wording.size_of(wording.effect_of(item.effect, d.after.effects), item.parameters)
     )
-    told = (size, findings.other_periods(item), findings.contained(result.simulated, item.effect))
+    told = (size, words.other_periods(item), words.contained(result.simulated, item.effect))
     return doc.Facts((
         (say("Effect"), item.title),
         (say("Size"), sentences(filter(None, told))),
@@ -134,7 +135,7 @@ def _before_after(result: JobDiagnosis) -> tuple[doc.Block | None, ...]:
         caption=say("Residual of each observation before and after, with U (k = {k}) from the noise.", k=_factor(d)),
         alternative=say("Residual rms {before} µm before and {after} µm after.", before=before, after=after),
     )  # fmt: skip
-    improved = findings.improvement_table(
+    improved = improvement_table(
         gain, say("Residual rms"), say("Rms on held-out {unseen}", unseen=gain.unseen),
         say("{unseen:capital} are left out with all their repeats; ± is one standard error.", unseen=gain.unseen),
     )  # fmt: skip
@@ -219,3 +220,45 @@ def _rivals(d: Diagnosis) -> doc.Table:
     heads = doc.columns((say("Explanation"), doc.Column(say("Probability"))))
     rows = tuple((wording.effect_title(name), wording.probability(p)) for name, p in d.rivals)
     return doc.Table(say("Model comparison: one explanation alone"), heads, rows, tuple(notes))
+
+
+def simulation_section(simulated: SimulatedTwin, refitted: Mapping[str, Mapping[str, Quantity]]) -> Section:
+    """Which simulation it was, and what of it was estimated anew."""
+    u = say("{u:.3g} µm", u=simulated.u_um)
+    if not simulated.u_um and not simulated.u_common_um:
+        u = say("not stated: taken as exact")
+    elif common := simulated.u_common_um:
+        u = say("{own}, and {common:.3g} µm of the artefact's size in common", own=u, common=common)
+    file = say("Error map") if simulated.maps else say("Prediction")
+    rows = (
+        *((file, Verbatim(name)) for name in simulated.files),
+        *((say("SHA-256"), Verbatim(value)) for value in simulated.files.values()),
+        (say("Program"), Verbatim(simulated.program)),
+        (say("Effects that it contains"), commas(wording.titles(simulated.contains)) or say("not stated")),
+        (say("Estimated anew"), commas(wording.titles(simulated.refitted)) or say("none")),
+        (say("Standard uncertainty of a predicted coordinate"), u),
+        (say("Predicted errors, rms in the observations"), say("{rms} µm", rms=alike(simulated.rms_predicted_um)[0])),
+    )
+    told = say(
+        "Observed minus predicted is what is explained here; where the artefact was taken to stand is no part of it. Sizes of "
+        "effects are what the machine has beyond what the simulation contains. The noise is that of both together."
+    )
+    differing = (
+        (wording.parameter_title(owner, name), wording.with_uncertainty(one), one.unit, wording.expanded(one)[2])
+        for owner, quantities in refitted.items() for name, one in quantities.items()
+    )  # fmt: skip
+    heads = (say("Parameter"), Column(say("Machine minus simulation")), say("Unit"), Column(say("k")))
+    anew = table(say("What the simulation contains, estimated anew"), heads, differing)
+    return section(say("Simulation"), Facts(tuple(row for row in rows if row[1])), Paragraph(told), anew)
+
+
+def improvement_table(gain: Improvement, rms: Text, heldout: Text, note: Text) -> Table:
+    """Rms in µm, and the gain in log predictive density; ``note``: what was held out, and what ± is."""
+    density = say("{elpd_gain:.1f} ± {elpd_gain_se:.1f}", elpd_gain=gain.elpd_gain, elpd_gain_se=gain.elpd_gain_se)
+    rows = (
+        (rms, *alike(gain.rms_before_um, gain.rms_after_um, decimals=2), unit("µm")),
+        (heldout, *alike(gain.heldout_rms_before_um, gain.heldout_rms_after_um, decimals=2), unit("µm")),
+        (say("Gain in log predictive density"), NOTHING, density, NOTHING),
+    )
+    heads = (say("Quantity"), Column(say("Before")), Column(say("After")), say("Unit"))
+    return Table(say("Improvement"), columns(heads), rows, (note,))

@@ -4,29 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from cmm_uq.analysis.conformity.accuracy import TITLES, UNITS
+from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
+from cmm_uq.analysis.diagnosis.location import Place, residual_field
 from cmm_uq.analysis.diagnosis.model_average import Rival
 from cmm_uq.analysis.diagnosis.power import ALLOWED
 from cmm_uq.analysis.diagnosis.smallest import PLACES, POWER, PeriodRange, SmallestEffect
 from cmm_uq.analysis.planning.set_up import ODDS, NextPlan, odds_words, rounded
 from cmm_uq.base import messages
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, plural, say
-from cmm_uq.base.units import Unit
-from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
-from cmm_uq.certificate.plots.plans import placing_pictures
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, plural, say, signed, together
+from cmm_uq.base.points import AXES
+from cmm_uq.base.units import Unit, unit
+from cmm_uq.certificate import wording
+from cmm_uq.certificate.document import Column, Paragraph, Plot, Section, Table, section, table
+from cmm_uq.certificate.plots.volume import placing_pictures, profile_plot, residual_field_plot
 from cmm_uq.certificate.result import JobDiagnosis
-from cmm_uq.certificate.wording import (
-    OUTCOME_WORDS,
-    effect_title,
-    parameter_title,
-    probability,
-    titles,
-    with_uncertainty,
-)
+from cmm_uq.certificate.wording import OUTCOME_WORDS, effect_title, probability, with_uncertainty
+from cmm_uq.jobs.columns import in_words, labelled, unit_of
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.maths.uncertainty.quantity import significant
 
 _PARTED = 3.0  # odds from which on two are parted at all
 TO_FILL_IN = "next_plan.csv"  # file that a diagnosis writes the set-ups to
@@ -41,13 +42,8 @@ def next_section(result: JobDiagnosis) -> Section:
         (number(plan.first + i), placing.title, placing.ends, number(plan.repeats))
         for i, placing in enumerate(plan.placings)
     )
-    heads = (
-        Column(say("Measurement")),
-        say("Set-up"),
-        say("First and last point, scale readings / mm"),
-        Column(say("Repeats")),
-    )
-    note = say("A CSV to fill in comes with this page.")
+    where, note = say("First and last point, scale readings / mm"), say("A CSV to fill in comes with this page.")
+    heads = (Column(say("Measurement")), say("Set-up"), where, Column(say("Repeats")))
     return section(
         title, Paragraph(_what(result, plan)), table(say("Set-ups to measure"), heads, set_ups, note), _partings(plan),
         _shown(plan, result.diagnosis.after.artefact), *placing_pictures(plan.placings, plan.box, plan.first),
@@ -60,9 +56,8 @@ def next_sentence(result: JobDiagnosis) -> Text:
     if plan is None:
         return NOTHING
     ends = messages.semicolons(say("{ends} mm", ends=placing.ends) for placing in plan.placings)
-    told = say(
-        "Measure next: {what} First and last point in scale readings: {ends}.", what=_what(result, plan), ends=ends
-    )
+    what = _what(result, plan)
+    told = say("Measure next: {what} First and last point in scale readings: {ends}.", what=what, ends=ends)
     odds = [parting.after for parting in plan.partings]
     reached = [each for each in odds if each >= _PARTED]
     if odds and not reached and not plan.shown:
@@ -95,11 +90,7 @@ def _what(result: JobDiagnosis, plan: NextPlan) -> Text:
 
 def _partings(plan: NextPlan) -> Table | None:
     rows = (
-        (
-            messages.together(map(effect_title, one.effects)),
-            odds_words(one.before),
-            say("{odds} : 1", odds=rounded(one.after)),
-        )
+        (together(map(effect_title, one.effects)), odds_words(one.before), say("{odds} : 1", odds=rounded(one.after)))
         for one in plan.partings
     )
     heads = (say("Cannot be told apart"), Column(say("Odds now, first over second")), Column(say("Odds expected then")))
@@ -128,10 +119,8 @@ _SHOWN = 4  # explanations that a table has columns for
 def costs_section(result: JobDiagnosis) -> Section:
     """A table of what remains; without blocks where one explanation is settled, or nothing depends on it."""
     rivals = result.diagnosis.remaining.rivals
-    heads = (
-        Column(say("{what}: {probability}", what=explanation(one), probability=probability(one.probability)))
-        for one in rivals[:_SHOWN]
-    )
+    named = ((explanation(one), probability(one.probability)) for one in rivals[:_SHOWN])
+    heads = (Column(say("{what}: {probability}", what=what, probability=chance)) for what, chance in named)
     note = say(
         "Each column is what follows if this explanation is the right one; figures and decisions are then corrected for "
         "its effects. Averages are weighted by the probabilities; a certificate states those of the error factors."
@@ -155,7 +144,7 @@ def costs_section(result: JobDiagnosis) -> Section:
 
 
 def explanation(rival: Rival) -> Text:
-    words = (*titles(rival.effects), *rival.functions)
+    words = (*wording.titles(rival.effects), *rival.functions)
     return messages.commas(words) if words else say("nothing missing")
 
 
@@ -164,7 +153,7 @@ def _cost_rows(result: JobDiagnosis) -> Iterator[tuple[Text, ...]]:
     for effect, parameters in remaining.averaged.items():
         for name, quantity in parameters.items():
             each = (with_uncertainty(rival.named[effect][name]) for rival in remaining.rivals[:_SHOWN])
-            yield (parameter_title(effect, name), *each, with_uncertainty(quantity), quantity.unit)
+            yield (wording.parameter_title(effect, name), *each, with_uncertainty(quantity), quantity.unit)
     if costs is None:
         return
     for name, quantity in costs.figures.items():
@@ -199,9 +188,8 @@ def without_power(result: JobDiagnosis) -> Text:
     ]  # fmt: skip
     if (more := len(words) - _NAMED) > 1:
         words = [*words[:_NAMED], say("{more} more", more=more)]
-    return (
-        say("But this recording could not have shown: {effects}.", effects=messages.listed(words)) if words else NOTHING
-    )
+    blindness = say("But this recording could not have shown: {effects}.", effects=messages.listed(words))
+    return blindness if words else NOTHING
 
 
 def unseen_section(result: JobDiagnosis) -> Section:
@@ -221,9 +209,8 @@ def unseen_section(result: JobDiagnosis) -> Section:
         "reckoned with would not. In closed form: mostly within 15 %, a name with a close rival within a factor of two.",
         power=100 * POWER,
     ))  # fmt: skip
-    return section(
-        say("What would not have been seen"), Paragraph(beside, tone="warning") if beside else None, smallest
-    )
+    warned = Paragraph(beside, tone="warning") if beside else None
+    return section(say("What would not have been seen"), warned, smallest)
 
 
 def _found(row: SmallestEffect, size: float | None) -> Text:
@@ -274,3 +261,108 @@ def _periods(periods: PeriodRange, row: SmallestEffect) -> Text:
     return say(
         "{worst}; not resolved: {ranges}\u00a0{unit}", worst=worst, ranges=messages.listed(ranges), unit=periods.unit
     )
+
+
+_READINGS = frozenset(f"{a}_mm" for a in AXES)
+
+
+def place_words(place: Place) -> Text:
+    """A place in words: ``along Y, depending on X, most from 300 to 600 mm``."""
+    what, region = in_words(place.covariate), region_words(place.covariate, *place.region)
+    if place.covariate not in _READINGS:
+        what = say("the {what}", what=what)
+    if place.along is None:
+        return say("depending on {what}, most {region}", what=what, region=region)
+    axis = Verbatim(place.along.upper())
+    if place.scale:
+        return say("in the scale of {axis}, depending on {what}, most {region}", axis=axis, what=what, region=region)
+    return say("along {axis}, depending on {what}, most {region}", axis=axis, what=what, region=region)
+
+
+def region_words(covariate: str, low: float, high: float) -> Text:
+    """A region of a covariate: ``from 300 to 600 mm``; of one value, ``at 300 mm``."""
+    own = unit_of(covariate)
+    space = Verbatim("\u00a0" if own else "")
+    one, other = (signed(value, ".0f" if abs(value) >= 100 else ".3g") for value in (low, high))
+    if one == other:
+        return say("at {value}{space}{unit}", value=one, space=space, unit=own)
+    return say("from {low} to {high}{space}{unit}", low=one, high=other, space=space, unit=own)
+
+
+def by_columns(d: Diagnosis) -> Text:
+    """What the effects found go by, where no function of it was looked for, such as of two directions of travel."""
+    found = (wording.effect_of(item.effect, d.after.effects) for item in d.effects)
+    columns = dict.fromkeys(column for effect in found if effect is not None for column in effect.columns)
+    return say("It depends on the {what}.", what=commas(in_words(column) for column in columns)) if columns else NOTHING
+
+
+def where_section(d: Diagnosis) -> Section:
+    """Pictures and table of where the residuals lie; without a mismatch, nothing."""
+    if d.verdict == "consistent":
+        return section(say("Where it is"))
+    further = (_profile(d.where[0]), _table(d.where)) if d.where else ()
+    return section(say("Where it is"), Paragraph(where_sentence(d)), field_picture(d), *further)
+
+
+def where_sentence(d: Diagnosis) -> Text:
+    if not d.where:
+        spread = say("No reading, column or direction by itself carries the evidence: it is spread over the recording.")
+        return by_columns(d) or spread
+    first = d.where[0]
+    size = significant(first.amplitude_um)
+    told = say("The evidence lies {place}: up to {size} µm.", place=place_words(first), size=size)
+    others = say("It could as well be read as {others}.", others=messages.alternatives(first.also))
+    return messages.after(told, others if first.also else NOTHING)
+
+
+def field_picture(d: Diagnosis) -> Plot | None:
+    """The residual field before and after what was found; before alone, where nothing was."""
+    field = residual_field(d.before, d.after)
+    if field is None:
+        return None
+    expanded = field.expanded(d.noise.coordinate)
+    beyond = [int(np.sum(np.linalg.norm(values, axis=1) > expanded)) for values in (field.before, field.after)]
+    titles: tuple[Text, Text] | tuple[Text] = (say("Before: what the model leaves"), say("After: with what was found"))
+    if not d.effects:
+        titles = (titles[0],)
+    what = say("Half of each length's residual at either end") if field.lengths else say("Residual of each point")
+    told = say(
+        "{what}, as far as it was observed, over the scale readings; arrows are longer than their U, shaded is where the "
+        "evidence lies.",
+        what=what,
+    )
+    count = say("{before} of {all} vectors are longer than their U before", before=beyond[0], all=len(expanded))
+    if d.effects:
+        count = say("{count} and {after} after", count=count, after=beyond[1])
+    along = next((place for place in d.where[:1] if place.covariate in _READINGS), None)
+    shade = None if along is None else (along.covariate[0], *along.region)
+    alternative = say("{count}.", count=count)
+    return residual_field_plot(field, expanded, titles=titles, shade=shade, caption=told, alternative=alternative)
+
+
+def _profile(place: Place) -> Plot:
+    (x, y, u), along, k = place.curve, Verbatim((place.along or "").upper()), number(place.k, ".2f")
+    label = say("Error along {along} / µm", along=along) if place.along else say("Error / µm")
+    if place.scale:
+        label = say("Scale of {along}, at the end of its range / µm", along=along)
+    caption = say(
+        "{what:capital}, with U (k = {k}), as what the model leaves shows it; below, each observation over the range of "
+        "its points. What the model itself would absorb is no part of it.", what=place.what, k=k,
+    )  # fmt: skip
+    region = region_words(place.covariate, *place.region)
+    shown = say("A function of up to {size:.3g} µm, largest {region}.", size=place.amplitude_um, region=region)
+    return profile_plot((x, y, place.k * u), place.data, place.region, x_label=labelled(place.covariate), y_label=label,
+                        caption=caption, alternative=shown)  # fmt: skip
+
+
+def _table(where: tuple[Place, ...]) -> Table | None:
+    rows = (
+        (place.what, say("{where:capital}", where=region_words(place.covariate, *place.region)),
+         significant(place.amplitude_um), number(place.p_value, ".1g"))
+        for place in where
+    )  # fmt: skip
+    heads = (say("What it depends on"), say("Where"), Column(say("Up to"), unit("µm")), Column(say("p")))
+    return table(say("What the residuals depend on"), heads, rows, say(
+        "p is corrected for having looked everywhere, and of a further place holds beside those above it. A region is where "
+        "the function exceeds half its largest value and its band does not hold zero, or between which values it jumps."
+    ))  # fmt: skip

@@ -354,15 +354,12 @@ def metadata(results: Mapping[str, Any], texts: Languages) -> tuple[dcc.Statemen
     again = [f"{name} SHA-256 {digest}" for name, digest in results["job"]["inputs_sha256"].items()]
     if (seed := results.get("sampling", {}).get("seed")) is not None:
         again.append(f"seed {seed}")
-    name, odd = (
-        say("Inputs, from which every figure follows again"),
-        [each["why"] for each in results.get("screening", ())],
-    )
+    name = say("Inputs, from which every figure follows again")
     stated = [texts("StatementMetadata", name=name, declaration=[*map(Verbatim, again)], ref_type="cmm_inputs")]
     if KEY in results:
         name, made = say("Records of the laboratory"), made_after(ChainHead.of_results(results))
         stated.append(texts("StatementMetadata", name=name, declaration=made, ref_type="cmm_records"))
-    if odd:
+    if odd := [each["why"] for each in results.get("screening", ())]:
         name = say("What is odd in the recording")
         stated.append(texts("StatementMetadata", name=name, declaration=english(odd), ref_type="cmm_screening"))
     return tuple(stated)

@@ -282,9 +282,6 @@ def _together(results: Mapping[str, Any], figures: plain.DigitalFigures) -> dcc.
         uncertainty=dcc.ExpandedList(uncertainties=U, factors=k, probabilities=(plain.P95,)),
         region=dcc.EllipsoidalRegion(columns=columns, factor=factor, probability=plain.P95, distribution="normal"),
     )  # fmt: skip
-    texts, named = (
-        figures.texts,
-        {"name": say("Estimates together, with their covariance"), "ref_type": "cmm_covariance"},
-    )
-    quantity = texts("DccQuantity", id=figures.id_of(("covariance",)), value=stated, **named)
-    return texts("DccResult", data=dcc.Data(parts=(quantity,)), **named)
+    named = {"name": say("Estimates together, with their covariance"), "ref_type": "cmm_covariance"}
+    quantity = figures.texts("DccQuantity", id=figures.id_of(("covariance",)), value=stated, **named)
+    return figures.texts("DccResult", data=dcc.Data(parts=(quantity,)), **named)

@@ -10,6 +10,7 @@ import csv
 import datetime as dt
 import io
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,8 +65,7 @@ def digits(of: FleetValue) -> str:
 
 
 def signed_rate(rate: float, spec: str) -> Number:
-    text = format(rate, spec)
-    return number(0.0, spec) if float(text) == 0 else signed(rate, spec)
+    return number(0.0, spec) if float(format(rate, spec)) == 0 else signed(rate, spec)
 
 
 def rate_words(rate: float, U: float, of: FleetValue) -> Text:
@@ -224,14 +224,7 @@ def _value(of: FleetValue) -> dict[str, Any]:
     return {
         "name": of.name, "quantity": of.quantity, "unit": of.unit, "machines": _machines(of),
         "certificates_left_out": of.left_out, "compared": of.compared,
-        "usual": [
-            {"kind": each.kind, "name": each.name, "machines": each.machines, "rate": each.rate, "u": each.u,
-             "lower": each.lower, "upper": each.upper}
-            for each in fleet.usual
-        ],
-        "spreads": [
-            {"name": each.name, "median": each.median, "lower": each.lower, "upper": each.upper} for each in fleet.spreads
-        ],
+        "usual": list(map(asdict, fleet.usual)), "spreads": list(map(asdict, fleet.spreads)),
         "convergence": {
             "converged": chains.converged, "rhat_max": chains.rhat_max, "ess_min": chains.ess_min, "steps": chains.steps,
             "sampler": chains.sampler, "machines": fleet.learnt_from,

@@ -156,8 +156,7 @@ def _by_effect(unseen: Iterable[UnseenError]) -> list[list[UnseenError]]:
     found: dict[str, list[UnseenError]] = {}
     for one in unseen:
         found.setdefault(one.line, []).append(one)
-    each = [sorted(own, key=lambda one: -one.share) for own in found.values()]
-    return sorted(each, key=lambda own: -own[0].share)
+    return sorted((sorted(own, key=lambda one: -one.share) for own in found.values()), key=lambda own: -own[0].share)
 
 
 def _called(one: UnseenError) -> Text:
@@ -198,8 +197,8 @@ def ways_section(found: PartMeasurement) -> Section:
         notes.append(say("u of form, orientation, location and runout is known to {known} %.", known=zones))
     if len(shown) < len(found.stated):
         notes.append(_chosen(shown))
-    words = best_words(critical(found))
-    return section(title, Paragraph(words) if words else None, table(say("Ways to measure"), heads, rows, *notes))
+    words = Paragraph(best_words(critical(found)))
+    return section(title, words, table(say("Ways to measure"), heads, rows, *notes))
 
 
 def best_words(one: CharacteristicFigures) -> Text:
@@ -216,12 +215,9 @@ def best_words(one: CharacteristicFigures) -> Text:
                gain=number(100 * (1 - float(best.u[one.place]) / now), ".0f"))  # fmt: skip
     helped = [other.name for other in figures_of(one.found)
               if other.place != one.place and best.u[other.place] < (1 - _GAIN) * planned.u[other.place]]  # fmt: skip
-    return after(told, _too(helped) if 0 < len(helped) <= _WAYS else NOTHING)
-
-
-def _too(names: list[Text]) -> Text:
-    return plural(len(names), one=say("It helps characteristic {names} too.", names=commas(names)),
-                  many=say("It helps characteristics {names} too.", names=commas(names)))  # fmt: skip
+    too = plural(len(helped), one=say("It helps characteristic {names} too.", names=commas(helped)),
+                 many=say("It helps characteristics {names} too.", names=commas(helped)))  # fmt: skip
+    return after(told, too if 0 < len(helped) <= _WAYS else NOTHING)
 
 
 def priors_section(found: PartMeasurement) -> Section:
@@ -229,13 +225,9 @@ def priors_section(found: PartMeasurement) -> Section:
     title = say("What the recording says of the machine's errors, and what it does not")
     if not found.influence:
         return section(title, _stated_bounds(found))
-    return section(
-        title,
-        Paragraph(priors_words(found), "warning" if resting_on_priors(found) else "plain"),
-        sizes_table(found.given.machine.scales),
-        _stated_bounds(found),
-        changes_table(found.influence, [Verbatim(one.name) for one in found.characteristics]),
-    )
+    told = Paragraph(priors_words(found), "warning" if resting_on_priors(found) else "plain")
+    changes = changes_table(found.influence, [Verbatim(one.name) for one in found.characteristics])
+    return section(title, told, sizes_table(found.given.machine.scales), _stated_bounds(found), changes)
 
 
 def resting_on_priors(found: PartMeasurement) -> list[str]:

@@ -113,7 +113,9 @@ class CharacteristicFigures:
 
     @property
     def interval(self) -> Text:
-        return self.interval_of(self.stated.interval, measured=self.stated.value is not None)
+        """Of the value, mm or °; where nothing was measured, of value less indication, µm or ″."""
+        low, high = map(self.error if self.stated.value is None else self.at, self.stated.interval)
+        return say("{low} to {high}", low=low, high=high)
 
     @property
     def limits(self) -> tuple[float | None, float | None]:
@@ -149,9 +151,11 @@ class CharacteristicFigures:
             return U
         return say("{value} {unit}, {U}", value=self.at(self.stated.value), unit=self.scale.value, U=U)
 
-    def with_factor(self, k: float) -> tuple[Text, Text]:
-        """U and k; dashes of what is stated by its interval."""
-        return (DASH, DASH) if self.one_sided else (self.small(self.expanded), self.factor_of(k))
+    @property
+    def with_factor(self) -> tuple[Text, Text]:
+        """U and k, a dash where there is no u; dashes of what is stated by its interval."""
+        k = number(self.stated.k, ".2f") if np.isfinite(self.stated.k) else DASH
+        return (DASH, DASH) if self.one_sided else (self.small(self.expanded), k)
 
     def small(self, size: float) -> Number:
         """An uncertainty, two digits of it, in µm or ″."""
@@ -170,15 +174,6 @@ class CharacteristicFigures:
         if value is None:
             return DASH
         return signed(float(f"{value / self.scale.per_value:.10g}"), ".10g")
-
-    def factor_of(self, k: float) -> Text:
-        """U over u; a dash where there is no u."""
-        return number(k, ".2f") if np.isfinite(k) else DASH
-
-    def interval_of(self, interval: tuple[float, float], *, measured: bool) -> Text:
-        """Of the value, mm or °; where nothing was measured, of value less indication, µm or ″."""
-        show = self.at if measured else self.error
-        return say("{low} to {high}", low=show(interval[0]), high=show(interval[1]))
 
     def accepted_of(self, accepted: tuple[float | None, float | None] | None) -> Text:
         """Which values a rule accepts, mm or °."""
@@ -202,14 +197,12 @@ def critical(found: PartMeasurement) -> CharacteristicFigures:
     every = figures_of(found)
     if found.nearest is not None:
         return every[found.nearest]
-    taken = [one.expanded / one.width if one.width > 0 else -1.0 for one in every]
-    return every[int(np.argmax(taken))]
+    return every[int(np.argmax([one.expanded / one.width if one.width > 0 else -1.0 for one in every]))]
 
 
 def by_margin(found: PartMeasurement) -> list[CharacteristicFigures]:
     """Every characteristic, the least margin first; those without any margin last, in their order."""
-    margins = np.where(np.isnan(found.margins), np.inf, found.margins)
-    every = figures_of(found)
+    margins, every = np.where(np.isnan(found.margins), np.inf, found.margins), figures_of(found)
     return [every[int(place)] for place in np.argsort(margins, kind="stable")]
 
 

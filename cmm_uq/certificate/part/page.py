@@ -1,9 +1,4 @@
-"""A part's measurement in short: whether it conforms, where it is nearest to a limit, what its uncertainty comes from.
-
-The machine that measured a part: its certificate, how it was verified, and how its errors are drawn.
-
-The page of a part: its characteristics with their uncertainty, what the limits make of them, and where it comes from.
-"""
+"""The page of a part: whether it conforms, its characteristics with their uncertainty, how it was probed, and its form."""
 
 from __future__ import annotations
 
@@ -17,7 +12,7 @@ from cmm_uq.analysis.parts.evaluation import characteristics_of
 from cmm_uq.analysis.parts.plan import Plan, Stylus
 from cmm_uq.analysis.parts.result import deviations_of
 from cmm_uq.base import messages
-from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, number, say
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, number, plural, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate import certificate, document as doc
@@ -64,11 +59,11 @@ def verdict_words(outcomes: Sequence[Outcome], *, measured: bool) -> Text:
         return say("Measured: no limits to decide on") if measured else planned
     all_ = len(outcomes)
     if outcome == "pass":
-        return messages.plural(all_, one=say("Conforms: its one limited characteristic is within its limits"),
+        return plural(all_, one=say("Conforms: its one limited characteristic is within its limits"),
                       many=say("Conforms: all {count} limited characteristics are within limits", count=all_))  # fmt: skip
     if outcome in ("fail", "conditional fail"):
         out = sum(one in ("fail", "conditional fail") for one in outcomes)
-        told = messages.plural(out, one=say("one of {all} characteristics is not", all=all_),
+        told = plural(out, one=say("one of {all} characteristics is not", all=all_),
                       many=say("{count} of {all} characteristics are not", count=out, all=all_))  # fmt: skip
         if outcome == "conditional fail":
             return say("Conditionally rejected: {told} within its limits with certainty", told=told)
@@ -76,7 +71,7 @@ def verdict_words(outcomes: Sequence[Outcome], *, measured: bool) -> Text:
     if outcome == "conditional pass":
         return say("Conditionally accepted: all values are within their limits, not all with their uncertainty")
     open_ = sum(one == "undecided" for one in outcomes)
-    return messages.plural(
+    return plural(
         open_, one=say("Undecided: one of {all} characteristics is too near to a limit", all=all_),
         many=say("Undecided: {count} of {all} characteristics are too near to a limit", count=open_, all=all_),
     )  # fmt: skip
@@ -182,8 +177,7 @@ def results_section(found: PartMeasurement) -> Section:
 
 def _parts(every: Sequence[CharacteristicFigures]) -> list[list[CharacteristicFigures]]:
     """Lengths and then angles, those that there are."""
-    parts = ([one for one in every if one.angular == angular] for angular in (False, True))
-    return [part for part in parts if part]
+    return list(filter(None, ([one for one in every if one.angular == angular] for angular in (False, True))))
 
 
 _UNMEASURED = say(
@@ -201,7 +195,7 @@ def _table(every: Sequence[CharacteristicFigures], *, measured: bool) -> Table |
     )  # fmt: skip
     rows = (
         (one.number, one.beside, *(() if one.stated.value is None else (one.at(one.stated.value),)),
-         *one.with_factor(one.stated.k), one.interval, *(() if measured else (one.error(one.stated.error),)))
+         *one.with_factor, one.interval, *(() if measured else (one.error(one.stated.error),)))
         for one in every
     )  # fmt: skip
     notes = (

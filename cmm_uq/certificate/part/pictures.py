@@ -21,9 +21,8 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.plots import style
-from cmm_uq.certificate.plots.plans import DEPTH
 from cmm_uq.certificate.plots.residuals import shown, told
-from cmm_uq.certificate.plots.vectors import arrows, scale_bar
+from cmm_uq.certificate.plots.volume import DEPTH, arrows, scale_bar
 from cmm_uq.maths.uncertainty.quantity import significant
 
 if TYPE_CHECKING:
@@ -294,8 +293,7 @@ def form_picture(plan: Plan, deviations: Floats) -> Plot:
 def _all(plan: Plan, ends: Floats, radius: Floats) -> Floats:
     """Corners of all that is drawn."""
     reach = float(radius.max(initial=0.0))
-    both = np.vstack([plan.points, ends])
-    return np.vstack([both, ends + reach, ends - reach])
+    return np.vstack([plan.points, ends, ends + reach, ends - reach])
 
 
 def _ellipses(ax: Axes, centres: Floats, covariance: Floats) -> None:

@@ -65,8 +65,7 @@ _COLOURS = {"pass": style.ACCENT, "conditional pass": style.ACCENT, "fail": styl
 def margin_plots(rows: Sequence[Margin]) -> list[Plot]:
     """The rows in order, forty a picture; none without rows."""
     parts = [rows[i : i + A_PAGE] for i in range(0, len(rows), A_PAGE)]
-    several = len(parts) > 1
-    return [margin_plot(part, (i + 1, len(parts)) if several else None) for i, part in enumerate(parts)]
+    return [margin_plot(part, (i, len(parts)) if len(parts) > 1 else None) for i, part in enumerate(parts, 1)]
 
 
 def margin_plot(rows: Sequence[Margin], part: tuple[int, int] | None = None) -> Plot:
@@ -151,8 +150,7 @@ def _bars(names: Sequence[Text], causes: Sequence[Text], shares: Floats) -> Plot
     rows = np.arange(len(names))
     with style.house_style():
         lines = _legend_lines(causes)
-        top = 4.6 * len(lines) + 2.0
-        height = top + _ROW_MM * len(names) + 3.0
+        height = 4.6 * len(lines) + 2.0 + _ROW_MM * len(names) + 3.0
         figure = style.new_figure(height)
         ax = figure.add_axes((_LEFT_MM / style.WIDTH_MM, 1.5 / height, 1 - (_LEFT_MM + _RIGHT_MM) / style.WIDTH_MM,
                               _ROW_MM * len(names) / height))  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,15 +31,13 @@ _SLANT = 40  # of the figures under the panels, degrees
 
 def corner_plot(
     samples: ArrayLike, names: Sequence[Text], *, units: Sequence[Text] | None = None, estimates: ArrayLike | None = None,
-    intervals95: ArrayLike | None = None, priors: Mapping[int, tuple[ArrayLike, ArrayLike]] | None = None,
     caption: Text, alternative: Text,
 ) -> Plot:  # fmt: skip
-    """Marginal and pairwise posterior densities.
+    """Marginal and pairwise posterior densities; between the 2.5 % and 97.5 % quantiles they are shaded.
 
     ``samples``: (n, d) draws; beyond twelve parameters the twelve with the strongest correlations are shown, and the caption
     says so; ``names, units``: (d,) words over the densities; ``estimates``: (d,) drawn as lines and crosses, the medians
-    where left out; ``intervals95``: (d, 2) shaded, between the 2.5 % and 97.5 % quantiles where left out; ``priors``: by
-    parameter, (x, density) of its prior, dashed in grey.
+    where left out.
     """
     total = len(names)
     draws = style.finite("samples", samples, (None, total))
@@ -52,17 +50,12 @@ def corner_plot(
     kept = draws[:, chosen]
     middle = np.median(draws, axis=0) if estimates is None else style.finite("estimates", estimates, (total,))
     between = np.quantile(draws, [0.025, 0.975], axis=0).T
-    if intervals95 is not None:
-        between = style.finite("intervals95", intervals95, (total, 2))
     labels = [names[c] for c in chosen]
     if units:
         labels = [say("{name} / {unit}", name=names[c], unit=units[c]) if units[c] else names[c] for c in chosen]
     with style.house_style():
         panels = _Panels(_ranges(kept), kept)
         panels.densities(middle[chosen], between[chosen])
-        for k, parameter in enumerate(chosen):
-            if priors and parameter in priors:
-                panels.prior(k, *priors[parameter])
         panels.pairs(middle[chosen])
         panels.frames()
         panels.words(labels)
@@ -136,15 +129,12 @@ class _Panels:
         """Values of a parameter as places along y in its row."""
         return np.asarray(self.across(row, values) - row + self.count - 1 - row)
 
-    def marginal(self, k: int) -> Floats:
-        index = self.bins[:, k]
-        return _smooth(np.bincount(index[index >= 0], minlength=_BINS).astype(np.float64))
-
     def densities(self, estimates: Floats, intervals: Floats) -> None:
         """Marginal density of each parameter, its interval shaded, its estimate a line."""
         for k in range(self.count):
             base = self.count - 1 - k
-            density = self.marginal(k)
+            index = self.bins[:, k]
+            density = _smooth(np.bincount(index[index >= 0], minlength=_BINS).astype(np.float64))
             x = k + _SCALE * (np.arange(_BINS) + 0.5) / _BINS
             y = base + _HEADROOM * _SCALE * density / density.max()
             inside = self.across(k, intervals[k])
@@ -153,17 +143,6 @@ class _Panels:
             self.ax.fill(within[[0, *range(len(within)), -1]], under, color=ACCENT, alpha=0.18, lw=0)
             self.ax.plot(x, y, color=ACCENT, lw=1.1)
             self.ax.plot(np.repeat(self.across(k, estimates[k]), 2), [base, base + _SCALE], color=INK, lw=0.7)
-
-    def prior(self, k: int, x: ArrayLike, density: ArrayLike) -> None:
-        """A prior density to the scale of the posterior's, as far as the panel goes."""
-        at = style.finite("prior", x, (None,))
-        heights = style.finite("prior density", density, at.shape)
-        posterior = self.marginal(k)
-        per_density = posterior.sum() * np.ptp(self.ranges[k]) / _BINS
-        grid = np.linspace(self.ranges[k, 0], self.ranges[k, 1], 64)
-        y = _HEADROOM * _SCALE * per_density / posterior.max() * np.interp(grid, at, heights, left=0, right=0)
-        base = self.count - 1 - k
-        self.ax.plot(self.across(k, grid), base + np.minimum(y, _SCALE), color=MUTED, lw=0.9, ls=(0, (3, 2)))
 
     def pairs(self, estimates: Floats) -> None:
         """Contours of 95 % and 50 % of every pair, and a cross at the estimate."""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _NOTE_MM = 128.0  # room of the note beside a title of thirty letters
-_PANELS = ((0, 1), (0, 2), (1, 2))
+_PANELS, _AXES = ((0, 1), (0, 2), (1, 2)), (say("X / mm"), say("Y / mm"), say("Z / mm"))
 
 
 def length_plot(
@@ -98,7 +98,6 @@ def _side_by_side(position: Floats) -> Floats:
 
 def volume_plot(
     start_mm: ArrayLike, residual_um: ArrayLike, *, end_mm: ArrayLike | None = None, travel_mm: ArrayLike | None = None,
-    axis_labels: Sequence[Text] = (say("X / mm"), say("Y / mm"), say("Z / mm")), quantity: Text = say("Residual / µm"),
     caption: Text, alternative: Text,
 ) -> Plot:  # fmt: skip
     """Residuals where they lie in the machine's volume, in three orthogonal projections to one scale.
@@ -106,9 +105,8 @@ def volume_plot(
     Sign and size show twice: by colour, and by a dot that is full for a positive residual, hollow for a negative one,
     and grows with it, so the picture also works in grey.
 
-    ``start_mm``: (n, 3) one end of each bar, or the points themselves; ``residual_um``: (n,) what is shown, in the unit
-    that ``quantity`` names; ``end_mm``: (n, 3) the other ends; none for points; ``travel_mm``: (3, 2) the machine's
-    volume in the same frame, drawn as an outline where given.
+    ``start_mm``: (n, 3) one end of each bar, or the points themselves; ``residual_um``: (n,); ``end_mm``: (n, 3) the other
+    ends; none for points; ``travel_mm``: (3, 2) the machine's volume in the same frame, drawn as an outline where given.
     """
     start = style.finite("start_mm", start_mm, (None, 3))
     end = start if end_mm is None else style.finite("end_mm", end_mm, (len(start), 3))
@@ -134,16 +132,15 @@ def volume_plot(
                          DIVERGING[index], len(start))  # fmt: skip
             if box is not None:
                 (left, right), (bottom, top) = box[a], box[b]
-                ax.plot(
-                    [left, right, right, left, left], [bottom, bottom, top, top, bottom], color=RULE, lw=0.7, zorder=0
-                )
-            ax.set(xlabel=axis_labels[a], ylabel=axis_labels[b], xlim=(low[a], high[a]), ylim=(low[b], high[b]))
+                around = [left, right, right, left, left], [bottom, bottom, top, top, bottom]
+                ax.plot(*around, color=RULE, lw=0.7, zorder=0)
+            ax.set(xlabel=_AXES[a], ylabel=_AXES[b], xlim=(low[a], high[a]), ylim=(low[b], high[b]))
             ax.locator_params(nbins=4)
         scale_axes.bar(edges[:-1], 1, np.diff(edges), align="edge", color=DIVERGING, lw=0)
         digits = max(0, 1 - int(np.floor(np.log10(limit))))
         scale_axes.set_xticks(edges, [f"{edge:+.{digits}f}".replace("-", "−") for edge in edges])
         scale_axes.set(xlim=(edges[0], edges[-1]), yticks=[])
-        label = say("{quantity}  (full dot: positive, hollow dot: negative)", quantity=quantity)
+        label = say("{quantity}  (full dot: positive, hollow dot: negative)", quantity=say("Residual / µm"))
         scale_axes.set_xlabel(label, labelpad=2)
         scale_axes.spines[:].set_visible(False)
         return style.drawn(figure, caption, alternative)

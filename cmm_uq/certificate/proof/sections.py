@@ -216,12 +216,8 @@ def probabilities_section(proof: DiagnosisProof) -> Section:
     title, each = say("Probability said, and right"), proof.judgement.probabilities
     if not each:
         return section(title, Paragraph(say("No effect was asserted.")))
-    heads = (
-        Column(say("Said"), unit("%"), numeric=False),
-        Column(say("Mean said"), unit("%")),
-        *RATE_HEADS,
-        say("Agree"),
-    )
+    said = Column(say("Said"), unit("%"), numeric=False), Column(say("Mean said"), unit("%"))
+    heads = (*said, *RATE_HEADS, say("Agree"))
     rows = (
         (say("{low:.0f} to {high:.0f}", low=100 * one.low, high=100 * one.high), number(100 * one.said, ".1f"),
          *cells(one.right), say("yes") if one.agrees else say("no"))
@@ -248,12 +244,10 @@ def intervals_section(proof: DiagnosisProof) -> Section:
 
 
 def kinds_section(proof: DiagnosisProof) -> Section:
+    by_kind = {kind: proof.judgement.by_noise(kind) for kind in dict.fromkeys(proof.design.noises)}
     rows = (
-        (
-            NOISE_WORDS[kind],
-            *(cell for rate in proof.judgement.by_noise(kind) for cell in (counted(rate), percent(rate))),
-        )
-        for kind in dict.fromkeys(proof.design.noises)
+        (NOISE_WORDS[kind], *(cell for rate in each for cell in (counted(rate), percent(rate))))
+        for kind, each in by_kind.items()
     )
     counts = (say("False alarms"), say("Effects found"), say("Intervals that hold"))
     rates = (column for count in counts for column in (Column(count), Column(say("Rate"), unit("%"))))

@@ -11,7 +11,7 @@ from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Statement
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
-from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
+from cmm_uq.analysis.diagnosis.joint import Mode
 from cmm_uq.analysis.diagnosis.power import ALLOWED
 from cmm_uq.analysis.diagnosis.smallest import PLACES, SmallestEffect
 from cmm_uq.analysis.planning.set_up import NextPlan
@@ -55,34 +55,28 @@ def head(job: Job, schema: str = SCHEMA, *, effects: bool = True) -> dict[str, A
 
 def results(result: Result) -> dict[str, Any]:
     """A result as plain data, in the layout of the schema ``cmm-uq/results/1``."""
-    posterior = result.posterior
+    posterior, noise = result.posterior, result.noise
     return {
         **head(result.job),
         "estimates": _by_effect(result.parameters),
         "artefact": _quantities(result.sizes),
         "certified": {
             size.name: {"value": size.nominal, "u": size.sd}
-            for size in result.artefact.sizes
-            if size.certified and size.role == "dimension"
+            for size in result.artefact.sizes if size.certified and size.role == "dimension"
         },
         "covariance": covariance_data(result.covariance),
         "differences": [
             {"of": ".".join(one.second), "minus": ".".join(one.first), one.second[1]: quantity_data(one.quantity)}
-            for combination in result.undetermined
-            for one in result.differences(combination)
+            for combination in result.undetermined for one in result.differences(combination)
         ],
         "tolerances": tolerances_data(result.verdicts),
         "noise": {
-            "stated_coordinate_um": result.noise.stated_um,
-            "coordinate_um": quantity_data(result.noise.coordinate),
-            **{
-                f"{name}_um": {**quantity_data(one.size), "probability": one.probability}
-                for name, one in result.noise.components.items()
-            },
-            **({"display_step_um": result.noise.display_um} if result.noise.display_um else {}),
-            "axes_differ_probability": result.noise.axes_apart,
-            "p_value": result.noise.p_value,
-            "contradicts_stated": result.noise.contradicts_stated,
+            "stated_coordinate_um": noise.stated_um, "coordinate_um": quantity_data(noise.coordinate),
+            **{f"{name}_um": {**quantity_data(one.size), "probability": one.probability}
+               for name, one in noise.components.items()},
+            **({"display_step_um": noise.display_um} if noise.display_um else {}),
+            "axes_differ_probability": noise.axes_apart, "p_value": noise.p_value,
+            "contradicts_stated": noise.contradicts_stated,
         },
         "sampling": {
             "sampler": posterior.sampler, "seed": posterior.seed, "draws": len(posterior.draws),
@@ -93,7 +87,7 @@ def results(result: Result) -> dict[str, Any]:
         **contradictions_data(result),
         "identifiability": _identifiability(result),
         "accuracy": {name: quantity.value for name, quantity in result.accuracy.items()},
-        "accuracy_uncertainty": {name: quantity_data(quantity) for name, quantity in result.accuracy.items()},
+        "accuracy_uncertainty": _quantities(result.accuracy),
         "conformity": [_statement(statement) for statement in result.statements],
         "verdicts": result.verdicts.data(),
         "diagnosis": diagnosis_data(result.diagnosed),
@@ -106,16 +100,17 @@ def diagnosis_data(found: JobDiagnosis) -> dict[str, Any]:
     d, changes, simulated = found.diagnosis, found.consequences, found.simulated
     return {
         **({} if simulated is None else {"simulation": simulated.data(_by_effect(corrections(found, simulated)))}),
-        "verdict": d.verdict,
-        "p_value": d.p_value,
-        **false_alarms(d.alpha),
+        "verdict": d.verdict, "p_value": d.p_value, **false_alarms(d.alpha),
         "where": [
             {"covariate": place.covariate, "region": list(place.region), "p_value": place.p_value,
              "amplitude_um": place.amplitude_um, "what": place.what, "direction": place.along, "also": list(place.also)}
             for place in d.where
         ],
         "effects": [effect_data(item, d.improvement) for item in d.effects],
-        "withheld": withheld_data(d.withheld),
+        "withheld": [
+            {"effect": item.effect, "probability": item.probability, "why": item.why, "periods_mm": _periods(item.modes)}
+            for item in d.withheld
+        ],
         "indistinguishable": [list(group) for group in d.indistinguishable],
         "suggested_measurements": [
             {"separates": list(s.separates), "what": s.what, "repetitions": s.repetitions, "odds": s.odds}
@@ -135,9 +130,8 @@ def diagnosis_data(found: JobDiagnosis) -> dict[str, Any]:
         **costs_data(found),
         **({"compared_on": d.compared} if d.compared < int(d.before.used.sum()) else {}),
         "corrected": None if changes is None else {
-            "accuracy": {
-                name: {"before": quantity_data(a), "after": quantity_data(b)} for name, (a, b) in changes.figures.items()
-            },
+            "accuracy": {name: {"before": quantity_data(a), "after": quantity_data(b)}
+                         for name, (a, b) in changes.figures.items()},
             "conformity": [{"before": _statement(a), "after": _statement(b)} for a, b in changes.statements],
         },
     }  # fmt: skip
@@ -154,11 +148,6 @@ def corrections(found: JobDiagnosis, simulated: SimulatedTwin) -> dict[str, dict
     for (owner, name), (values, of) in d.after.reported(d.posterior.draws, simulated.refitted).items():
         each.setdefault(owner, {})[name] = Quantity.of_draws(values, of)
     return each
-
-
-def withheld_data(withheld: Sequence[WithheldEffect]) -> list[dict[str, Any]]:
-    return [{"effect": item.effect, "probability": item.probability, "why": item.why,
-             "periods_mm": _periods(item.modes)} for item in withheld]  # fmt: skip
 
 
 def _periods(modes: Sequence[Mode]) -> list[dict[str, Any]]:

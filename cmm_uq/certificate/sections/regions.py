@@ -53,22 +53,14 @@ def regions_section(result: Result) -> Section:
         "The first figures are means over the recorded set-ups. The machine has other errors besides, taken as large as this "
         "recording shows errors of their kind to be; elsewhere a factor differs by what they do."
     )
-    prior = (
-        say(
-            "Over the measuring range these rest on what was taken for the other errors before the recording, so that "
-            "value or U changes by a tenth of U or more with it: {names}.",
-            names=rests,
-        )
-        if rests
-        else NOTHING
+    prior = say(
+        "Over the measuring range these rest on what was taken for the other errors before the recording, so that "
+        "value or U changes by a tenth of U or more with it: {names}.",
+        names=rests,
     )
+    tables = sizes_table(regions.scales), changes_table(regions.influence, names)
     return section(
-        _TITLE,
-        Paragraph(words),
-        _table(result, regions, ranged),
-        Paragraph(prior) if prior else None,
-        sizes_table(regions.scales),
-        changes_table(regions.influence, names),
+        _TITLE, Paragraph(words), _table(result, regions, ranged), Paragraph(prior) if rests else None, *tables
     )
 
 
@@ -81,9 +73,8 @@ def _table(result: Result, regions: FactorRegions, ranged: dict[Key, Quantity]) 
         mean, U, _ = wording.expanded(regions.recorded[key] if result.averaged else result.parameters[key[0]][key[1]])
         value, wider = rounded(quantity.value, quantity.expanded)
         ends: Sequence[Text] = [rounded(end, quantity.expanded)[0] for end in regions.eighths.get(key, ())]
-        rows.append(
-            (wording.title_of(key, result), mean, U, value, wider, *(ends or (NOTHING, NOTHING)), quantity.unit)
-        )
+        title, ends = wording.title_of(key, result), ends or (NOTHING, NOTHING)
+        rows.append((title, mean, U, value, wider, *ends, quantity.unit))
     note = say(
         "As recorded: the mean over the recorded set-ups. In the measuring range, and in an eighth of it with half of each "
         "travel, a factor is what least squares of all factors find of all errors at points that fill it; its U is "
@@ -97,7 +88,7 @@ def _table(result: Result, regions: FactorRegions, ranged: dict[Key, Quantity]) 
 
 def regions_warnings(result: Result) -> list[Text]:
     """What all errors together say against the named model, and against a tolerance that it keeps or exceeds."""
-    regions, texts = result.regions, list[Text]()
+    regions, texts, open_there = result.regions, list[Text](), list[Text]()
     if not isinstance(regions, FactorRegions):
         return texts
     for key in result.denied:
@@ -112,21 +103,17 @@ def regions_warnings(result: Result) -> list[Text]:
                 name=name, alone=alone, together=wording.with_uncertainty(together), unit=one.unit,
             )
         )  # fmt: skip
-    open_there = []
     for key, quantity in over_range(result).items():
         tolerance, one = result.job.facts.model.tolerances.get(key[0]), result.parameters[key[0]][key[1]]
         if tolerance is not None and _place(one, tolerance) not in (None, _place(quantity, tolerance)):
             value, name = wording.with_uncertainty(quantity), wording.title_of(key, result)
             open_there.append(say("{name} ({value} {unit})", name=name, value=value, unit=quantity.unit))
-    if open_there:
-        texts.append(
-            say(
-                "Tolerances are judged on the error factors as estimated. Over the measuring range it is open whether these "
-                "are kept: {names}.",
-                names=listed(open_there),
-            )
-        )
-    return texts
+    unknown = say(
+        "Tolerances are judged on the error factors as estimated. Over the measuring range it is open whether these "
+        "are kept: {names}.",
+        names=listed(open_there),
+    )
+    return [*texts, unknown] if open_there else texts
 
 
 def _place(quantity: Quantity, tolerance: float) -> bool | None:
@@ -200,14 +187,11 @@ def family_words(name: str) -> Text:
 
 def sizes_table(scales: Mapping[str, Floats]) -> Table | None:
     """``scales``: draws (N,) of each family's size, over what physics allows."""
+    keys = ("allowed", "size", "low", "high")
     figures = (say("Physics allows"), say("As recorded"), say("95 % interval from"), say("to"))
     heads: tuple[Text | Column, ...] = (say("Errors"), *map(Column, figures), say("Unit"))
     rows = (
-        (
-            family_words(str(one["family"])),
-            *(number(one[key], ".2g") for key in ("allowed", "size", "low", "high")),
-            unit(str(one["unit"])),
-        )
+        (family_words(one["family"]), *(number(one[key], ".2g") for key in keys), unit(one["unit"]))
         for one in families_data(scales)
     )
     return table(say("Sizes of errors, root mean square"), heads, rows, say(
@@ -219,27 +203,16 @@ def sizes_table(scales: Mapping[str, Floats]) -> Table | None:
 
 def changes_table(influence: Iterable[PriorInfluence], names: Sequence[Text]) -> Table | None:
     """``names`` of the figures that the changes are of."""
-    heads = (
-        say("Errors"),
-        Column(say("Prior times")),
-        Column(say("u changes by"), unit("%")),
-        say("Of"),
-        Column(say("Value changes by"), unit("%")),
-        say("Of"),
-    )
+    of_u, of_value = (Column(head, unit("%")) for head in (say("u changes by"), say("Value changes by")))
+    heads = (say("Errors"), Column(say("Prior times")), of_u, say("Of"), of_value, say("Of"))
     rows = (
         (family_words(one.family), number(one.times, "g"), *_largest(one.u - 1, names), *_largest(one.shift, names))
-        for one in influence if one.family == ALL or not _little(one)
+        for one in influence if one.family == ALL or np.abs([one.u - 1, one.shift]).max() >= _LITTLE
     )  # fmt: skip
     return table(say("If this were different"), heads, rows, say(
         "The largest change of all figures, of the value as a part of its u. Errors of a family that the recording "
         "hardly shows are scaled with its prior. Priors that would change nothing by more than 1 % are left out.",
     ))  # fmt: skip
-
-
-def _little(one: PriorInfluence) -> bool:
-    """Whether nothing changes by more than a hundredth."""
-    return bool(np.all(np.abs(one.u - 1) < _LITTLE) and np.all(np.abs(one.shift) < _LITTLE))
 
 
 def _largest(changes: Floats, names: Sequence[Text]) -> tuple[Text, Text]:

@@ -195,21 +195,10 @@ def _judged(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
     if embedded.sig_object.get("/SubFilter") != PADES:
         problems.append(NO_PADES)
     revision = file.data[: int(embedded.byte_range[2]) + int(embedded.byte_range[3])]
-    found = judged(
-        FileSignature(
-            "",
-            (*problems, *appended),
-            time=at,
-            time_proven=proven,
-            intact=intact,
-            covers_whole_file=intact and whole,
-            reason=str(embedded.sig_object.get("/Reason", "")),
-            content=revision if intact else b"",
-        ),
-        embedded.signer_cert,
-        evidence,
-        file.trust,
-    )
+    own = FileSignature("", (*problems, *appended), time=at, time_proven=proven, intact=intact)
+    reason, content = str(embedded.sig_object.get("/Reason", "")), revision if intact else b""
+    own = replace(own, covers_whole_file=intact and whole, reason=reason, content=content)
+    found = judged(own, embedded.signer_cert, evidence, file.trust)
     return replace(found, level=f"PAdES B-{_level(file, embedded, stamped, known=found.revocation == 'good')}")
 
 
@@ -265,29 +254,23 @@ def _whole(file: _File, embedded: EmbeddedPdfSignature) -> tuple[bool, list[Text
     """Whether only time stamps, evidence and further signatures were appended, and else what."""
     from pyhanko.sign.diff_analysis import DiffResult, ModificationLevel
 
-    from cmm_uq.certificate.sign.pdf_library import (
-        LASTING,
-        POLICY,
-        is_all_of_stamps,
-        is_good_stamp,
-        places_of,
-        unaccounted,
-    )
+    from cmm_uq.certificate.sign import pdf_library as library
 
     # whether a further signature, whose signer is judged as well, covers what was appended after this one
     later = any(one.signed_revision > embedded.signed_revision for one in file.embedded if not _is_stamp(one))
     most = ModificationLevel.FORM_FILLING if later else ModificationLevel.LTA_UPDATES
-    embedded.compute_integrity_info(diff_policy=POLICY if later else LASTING)
+    embedded.compute_integrity_info(diff_policy=library.POLICY if later else library.LASTING)
     result, allowed = embedded.diff_result, embedded.summarise_integrity_info()["docmdp_ok"]
     revisions = range(embedded.signed_revision + 1, file.reader.total_revisions)
     end = int(embedded.byte_range[2]) + int(embedded.byte_range[3])
-    if not later and unaccounted(file.data, end, [places_of(file.reader, one) for one in revisions]):
+    places = (library.places_of(file.reader, one) for one in revisions)
+    if not later and library.unaccounted(file.data, end, places):
         return False, [BEHIND]
     empty = [one for one in revisions if not file.reader.xrefs.explicit_refs_in_revision(one)]
     if isinstance(result, DiffResult) and result.modification_level <= most and allowed and not empty:
         stamps = () if later else [one for one in file.embedded if one.signed_revision in revisions]
-        alone = later or is_all_of_stamps(file.reader, embedded.signed_revision)
-        alone &= all(_fits(file.data, one) and is_good_stamp(one, file.evidence, file.trust) for one in stamps)
+        alone = later or library.is_all_of_stamps(file.reader, embedded.signed_revision)
+        alone &= all(_fits(file.data, one) and library.is_good_stamp(one, file.evidence, file.trust) for one in stamps)
         return (True, []) if alone else (False, [STAMP_ELSE])
     count = file.reader.total_revisions - 1 - embedded.signed_revision
     changed = commas([Verbatim(name) for name in _changed(file.reader, embedded.signed_revision)])

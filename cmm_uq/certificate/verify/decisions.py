@@ -28,7 +28,7 @@ from cmm_uq.analysis.conformity.standards import BUILT_IN
 from cmm_uq.analysis.conformity.statement import Decided, Statement
 from cmm_uq.base.messages import NOTHING, Verbatim
 from cmm_uq.certificate.verify.figures import Wrong, inside_of, is_zone
-from cmm_uq.certificate.verify.found import Inquiry
+from cmm_uq.certificate.verify.given import Inquiry
 from cmm_uq.jobs.tables import conformity as table
 from cmm_uq.jobs.tables.conformity import Rule
 from cmm_uq.jobs.verdicts import gravest

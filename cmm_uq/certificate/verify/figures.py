@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.certificate.part.measurement import CertificateStatus, standing_data
-from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.certificate.verify.given import JOB
+from cmm_uq.certificate.verify.given import JOB, Inquiry
 from cmm_uq.jobs.part.feature import ASKS
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.verdicts import Verdict, Verdicts

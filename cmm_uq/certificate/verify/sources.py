@@ -19,8 +19,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import PDF_BYTES
 from cmm_uq.certificate.sign.found import AFTER
-from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.certificate.verify.given import JOB, RESULTS, Given, given_of, strict_json
+from cmm_uq.certificate.verify.given import JOB, RESULTS, Given, Inquiry, given_of, strict_json
 from cmm_uq.certificate.verify.views import AHEAD, Signed
 from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
 from cmm_uq.jobs.dcc import read

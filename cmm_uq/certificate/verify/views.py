@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.base.errors import CmmUqError, NotInstalledError
-from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.certificate.verify.given import Given
+from cmm_uq.certificate.verify.given import Given, Inquiry
 from cmm_uq.certificate.verify.opened import read_html, reading
 from cmm_uq.laboratory.records.facts import ChainHead
 

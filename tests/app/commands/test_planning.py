@@ -23,7 +23,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Message
 from cmm_uq.base.points import Points
 from cmm_uq.certificate.origin import as_json
-from cmm_uq.certificate.plots.plans import gain_plot, placing_pictures
+from cmm_uq.certificate.plots.volume import gain_plot, placing_pictures
 from cmm_uq.certificate.render import render_html
 from cmm_uq.jobs.derived_job import Truth
 from cmm_uq.machine.model.measurement import ARTEFACT

@@ -20,12 +20,11 @@ from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.diagnosis.overview import overview_of, share_of
 from cmm_uq.certificate.diagnosis.page import diagnosis_document
-from cmm_uq.certificate.diagnosis.sections import next_sentence
+from cmm_uq.certificate.diagnosis.sections import next_sentence, place_words, region_words
 from cmm_uq.certificate.document import Document, Overview, Plot, Table
 from cmm_uq.certificate.render import render_html
 from cmm_uq.certificate.result import JobDiagnosis
 from cmm_uq.certificate.results.contents import next_data
-from cmm_uq.certificate.sections.findings import place_words, region_words
 from cmm_uq.machine.physics.catalogue import EVERY, every
 from tests.artefacts.constructions import plate
 from tests.artefacts.simulated import diagnosed

@@ -25,8 +25,8 @@ from cmm_uq.certificate.part.pictures import (
     part_picture,
 )
 from cmm_uq.certificate.part.plots import A_PAGE, Margin, correlation_plot, margin_plot, margin_plots, shares_plots
-from cmm_uq.certificate.plots.plans import _seen
 from cmm_uq.certificate.plots.style import WIDTH_MM, house_style
+from cmm_uq.certificate.plots.volume import _seen
 from tests.certificate.saying import leaves
 from tests.parts_drawn import UP, bore, plane
 

@@ -12,7 +12,7 @@ import pytest
 
 from cmm_uq.certificate.verify.decisions import check_decisions
 from cmm_uq.certificate.verify.figures import check_figures, check_verdicts
-from cmm_uq.certificate.verify.found import Inquiry
+from cmm_uq.certificate.verify.given import Inquiry
 
 
 @pytest.fixture

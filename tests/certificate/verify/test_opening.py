@@ -15,8 +15,7 @@ import pytest
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import PDF_UNPACKED
 from cmm_uq.certificate.verify import opened
-from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.certificate.verify.given import Given, canonical, check_files, read_given, strict_json
+from cmm_uq.certificate.verify.given import Given, Inquiry, canonical, check_files, read_given, strict_json
 from cmm_uq.certificate.verify.opened import PdfFile, read_html, read_pdf
 
 

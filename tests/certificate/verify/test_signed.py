@@ -16,7 +16,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate import sign as signing
 from cmm_uq.certificate.sign import sign_pdf, sign_xml, signer_of_file
 from cmm_uq.certificate.verify.again import Again
-from cmm_uq.certificate.verify.found import Inquiry
+from cmm_uq.certificate.verify.given import Inquiry
 from tests.certificate.sign.authority import SIGNED, Held, curve_key, issued, root
 from tests.certificate.verify.test_forms import spoil
 from tests.conftest import ROOT

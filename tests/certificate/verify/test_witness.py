@@ -19,7 +19,7 @@ from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.app.commands.laboratory.batch import BatchOptions, write_batch
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.verify.found import Inquiry
+from cmm_uq.certificate.verify.given import Inquiry
 from cmm_uq.certificate.verify.sources import witnesses_of
 from cmm_uq.jobs.dcc import read
 from cmm_uq.laboratory.records import open_records

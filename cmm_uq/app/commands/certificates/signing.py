@@ -79,10 +79,10 @@ class Signing:
                 return sign.sign_xml(data, self.signer, at=self.at, where=name)
             if not name.endswith(".pdf"):
                 return data
-            from cmm_uq.certificate.render import same, seal
+            from cmm_uq.certificate.render import seal
 
             told = (Verbatim(str(laboratory.get(key) or "")) for key in ("name", "accreditation"))
-            seen = seal(self.signer, self.at, *told, language=language, said=said or same)
+            seen = seal(self.signer, self.at, *told, language=language, said=said)
             return sign.sign_pdf(data, self.signer, seal=seen, at=self.at, stamping=self.stamping, reason=self.reason)
 
         return signed

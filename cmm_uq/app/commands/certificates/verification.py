@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.verify import given as files, sources, views
-from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Inquiry
-from cmm_uq.certificate.verify.given import RESULTS, Given
+from cmm_uq.certificate.verify.given import AGAIN, NOT_ASKED, RESULTS, Given, Inquiry
 from cmm_uq.laboratory.records.facts import ChainHead, Heads
 from cmm_uq.laboratory.records.opening import open_records
 

@@ -12,7 +12,7 @@ from cmm_uq.certificate.verify.given import Given, read_given
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.verification import Compute
     from cmm_uq.app.commands.files import Stage
-    from cmm_uq.certificate.verify.found import Inquiry
+    from cmm_uq.certificate.verify.given import Inquiry
 
 
 def verify(

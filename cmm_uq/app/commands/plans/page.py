@@ -25,7 +25,7 @@ from cmm_uq.certificate.document import (
     working_page,
 )
 from cmm_uq.certificate.origin import program
-from cmm_uq.certificate.plots.plans import gain_plot, placing_pictures
+from cmm_uq.certificate.plots.volume import gain_plot, placing_pictures
 from cmm_uq.certificate.wording import effect_title
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.catalogue import every
