@@ -120,12 +120,8 @@ def tightness(document: Document) -> int:
 
 
 def _remarks_behind(document: Document) -> Document:
-    long = [
-        row
-        for facts in document.particulars
-        for row in facts.rows
-        if getattr(row[0], "source", row[0]) in _REMARKS and letters(row[1]) > _LONG
-    ]
+    every = (row for facts in document.particulars for row in facts.rows)
+    long = [row for row in every if getattr(row[0], "source", row[0]) in _REMARKS and letters(row[1]) > _LONG]
     if not long:
         return document
     in_full = _said(document, _IN_FULL)
@@ -276,13 +272,9 @@ def _attachment(name: str, data: bytes, language: Code) -> dict[str, Any]:
         body: str | list[int] = data.decode("utf-8")
     except UnicodeDecodeError:
         body = list(data)
-    return {
-        "name": name,
-        "data": body,
-        "relationship": "data" if outcome else "source",
-        "type": _TYPES.get(suffix, "application/octet-stream"),
-        "description": str.__str__(said_in(title, language)),
-    }
+    described, kind = str.__str__(said_in(title, language)), _TYPES.get(suffix, "application/octet-stream")
+    relationship = "data" if outcome else "source"
+    return {"name": name, "data": body, "relationship": relationship, "type": kind, "description": described}
 
 
 def _with_fallback(content: dict[str, Any], language: Code, **how: Any) -> bytes:

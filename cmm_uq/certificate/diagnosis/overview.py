@@ -154,9 +154,8 @@ def _to_do(result: JobDiagnosis) -> Text:
         told.append(say("First measure the set-ups that are told below, to part what this recording cannot."))
     told += [_look_at(d, item) for item in d.effects]
     if d.verdict in ("partial", "unexplained"):
-        told.append(
-            say("Look at the pictures below and measure again: do not compensate by a model that does not fit.")
-        )
+        look = say("Look at the pictures below and measure again: do not compensate by a model that does not fit.")
+        told.append(look)
     if d.verdict == "explained":
         told.append(say("Then measure again."))
     if d.verdict == "consistent":

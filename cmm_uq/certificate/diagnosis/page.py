@@ -38,12 +38,9 @@ def diagnosed_outcome(result: JobDiagnosis) -> Outcome:
 
 def diagnosis_results(result: JobDiagnosis) -> dict[str, Any]:
     posterior = result.diagnosis.posterior
-    sampling = ("sampler", "seed", "ess_min", "rhat_max", "converged")
-    return {
-        **head(result.job),
-        "sampling": {name: getattr(posterior, name) for name in sampling},
-        "diagnosis": diagnosis_data(result),
-    }
+    names = ("sampler", "seed", "ess_min", "rhat_max", "converged")
+    sampling = {name: getattr(posterior, name) for name in names}
+    return {**head(result.job), "sampling": sampling, "diagnosis": diagnosis_data(result)}
 
 
 def diagnosis_document(result: JobDiagnosis) -> doc.Document:
@@ -91,19 +88,16 @@ def _left_out(result: JobDiagnosis) -> tuple[doc.Block, ...]:
     d = result.diagnosis
     if d.verdict == "consistent":
         return ()
-    alike = (
-        doc.Paragraph(words.ambiguous(wording.titles(group, d.after.effects)), tone="warning")
-        for group in d.indistinguishable
-    )
+    groups = (wording.titles(group, d.after.effects) for group in d.indistinguishable)
+    alike = (doc.Paragraph(words.ambiguous(group), tone="warning") for group in groups)
     withheld = map(doc.Paragraph, words.withheld_words(d.withheld))
     return doc.Paragraph(words.verdict_of(result)), *(_effect(result, item) for item in d.effects), *withheld, *alike
 
 
 def _effect(result: JobDiagnosis, item: OmittedEffect) -> doc.Facts:
     d = result.diagnosis
-    size = say(
-        "{size:capital}.", size=wording.size_of(wording.effect_of(item.effect, d.after.effects), item.parameters)
-    )
+    effect = wording.effect_of(item.effect, d.after.effects)
+    size = say("{size:capital}.", size=wording.size_of(effect, item.parameters))
     told = (size, words.other_periods(item), words.contained(result.simulated, item.effect))
     return doc.Facts((
         (say("Effect"), item.title),

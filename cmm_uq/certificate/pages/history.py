@@ -141,9 +141,8 @@ def history_data(history: MachineHistory) -> dict[str, Any]:
 def _value_data(history: MachineHistory, one: ValueHistory) -> dict[str, Any]:
     series = one.series
     dates = [dt.date.fromordinal(int(ordinal)).isoformat() for ordinal in series.day]
-    rows = zip(
-        dates, series.value, series.u, series.u_artefact, series.artefact, series.entry, series.interim, strict=True
-    )
+    columns = (series.value, series.u, series.u_artefact, series.artefact, series.entry, series.interim)
+    rows = zip(dates, *columns, strict=True)
     change, line, crossing = one.change, one.line, one.crossing
     return {
         "quantity": series.quantity, "unit": series.unit, "limit": series.limit, "beyond_limit": one.beyond,
@@ -281,9 +280,8 @@ def overview_of(history: MachineHistory) -> doc.Overview:
     )
     last = history.decision
     fails, open_ = bool(beyond) or last in BEYOND, last not in (*BEYOND, "pass", NONE)
-    standing: doc.Standing = (
-        "bad" if fails else "open" if open_ or probable or changed or not history.values else "good"
-    )
+    doubtful = open_ or probable or changed or not history.values
+    standing: doc.Standing = "bad" if fails else "open" if doubtful else "good"
     verdicts = (
         (not history.values, say("Nothing is recorded yet")), (fails, say("Beyond its limits")),
         (open_, say("Its last certificate does not state that it conforms")),
@@ -296,9 +294,8 @@ def overview_of(history: MachineHistory) -> doc.Overview:
     rows += [(label, commas(names)) for label, names in (
         (say("Beyond a limit"), beyond), (say("Changed significantly"), changed),
     ) if names]  # fmt: skip
-    medians = (
-        (one.crossing.quantile(0.5), one) for one in history.values if one.crossing is not None and not one.beyond
-    )
+    ahead = ((one.crossing, one) for one in history.values if one.crossing is not None and not one.beyond)
+    medians = ((crossing.quantile(0.5), one) for crossing, one in ahead)
     first = min(((when, one) for when, one in medians if when is not None), key=lambda pair: pair[0], default=None)
     if first is not None:
         name, when = Verbatim(first[1].series.quantity), meets(first[1], history.on)

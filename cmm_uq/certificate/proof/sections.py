@@ -191,9 +191,8 @@ def answers_section(proof: DiagnosisProof) -> Section:
         "the machine."
     )]  # fmt: skip
     if (ratio := judged.held_out_ratio) is not None:
-        notes.append(
-            say("Held out: the rms of predictions after over before is {ratio:.2f} in the median.", ratio=ratio)
-        )
+        held = say("Held out: the rms of predictions after over before is {ratio:.2f} in the median.", ratio=ratio)
+        notes.append(held)
     rates = table(say("Rates"), (say("What"), *RATE_HEADS), ((what, *cells(rate)) for what, rate in figures), *notes)
     return section(say("What was hidden, and what was said"), verdicts, rates)
 
@@ -315,9 +314,8 @@ def unseen_section(proof: DiagnosisProof) -> Section:
         if reach.standing == set_ups.UNRECORDED:
             by_columns.setdefault(reach.columns, []).append(reach.title)
     rows = ((semicolons(effects), commas(names(columns))) for columns, effects in by_columns.items())
-    left_out = table(
-        say("Not considered, because it is not recorded"), (say("Effects"), say("Columns that they go by")), rows
-    )
+    heads = (say("Effects"), say("Columns that they go by"))
+    left_out = table(say("Not considered, because it is not recorded"), heads, rows)
     return section(say("What these set-ups cannot see"), *map(Paragraph, texts), left_out)
 
 

@@ -138,14 +138,11 @@ def provenance_of(job: Behind, results: Mapping[str, Any], outputs: Mapping[str,
     graph = {
         "prefix": {"cmm-uq": _PREFIX, "file": f"{_PREFIX}file:", "package": f"{_PREFIX}package:"},
         "entity": entities,
-        "activity": {
-            _RECORDING: {"cmm-uq:origin": job.origin, "cmm-uq:date": _day(job.said.date)},
-            _REPORT: {"prov:label": f"cmm-uq {job.command}", **seed},
-        },
+        "activity": {_RECORDING: {"cmm-uq:origin": job.origin, "cmm-uq:date": _day(job.said.date)},
+                     _REPORT: {"prov:label": f"cmm-uq {job.command}", **seed}},
         "agent": {
-            _PROGRAM: {
-                "prov:type": _name("prov:SoftwareAgent"), "prov:label": program["name"], "cmm-uq:version": program["version"],
-            },
+            _PROGRAM: {"prov:type": _name("prov:SoftwareAgent"), "prov:label": program["name"],
+                       "cmm-uq:version": program["version"]},
             **({_LABORATORY: organisation} if laboratory else {}),
         },
         **_relations(job, entities, outputs),

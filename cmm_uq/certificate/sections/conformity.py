@@ -165,9 +165,8 @@ def _table(statement: Statement) -> Table:
         key = (item.measurement, item.length_mm, round(item.u_um, 9), item.limit_um, item.standing, item.set_aside)
         together.setdefault(key, []).append(item)
     rows, count = list(together.values()), len(statement.errors)
-    notes: list[Text] = [
-        plural(count, one=say("{count} value.", count=count), many=say("{count} values.", count=count))
-    ]
+    counted = plural(count, one=say("{count} value.", count=count), many=say("{count} values.", count=count))
+    notes: list[Text] = [counted]
     if len(rows) > _LISTED:
         rows = sorted(rows, key=lambda row: min(item.limit_um - abs(item.error_um) for item in row))[:_LISTED]
         notes.append(say("The {count} rows nearest to their limits; results.json has all.", count=_LISTED))
@@ -179,9 +178,8 @@ def _table(statement: Statement) -> Table:
         *((Column(say("U"), unit("µm")), say("P")) if known else ()), Column(say("Limit"), unit("µm")), say("Decision"),
     ))  # fmt: skip
     if known:
-        notes.append(
-            say("U: expanded uncertainty, k = 2. P: lowest probability in the row that a value is within its limit.")
-        )
+        told = say("U: expanded uncertainty, k = 2. P: lowest probability in the row that a value is within its limit.")
+        notes.append(told)
     title = say("All values decided by {standard}", standard=named(statement))
     cells = tuple(_row(row, lengths=lengths, known=known, signed_values=statement.signed) for row in rows)
     return Table(title, heads, cells, tuple(notes))
@@ -192,9 +190,8 @@ def _row(row: Sequence[Decided], *, lengths: bool, known: bool, signed_values: b
     chance, standing = worst.decision.probability_conforming, _STANDING[row[0].standing]
     if worst.set_aside and not standing:
         standing = say("set aside by the screening")
-    values = messages.in_a_row(
-        messages.signed(item.error_um, "+.2f") if signed_values else number(item.error_um, ".2f") for item in row
-    )
+    shown, spec = (messages.signed, "+.2f") if signed_values else (number, ".2f")
+    values = messages.in_a_row(shown(item.error_um, spec) for item in row)
     decision = OUTCOME_WORDS[worst.outcome]
     return (
         DASH if worst.measurement is None else number(worst.measurement),

@@ -33,9 +33,8 @@ def stated_table(
     value: Text = say("Value"),
 ) -> Table:  # fmt: skip
     heads = (what, doc.Column(value), doc.Column(say("U")), doc.Column(say("k")), say("Unit"))
-    return Table(
-        caption, doc.columns(heads), tuple((name, *wording.expanded(one), one.unit) for name, one in named), notes
-    )
+    rows = tuple((name, *wording.expanded(one), one.unit) for name, one in named)
+    return Table(caption, doc.columns(heads), rows, notes)
 
 
 def performance(result: Result) -> Section:
@@ -64,9 +63,8 @@ def error_factors(result: Result) -> Section:
         rows.append((wording.title_of(key, result), *wording.expanded(quantity), least, quantity.unit))
     least_squares = say("Least squares, named model") if result.averaged else say("Least squares")
     figures = (doc.Column(head) for head in (say("Estimate"), say("U"), say("k"), least_squares))
-    factors = doc.table(
-        say("Error factors of the machine"), (say("Error factor"), *figures, say("Unit")), rows, SIGN, UNCERTAINTY
-    )
+    heads: tuple[Text | doc.Column, ...] = (say("Error factor"), *figures, say("Unit"))
+    factors = doc.table(say("Error factors of the machine"), heads, rows, SIGN, UNCERTAINTY)
     free = (block for combination in result.undetermined for block in _free_combination(result, combination))
     return section(say("Error factors"), factors, *free)
 
@@ -180,9 +178,8 @@ def summary(result: Result, warnings: Iterable[Text]) -> wording.Summary:
     subject = say("{machine}, {artefact:small}, {count} observations",
                   machine=machine, artefact=artefact.title, count=len(result.residuals))  # fmt: skip
     figures = [wording.figure_row(TITLES[name], quantity) for name, quantity in result.accuracy.items()]
-    figures += [
-        wording.figure_row(size.title, result.sizes[size.name]) for size in artefact.sizes if size.role == "sought"
-    ]
+    sought = (size for size in artefact.sizes if size.role == "sought")
+    figures += [wording.figure_row(size.title, result.sizes[size.name]) for size in sought]
     figures += [
         wording.figure_row(wording.title_of(key, result), one, known=key not in result.not_given)
         for key, one in reported(result)

@@ -107,18 +107,11 @@ def _unaccounted(certificate: x509.Certificate, evidence: Evidence, trust: Trust
     yield from (one.subject.rfc4514_string() for one in beside - known)
     above = known | anchors
     unnamed = set() if anchors else {one.issuer for one in known} - {one.subject for one in known}  # nobody can look
-    yield from (
-        one.issuer.rfc4514_string()
-        for one in lists
-        if one.issuer not in unnamed and not any(_listed_by(issuer, one) for issuer in above)
-    )
+    strange = (one for one in lists if one.issuer not in unnamed and not any(_listed_by(by, one) for by in above))
+    yield from (one.issuer.rfc4514_string() for one in strange)
     serials = {one.serial_number for one in above}
-    yield from (
-        "OCSP"
-        for answer in answers
-        if answer.serial_number not in serials or not any(_answered(answer, one) for one in above)
-    )
-    yield from ("OCSP" for _ in range(len(evidence.answers) - len(answers)))
+    owned = [one for one in answers if one.serial_number in serials and any(_answered(one, by) for by in above)]
+    yield from ["OCSP"] * (len(evidence.answers) - len(owned))
 
 
 def _further(signed: cms.SignedData) -> Iterator[str]:
@@ -231,12 +224,9 @@ def _lists(evidence: Evidence, trust: Trust) -> Sequence[crl.CertificateList]:
 
 def _listed(certificate: x509.Certificate, evidence: Evidence, trust: Trust) -> bool:
     """Whether a list of the issuer names the certificate, whenever that was."""
-    return any(
-        revoked["user_certificate"] == certificate.serial_number
-        for one in _lists(evidence, trust)
-        if one.issuer == certificate.issuer
-        for revoked in one["tbs_cert_list"]["revoked_certificates"].native or ()
-    )
+    lists = (one["tbs_cert_list"] for one in _lists(evidence, trust) if one.issuer == certificate.issuer)
+    revoked = (each for one in lists for each in one["revoked_certificates"].native or ())
+    return any(each["user_certificate"] == certificate.serial_number for each in revoked)
 
 
 def stamped_time(

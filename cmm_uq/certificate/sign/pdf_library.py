@@ -134,19 +134,13 @@ class Tagged(WhitelistRule):  # type: ignore[misc]
             return []
 
 
-POLICY = StandardDiffPolicy(
-    [*DEFAULT_DIFF_POLICY.global_rules, Tagged().as_qualified(ModificationLevel.FORM_FILLING)],
-    DEFAULT_DIFF_POLICY.form_rule,
-)
+_grown_by = Tagged().as_qualified(ModificationLevel.FORM_FILLING)
+POLICY = StandardDiffPolicy([*DEFAULT_DIFF_POLICY.global_rules, _grown_by], DEFAULT_DIFF_POLICY.form_rule)
 """For what a further signature covers, whose signer is judged as well."""
 
-LASTING = StandardDiffPolicy(
-    [
-        CatalogModificationRule(frozenset({"/AcroForm", "/DSS"})),
-        DSSCompareRule().as_qualified(ModificationLevel.LTA_UPDATES),
-    ],
-    DEFAULT_DIFF_POLICY.form_rule,
-)
+_store = DSSCompareRule().as_qualified(ModificationLevel.LTA_UPDATES)
+_catalogue = CatalogModificationRule(frozenset({"/AcroForm", "/DSS"}))
+LASTING = StandardDiffPolicy([_catalogue, _store], DEFAULT_DIFF_POLICY.form_rule)
 """For what stands behind the last signature: evidence and time stamps, for which no signer vouches."""
 
 _STAMP = {
@@ -174,11 +168,8 @@ _WIDGET = {
 def is_good_stamp(embedded: Any, evidence: Evidence, trust: Trust) -> bool:
     """Whether a time stamp of the document fits, is of somebody trusted where anybody is, and says nothing besides."""
     pairs = ((embedded.sig_object, _STAMP), (embedded.sig_field, _WIDGET))
-    plain = all(
-        key in form and re.fullmatch(form[key], str(value), re.DOTALL)
-        for held, form in pairs
-        for key, value in held.items()
-    )
+    stated = ((form.get(key), str(value)) for held, form in pairs for key, value in held.items())
+    plain = all(form is not None and re.fullmatch(form, value, re.DOTALL) for form, value in stated)
     at, proven = stamped_time(embedded.signed_data, embedded.compute_digest, evidence, trust)
     return plain and (proven or (at is not None and not trust.anchors))
 
@@ -274,9 +265,8 @@ def _grown(old: Any, new: Any) -> list[Any]:
     )  # fmt: skip
     if not same or not elements:
         return []
-    holders = [after, top_after, after["/ParentTree"], numbers_after, _list(top_after)]
-    held = [one.container_ref for one in holders if one.container_ref is not None]
-    return [*elements, *held]
+    holders = (after, top_after, after["/ParentTree"], numbers_after, _list(top_after))
+    return [*elements, *(one.container_ref for one in holders if one.container_ref is not None)]
 
 
 def _top(root: Any) -> Any:

@@ -273,12 +273,8 @@ def _own(element: _Element, references: list[_Element]) -> bool:
     inner = (element.find(f"{DS}KeyInfo"), element.find(PROPERTIES))
     parts = {part.get("Id") for part in inner if part is not None}
     root = element.getroottree().getroot()
-    names = [
-        str(value)
-        for one in root.iter()
-        for key, value in one.attrib.items()
-        if str(key).rpartition("}")[2].lower() == "id"
-    ]
+    attributes = [(str(key), str(value)) for one in root.iter() for key, value in one.attrib.items()]
+    names = [value for key, value in attributes if key.rpartition("}")[2].lower() == "id"]
     named = [str(one.get("URI"))[1:] for one in references if one.get("URI") != ""]
     by_name = all(one.get("URI") is not None for one in references) and len(set(named)) == len(named)
     covered = element.find(PROPERTIES)

@@ -178,9 +178,8 @@ def _compare_html(inquiry: Inquiry, given: Given, again: Again, *, kernels: bool
     if kernels:
         here, there = (_NUMBER.sub("#", " ".join(text.split())) for text in (page.text, read_html(should, name).text))
         if here == there:
-            inquiry.left(
-                f"figures and pictures of {name}", "the figures differ in their last digits, and with them the pictures"
-            )
+            why = "the figures differ in their last digits, and with them the pictures"
+            inquiry.left(f"figures and pictures of {name}", why)
             return False
     line, stands, wanted = _first_line(content, should)
     inquiry.wrong("again", name, f"line {line}", "is not what its inputs give", stands, wanted)

@@ -256,9 +256,8 @@ def _check_manifest(inquiry: Inquiry, given: Given, manifest: Manifest) -> None:
         elif (hashed := sha256(contents[name]).hexdigest()) != digest:
             inquiry.wrong("files", name, "", f"is not the file whose hash {MANIFEST} has", hashed, digest)
         elif stands["files"][name] != (should := {"sha256": digest, "bytes": len(contents[name])}):
-            inquiry.wrong(
-                "files", MANIFEST, f"files.{name}", "is not what the file gives", stands["files"][name], should
-            )
+            there, problem = stands["files"][name], "is not what the file gives"
+            inquiry.wrong("files", MANIFEST, f"files.{name}", problem, there, should)
     for name in contents.keys() - manifest.files.keys():
         inquiry.wrong("files", MANIFEST, "files", f"does not name {name}")
     own = json.loads(manifest.as_json(dict.fromkeys(manifest.files, 0)))

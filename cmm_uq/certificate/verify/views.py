@@ -262,9 +262,8 @@ def _check_time(inquiry: Inquiry, name: str, signature: FileSignature, place: st
         inquiry.left(f"when {name} was signed", why)
     for moment, why in earliest:
         if time < moment:
-            inquiry.wrong(
-                "signatures", name, place, f"says {time:%Y-%m-%d %H:%M} UTC, before there was anything to sign: {why}"
-            )
+            problem = f"says {time:%Y-%m-%d %H:%M} UTC, before there was anything to sign: {why}"
+            inquiry.wrong("signatures", name, place, problem)
 
 
 def _check_signed(
@@ -280,10 +279,8 @@ def _check_signed(
         inquiry.notes.append(f"{name} carries no electronic signature: who issued it is not shown.")
     for number, one in enumerate(signed, 1):
         at = "at no time that it says" if one.time is None else f"on {one.time:%Y-%m-%d %H:%M} UTC"
-        who = (
-            f"{name}: {one.level} by {one.name or 'nobody'}, {at}{'' if one.time_proven else ' by the signer himself'}"
-        )
-        inquiry.notes.append(f"{who}; revocation: {one.revocation}.")
+        who, by = f"{name}: {one.level} by {one.name or 'nobody'}", "" if one.time_proven else " by the signer himself"
+        inquiry.notes.append(f"{who}, {at}{by}; revocation: {one.revocation}.")
         _check_time(inquiry, name, one, f"signature {number}", earliest)
         holds = one.problems or (one.intact and one.covers_whole_file and (one.trusted or trust is None))
         for problem in one.problems if holds else ("does not hold",):
