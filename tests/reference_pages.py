@@ -13,8 +13,8 @@ from typer.models import ArgumentInfo, CommandInfo
 
 from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.app.cli.commands import app
+from cmm_uq.app.commands.forms import SCHEMAS, as_text, schema_named
 from cmm_uq.app.commands.jobs.new import known
-from cmm_uq.app.commands.jobs.schemas import SCHEMAS, as_text, schema_named
 from cmm_uq.artefacts import kind_named
 from cmm_uq.base.files.table import unit_of
 from cmm_uq.jobs.beginning import Beginning

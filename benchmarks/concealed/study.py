@@ -17,7 +17,8 @@ from rich.progress import track
 from benchmarks.concealed.generator import DESIGNS, NOTHING, SIGNALS, case, seal
 from benchmarks.concealed.greedy import searched
 from benchmarks.concealed.physics import holds
-from cmm_uq.app.commands.diagnose import diagnose_job
+from cmm_uq.app.commands.diagnose import diagnose_read
+from cmm_uq.app.commands.reading import read_job
 
 
 def make(folder: Path, cases: int, seed: int) -> list[dict]:
@@ -41,7 +42,7 @@ def make(folder: Path, cases: int, seed: int) -> list[dict]:
 
 def diagnosed(job: Path) -> dict:
     start = time.perf_counter()
-    d = diagnose_job(job).diagnosis
+    d = diagnose_read(read_job(job)).diagnosis
     return {
         "verdict": d.verdict, "p": d.p_value, "seconds": time.perf_counter() - start,
         "effects": {

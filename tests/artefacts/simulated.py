@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.app.commands.diagnose import diagnosis_outcome
-from cmm_uq.app.commands.plans.plan import plan_outcome
+from cmm_uq.app.commands.plan import plan_outcome
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.certificate.document import Block, Document, Table

@@ -18,7 +18,7 @@ from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.screening.shape import Screening
 from cmm_uq.app.commands.diagnose import write_diagnosis
 from cmm_uq.app.commands.jobs.simulate import write_simulation
-from cmm_uq.app.commands.plans.plan import write_plan
+from cmm_uq.app.commands.plan import write_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import REPORT, write_report
 from cmm_uq.artefacts import BUILT_IN, kind_named, names

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from cmm_uq.app.commands.jobs.schemas import shipped
+from cmm_uq.app.commands.forms import shipped
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.messages import Message, Text, Verbatim
 from cmm_uq.certificate.certificate import conditions

@@ -157,7 +157,7 @@ def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0, language: 
     ------
     CmmUqError : the plan is impossible.
     """
-    from cmm_uq.app.commands.plans.plan import plan_outcome
+    from cmm_uq.app.commands.plan import plan_outcome
 
     return PlanOutcome(plan_outcome(in_language(_job(job), language), power=power, seed=seed))
 

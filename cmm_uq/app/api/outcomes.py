@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 from cmm_uq.app.commands.diagnose import DIAGNOSE
 from cmm_uq.app.commands.files import Form
 from cmm_uq.app.commands.parts.part import written
-from cmm_uq.app.commands.plans.plan import PLAN
+from cmm_uq.app.commands.plan import PLAN
 from cmm_uq.app.commands.prove import PROVE
 from cmm_uq.app.commands.report import REPORT
 from cmm_uq.base.errors import CmmUqError

@@ -78,16 +78,8 @@ class History:
 
         found: list[dict[str, Any]] = []
         for one in self.found.values:
-            series = one.series
-            columns = (
-                series.day,
-                series.value,
-                series.u,
-                series.u_artefact,
-                series.artefact,
-                series.entry,
-                series.interim,
-            )
+            s = series = one.series
+            columns = (s.day, s.value, s.u, s.u_artefact, s.artefact, s.entry, s.interim)
             found += [
                 {"name": series.name, "date": dt.date.fromordinal(int(day)), "value": float(value), "u": float(u),
                  "u_artefact": float(common), "artefact": str(artefact), "entry": int(entry), "interim": bool(interim)}
@@ -128,9 +120,8 @@ def due(
     CmmUqError : there are no records, or a machine is not in them.
     """
     asked = (machines,) if isinstance(machines, str) else machines
-    return DueList(
-        what_is_due(records, asked, on=_day(on), within=within, fleet=None if fleet is None else Path(fleet))
-    )
+    prior = None if fleet is None else Path(fleet)
+    return DueList(what_is_due(records, asked, on=_day(on), within=within, fleet=prior))
 
 
 def history(

@@ -68,10 +68,8 @@ def _questions(usual: dict[str, Any]) -> list[tuple[str, str, str, str]]:
             ("artefact", "name", "Artefact", artefact["name"]), ("artefact", "serial", "Its serial number", ""),
             *(("artefact", f"certificate_{key}", question, "") for key, question in CHAIN.items()),
         ]  # fmt: skip
-    for key, question in (
-        ("length_mm", "Certified length or diameter in mm"),
-        ("u_um", "Its standard uncertainty (k = 1) in µm"),
-    ):
+    sizes = {"length_mm": "Certified length or diameter in mm", "u_um": "Its standard uncertainty (k = 1) in µm"}
+    for key, question in sizes.items():
         if key in artefact:
             questions.append(("artefact", key, question, str(artefact[key])))
     for wish in usual.get("conformity", ()):
@@ -114,7 +112,6 @@ _BEST_FIT = "best fit"
 
 
 def part_answers() -> Answers:
-    """What the user says of a new job of a part."""
     from cmm_uq.app.commands.parts.new import Answers, certificate_files
     from cmm_uq.jobs.part.job import TABLES
 

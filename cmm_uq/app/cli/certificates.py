@@ -47,14 +47,7 @@ def verify(
     with end.progress() as stage:
         from cmm_uq.app.commands.certificates.verify import verify
 
-        found = verify(
-            files,
-            rerun=rerun,
-            trust=trust or None,
-            schema=schema,
-            records=records,
-            stage=stage or (lambda what, part: None),
-        )
+        found = verify(files, rerun=rerun, trust=trust or None, schema=schema, records=records, stage=stage)
     data = {"schema": "cmm-uq/verification/1", "subject": found.subject, **found.inquiry.as_data()}
     left = terminal.NOT_WHOLLY_CHECKED if found.inquiry.unchecked else 0
     end.put(data, _verified(found, verbose=end.verbose), terminal.NOT_VERIFIED if found.inquiry.findings else left)
@@ -94,13 +87,13 @@ def sign(
     signing = opt.open_key(key, time_server, level, trust)
     from cmm_uq.app.commands.certificates.signing import sign_files
 
-    done = sign_files(files, signing, out=out, records=records)
-    recorded = [f"Recorded in {done.records}."] if done.records else []
+    signed, place = sign_files(files, signing, out=out, records=records)
+    recorded = [f"Recorded in {place}."] if place else []
     end.put({
         "signer": signing.signer.name, "test_key": signing.signer.test_key, "at": signing.at.isoformat(),
         "level": "B-B" if signing.stamping is None else signing.stamping.level,
-        "files": [str(path) for path in done.files], "records": done.records,
-    }, [*recorded, *opt.signatures(signing, done.files)])  # fmt: skip
+        "files": [str(path) for path in signed], "records": place,
+    }, [*recorded, *opt.signatures(signing, signed)])  # fmt: skip
 
 
 def release(
@@ -165,13 +158,12 @@ def affected(
     with end.progress() as stage:
         from cmm_uq import __version__
         from cmm_uq.app.commands.certificates.affected import affected_certificates
-        from cmm_uq.app.commands.files import silent
         from cmm_uq.laboratory.records import open_records
 
         last = __version__ if to is None else to
         with open_records(records, read_only=write is None) as history:
             certificates = list(affected_certificates(
-                history, version, last, recompute=not only_list, out=write, where=str(history.place), stage=stage or silent
+                history, version, last, recompute=not only_list, out=write, where=str(history.place), stage=stage
             ))  # fmt: skip
     count = "1 certificate touched" if len(certificates) == 1 else f"{len(certificates)} certificates touched"
     changed = "" if only_list else f", {sum(one.changed for one in certificates)} changed"
@@ -290,14 +282,10 @@ def new_key(
     from cmm_uq.app.commands.certificates.signing import new_test_key
     from cmm_uq.certificate.sign import TEST_NOTE
 
-    made = new_test_key(file, name, lambda question: opt.ask_secret(question, twice=True))
-    end.put(
-        {"key": str(made.key), "certificate": str(made.certificate), "test_key": True},
-        [
-            f"{made.key} signs until {made.until}; {made.certificate} is for whoever is to trust it.",
-            f"TEST KEY: whatever it signs says: {TEST_NOTE}",
-        ],
-    )
+    certificate, until = new_test_key(file, name, lambda question: opt.ask_secret(question, twice=True))
+    whom = f"{file} signs until {until}; {certificate} is for whoever is to trust it."
+    data = {"key": str(file), "certificate": str(certificate), "test_key": True}
+    end.put(data, [whom, f"TEST KEY: whatever it signs says: {TEST_NOTE}"])
 
 
 def standards(
@@ -309,7 +297,7 @@ def standards(
     With --form a form is written that a laboratory fills in beside its own copy and names in [[conformity]] clauses.
     Nothing is overwritten.
     """
-    from cmm_uq.app.commands.certificates.standards import clauses_of, listed_standards, write_form
+    from cmm_uq.app.commands.forms import clauses_of, listed_standards, write_form
 
     if name is None:
         if form is not None:
@@ -327,6 +315,6 @@ def schema(
     name: str = argument("job", "job (with its plan), part, budget, truth, instrument or schedule.", "NAME"),
 ) -> None:
     """Print the JSON Schema of a file, with the kinds, effects and standards that are installed."""
-    from cmm_uq.app.commands.jobs.schemas import as_text, schema_named
+    from cmm_uq.app.commands.forms import as_text, schema_named
 
     put_json(as_text(schema_named(name)))

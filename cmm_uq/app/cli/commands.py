@@ -112,10 +112,7 @@ cmm-uq --help lists all commands, cmm-uq COMMAND --help the options of one."""
 
 
 @app.callback(invoke_without_command=True)
-def _alone(
-    context: typer.Context,
-    version: bool = flag(False, "--version", "Print the version and stop."),
-) -> None:
+def _alone(context: typer.Context, version: bool = flag(False, "--version", "Print the version and stop.")) -> None:
     from cmm_uq import __version__
 
     if version:

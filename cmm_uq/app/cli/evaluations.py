@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import typer
@@ -63,7 +64,7 @@ def report(
     with end.progress() as stage:
         from cmm_uq.app.commands.report import write_report
 
-        told = None if end.silent else show_imported
+        told = partial(show_imported, silent=end.silent)
         written = write_report(job[0], out, seed=seed, force=end.force, stage=stage, told=told, records=records,
                                language=end.language, signing=signing)  # fmt: skip
     try:
@@ -89,7 +90,7 @@ def diagnose(
     with end.progress() as stage:
         from cmm_uq.app.commands.diagnose import write_diagnosis
 
-        told = None if end.silent else show_imported
+        told = partial(show_imported, silent=end.silent)
         written = write_diagnosis(job, out, seed=seed, alpha=alpha, against=against, force=end.force, stage=stage, told=told,
                                   language=end.language, records=records)  # fmt: skip
     conclude(written, end)
@@ -106,7 +107,7 @@ def plan(
 ) -> None:
     """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
     with end.progress() as stage:
-        from cmm_uq.app.commands.plans.plan import write_plan
+        from cmm_uq.app.commands.plan import write_plan
 
         written = write_plan(job, out, power=power, seed=seed, force=end.force, stage=stage, language=end.language)
     conclude(written, end)

@@ -152,7 +152,6 @@ def _page(view: View, typed: str, height: int) -> RenderableType:
 
 
 def _lines(typed: Callable[[str | None], None]) -> None:
-    """Lines of standard input, to its end."""
     with contextlib.suppress(OSError, ValueError):
         while sys.stdin is not None and (line := sys.stdin.readline()):
             typed(line.rstrip("\r\n"))
@@ -273,8 +272,6 @@ def watch(profile: str = PROFILE, port: str = PORT, job: Path | None = JOB, seco
 
 
 class Parity(StrEnum):
-    """Of a serial line."""
-
     NONE, EVEN, ODD = "none", "even", "odd"
 
 

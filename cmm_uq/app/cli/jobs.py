@@ -82,7 +82,6 @@ def new(
 
 
 def _tables(machine: str, serial: str, settings: list[str]) -> dict[str, dict[str, Any]]:
-    """What the options say, by table and key."""
     named: dict[str, Any] = {name: value for name, value in (("name", machine), ("serial", serial)) if value}
     tables = {"machine": named} if named else {}
     for setting in settings:
@@ -144,13 +143,12 @@ def _setting(text: str) -> tuple[str, str | int]:
 
 
 def show_recognised(recognised: Recognition) -> None:
-    """What was recognised, as a table."""
     show([(("Recognised", "bold"),), *screen_layout(verbose=True).table(recognised.rows), ()])
 
 
-def show_imported(job: Job) -> None:
+def show_imported(job: Job, *, silent: bool) -> None:
     """What was recognised of the files of a job that were imported, before anything is computed of them."""
-    for recognised in job.imported:
+    for recognised in () if silent else job.imported:
         show_recognised(recognised)
 
 
@@ -188,7 +186,6 @@ def _clauses_shown(check: JobCheck) -> Iterable[str]:
 
 
 def _check_summary(check: JobCheck) -> Summary:
-    """Whether anything would stop report, and all that is wrong."""
     from cmm_uq.base.messages import Verbatim, plural, say
     from cmm_uq.certificate.wording import Headline, Summary
 
@@ -232,12 +229,7 @@ def compensate(
     end: Ending = opt.FORCED,
 ) -> None:  # fmt: skip
     """Correct a recording by its machine's error maps, as a job folder of its own, or make such a map of one."""
-    from cmm_uq.app.commands.jobs.compensate import (
-        worth_of,
-        write_compensated,
-        write_compensated_cloud,
-        write_new_map,
-    )
+    from cmm_uq.app.commands.jobs import compensate as corrected
     from cmm_uq.machine.physics.map_interpolation import Beyond
 
     beyond: Beyond = "extrapolate" if extrapolate else "refuse"
@@ -246,17 +238,17 @@ def compensate(
             problem = "--new-map makes a map, and goes with none of --cloud, --map-text and --extrapolate"
             raise CmmUqError(problem, fix="Leave out one of them")
         with end.progress() as stage:
-            files, found = write_new_map(job, out, force=end.force, stage=stage)
+            files, found = corrected.write_new_map(job, out, force=end.force, stage=stage)
         what = f"An error map of all errors that the recording of {job} shows"
-        conclude_derived(files, what, end, is_job=False, remarks=worth_of(found))
+        conclude_derived(files, what, end, is_job=False, remarks=corrected.worth_of(found))
         return
     if cloud is None:
-        files = write_compensated(job, out, beyond=beyond, map_text_c=map_text, force=end.force)
+        files = corrected.write_compensated(job, out, beyond=beyond, map_text_c=map_text, force=end.force)
     elif map_text is not None:
         raise CmmUqError("--map-text goes with a recording, not with --cloud", fix="Leave out one of them")
     else:
         with end.progress() as stage:
-            part = None if stage is None else partial(stage, f"Compensating {cloud.name}")
-            files = write_compensated_cloud(job, cloud, out, beyond=beyond, force=end.force, progress=part)
+            tell = partial(stage, f"Compensating {cloud.name}")
+            files = corrected.write_compensated_cloud(job, cloud, out, beyond=beyond, force=end.force, progress=tell)
     what = f"{'The recording' if cloud is None else cloud.name} of {job}, compensated by its error maps"
     conclude_derived(files, what, end, is_job=cloud is None)

@@ -222,10 +222,7 @@ def serve(
     from cmm_uq.app.serve import server as http, site as pages
 
     site = pages.Site(records)
-    with (
-        http.RecordsServer(site.answer, bind=bind, port=port, names=name or ()) as server,
-        keeping(lambda: "the page is closed"),
-    ):
+    with http.RecordsServer(site.answer, bind, port, name or ()) as server, keeping(lambda: "the page is closed"):
         if not quiet:
             say_now(f"{site.place} at {server.url} until Ctrl-C")
             if not server.alone:

@@ -48,7 +48,6 @@ def kinds(incomplete: str) -> list[str]:
 
 
 def profiles(incomplete: str) -> list[str]:
-    """Ready profiles of instruments, and files in TOML."""
     from cmm_uq.laboratory.live.instruments.library import ready
 
     return [*(name for name in ready() if name.startswith(incomplete)), *toml_files(incomplete)]
@@ -86,12 +85,10 @@ def argument(default: Any, text: str, metavar: str, shown: str | bool = True, **
 
 
 def flag(default: bool, name: str, text: str, *names: str) -> Any:
-    """An option without a value."""
     return typer.Option(default, name, *names, help=text)
 
 
 def out(default: None, shown: str) -> Any:
-    """Of ``--out``, where a folder is chosen without it."""
     return option(default, "Folder to write to.", "DIR", shown)
 
 
@@ -122,7 +119,7 @@ class Ending(NamedTuple):
     def silent(self) -> bool:
         return self.quiet or self.json
 
-    def progress(self) -> AbstractContextManager[Stage | None]:
+    def progress(self) -> AbstractContextManager[Stage]:
         return progress(quiet=self.silent, verbose=self.verbose)
 
     def put(self, data: Mapping[str, Any], lines: Iterable[str], code: int = 0) -> None:
@@ -224,7 +221,6 @@ _LONGEST = 36_500
 
 
 def day_of(text: str | None) -> dt.date | None:
-    """The day of ``--on``."""
     if text is None:
         return None
     try:
@@ -245,10 +241,9 @@ def time_of(text: str | None) -> dt.timedelta | None:
 
 
 def open_key(key: str, server: str | None, level: str | None, trust: list[Path] | None) -> Signing:
-    """The key, opened."""
-    from cmm_uq.app.commands.certificates.signing import SigningOptions, signing
+    from cmm_uq.app.commands.certificates.signing import signing, stamping_of
 
-    return signing(SigningOptions(key, level, server, tuple(trust or ())), ask_secret)
+    return signing(key, stamping_of(level, server, trust or ()), ask_secret)
 
 
 def ask_secret(question: str, *, twice: bool = False) -> str:
@@ -256,11 +251,9 @@ def ask_secret(question: str, *, twice: bool = False) -> str:
     from cmm_uq.app.commands.certificates.signing import PASSPHRASE_FILE
 
     if not on_terminal(sys.stdin):
-        raise CmmUqError(
-            f"{question.rstrip(': ')}: nobody is there to be asked",
-            where="standard input",
-            fix=f"Write it into a file, chmod 600, and name that in {PASSPHRASE_FILE}",
-        )
+        fix = f"Write it into a file, chmod 600, and name that in {PASSPHRASE_FILE}"
+        nobody = f"{question.rstrip(': ')}: nobody is there to be asked"
+        raise CmmUqError(nobody, where="standard input", fix=fix)
     found: str = typer.prompt(question.rstrip(": "), hide_input=True, confirmation_prompt=twice, err=True)
     return found
 

@@ -37,9 +37,8 @@ def _entries(count: int) -> str:
     return "1 entry" if count == 1 else f"{count} entries"
 
 
-_WITNESS = (
-    "Certificates (PDF, XML, results.json, folders): the records must have the entry that each states; again for more."
-)
+_FORMS = "Certificates (PDF, XML, results.json, folders)"
+_WITNESS = f"{_FORMS}: the records must have the entry that each states; again for more."
 WITNESS = option(None, _WITNESS, "FILE|DIR", "none", "--witness")
 
 
@@ -66,13 +65,7 @@ def verify(
     lines = [f"{one.kind}: {f'entry {one.entry}: ' if one.entry else ''}{one.problem}" for one in findings[:SHOWN]]
     lines += [f"and {len(findings) - SHOWN} more"] if len(findings) > SHOWN else []
     told = [{"kind": one.kind, "entry": one.entry, "problem": one.problem} for one in findings]
-    data: dict[str, Any] = {
-        "records": str(opened.shown),
-        "entries": number,
-        "head": last,
-        "sound": sound,
-        "findings": told,
-    }
+    data = {"records": str(opened.shown), "entries": number, "head": last, "sound": sound, "findings": told}
     if witness:
         count, newest = len(stated), max(one.head.entries for one in stated)
         data["witnesses"] = {"certificates": count, "entries": newest, "passed_over": without}
@@ -140,9 +133,7 @@ def _place(records: str | None) -> tuple[str | Path, str]:
 
 @opt.command(app, "restore", "records restore records-2026-11-22.db --records reports/records.db")
 def restore(
-    file: Path = argument(..., "File of a backup.", "FILE"),
-    records: str | None = opt.RECORDS,
-    end: Ending = opt.BRIEF,
+    file: Path = argument(..., "File of a backup.", "FILE"), records: str | None = opt.RECORDS, end: Ending = opt.BRIEF
 ) -> None:
     """Make records of a backup whose chain holds; a file in its place is kept as NAME.before-restore."""
     from cmm_uq.laboratory.records import backup as backups
@@ -215,9 +206,9 @@ def try_out(
     from cmm_uq.app.commands.laboratory.schedule import schedule_of, send_trial
 
     trials = send_trial(schedule_of(folders or (), schedule))
-    lines = (f"{one.channel}: {'sent' if one.sent else 'not sent'}{'. ' if one.why else ''}{one.why}" for one in trials)
-    data = {"channels": [{"channel": one.channel, "sent": one.sent, "why": one.why or None} for one in trials]}
-    end.put(data, lines, 0 if all(one.sent for one in trials) else NEEDS_A_PERSON)
+    lines = (f"{name}: {'sent' if sent else 'not sent'}{'. ' if why else ''}{why}" for name, sent, why in trials)
+    data = {"channels": [{"channel": name, "sent": sent, "why": why or None} for name, sent, why in trials]}
+    end.put(data, lines, 0 if all(sent for _, sent, _ in trials) else NEEDS_A_PERSON)
 
 
 _UNITS = "schedule print systemd jobs --at 06:15 --days MON,THU --out units"

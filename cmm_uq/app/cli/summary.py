@@ -67,6 +67,7 @@ LINES, WARNING_LINES = 3, 2  # of a text that is shortened, and of a warning
 ITEMS = 6  # of a list that is shortened
 NARROWEST = 8  # cells of a column that is folded
 _GAP, _MORE = "  ", " …"
+Row = tuple[str, str]  # names of files, and what they are
 
 
 @dataclass(frozen=True)
@@ -77,13 +78,7 @@ class Layout:
     verbose: bool = False
 
     def screen(
-        self,
-        summary: Summary,
-        *,
-        name: str = "",
-        banner: str = "",
-        files: Sequence[tuple[str, str]] = (),
-        folder: str = "",
+        self, summary: Summary, *, name: str = "", banner: str = "", files: Sequence[Row] = (), folder: str = ""
     ) -> list[Line]:
         """All that is shown at the end of a command on a job; ``banner``: what the reader must not overlook."""
         subject = ": ".join(filter(None, (name, ", ".join(filter(None, (summary.subject, summary.date))))))
@@ -155,16 +150,14 @@ class Layout:
 
 
 def _widths(cells: Sequence[Sequence[str]]) -> list[int]:
-    """Of the columns."""
     return [max(map(cell_len, column)) for column in zip(*cells, strict=True)]
 
 
 def screen_layout(*, verbose: bool) -> Layout:
-    """For standard output."""
     return Layout(columns() if on_terminal(sys.stdout) else None, verbose)
 
 
-def file_rows(files: Mapping[str, Path], *, whole: bool) -> list[tuple[str, str]]:
+def file_rows(files: Mapping[str, Path], *, whole: bool) -> list[Row]:
     """Rows of what was written and what it is; files that are the same thing on one row, unless each has a row of its own."""
     if whole:
         return [(str(path), _what(name)) for name, path in files.items()]
@@ -187,10 +180,7 @@ def folder_of(files: Mapping[str, Path]) -> str:
     return next((str(path.parent) for name, path in files.items() if "/" not in name), "")
 
 
-def show_summary(
-    summary: Summary, files: Mapping[str, Path], *, verbose: bool, name: str = "", banner: str = ""
-) -> None:
-    """A summary and the files that were written, on standard output."""
+def show_summary(summary: Summary, files: Mapping[str, Path], verbose: bool, name: str = "", banner: str = "") -> None:
     rows, folder = file_rows(files, whole=verbose), folder_of(files)
     show(screen_layout(verbose=verbose).screen(summary, name=name, banner=banner, files=rows, folder=folder))
 

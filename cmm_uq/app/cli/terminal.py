@@ -53,10 +53,8 @@ def any_character() -> None:
 def _nearest(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    nearest = (
-        NEAREST.get(c) or c.encode("ascii", "backslashreplace").decode() for c in error.object[error.start : error.end]
-    )
-    return "".join(nearest), error.end
+    beyond = error.object[error.start : error.end]
+    return "".join(NEAREST.get(c) or c.encode("ascii", "backslashreplace").decode() for c in beyond), error.end
 
 
 def json_for(encoding: str | None, text: str) -> str:
@@ -176,13 +174,13 @@ def tell(error: CmmUqError, code: int) -> None:
 
 
 @contextmanager
-def progress(*, quiet: bool, verbose: bool) -> Iterator[Stage | None]:
+def progress(*, quiet: bool, verbose: bool) -> Iterator[Stage]:
     """The stages of a command on standard error: a bar on a terminal; elsewhere a line each when asked for, else nothing.
 
     A stage is what is being done, and after a colon what of it is counted, which changes while it lasts.
     """
     if quiet or not (verbose or styled(sys.stderr)):
-        yield None
+        yield lambda what, part: None
     elif styled(sys.stderr):
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

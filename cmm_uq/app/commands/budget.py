@@ -21,10 +21,9 @@ FILES = ("budget.html", "budget.pdf", "results.json")
 
 def write_budget(
     file: Path, out: Path | None = None, *, seed: int | None = None, force: bool = False,
-    stage: Stage | None = None, language: Code = ENGLISH,
+    stage: Stage = silent, language: Code = ENGLISH,
 ) -> Written[Evaluation]:  # fmt: skip
     """Evaluate a model file and write ``budget.html``, ``budget.pdf`` and ``results.json``, all or none."""
-    tell = stage or silent
     fonts_of(language)  # refused before anything is computed
     model = read_model_file(file)
     folder = out or Path("reports") / file.stem
@@ -32,9 +31,9 @@ def write_budget(
         raise CmmUqError("has the name of a file that this command writes", where=str(file), fix="Rename it")
     owner = Owner("budget", _identity(file))
     with staged(folder, owner, inputs=(file,), force=force, expected=FILES) as place:
-        tell("Propagating the uncertainty", 0.0)
+        stage("Propagating the uncertainty", 0.0)
         evaluation = model.evaluate(seed)
-        tell("Rendering", 0.7)
+        stage("Rendering", 0.7)
         from cmm_uq.certificate.document import translated as said
         from cmm_uq.certificate.origin import as_json
         from cmm_uq.certificate.pages.budget import budget_document

@@ -48,22 +48,10 @@ DIAGNOSE = Form("diagnose", ("diagnosis.html", "diagnosis.pdf"), "diagnosis", (T
 def diagnose_read(
     job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
 ) -> AnalysisResult:
-    """Diagnose a job that was read, in the way of its kind."""
-    _check_rate(alpha)
-    with refusing_overflow(job.recording_path, OVERFLOW_FIX):
-        return _recipe(job).analyse(job, seed=seed, alpha=alpha, progress=progress)
-
-
-def diagnose_job(
-    folder: Path, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
-) -> JobDiagnosis:
-    _check_rate(alpha)
-    return _diagnose(read_job(folder), seed=seed, alpha=alpha, progress=progress)
-
-
-def _check_rate(alpha: float) -> None:
     if not 1e-6 <= alpha <= 0.5:
         raise CmmUqError(f"a false-alarm rate of {alpha:g}", fix="Give one between 0.000001 and 0.5; 0.01 is usual")
+    with refusing_overflow(job.recording_path, OVERFLOW_FIX):
+        return _recipe(job).analyse(job, seed=seed, alpha=alpha, progress=progress)
 
 
 def _diagnose(job: Job, *, seed: int, alpha: float, progress: Progress | None = None) -> JobDiagnosis:
@@ -164,7 +152,7 @@ def diagnosis_outcome(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, s
 
 def write_diagnosis(
     job: Path, out: Path | None = None, *, seed: int = 0, alpha: float = FALSE_ALARMS, against: Path | None = None,
-    force: bool = False, stage: Stage | None = None, told: Told | None = None, records: str | Path | None = NONE,
+    force: bool = False, stage: Stage = silent, told: Told = lambda job: None, records: str | Path | None = NONE,
     language: Code | None = None,
 ) -> Written[Outcome]:  # fmt: skip
     """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf`` and ``results.json``, all or none.
@@ -173,10 +161,9 @@ def write_diagnosis(
     that the recording is compared with, whatever the job names; ``records``: file, URL, ``none``, or ``None`` for those of
     the environment, else beside the folder.
     """
-    read, tell = in_language(read_job(job), language), stage or silent
+    read = in_language(read_job(job), language)
     if against is not None:
         read = compared_with(read, against)
-    if told is not None:
-        told(read)
-    outcome = partial(diagnosis_outcome, read, seed=seed, alpha=alpha, stage=tell)
-    return DIAGNOSE.write(read, outcome, out, force=force, stage=tell, records=records)
+    told(read)
+    outcome = partial(diagnosis_outcome, read, seed=seed, alpha=alpha, stage=stage)
+    return DIAGNOSE.write(read, outcome, out, force=force, stage=stage, records=records)

@@ -32,22 +32,26 @@ _UNITS_AT_THE_END = ("mm", "um", "arcsec", "ppm", "rad", "deg", "m", "k", "per")
 
 
 @contextlib.contextmanager
-def opened(where: str | Path | None, out: Path | None, *, make: bool = True) -> Iterator[Records | None]:
-    """The records that a command writes to; ``None`` where there are to be none, or are none and none are to be made."""
+def opened(
+    where: str | Path | None, out: Path | None, *, make: bool = True, create: bool = True
+) -> Iterator[Records | None]:
+    """The records of a command; ``None`` where there are to be none, or are none and none are to be made.
+
+    ``create``: whether a place that has nothing in it is made records.
+    """
     place = place_of(where, DEFAULT if out is None else beside(out.absolute()))
     if place is None or not (make or is_url(place) or Path(place).exists()):
         yield None
         return
     from cmm_uq.laboratory.records.opening import open_records
 
-    with open_records(place, create=True) as records:
+    with open_records(place, create=create) as records:
         yield records
 
 
 def ledger_of(
     records: Records, job: Job, command: str, folder: Path, files: Mapping[str, bytes], results: str
 ) -> Ledger:
-    """For the files of an outcome, that are recorded as they are put in place."""
     hashes = {name: sha256(data).hexdigest() for name, data in files.items()}
     content = content_of(records, files[results], job, command, folder, hashes)
     return records.ledger(kind_of_entry(content), content)
@@ -161,10 +165,9 @@ class Form:
             stage(f"Writing: {len(contents)} files to {folder}", 0.95)
             ledger = None if history is None else ledger_of(history, job, self.command, folder, contents, RESULTS)
             files = place.write(contents, ledger=ledger)
-            nameless = (
-                "" if job.facts.machine.serial else "; the machine has no [machine] serial and is known by its name"
-            )
-            recorded = "" if history is None else f"Recorded in {history.shown}{nameless}."
+            by_name = "; the machine has no [machine] serial and is known by its name"
+            how = "" if job.facts.machine.serial else by_name
+            recorded = "" if history is None else f"Recorded in {history.shown}{how}."
         stage("Done", 1.0)
         ends = (found.summary, found.conforming, job.facts.job.id, job.origin, recorded)
         return Written(found, contents[RESULTS], files, *ends)

@@ -41,15 +41,13 @@ OVERFLOW_FIX = (  # where figures leave the range of numbers
 def model_of(job: Job, artefact: Artefact) -> RecordingModel:
     if len(artefact.noise_scale) > OBSERVATIONS.most:
         many = f"{len(artefact.noise_scale)} observations are more than are estimated from at once"
-        raise CmmUqError(
-            many, where=job.recording_path, fix=f"{OBSERVATIONS.most} are the most: thin out the recording"
-        )
+        thin_out = f"{OBSERVATIONS.most} are the most: thin out the recording"
+        raise CmmUqError(many, where=job.recording_path, fix=thin_out)
     if (count := Freedoms.of(artefact.placing(artefact.points.xyz)).count) > FREEDOMS.most:
-        raise CmmUqError(
-            f"the placings have {count} freedoms together, more than are estimated beside the machine's errors at once",
-            where=job.recording_path,
-            fix=f"{FREEDOMS.most} are the most: split the recording",
+        many = (
+            f"the placings have {count} freedoms together, more than are estimated beside the machine's errors at once"
         )
+        raise CmmUqError(many, where=job.recording_path, fix=f"{FREEDOMS.most} are the most: split the recording")
     stated, aside = job.facts.recording.u_coordinate_um, job.facts.recording.measurements_aside
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
@@ -106,17 +104,16 @@ def recorded_model(job: Job, *, placings: bool = False) -> tuple[RecordingModel,
     )  # fmt: skip
     artefact = observe(job.facts.artefact, recording.points, where=where)
     model = model_of(job, artefact)
-    if placings or job.origin != MEASURED:
-        return model, (*recording.findings, *_unread(artefact))
-    found = model.estimate().least_squares
-    scatter = found.sigma_of_residuals
-    # what is said to be measured fits to the last digit, though its digits would show a nanometre
-    if found.degrees_of_freedom >= FEWEST_LEFT and max(scatter, display_step(job.points.xyz, scatter)) < NANOMETRE:
-        raise CmmUqError(
-            "the readings have no scatter at all: they agree with each other to below a nanometre, as computed or nominal "
-            "values do, and no machine's", where=job.recording_path,
-            fix='Record what the machine indicated; or, of a simulation, state origin = "simulated" in job.toml [job]',
-        )  # fmt: skip
+    if not placings and job.origin == MEASURED:
+        found = model.estimate().least_squares
+        scatter = found.sigma_of_residuals
+        # what is said to be measured fits to the last digit, though its digits would show a nanometre
+        if found.degrees_of_freedom >= FEWEST_LEFT and max(scatter, display_step(job.points.xyz, scatter)) < NANOMETRE:
+            raise CmmUqError(
+                "the readings have no scatter at all: they agree with each other to below a nanometre, as computed or nominal "
+                "values do, and no machine's", where=job.recording_path,
+                fix='Record what the machine indicated; or, of a simulation, state origin = "simulated" in job.toml [job]',
+            )  # fmt: skip
     return model, (*recording.findings, *_unread(artefact))
 
 
@@ -213,11 +210,10 @@ def against_simulation(job: Job, facts: SimulationFacts) -> Against:
     left = observe(job.facts.artefact, points, where=where)
     plain = replace(recorded, artefact=left, effects=named if facts.refit else ())
     if plain.estimate().least_squares.sigma_of_residuals < _NO_NOISE:
-        raise CmmUqError(
-            "prediction and recording differ by no noise at all: one of them is made of the other",
-            where=f"job.toml {KEY}" if job.prediction is None else job.prediction.where,
-            fix="Name the file that the simulation wrote, and the recording that the machine made",
-        )
+        alike = "prediction and recording differ by no noise at all: one of them is made of the other"
+        place = f"job.toml {KEY}" if job.prediction is None else job.prediction.where
+        fix = "Name the file that the simulation wrote, and the recording that the machine made"
+        raise CmmUqError(alike, where=place, fix=fix)
     stated = job.facts.recording.u_coordinate_um
     each = np.hypot(found.u, found.turned)
     u = float(np.sqrt(np.mean(each**2)))
@@ -287,7 +283,6 @@ def _weighing(observe: Observe, points: Points, ratio: Floats, u_common: float) 
 
 
 def _odd(found: PredictedErrors) -> list[Finding]:
-    """What must be known of a prediction before it is believed."""
     told: list[Text] = []
     if found.unused:
         told.append(plural(

@@ -49,6 +49,7 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 CASES, FEWEST, MOST = 200, 1, 20_000
 _PROGRAM = "cmm_uq.app.commands.prove"
 _OF_ARTEFACT = "artefact"  # mechanism of effects that a fault of the artefact may be called
+_KIND, _EXPLAINED = "job.toml [artefact] kind", "Prove a job whose recording is explained by effects"
 Sealed = Callable[[str], None]  # told the SHA-256 of the truth, before anything is diagnosed
 
 
@@ -143,11 +144,8 @@ def design_of(job: Job) -> tuple[Job, Design]:
     kind, facts = kind_of(job), job.facts
     offered = kind.offers("own", OwnAnalysis)
     if kind.observe is None or (offered is not None and offered.diagnose is not None):
-        raise CmmUqError(
-            f"a job of kind {facts.artefact.kind!r} has an analysis of its own, which is not proved by cases of effects",
-            where="job.toml [artefact] kind",
-            fix="Prove a job whose recording is explained by effects",
-        )
+        kind_of_its_own = f"a job of kind {facts.artefact.kind!r} has an analysis of its own"
+        raise CmmUqError(f"{kind_of_its_own}, which is not proved by cases of effects", where=_KIND, fix=_EXPLAINED)
     if facts.simulation is not None:
         raise CmmUqError("the diagnosis against a simulation is not proved: cases are drawn by the job's own model",
                          where=f"job.toml {KEY}", fix="Leave the simulation out")  # fmt: skip
@@ -164,7 +162,7 @@ def design_of(job: Job) -> tuple[Job, Design]:
         raise CmmUqError(what, where="job.toml [recording] u_coordinate_um", fix=fix)
     points = job.points
     if not len(points):
-        from cmm_uq.app.commands.plans.planning import make_plan
+        from cmm_uq.app.commands.planning import make_plan
 
         points = make_plan(job, power=False).outlook.points
     noise = Setting.of(replace(job, points=points), kind).noise
@@ -219,7 +217,7 @@ def prove_outcome(
 
 
 def write_proof(
-    job: Path, options: ProofOptions, out: Path | None = None, *, force: bool = False, stage: Stage | None = None,
+    job: Path, options: ProofOptions, out: Path | None = None, *, force: bool = False, stage: Stage = silent,
     sealed: Sealed | None = None, language: Code | None = None,
 ) -> Written[Outcome]:  # fmt: skip
     """Prove the diagnosis on a job's set-ups and write page, truth, answers and ``results.json``, all or none.
@@ -227,14 +225,13 @@ def write_proof(
     Truth and answers are kept in ``cases.unfinished`` while they come; the same call goes on with what an interrupted
     one left.
     """
-    tell = stage or silent
-    tell("Reading the job", 0.0)
+    stage("Reading the job", 0.0)
     read = in_language(read_job(job, recorded=False), language)
     folder = (out or REPORTS / read.facts.job.id / PROVE.below) / UNFINISHED
     kept: list[AnswersFolder] = []
-    outcome = partial(prove_outcome, read, options, stage=tell, folder=folder, sealed=sealed, kept=kept)
+    outcome = partial(prove_outcome, read, options, stage=stage, folder=folder, sealed=sealed, kept=kept)
     try:
-        written = PROVE.write(read, outcome, out, force=force, stage=tell)
+        written = PROVE.write(read, outcome, out, force=force, stage=stage)
     except BaseException:
         for answers in kept:
             answers.close()
@@ -290,8 +287,7 @@ def diagnosed_case(job: Job, design: Design, case: Case, setting: CaseSetting) -
         return {"number": case.number, REFUSED: f"{type(error).__name__}: {error}"}
     if not isinstance(found, JobDiagnosis):
         kind = job.facts.artefact.kind
-        raise CmmUqError(f"a diagnosis of a job of kind {kind!r} names no effects", where="job.toml [artefact] kind",
-                         fix="Prove a job whose recording is explained by effects")  # fmt: skip
+        raise CmmUqError(f"a diagnosis of a job of kind {kind!r} names no effects", where=_KIND, fix=_EXPLAINED)
     d = found.diagnosis
     return {
         "number": case.number, "verdict": d.verdict, "p_value": _rounded(d.p_value),
@@ -333,9 +329,5 @@ def _rounded(value: float) -> float | None:
     return float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None
 
 
-def main() -> None:
-    serve(begin)
-
-
 if __name__ == "__main__":
-    main()
+    serve(begin)

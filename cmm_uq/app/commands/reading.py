@@ -33,13 +33,11 @@ NAMEABLE = Nameable(table_of, names, Standards(standard_named, standard_names))
 
 @naming_package()
 def read_job(folder: Path, *, recorded: bool = True) -> Job:
-    """Read and check a job; see :func:`cmm_uq.jobs.reading.read_job`."""
     return reading.read_job(folder, NAMEABLE, recorded=recorded)
 
 
 @naming_package()
 def read_machine(folder: Path) -> Job:
-    """A job for its machine alone; see :func:`cmm_uq.jobs.reading.read_machine`."""
     return reading.read_machine(folder, NAMEABLE)
 
 
@@ -109,9 +107,8 @@ def as_csv(frame: pd.DataFrame, name: str) -> bytes:
     try:
         text = pd.DataFrame(frame).to_csv(index=False, lineterminator="\n")
     except (TypeError, ValueError) as error:
-        raise CmmUqError(
-            f"is no table: {error}", where=name, fix="Give a DataFrame with the columns of the file"
-        ) from None
+        fix = "Give a DataFrame with the columns of the file"
+        raise CmmUqError(f"is no table: {error}", where=name, fix=fix) from None
     return text.encode()
 
 

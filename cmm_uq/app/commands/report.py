@@ -156,8 +156,8 @@ def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent, composed: 
 
 
 def write_report(
-    job: Path, out: Path | None = None, *, seed: int = 0, force: bool = False, stage: Stage | None = None,
-    told: Told | None = None, records: str | Path | None = NONE, language: Code | None = None,
+    job: Path, out: Path | None = None, *, seed: int = 0, force: bool = False, stage: Stage = silent,
+    told: Told = lambda job: None, records: str | Path | None = NONE, language: Code | None = None,
     signing: Signing | None = None,
 ) -> Written[Outcome]:  # fmt: skip
     """Analyse a job and write its certificate (HTML, PDF, DCC), ``results.json`` and ``provenance.json``, all or none.
@@ -167,11 +167,9 @@ def write_report(
     records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the
     folder; signing : who signs the certificate; ``None`` for nobody.
     """
-    tell = stage or silent
-    tell("Reading the job", 0.0)
+    stage("Reading the job", 0.0)
     read = with_replaced(in_language(read_job(job), language), records, out)
     report_recipe(read)  # refused before anything is made
-    if told is not None:
-        told(read)
-    outcome = partial(report_outcome, read, seed=seed, stage=tell)
-    return REPORT.write(read, outcome, out, force=force, stage=tell, records=records, signing=signing)
+    told(read)
+    outcome = partial(report_outcome, read, seed=seed, stage=stage)
+    return REPORT.write(read, outcome, out, force=force, stage=stage, records=records, signing=signing)

@@ -34,7 +34,6 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 
 
 def certificate_page(view: SiteView, request: WebRequest) -> p.WebPage:
-    """The certificate whose entry the address names."""
     request.only(("entry",))
     one, entry = _named(view, request)
     folder, number = Path(one.folder), Verbatim(one.number)
@@ -68,7 +67,6 @@ def certificate_page(view: SiteView, request: WebRequest) -> p.WebPage:
 
 
 def recorded_file(view: SiteView, request: WebRequest) -> WebResponse:
-    """A file of a certificate, as it was recorded."""
     request.only(("entry", "name", "keep"))
     keep, name = request.one_of("keep", ("yes",)) == "yes", request.text("name")
     one, entry = _named(view, request)
@@ -165,7 +163,6 @@ def _files(one: RecordedCertificate, files: tuple[RecordedFile, ...]) -> PageTab
 
 
 def diagnosis_section(diagnosis: Mapping[str, Any]) -> tuple[p.Section, ...]:
-    """A section, where there is a verdict."""
     if not diagnosis.get("verdict"):
         return ()
     facts: list[tuple[Text, Cell]] = [(say("Verdict"), p.cell_of(p.VERDICTS, str(diagnosis["verdict"])))]
@@ -224,7 +221,6 @@ class RecordedFile(NamedTuple):
 
     @property
     def shown(self) -> bool:
-        """Whether a browser shows it."""
         return Path(self.name).suffix.lower() in MEDIA
 
 
@@ -252,7 +248,6 @@ def hashes(data: Mapping[str, Any]) -> dict[str, str]:
 
 
 def content_of(file: RecordedFile, folder: Path) -> bytes:
-    """The recorded bytes."""
     name, place = Verbatim(file.name), Verbatim(str(folder))
 
     def refused(problem: Text, fix: Text = NOTHING, status: HTTPStatus = HTTPStatus.CONFLICT) -> RefusedRequest:
@@ -294,7 +289,6 @@ def results_of(files: tuple[RecordedFile, ...], folder: Path) -> dict[str, Any]:
 
 
 def sent(file: RecordedFile, content: bytes, *, keep: bool) -> WebResponse:
-    """A recorded file as an answer."""
     media, policy = MEDIA.get(Path(file.name).suffix.lower(), ("application/octet-stream", OWN))
     how = "attachment" if keep or not file.shown else "inline"
     name = quote(file.name.rpartition("/")[2], safe="")

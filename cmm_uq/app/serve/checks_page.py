@@ -47,7 +47,6 @@ class FileMatch:
 
 
 def look_up(records: Records, dropped: UploadedFile) -> FileMatch:
-    """Look a file up."""
     if (results := records.has_results(dropped.sha256)) is not None:
         return FileMatch("recorded", records.certificate(results), "results.json")
     says = number_in(dropped.content or b"")
@@ -83,14 +82,12 @@ _SCOPE = say(
 
 
 def file_page(view: SiteView, request: WebRequest) -> WebPage:
-    """The form."""
     request.only(())
     lead = say("Is this certificate the one that was issued, and does it still hold?")
     return WebPage(say("Check a file"), "/file", lead=lead, blocks=_form())
 
 
 def dropped_page(view: SiteView, request: WebRequest) -> WebPage:
-    """What the records know of the file in the request."""
     request.only(())
     dropped = read_dropped(request)
     known = look_up(view.records, dropped)

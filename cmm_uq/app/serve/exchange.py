@@ -44,7 +44,6 @@ class WebRequest:
     length: int = 0
 
     def only(self, known: Iterable[str]) -> None:
-        """Refuse what this page does not know."""
         names = tuple(known)
         for name in self.query:
             if name not in names:
@@ -86,7 +85,6 @@ class WebRequest:
 
 
 def read_address(target: str) -> tuple[str, dict[str, str]]:
-    """Path and query of a request line."""
     if not target.startswith("/") or not target.isascii() or not target.isprintable():
         raise bad(say("the address is no path of this page"))
     parts = urlsplit(target)
@@ -107,7 +105,6 @@ def read_address(target: str) -> tuple[str, dict[str, str]]:
 
 
 def bad(problem: Text, fix: Text = NOTHING) -> RefusedRequest:
-    """A request that cannot be understood."""
     return RefusedRequest(HTTPStatus.BAD_REQUEST, problem, fix)
 
 
@@ -148,7 +145,6 @@ class WebResponse:
     headers: Mapping[str, str] = field(default_factory=dict)
 
     def all_headers(self) -> dict[str, str]:
-        """Every header but the connection's."""
         return {
             "Content-Type": self.media, "Content-Length": str(len(self.body)), **SECURITY,
             "Content-Security-Policy": self.policy, "Referrer-Policy": self.referrer, **self.headers,
@@ -178,7 +174,6 @@ class UploadedFile:
 
 
 def read_dropped(asked: WebRequest) -> UploadedFile:
-    """The file in the body of a form."""
     found = _BOUNDARY.fullmatch(asked.headers.get("content-type", "").strip())
     if found is None or asked.body is None:
         raise RefusedRequest(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, say("this page takes a file from its own form only"))

@@ -46,7 +46,6 @@ def _options(words: Mapping[str, p.Word]) -> tuple[tuple[str, Text], ...]:
 
 
 def _dates(request: WebRequest) -> tuple[dt.date | None, dt.date | None, tuple[p.FormField, ...]]:
-    """First and last day of a list, and the fields that they are chosen by."""
     since, until = request.day("since"), request.day("until")
     if since is not None and until is not None and since > until:
         raise bad(say("the list would end before it begins"), say("Exchange the two dates"))
@@ -55,7 +54,6 @@ def _dates(request: WebRequest) -> tuple[dt.date | None, dt.date | None, tuple[p
 
 
 def certificates_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
-    """Certificates and interim checks."""
     request.only(_KEYS)
     text, machine, artefact = (request.text(name) for name in ("text", "machine", "artefact"))
     origin = request.one_of("origin", tuple(p.ORIGINS)) or "measured"
@@ -124,7 +122,6 @@ ARTEFACT_COLUMNS = p.columns(
 
 
 def artefacts_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
-    """All artefacts."""
     request.only(("text", "page"))
     folded = request.text("text").casefold()
     known = sorted(view.records.artefacts(), key=lambda one: (one.due or dt.date.max, one.serial))
@@ -169,7 +166,6 @@ COLUMNS = p.columns(
 
 
 def machines_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
-    """All machines, or those that were chosen."""
     request.only(("text", "state", "place", "page"))
     text, state, place = request.text("text"), request.one_of("state", tuple(v.GROUPS)), request.text("place")
     request.count("page")  # refused before anything is worked out
@@ -204,9 +200,8 @@ def _has(one: v.MachineStanding, text: str, state: str, place: str) -> bool:
 
 
 def _overdue_artefacts(view: v.SiteView) -> tuple[p.PageNotice, ...]:
-    overdue = [
-        (one.serial, one.due) for one in view.records.artefacts() if one.due is not None and one.due < view.today
-    ]
+    known = view.records.artefacts()
+    overdue = [(one.serial, one.due) for one in known if one.due is not None and one.due < view.today]
     if not overdue:
         return ()
     count = len(overdue)
@@ -220,10 +215,9 @@ def _overdue_artefacts(view: v.SiteView) -> tuple[p.PageNotice, ...]:
 
 
 def due_cell(one: v.MachineStanding, *, why: bool = True) -> p.Cell:
-    """When a machine is due, and why."""
     if one.due is None:
         return p.Cell(DASH)
-    return p.Cell(DASH if one.due.day is None else day(one.due.day), note=one.due.why if why else NOTHING)
+    return p.Cell(DASH if one.due.due is None else day(one.due.due), note=one.due.why if why else NOTHING)
 
 
 def _row(one: v.MachineStanding) -> tuple[p.Cell, ...]:
@@ -285,8 +279,8 @@ def machine_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
 def _group_words(one: v.MachineStanding, name: str) -> Text:
     """A group of a machine, with the date or the decision that put it there."""
     due, certificate = one.due, one.newest.certificate
-    if due is not None and due.day is not None:
-        date = day(due.day)
+    if due is not None and due.due is not None:
+        date = day(due.due)
         dated = {"overdue": say("Overdue since {day}", day=date), "due": say("Due soon, on {day}", day=date),
                  "order": say("In order, due on {day}", day=date)}  # fmt: skip
         if name in dated:

@@ -236,7 +236,6 @@ def day_cell(date: dt.date | None) -> Cell:
 
 
 def moment(at: dt.datetime) -> Text:
-    """A moment to the minute."""
     return say("{moment} UTC", moment=Day(f"{at:%Y-%m-%d %H:%M}"))
 
 

@@ -45,7 +45,7 @@ class RecordsServer(ThreadingHTTPServer):
     request_queue_size = 64
     allow_reuse_address = not hasattr(socket, "SO_EXCLUSIVEADDRUSE")  # on Windows it would let two servers share a port
 
-    def __init__(self, answer: Answering, *, bind: str = "127.0.0.1", port: int = 8765, names: Collection[str] = ()):
+    def __init__(self, answer: Answering, bind: str = "127.0.0.1", port: int = 8765, names: Collection[str] = ()):
         self.answer, self._lock = answer, threading.Lock()
         self._open: dict[Any, tuple[str | int, float]] = {}  # whose, and since when it waits for its browser
         try:
@@ -73,7 +73,6 @@ class RecordsServer(ThreadingHTTPServer):
 
     @property
     def url(self) -> str:
-        """Where a browser on this machine finds it."""
         host = self.server_name
         if ipaddress.ip_address(host).is_unspecified:
             host = "127.0.0.1"

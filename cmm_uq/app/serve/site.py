@@ -108,7 +108,6 @@ class Site:
         self.checking = ChainComparing(self.opened)
 
     def opened(self) -> Records:
-        """The records, to be read."""
         return open_records(self._where, read_only=True)
 
     def warm(self) -> None:
@@ -117,7 +116,6 @@ class Site:
             self.machines()
 
     def answer(self, request: WebRequest | RefusedRequest) -> WebResponse:
-        """The answer to a request, whatever happens."""
         title = None
         try:
             if isinstance(request, RefusedRequest):
@@ -178,11 +176,6 @@ class Site:
         """How every machine stands, the most urgent first."""
         with self.opened() as records:
             return self._standing(records, self._today())
-
-    def forget(self) -> None:
-        """Work out anew how the machines stand when it is next asked for, as after a new entry."""
-        with self._lock:
-            self._kept = None
 
     def _rendered(self, page: WebPage) -> WebResponse:
         foot = (

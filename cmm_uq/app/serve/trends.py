@@ -41,7 +41,6 @@ class PlotFrame:
 
     @property
     def left(self) -> float:
-        """Margin of the longest figure at the axis."""
         longest = max((len(text) for text in ticks(self.low, self.high)[1]), default=0)
         return 10 + DIGIT * min(longest, 15)
 
@@ -115,7 +114,6 @@ def drawn(trend: Trend, limit_word: Text, adjusted_word: Text) -> str:
 
 
 def _range(values: Sequence[float]) -> tuple[float, float]:
-    """Somewhat more than the values."""
     low, high = min(values), max(values)
     room = 0.08 * (high - low) or 0.1 * abs(high) or 1.0
     return low - room, high + room
@@ -234,7 +232,6 @@ def _chart(course: Course, adjusted: tuple[int, ...]) -> Chart:
 
 
 def _in_words(course: Course, newest: Text, *, beyond: bool) -> Text:
-    """The sentence in place of the picture."""
     values = [one.value for one in course.stated]
     low, high = (number(value, ".4g") for value in (min(values), max(values)))
     first, last = course.stated[0].day, course.stated[-1].day

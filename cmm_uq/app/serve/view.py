@@ -16,6 +16,7 @@ from cmm_uq.app.serve.page import DECISIONS, VERDICTS, Cell, PageTable, address
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 from cmm_uq.certificate.document import Standing
+from cmm_uq.laboratory.due.due import DueItem
 from cmm_uq.laboratory.records.facts import ChainFinding
 from cmm_uq.laboratory.records.listing import CertificateFilter, ListedCertificate, Newest, chosen, standing_of_all
 from cmm_uq.laboratory.records.store import Records
@@ -98,7 +99,6 @@ def machine_cell(serial: str, name: str = "") -> Cell:
 
 
 def certificate_cell(one: ListedCertificate) -> Cell:
-    """A certificate by its number, leading to its page."""
     note = say("interim check") if one.interim else say("diagnosis") if one.command != "report" else NOTHING
     return Cell(p.shown(one.number or one.job), address("/certificate", entry=one.entry), note=note)
 
@@ -119,9 +119,8 @@ def certificates_table(
          p.cell_of(p.DECISIONS, one.decision), p.cell_of(p.VERDICTS, one.diagnosis), p.cell_of(p.STATES, one.state))
         for one in rows
     ]  # fmt: skip
-    return PageTable(
-        caption, tuple(COLUMNS[i] for i in columns), tuple(tuple(row[i] for i in columns) for row in cells), empty
-    )
+    shown = tuple(tuple(row[i] for i in columns) for row in cells)
+    return PageTable(caption, tuple(COLUMNS[i] for i in columns), shown, empty)
 
 
 Listed = TypeVar("Listed")
@@ -134,12 +133,10 @@ def on_page(found: Sequence[Listed], request: WebRequest) -> Sequence[Listed]:
 
 
 def paged(records: Records, choice: CertificateFilter, request: WebRequest) -> tuple[list[ListedCertificate], int]:
-    """The certificates of a page of a list, and how many there are on all."""
     return chosen(records, choice, PER_PAGE, (request.count("page") - 1) * PER_PAGE)
 
 
 def pager(request: WebRequest, count: int, what: Text) -> tuple[p.Pager, ...]:
-    """Where in the list the reader is; nothing where there is only one page."""
     page = request.count("page")
     if count <= PER_PAGE and page == 1:
         return ()
@@ -163,24 +160,13 @@ def problem_of(error: CmmUqError) -> tuple[Text, Text]:
 SOON = dt.timedelta(days=60)  # what is due within it is shown before it is late
 
 
-class DueDate(NamedTuple):
-    """On which ``day`` a machine is due, ``None`` where no rule gives one, and why.
-
-    ``beyond``: whether its last certificate finds it beyond its limits: it is overdue from that day on.
-    """
-
-    day: dt.date | None
-    why: Text
-    beyond: bool = False
+DueDates = Callable[[Records, dt.date], Mapping[str, DueItem]]  # on a day, by serial, of machines that have a date
 
 
-DueDates = Callable[[Records, dt.date], Mapping[str, DueDate]]  # on a day, by serial, of machines that have one
-
-
-def by_rule(records: Records, today: dt.date) -> dict[str, DueDate]:
+def by_rule(records: Records, today: dt.date) -> dict[str, DueItem]:
     """Of all machines, each by its own rule, its interim checks and its adjustments."""
     found = due_in(records, (), today) if records.head()[0] else []
-    return {one.serial: DueDate(one.due, one.why, one.beyond) for one in found if one.item == "machine"}
+    return {one.serial: one for one in found if one.item == "machine"}
 
 
 @dataclass(frozen=True)
@@ -209,7 +195,7 @@ class MachineStanding(NamedTuple):
     """A machine with its newest certificate, when it is due, and its groups, the most urgent first."""
 
     newest: Newest
-    due: DueDate | None
+    due: DueItem | None
     groups: tuple[str, ...]
 
     @property
@@ -228,17 +214,17 @@ def in_order(machines: Sequence[MachineStanding]) -> tuple[MachineStanding, ...]
     """The most urgent first, then by due date and serial."""
 
     def urgency(one: MachineStanding) -> tuple[int, dt.date, str]:
-        due = one.due.day if one.due is not None and one.due.day is not None else dt.date.max
+        due = one.due.due if one.due is not None and one.due.due is not None else dt.date.max
         return _URGENCY[one.groups[0]], due, one.serial
 
     return tuple(sorted(machines, key=urgency))
 
 
-def groups(newest: Newest, due: DueDate | None, today: dt.date) -> tuple[str, ...]:
+def groups(newest: Newest, due: DueItem | None, today: dt.date) -> tuple[str, ...]:
     """To which groups a machine belongs, the most urgent first."""
     found: tuple[str, ...] = ()
-    if due is not None and due.day is not None:
-        found = ("overdue",) if due.beyond or due.day < today else ("due",) if due.day <= today + SOON else ()
+    if due is not None and due.due is not None:
+        found = ("overdue",) if due.beyond or due.due < today else ("due",) if due.due <= today + SOON else ()
     certificate = newest.certificate
     if certificate is None:
         found += ("never",)

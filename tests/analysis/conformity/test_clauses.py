@@ -10,7 +10,7 @@ import pytest
 
 from cmm_uq.analysis.conformity.standards import BUILT_IN, CLAUSES, statement
 from cmm_uq.analysis.conformity.statement import Statement, clauses_in_words
-from cmm_uq.app.commands.certificates.standards import form, write_form
+from cmm_uq.app.commands.forms import form, write_form
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError

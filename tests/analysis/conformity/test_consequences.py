@@ -11,7 +11,8 @@ import pandas as pd
 import pytest
 
 from cmm_uq.analysis.conformity.accuracy import figures
-from cmm_uq.app.commands.diagnose import diagnose_job
+from cmm_uq.app.commands.diagnose import diagnose_read
+from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.units import ARCSECOND
 from cmm_uq.certificate.result import JobDiagnosis
 
@@ -31,7 +32,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> JobDiagnosis:
     text = re.sub(r"(?m)^effects = .*$", 'effects = ["scale_x", "scale_y", "scale_z"]', text)
     text = re.sub(r"(?m)^limit_um = .*$", f"limit_um = {LIMIT_UM}", text)
     (job / "job.toml").write_text(text + STATED, encoding="utf-8")
-    return diagnose_job(job)
+    return diagnose_read(read_job(job))
 
 
 STATED = """
@@ -68,4 +69,4 @@ def test_a_decision_that_the_squareness_spoilt_is_mended_by_its_correction(found
 
 
 def test_nothing_found_changes_nothing() -> None:
-    assert diagnose_job(EXAMPLE).consequences is None
+    assert diagnose_read(read_job(EXAMPLE)).consequences is None

@@ -19,7 +19,7 @@ from benchmarks.told_nothing import case
 from cmm_uq.analysis.diagnosis.comparison.search import model_comparison
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.analysis.diagnosis.held_out import improvement
-from cmm_uq.app.commands.diagnose import diagnose_job
+from cmm_uq.app.commands.diagnose import diagnose_read
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
@@ -85,7 +85,7 @@ def test_told_only_of_scale_the_real_recording_shows_its_squareness() -> None:
 
 
 def test_with_all_six_factors_the_real_recording_is_consistent() -> None:
-    found = diagnose_job(ROOT / "examples" / "iota-1102-20C").diagnosis
+    found = diagnose_read(read_job(ROOT / "examples" / "iota-1102-20C")).diagnosis
     assert found.verdict == "consistent"
     assert not found.effects
     assert not found.where

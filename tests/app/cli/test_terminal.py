@@ -18,7 +18,7 @@ from rich.cells import cell_len
 from cmm_uq.app.cli import terminal as encoding
 from cmm_uq.app.cli.summary import COLOURS, Layout
 from cmm_uq.app.cli.terminal import Line, folded, progress
-from cmm_uq.app.commands.plans.plan import plan_summary
+from cmm_uq.app.commands.plan import plan_summary
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.units import Unit
 from cmm_uq.certificate.wording import Headline, Summary

@@ -17,7 +17,7 @@ import pypdf
 import pytest
 
 from cmm_uq.app.commands.budget import write_budget
-from cmm_uq.app.commands.jobs.schemas import SCHEMAS, as_text, schema_named
+from cmm_uq.app.commands.forms import SCHEMAS, as_text, schema_named
 from cmm_uq.artefacts import kind_named
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.schema import keys_of

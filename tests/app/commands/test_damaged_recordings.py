@@ -14,7 +14,7 @@ import pytest
 import cmm_uq
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import tail_probability
 from cmm_uq.analysis.screening.columns import Finding
-from cmm_uq.app.commands.diagnose import diagnose_job, diagnose_read, screened_model
+from cmm_uq.app.commands.diagnose import diagnose_read, screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import evaluate_job as analyse_job, outcome_of
 from cmm_uq.base.errors import CmmUqError
@@ -77,14 +77,14 @@ def test_a_damaged_recording_is_refused_with_its_place(example: str, damage: Dam
 @pytest.mark.parametrize("example", KINDS)
 def test_three_rows_are_too_few_for_any_artefact(example: str, tmp_path: Path) -> None:
     with pytest.raises(CmmUqError) as error:
-        diagnose_job(job_with(example, lambda table: table.head(3), tmp_path))
+        diagnose_read(read_job(job_with(example, lambda table: table.head(3), tmp_path)))
     assert error.value.fix
 
 
 @pytest.mark.parametrize("example", [name for name in KINDS if not name.startswith(("iota", "bryan", "digitizer"))])
 def test_a_single_placing_is_diagnosed_by_its_points(example: str, tmp_path: Path) -> None:
     """No placing can be held out, so its points are, each with its repeats."""
-    improvement = diagnose_job(job_with(example, one_place, tmp_path)).diagnosis.improvement
+    improvement = diagnose_read(read_job(job_with(example, one_place, tmp_path))).diagnosis.improvement
     assert np.isfinite([improvement.heldout_rms_before_um, improvement.heldout_rms_after_um]).all()
 
 
@@ -92,14 +92,14 @@ def test_a_single_placing_is_diagnosed_by_its_points(example: str, tmp_path: Pat
 def test_one_distance_or_attitude_determines_nothing(example: str, tmp_path: Path) -> None:
     job = job_with(example, one_place, tmp_path)
     with pytest.raises(CmmUqError):
-        diagnose_job(job)
+        diagnose_read(read_job(job))
 
 
 @pytest.mark.parametrize("row", [0, 4, 41])
 def test_a_triangle_without_one_of_its_corners_is_refused(row: int, tmp_path: Path) -> None:
     job = job_with("triangle-simulated", lambda table: table.drop(index=row), tmp_path)
     with pytest.raises(CmmUqError, match="the triangle does not close"):
-        diagnose_job(job)
+        diagnose_read(read_job(job))
 
 
 def test_more_observations_than_memory_holds_are_refused_before_the_estimate(tmp_path: Path) -> None:
@@ -111,7 +111,7 @@ def test_more_observations_than_memory_holds_are_refused_before_the_estimate(tmp
     columns = {"measurement": 1, "point": balls + 1, "repeat": 1, **read, **grid}
     job = job_with("plate-simulated", lambda _: pd.DataFrame(columns), tmp_path)
     with pytest.raises(CmmUqError, match=f"{3 * len(balls)} observations are more than are estimated from at once"):
-        diagnose_job(job)
+        diagnose_read(read_job(job))
 
 
 EFFECTS = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")

@@ -30,7 +30,7 @@ from cmm_uq.app.commands.jobs.new import (
     write_new,
 )
 from cmm_uq.app.commands.parts.new import PART
-from cmm_uq.app.commands.plans.plan import write_plan
+from cmm_uq.app.commands.plan import write_plan
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.app.commands.report import report_outcome
 from cmm_uq.artefacts import BUILT_IN, kind_named

@@ -14,9 +14,9 @@ import pytest
 from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.app.commands.jobs.check import check_job
 from cmm_uq.app.commands.jobs.simulate import simulate
-from cmm_uq.app.commands.plans.page import combination, plan_document
-from cmm_uq.app.commands.plans.plan import plan_results
-from cmm_uq.app.commands.plans.planning import RECORDED, SPREAD, MeasurementPlan, make_plan
+from cmm_uq.app.commands.plan import plan_results
+from cmm_uq.app.commands.plan_page import combination, plan_document
+from cmm_uq.app.commands.planning import RECORDED, SPREAD, MeasurementPlan, make_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import evaluate_job as analyse_job
 from cmm_uq.base.errors import CmmUqError

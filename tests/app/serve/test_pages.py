@@ -12,9 +12,10 @@ import pytest
 from cmm_uq.app.serve.certificate_page import RecordedFile, content_of, files_of, results_of, sent
 from cmm_uq.app.serve.checks_page import FileMatch, look_up, number_in, verdict
 from cmm_uq.app.serve.exchange import RefusedRequest, UploadedFile
-from cmm_uq.app.serve.view import DueDate, MachineStanding, groups, in_order
+from cmm_uq.app.serve.view import MachineStanding, groups, in_order
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.render import render_html, render_pdf
+from cmm_uq.laboratory.due.due import DueItem
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.facts import Entry, RecordedMachine
 from cmm_uq.laboratory.records.listing import ListedCertificate, Newest
@@ -34,8 +35,8 @@ def newest(
     return Newest(RecordedMachine(serial, "", "", "", ""), listed)
 
 
-def due(days: int) -> DueDate:
-    return DueDate(TODAY + dt.timedelta(days=days), say("so many days"))
+def due(days: int) -> DueItem:
+    return DueItem("machine", "1", "", "", "", None, TODAY + dt.timedelta(days=days), say("so many days"))
 
 
 @pytest.mark.parametrize(("days", "group"), [(-1, "overdue"), (0, "due"), (60, "due"), (61, "order")])

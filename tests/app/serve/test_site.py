@@ -18,9 +18,10 @@ from cmm_uq.app.commands.laboratory.due import due_in
 from cmm_uq.app.serve.exchange import WebRequest, read_address
 from cmm_uq.app.serve.page import WebPage
 from cmm_uq.app.serve.site import PAGES, Site
-from cmm_uq.app.serve.view import ChainComparing, DueDate
+from cmm_uq.app.serve.view import ChainComparing
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
+from cmm_uq.laboratory.due.due import DueItem
 from cmm_uq.laboratory.records import open_records
 from tests.app.serve.conftest import Looked
 from tests.app.serve.laboratory import HOSTILE, RESULTS, TODAY, TURNED, entry_of, opened_in
@@ -176,11 +177,11 @@ def test_a_page_of_a_long_list_leads_to_its_neighbours(tmp_path: Path) -> None:
 def test_due_dates_are_asked_of_who_serves(laboratory: Path) -> None:
     asked: list[dt.date] = []
 
-    def due(records: object, today: dt.date) -> dict[str, DueDate]:
+    def due(records: object, today: dt.date) -> dict[str, DueItem]:
         asked.append(today)
         return {
-            "K1": DueDate(dt.date(2026, 12, 24), say("it drifts")),
-            "K3": DueDate(None, say("nothing is known of it")),
+            "K1": DueItem("machine", "K1", "", "", "", None, dt.date(2026, 12, 24), say("it drifts")),
+            "K3": DueItem("machine", "K3", "", "", "", None, None, say("nothing is known of it")),
         }
 
     site = Site(laboratory, due=due, today=lambda: TODAY)
@@ -201,10 +202,8 @@ def test_a_machine_is_due_by_its_own_rule_as_the_command_says(tmp_path: Path) ->
     site = Site(tmp_path / "records.db", today=lambda: TODAY)
     found = {one.serial: one.due for one in site.machines()}
     with open_records(tmp_path / "records.db", read_only=True) as records:
-        assert found == {
-            one.serial: DueDate(one.due, one.why) for one in due_in(records, (), TODAY) if one.item == "machine"
-        }
-    assert {serial: one and one.day for serial, one in found.items()} == {
+        assert found == {one.serial: one for one in due_in(records, (), TODAY) if one.item == "machine"}
+    assert {serial: one and one.due for serial, one in found.items()} == {
         "H": dt.date(2026, 9, 2), "Y": dt.date(2027, 3, 2),
     }  # fmt: skip
     machine = site.answer(WebRequest("GET", *read_address("/machine?serial=H"))).body.decode()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.plans.plan import write_plan
+from cmm_uq.app.commands.plan import write_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts.digitizer import THREE as PLANNED, DigitizerArtefact, scan, words
 from cmm_uq.artefacts.digitizer_page import DigitizerFigures, results

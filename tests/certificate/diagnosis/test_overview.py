@@ -15,7 +15,8 @@ import pytest
 import cmm_uq
 from cmm_uq.analysis.diagnosis.model_average import ModelAverage, Rival
 from cmm_uq.analysis.planning.set_up import DetectionChange, NextPlan, Separation
-from cmm_uq.app.commands.diagnose import diagnose_job
+from cmm_uq.app.commands.diagnose import diagnose_read
+from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.diagnosis.overview import overview_of, share_of
@@ -36,7 +37,7 @@ IDENTIFIER = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")  # words that no technicia
 
 @cache
 def recorded() -> JobDiagnosis:
-    return diagnose_job(ROOT / "examples" / "iota-1102-20C")
+    return diagnose_read(read_job(ROOT / "examples" / "iota-1102-20C"))
 
 
 def consistent() -> JobDiagnosis:
@@ -52,7 +53,7 @@ def explained(tmp_path_factory: pytest.TempPathFactory) -> JobDiagnosis:
         (folder / file.name).write_bytes(file.read_bytes())
     text = (folder / "job.toml").read_text("utf-8")
     (folder / "job.toml").write_text(text.replace('"squareness_xy", ', ""), encoding="utf-8")
-    return diagnose_job(folder)
+    return diagnose_read(read_job(folder))
 
 
 def rows(found: JobDiagnosis) -> dict[str, str]:

@@ -14,7 +14,7 @@ import pytest
 
 from cmm_uq.app.commands.jobs.compensate import write_compensated
 from cmm_uq.app.commands.jobs.simulate import write_simulation
-from cmm_uq.app.commands.plans.plan import write_plan
+from cmm_uq.app.commands.plan import write_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError

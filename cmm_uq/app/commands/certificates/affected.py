@@ -62,7 +62,6 @@ class JobInputs:
         return tuple(str(wish.get("standard")) for wish in self.job.get("conformity") or ())
 
     def has(self, key: str) -> bool:
-        """Whether job.toml has a key, with its table."""
         table: Any = self.job
         for part in key.split("."):
             if not isinstance(table, Mapping) or part not in table:
@@ -108,12 +107,10 @@ class Correction:
 
 @cache
 def corrections() -> tuple[Correction, ...]:
-    """All, as the package has them."""
     file = package_files("cmm_uq") / CORRECTIONS
     if not file.is_file():
-        raise CmmUqError(
-            "the list of corrections is missing", where=str(file), fix="Install cmm-uq again, from a whole wheel"
-        )
+        whole = "Install cmm-uq again, from a whole wheel"
+        raise CmmUqError("the list of corrections is missing", where=str(file), fix=whole)
     try:
         return tuple(
             Correction(row.pop("version"), row.pop("what"), **{key: tuple(names) for key, names in row.items()})
@@ -187,9 +184,8 @@ def affected_certificates(
     out : folder for drafts that are to replace those that changed; ``None`` to write none.
     """
     if order(last) > order(__version__):
-        raise CmmUqError(
-            f"this is version {__version__}", where=f"--to {last}", fix="Install the version that has the corrections"
-        )
+        fix = "Install the version that has the corrections"
+        raise CmmUqError(f"this is version {__version__}", where=f"--to {last}", fix=fix)
     if order(first) > order(last):
         raise CmmUqError(f"{last} is before {first}: nothing was corrected between them", where=f"--version {first}",
                          fix="Give the version that the oldest certificates were made by")  # fmt: skip

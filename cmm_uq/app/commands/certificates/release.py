@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.commands.files import called
+from cmm_uq.app.commands.files import called, opened
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
@@ -30,7 +30,6 @@ from cmm_uq.jobs.tables.identification import MEASURED, REPLACED as FILE, denies
 from cmm_uq.jobs.verdicts import NONE, Verdicts
 from cmm_uq.laboratory.records.content import values
 from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, spelled
-from cmm_uq.laboratory.records.place import DEFAULT, beside, place_of
 from cmm_uq.maths.uncertainty.quantity import Quantity, rounded
 
 if TYPE_CHECKING:
@@ -54,17 +53,13 @@ Shown = tuple[Text, Text, Text]  # what a decision or a figure is, how it is pri
 def with_replaced(job: Job, where: str | Path | None, out: Path | None) -> Job:
     """The job with the results of the certificate that it replaces, from the records where it names no file of them."""
     replaces = job.facts.job.replaces
-    place = place_of(where, DEFAULT if out is None else beside(out.absolute()))
-    if replaces is None or job.origin != MEASURED or _name(job) is not None or place is None:
+    if replaces is None or job.origin != MEASURED or _name(job) is not None:
         return job
-    if isinstance(place, Path) and not place.exists():
-        return job
-    from cmm_uq.laboratory.records.opening import open_records
-
-    with open_records(place) as records:
-        found = replaced_in(records, replaces.number, job.facts.machine.serial)
-        content = None if found is None else results_of(records, found)
-    return job if content is None else replace(job, inputs={**job.inputs, FILE: content})
+    with opened(where, out, make=False, create=False) as records:
+        found = None if records is None else replaced_in(records, replaces.number, job.facts.machine.serial)
+        if records is None or found is None:
+            return job
+        return replace(job, inputs={**job.inputs, FILE: results_of(records, found)})
 
 
 def replaced_in(records: Records, number: str, serial: str) -> RecordedCertificate | None:
@@ -104,14 +99,11 @@ def reissued(outcome: Outcome) -> Outcome:
         comparison = compared(replaces.number, _read(job.inputs[name], str(job.folder / name), job), outcome.results)
     if replaces.denies:
         refuse_denied(comparison, "[job.replaces] " + ("changed" if replaces.denies_in_words else "figures_changed"))
-    composed = outcome.composed
-    return replace(
-        outcome, results={**outcome.results, KEY: comparison.data}, composed=lambda: comparison.on(composed())
-    )
+    results = {**outcome.results, KEY: comparison.data}
+    return replace(outcome, results=results, composed=lambda: comparison.on(outcome.composed()))
 
 
 def compared(number: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Reissue:
-    """What differs between both results, as printed."""
     differences, added, count = list[ChangedFigure](), list[ChangedFigure](), 0
     for shown in (_decisions, _figures):
         then, now = shown(before), shown(after)
@@ -127,7 +119,6 @@ def compared(number: str, before: Mapping[str, Any], after: Mapping[str, Any]) -
 
 
 def refuse_denied(comparison: Reissue, where: str) -> None:
-    """Refuse the statement that nothing is changed where anything is."""
     if comparison.differences:
         told = semicolons([one.sentence for one in comparison.differences[:3]])
         count = len(comparison.differences)
@@ -298,7 +289,6 @@ def release(
     records: Records, name: str, *, by: str, reason: str = "", despite: str = "",
     ask: Callable[[str], str] | None = None,
 ) -> Release:  # fmt: skip
-    """Release a certificate, or sign it as the first of two persons."""
     certificate, person = certificate_named(records, name, ("draft",)), _person(by)
     if (why := blocked(certificate)) is not None:
         raise CmmUqError(f"{certificate.number} cannot be released: {why}", where=records.shown)
@@ -328,12 +318,10 @@ def release(
 
 
 def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: str | None = None) -> Release:
-    """Withdraw a certificate, or put another in its place."""
     certificate, person = certificate_named(records, name, STANDING), _person(by)
     if not reason.strip():
-        raise CmmUqError(
-            "a certificate is withdrawn for a reason", where="--reason", fix="Say it: it stays in the records"
-        )
+        fix = "Say it: it stays in the records"
+        raise CmmUqError("a certificate is withdrawn for a reason", where="--reason", fix=fix)
     if certificate.state not in STANDING:
         raise CmmUqError(f"{certificate.number} is {certificate.state} already", where=records.shown)
     if replaced_by is None:
@@ -344,9 +332,8 @@ def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: 
         raise CmmUqError("a certificate does not replace itself", where="--replaced-by", fix="Name the new one's entry")
     if other.state != "released" or other.machine != certificate.machine:
         why = f"is {other.state}" if other.state != "released" else f"is of {other.machine}, not {certificate.machine}"
-        raise CmmUqError(
-            f"{other.number} {why}", where="--replaced-by", fix="Name a released certificate of this machine"
-        )
+        fix = "Name a released certificate of this machine"
+        raise CmmUqError(f"{other.number} {why}", where="--replaced-by", fix=fix)
     refuse_denial(records, certificate, other, reason)
     _sign(records, "replacement", certificate, person, reason, replaced_by=other.entry)
     return Release(records.certificate(certificate.entry))

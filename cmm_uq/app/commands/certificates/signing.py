@@ -7,12 +7,13 @@ import datetime as dt
 import io
 import os
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cmm_uq.app.commands.files import opened
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import SIGNED_BYTES
@@ -20,41 +21,24 @@ from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.output import Owner, finish_interrupted, read_manifest, staged
 from cmm_uq.certificate import sign
 from cmm_uq.certificate.sign.signer import SCHEME, signer_of_token
-from cmm_uq.laboratory.records.place import beside, place_of
 from cmm_uq.laboratory.schedule import settings as credentials
-
-if TYPE_CHECKING:
-    from cmm_uq.laboratory.records.store import Records
 
 PASSPHRASE, PASSPHRASE_FILE = "CMM_UQ_SIGN_PASSPHRASE", "CMM_UQ_SIGN_PASSPHRASE_FILE"
 Asking = Callable[[str], str]  # asks whoever is at the keyboard for a secret; a :class:`CmmUqError` where nobody is
 
 
-@dataclass(frozen=True)
-class SigningOptions:
-    """Key (PKCS#12 file, or URI ``pkcs11:…`` on a token), level of PAdES, time stamp server, and trusted certificates.
-
-    ``level`` is B-T with a time stamp server, else B-B, where it is ``None``.
-    """
-
-    key: str
-    level: str | None = None
-    server: str | None = None
-    trust: tuple[Path, ...] = ()
-
-    @property
-    def stamping(self) -> sign.Stamping | None:
-        """What lifts a signature above B-B."""
-        known = (level for level in sign.LEVELS if (self.level or "").upper() in (level, level.removeprefix("B-")))
-        level: sign.Level | None = next(known, None) if self.level is not None else "B-T" if self.server else "B-B"
-        if level is None:
-            fix = f"One of {', '.join(sign.LEVELS)}"
-            raise CmmUqError(f"{self.level!r} is no level of a signature", where="--level", fix=fix)
-        if level == "B-B":
-            return None
-        if not self.server:
-            raise CmmUqError(f"level {level} needs a time stamp server", where="--level", fix="Add --time-server URL")
-        return sign.Stamping(self.server, level, sign.trust_of(self.trust))
+def stamping_of(named: str | None, server: str | None, trust: Sequence[Path]) -> sign.Stamping | None:
+    """What lifts a signature above level B-B; a level that is not named is B-T with a time stamp server, else B-B."""
+    known = (level for level in sign.LEVELS if (named or "").upper() in (level, level.removeprefix("B-")))
+    level: sign.Level | None = next(known, None) if named is not None else "B-T" if server else "B-B"
+    if level is None:
+        fix = f"One of {', '.join(sign.LEVELS)}"
+        raise CmmUqError(f"{named!r} is no level of a signature", where="--level", fix=fix)
+    if level == "B-B":
+        return None
+    if not server:
+        raise CmmUqError(f"level {level} needs a time stamp server", where="--level", fix="Add --time-server URL")
+    return sign.Stamping(server, level, sign.trust_of(tuple(trust)))
 
 
 @dataclass(frozen=True)
@@ -88,14 +72,13 @@ class Signing:
         return signed
 
 
-def signing(options: SigningOptions, asking: Asking) -> Signing:
-    """Open the key, before anything is computed."""
-    stamping = options.stamping
+def signing(key: str, stamping: sign.Stamping | None, asking: Asking) -> Signing:
+    """Open the key, a PKCS#12 file or the URI ``pkcs11:…`` of a token, before anything is computed."""
     at = sign.signing_time()
-    if options.key.startswith(SCHEME):
-        signer = signer_of_token(options.key, secret("PIN of the token: ", asking))
+    if key.startswith(SCHEME):
+        signer = signer_of_token(key, secret("PIN of the token: ", asking))
     else:
-        signer = sign.signer_of_file(Path(options.key), secret("Passphrase of the key: ", asking))
+        signer = sign.signer_of_file(Path(key), secret("Passphrase of the key: ", asking))
     signer.check(at)
     return Signing(signer, at, stamping)
 
@@ -110,19 +93,12 @@ def secret(question: str, asking: Asking) -> str:
 RESULTS, SUFFIXES = "results.json", (".pdf", ".xml")
 
 
-@dataclass(frozen=True)
-class Signed:
-    """Files that have a signature now, and the records that know of it, as they are shown; empty where none do."""
-
-    files: tuple[Path, ...]
-    records: str = ""
-
-
 def sign_files(
     paths: Sequence[Path], signing: Signing, *, out: Path | None = None, records: str | Path | None = None
-) -> Signed:
+) -> tuple[list[Path], str]:
     """Sign PDF and XML files of one folder in the set that they are of, or copies of them in the folder ``out``.
 
+    Gives the files that have a signature now, and the records that know of it, as they are shown; empty where none do.
     ``records`` that are told of it where the certificate is recorded in them: file, URL, ``none``, or ``None`` for those
     of the environment, else beside the folder.
     """
@@ -130,14 +106,14 @@ def sign_files(
     if out is not None:
         with staged(out, Owner("sign", folder.name), inputs=paths, expected=[path.name for path in paths]) as place:
             written = place.write({path.name: _signed(path, signing) for path in paths})
-        return Signed(tuple(written[path.name] for path in paths))
+        return [written[path.name] for path in paths], ""
     finish_interrupted(folder)
     manifest = read_manifest(folder)
     for path in paths:
         if manifest is None or path.name not in manifest.files:
             raise CmmUqError("is of no set that cmm-uq wrote", where=str(path), fix="Give --out DIR for a signed copy")
     assert manifest is not None  # noqa: S101 - there is at least one path
-    with _opened(records, folder) as history:
+    with opened(records, folder, make=False, create=False) as history:
         contents = {}
         for name, digest in manifest.files.items():
             file = folder / name
@@ -157,11 +133,10 @@ def sign_files(
             ledger, where = history.ledger("signed", {"certificate": entry, **by, "files": files}), history.shown
         with staged(folder, manifest.owner, expected=[*manifest.files]) as place:
             place.write({**contents, **signed}, ledger=ledger)
-    return Signed(tuple(paths), where)
+    return list(paths), where
 
 
 def _folder_of(paths: Sequence[Path]) -> Path:
-    """The folder of all files."""
     for path in paths:
         if path.suffix.lower() not in SUFFIXES:
             raise CmmUqError("is neither PDF nor XML", where=str(path), fix="Name certificate.pdf or certificate.xml")
@@ -198,33 +173,11 @@ def _laboratory(pdf: bytes) -> Mapping[str, Any]:
     return laboratory if isinstance(laboratory, Mapping) else {}
 
 
-@contextlib.contextmanager
-def _opened(where: str | Path | None, folder: Path) -> Iterator[Records | None]:
-    """The records, where there are any."""
-    place = place_of(where, beside(folder.absolute()))
-    if place is None or (isinstance(place, Path) and not place.exists()):
-        yield None
-        return
-    from cmm_uq.laboratory.records.opening import open_records
-
-    with open_records(place) as records:
-        yield records
-
-
 PRIVATE, PUBLIC = 0o600, 0o644
 
 
-@dataclass(frozen=True)
-class KeyFiles:
-    """PKCS#12 file, PEM file of its certificate, and the last day of that."""
-
-    key: Path
-    certificate: Path
-    until: dt.date
-
-
-def new_test_key(path: Path, name: str, asking: Asking) -> KeyFiles:
-    """Make a test key; a file that is there is not written over."""
+def new_test_key(path: Path, name: str, asking: Asking) -> tuple[Path, dt.date]:
+    """Make a test key: the PEM file of its certificate, and the last day of that. A file that is there is not written over."""
     beside = path.with_suffix(".pem")
     if beside == path:
         raise CmmUqError("is the name of its certificate", where=str(path), fix="Name the key .p12")
@@ -239,7 +192,7 @@ def new_test_key(path: Path, name: str, asking: Asking) -> KeyFiles:
         with contextlib.suppress(OSError):
             path.unlink()
         raise
-    return KeyFiles(path, beside, made.until)
+    return beside, made.until
 
 
 def _write(path: Path, content: bytes, mode: int) -> None:
@@ -249,6 +202,5 @@ def _write(path: Path, content: bytes, mode: int) -> None:
         with os.fdopen(descriptor, "wb") as file:
             file.write(content)
     except OSError as error:
-        raise OutputError(
-            f"cannot be written: {error.strerror}", where=str(path), fix="Choose another folder"
-        ) from None
+        problem = f"cannot be written: {error.strerror}"
+        raise OutputError(problem, where=str(path), fix="Choose another folder") from None

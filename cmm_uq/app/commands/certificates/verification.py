@@ -65,18 +65,14 @@ def _computes_alike(inquiry: Inquiry, made: str, command: str, job: Job | None) 
     touching = [one for one in between(made, __version__) if one.concerns(command, *of_job)]
     inquiry.notes += [f"Version {one.version} corrects: {one.what}" for one in touching]
     if touching:
-        count, verb = (
-            len(touching),
-            "correction since then touches" if len(touching) == 1 else "corrections since then touch",
-        )
-        why = f"; {count} {verb} this certificate"
+        verb = "correction since then touches" if len(touching) == 1 else "corrections since then touch"
+        why = f"; {len(touching)} {verb} this certificate"
     if why:
         inquiry.left(AGAIN, f"made by version {made}, and this is {__version__}{why}")
     return not why
 
 
 def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Again:
-    """What the inputs of a certificate give."""
     from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
     from cmm_uq.app.commands.diagnose import DIAGNOSE, diagnosis_outcome
     from cmm_uq.app.commands.report import REPORT, report_outcome
@@ -150,16 +146,9 @@ class Verification:
         return str(self.given.results[1]["job"]["id"]) if self.given.results is not None else ""
 
 
-@dataclass(frozen=True)
-class Recomputation:
-    """What computes a certificate again from its inputs and compares: whether its documents are the same to the byte."""
-
-    compute: Callable[[], bool]
-    job: Job | None = None
-
-
-# compares figures, decisions and inputs; ``None`` where the inputs are not there, or not sound
-Examine = Callable[[Inquiry, Given], "Recomputation | None"]
+# the job of the inputs, and what computes all again: whether documents are the same to the byte; ``None`` without sound inputs
+Examined = tuple["Job | None", Callable[[], bool]] | None
+Examine = Callable[[Inquiry, Given], Examined]  # compares figures, decisions and inputs
 
 
 def verify_given(
@@ -181,8 +170,7 @@ def verify_given(
         from cmm_uq.certificate.sign import trust_of
 
         trusted = trust_of(tuple(trust))
-    again = examine(inquiry, given)
-    job = None if again is None else again.job
+    job, again = examine(inquiry, given) or (None, None)
     issued = None if job is None else job.facts.job.issued or job.facts.job.date
     signed = views.check_signatures(inquiry, given, trusted, issued)
     if records is not None:
@@ -194,7 +182,7 @@ def verify_given(
     if not rerun:
         inquiry.left(AGAIN, NOT_ASKED)
     elif again is not None:
-        alike = again.compute()
+        alike = again()
     forms = " and ".join(form[0] for form in (given.pdf, given.html) if form is not None)
     if forms and not alike:
         why = "they are compared where they are made again to the byte"
@@ -233,16 +221,13 @@ def _check_schema(inquiry: Inquiry, given: Given) -> None:
 
 def examine_certificate(
     inquiry: Inquiry, given: Given, compute: Compute | None = None, stage: Stage = lambda what, part: None
-) -> Recomputation | None:
+) -> Examined:
     """The certificate of a machine: its job, computed again by ``compute``, by default as ``report`` and ``diagnose`` do."""
     if (job := _compare(inquiry, given)) is None:
         return None
-
-    def computed() -> Again:
-        return compute(given, job) if compute else again(given, job, stage)
-
+    computed = partial(compute, given, job) if compute else partial(again, given, job, stage)
     command = "report" if given.results and "estimates" in given.results[1] else "diagnose"
-    return Recomputation(lambda: compute_again(inquiry, given, computed, command, job), job)
+    return job, lambda: compute_again(inquiry, given, computed, command, job)
 
 
 def _compare(inquiry: Inquiry, given: Given) -> Job | None:

@@ -87,7 +87,6 @@ class JobCheck:
 
     @property
     def sound(self) -> bool:
-        """Whether nothing would stop the command."""
         return not self.problems
 
     def as_data(self) -> dict[str, Any]:

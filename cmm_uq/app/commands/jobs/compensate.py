@@ -92,43 +92,39 @@ def write_compensated(
         found = ErrorMaps(maps_of(read)).map_at(map_text_c, beyond=beyond)
         text[name] = error_map_text(found, name=name).encode()
     owner = Owner("compensate", read.facts.job.id, read.origin)
-    with staged(
-        out, owner, inputs=read.paths, force=force, expected=(*read.inputs, *text, POINTS_U, PROVENANCE)
-    ) as place:
+    expected = (*read.inputs, *text, POINTS_U, PROVENANCE)
+    with staged(out, owner, inputs=read.paths, force=force, expected=expected) as place:
         return place.write(_files(read, beyond, text))
 
 
 def write_new_map(
-    job: Path, out: Path, *, seed: int = 0, force: bool = False, stage: Stage | None = None
+    job: Path, out: Path, *, seed: int = 0, force: bool = False, stage: Stage = silent
 ) -> tuple[dict[str, Path], FieldMap]:
     """Write the error map of all errors that a calibration shows, its covariance, and what they are good for.
 
     Returns and raises as :func:`~cmm_uq.app.commands.jobs.simulate.write_simulation`, and the map.
     """
-    tell, read = stage or silent, read_job(job)
+    read = read_job(job)
     _refuse(read)
     refuse_planned(read)
     owner = Owner("compensate", read.facts.job.id, read.origin)
     names = (NEW_MAP, COVARIANCE, MAP_KEYS, PROVENANCE)
     with staged(out, owner, inputs=read.paths, force=force, expected=names) as place:
-        tell("Estimating the errors", 0.0)
+        stage("Estimating the errors", 0.0)
         result, kind = evaluate_job(read, seed=seed), kind_of(read)
         if not isinstance(result, Result) or not any(map(of_machine, result.model.effects)):
             raise kind.refused("made an error map of")
         observe = partial(kind.observing("reported"), read.facts.artefact, where=read.recording_path)
-        tell("Drawing all errors together", 0.4)
+        stage("Drawing all errors together", 0.4)
         try:
             found = field_map(result.model, result.posterior, result.doubt, observe, seed)
         except CmmUqError as error:
             raise CmmUqError(error.problem, where=error.where or str(read.folder), fix=error.fix) from error
         if found.disagree:
             names_of = ", ".join(".".join(key) for key in found.disagree)
-            problem = (
-                f"all errors together say something else of {names_of} than the named ones alone: neither makes a map"
-            )
-            raise CmmUqError(
-                problem, where=str(read.folder), fix=f"cmm-uq diagnose {read.folder} says what may be wrong"
-            )
+            problem = f"all errors together say something else of {names_of} than the named ones alone"
+            fix = f"cmm-uq diagnose {read.folder} says what may be wrong"
+            raise CmmUqError(f"{problem}: neither makes a map", where=str(read.folder), fix=fix)
         return place.write(_map_files(read, found)), found
 
 
@@ -163,24 +159,18 @@ def _map_files(read: Job, found: FieldMap) -> dict[str, bytes]:
         f'error_map = [{{ file = "{NEW_MAP}", temperature_c = {error_map.temperature!r}, squareness_arcsec = {{ {square} }}, '
         f'covariance = "{COVARIANCE}", u_beside_um = {beside} }}]\n'
     )
+    both = ("uncorrected", "corrected")
+    tried = None
+    if held is not None:
+        errors = {"uncorrected": held.uncorrected, "named_errors": held.named, "corrected": held.corrected}
+        tried = {"left_out": str(held.unseen), **{name: _figure(error) for name, error in errors.items()}}
+        tried["predicted"] = dict(zip(both, map(_figure, held.predicted), strict=True))
     told = {
-        "software": PROGRAM,
-        "recording": read.origin,
-        "inputs_sha256": sha256(read.inputs),
+        "software": PROGRAM, "recording": read.origin, "inputs_sha256": sha256(read.inputs),
         "chain": read.facts.machine.chain,
-        "sign": "true = indicated + e",
-        "errors_not_in_it": list(found.omitted),
-        "range_rms_um": dict(zip(("uncorrected", "corrected"), map(_figure, found.range_um), strict=True)),
-        "held_out_rms_um": None
-        if held is None
-        else {
-            "left_out": str(held.unseen),
-            "uncorrected": _figure(held.uncorrected),
-            "named_errors": _figure(held.named),
-            "corrected": _figure(held.corrected),
-            "predicted": dict(zip(("uncorrected", "corrected"), map(_figure, held.predicted), strict=True)),
-        },
-    }
+        "sign": "true = indicated + e", "errors_not_in_it": list(found.omitted),
+        "range_rms_um": dict(zip(both, map(_figure, found.range_um), strict=True)), "held_out_rms_um": tried,
+    }  # fmt: skip
     return {
         NEW_MAP: (_made_of(read) + error_map_csv(error_map)).encode(),
         COVARIANCE: covariance_file(error_map.covariance, error_map),
@@ -237,10 +227,8 @@ def _files(read: Job, beyond: Beyond, text: Mapping[str, bytes]) -> dict[str, by
         u = with_u[1].standard_uncertainty(with_u[0], readings, tip=tip, chain=chain) / MICROMETRE
         places = np.column_stack([points.measurement, points.point, points.repeat])
         lines = [f"{m},{p},{r},{x:.4f},{y:.4f},{z:.4f}" for (m, p, r), (x, y, z) in zip(places, u, strict=True)]
-        text = {
-            **text,
-            POINTS_U: ("\n".join(["measurement,point,repeat,u_x_um,u_y_um,u_z_um", *lines]) + "\n").encode(),
-        }
+        heads = "measurement,point,repeat,u_x_um,u_y_um,u_z_um"
+        text = {**text, POINTS_U: ("\n".join([heads, *lines]) + "\n").encode()}
         sample = SampledPoints(200)
         sample.add(readings, points.xyz, tip)
         provenance["distances"] = sample.distances(*with_u, chain)
@@ -319,9 +307,9 @@ class _WithUncertainty:
     def __call__(self, rows: Floats) -> Floats:
         found = self._chain(rows)
         tips = np.empty((len(rows), 3))
-        numbers = (
-            rows[:, self.columns.index(POSE)] if POSE in self.columns else np.full(len(rows), min(self._chain.poses))
-        )
+        numbers = np.full(len(rows), min(self._chain.poses))
+        if POSE in self.columns:
+            numbers = rows[:, self.columns.index(POSE)]
         for number in np.unique(numbers):
             here, one = numbers == number, self._chain.poses[int(number)]
             tips[here] = one.tips(rows[here, :2])

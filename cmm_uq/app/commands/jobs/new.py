@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.app.commands.jobs.schemas import shipped
+from cmm_uq.app.commands.forms import shipped
 from cmm_uq.app.commands.parts.new import PART, Answers, part_files, part_of_answers, part_of_drawing
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.artefacts import kind_named, names
@@ -115,9 +115,8 @@ def _readme_text(job: Job, begin: Beginning) -> str:
             f'first line and `origin = "simulated"` in job.toml, and state what is marked {EXAMPLE} there.'
         )
     if begin.command == PLAN:
-        lines.append(
-            f"- Nothing is recorded yet: the plan writes `plan.csv`, to be filled in as `{facts.recording.file}`."
-        )
+        to_be = f"to be filled in as `{facts.recording.file}`"
+        lines.append(f"- Nothing is recorded yet: the plan writes `plan.csv`, {to_be}.")
     return "\n".join(lines) + "\n"
 
 
@@ -144,10 +143,8 @@ def budget_files() -> dict[str, bytes]:
         for i, (name, given) in enumerate(_INPUTS.items())
     ]  # fmt: skip
     model = commented({"properties": {"model": keys["model"]}}, {"model": _MODEL})
-    example = (
-        "# An example: put in your own model and figures. What stands behind # is the default, or what may be said"
-    )
-    head = f"#:schema ./{BUDGET_SCHEMA}\n{example} besides.\n"
+    example = "# An example: put in your own model and figures."
+    head = f"#:schema ./{BUDGET_SCHEMA}\n{example} What stands behind # is the default, or what may be said besides.\n"
     correlation = f'# [correlation]  # {keys["correlation"]["description"]}\n# "indicated,temperature" = 0.0\n'
     readme = (
         "# A measurement model and its uncertainty\n\n"
@@ -169,7 +166,6 @@ def known() -> dict[str, str]:
 
 
 def titles() -> dict[str, str]:
-    """What a new job can be asked for by, each with what it is."""
     others = {PLAN: "A job that is only planned (--set artefact.kind=…)", BUDGET: "A measurement model of one's own",
               PART: "A part: its features, tolerances, and the machine that measures it"}  # fmt: skip
     kinds = {name: kind_or_refused(kind).beginning(name).title for name, kind in known().items()}
@@ -177,7 +173,6 @@ def titles() -> dict[str, str]:
 
 
 def usual(name: str) -> dict[str, Any]:
-    """What job.toml of a new job says where nothing is given."""
     kind, begin = _begun(name)
     return _tables(kind, begin, {}, name)
 
@@ -258,15 +253,13 @@ def job_id(folder: Path, given: Tables, otherwise: str = "job") -> str:
 
 
 def check_empty(folder: Path, but: str = "") -> None:
-    """Refuse a folder that something lies in."""
     try:
         there = sorted(path.name for path in folder.iterdir() if not (but and path.name.startswith(but)))
     except FileNotFoundError:
         return
     except OSError as error:
-        raise CmmUqError(
-            f"cannot be a new folder: {error.strerror}", where=str(folder), fix="Name another one"
-        ) from None
+        problem = f"cannot be a new folder: {error.strerror}"
+        raise CmmUqError(problem, where=str(folder), fix="Name another one") from None
     if there:
         raise CmmUqError(f"is not empty: {there[0]!r} lies in it", where=str(folder),
                          fix="Name a folder that does not exist yet; nothing is overwritten")  # fmt: skip

@@ -78,9 +78,8 @@ def _rows(file: DroppedFile, job: Job) -> list[dict[str, float]]:
         found = _imported(file.content, where, keys)
         columns = dict(found.columns)
         if "measurement" not in found.recognised.columns:
-            columns = {
-                name: values for name, values in columns.items() if name not in ("measurement", "point", "repeat")
-            }
+            for name in ("measurement", "point", "repeat"):
+                columns.pop(name, None)
     columns.pop("time_s", None)  # by another clock
     names = list(columns)
     return [dict(zip(names, map(float, row), strict=True)) for row in zip(*columns.values(), strict=True)]
@@ -146,9 +145,8 @@ def _check_origin(job: Job, *, simulate: bool) -> None:
     where = f"{job.folder / 'job.toml'} [job] origin"
     if not job.facts.artefact.with_recording:
         kind = job.facts.artefact.kind
-        raise CmmUqError(
-            f"a job of kind {kind!r} has no recording of points", where=where, fix="Nothing is taken for it"
-        )
+        problem = f"a job of kind {kind!r} has no recording of points"
+        raise CmmUqError(problem, where=where, fix="Nothing is taken for it")
     if simulate and job.origin != SIMULATED:
         raise CmmUqError(f"a simulated recording would pass for {job.origin}", where=where,
                          fix="Give --out FOLDER: a copy of the job is made there, and marked")  # fmt: skip
@@ -181,8 +179,8 @@ def _plan(job: Job, story: Story) -> tuple[str, list[str]]:
         ((name, content),) = plan_file(job).items()
         read_recording(content, str(job.folder / name), job.points.machine)
         return content.decode("utf-8-sig"), []
-    from cmm_uq.app.commands.plans.plan import recording_to_be
-    from cmm_uq.app.commands.plans.planning import make_plan
+    from cmm_uq.app.commands.plan import recording_to_be
+    from cmm_uq.app.commands.planning import make_plan
 
     try:
         plan = make_plan(job, power=False)
@@ -242,9 +240,8 @@ def write_trial(folder: Path, out: Path) -> Path:
     job = read_job(folder, recorded=False)
     if (out / "job.toml").exists():
         if read_job(out, recorded=False).origin != SIMULATED:
-            raise CmmUqError(
-                "is a job whose recording is measured", where=str(out), fix="Name another folder with --out"
-            )
+            fix = "Name another folder with --out"
+            raise CmmUqError("is a job whose recording is measured", where=str(out), fix=fix)
         return out
     document: Any = tomlkit.parse(job.inputs["job.toml"].decode("utf-8-sig"))
     document["job"]["id"] = f"{job.facts.job.id}-trial"

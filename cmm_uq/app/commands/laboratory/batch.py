@@ -16,13 +16,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cmm_uq import __version__
 from cmm_uq.app.commands.files import NOT_RECORDED, REPORTS, RESULTS, Stage, ledger_of, opened, silent
 from cmm_uq.app.commands.laboratory import batch_jobs
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import REPORT
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.output import interruption, staged
+from cmm_uq.base.languages.translation import ENGLISH
+from cmm_uq.base.output import interruption, read_manifest, sha256_of, staged
+from cmm_uq.base.output.manifest import journal_for
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.source import sha256
 from cmm_uq.laboratory.records.place import NONE
 from cmm_uq.laboratory.schedule.processes import Pace, TaskAnswer, WorkerTask, answers, check_workers, processes
 
@@ -123,11 +127,14 @@ class BatchRun:
     """One batch on its way: what came of it so far, with the ``records`` that each report is recorded in."""
 
     def __init__(
-        self, listed: list[batch_jobs.BatchJob], options: BatchOptions, output: batch_jobs.BatchOutput, batch: Batch,
+        self,
+        listed: list[batch_jobs.BatchJob],
+        options: BatchOptions,
+        batch: Batch,
         records: Records | None,
         tell: Stage,
-    ) -> None:  # fmt: skip
-        self.listed, self.options, self.output, self.batch, self.records = listed, options, output, batch, records
+    ) -> None:
+        self.listed, self.options, self.batch, self.records = listed, options, batch, records
         self.there = bytearray(len(listed))
         self._under_way: dict[int, Job] = {}
         self._writing: dict[Future[dict[str, Any]], int] = {}
@@ -135,12 +142,12 @@ class BatchRun:
         self._pace, self._tell = Pace(len(listed)), tell
 
     def kept(self) -> str:
-        done, out = sum(self.there), shlex.quote(str(self.output.out))
+        done, out = sum(self.there), shlex.quote(str(self.batch.out))
         return f"{done} of {len(self.listed)} jobs are written in {out}: the same command with --resume goes on"
 
     def folders(self) -> Iterator[Path]:
         """Of the reports that are there, in the order of the jobs."""
-        return (self.output.out / one.id for one, there in zip(self.listed, self.there, strict=True) if there)
+        return (self.batch.out / one.id for one, there in zip(self.listed, self.there, strict=True) if there)
 
     def _progress(self) -> None:
         self._tell(f"Reporting jobs: {self._pace}", self._pace.part)
@@ -178,9 +185,9 @@ class BatchRun:
         for number, one in enumerate(self.listed):
             try:
                 job = read_job(Path(one.folder))
-                results = self.output.done(job) if self.options.resume else None
+                results = self._there(job) if self.options.resume else None
                 if results is None:
-                    self.output.check(job)
+                    self._check(job)
             except CmmUqError as error:
                 self._fail(number, error, computed=False)
                 continue
@@ -193,10 +200,45 @@ class BatchRun:
             heads = NOT_RECORDED if self.records is None else self.records.heads(REPORT.command, job.facts.job.id)
             yield number, (one.folder, dict(job.inputs), heads)
 
+    def _folder(self, job: Job) -> Path:
+        return self.batch.out / job.facts.job.id
+
+    def _names(self, job: Job) -> list[str]:
+        """Of the files that are certain to be written."""
+        return [RESULTS] if self.options.results_only else [*REPORT.names(job), RESULTS]
+
+    def _check(self, job: Job) -> None:
+        """Make sure, before a job is computed, that it can be written."""
+        folder, owner = self._folder(job), REPORT.owner(job)
+        there = read_manifest(folder)
+        own = there is not None and there.owner == owner
+        documents = [name for name in REPORT.names(job) if there is not None and name in there.files]
+        if self.options.results_only and own and documents:
+            raise CmmUqError("would be lost where figures alone are written again", where=str(folder / documents[0]),
+                             fix="Leave --results-only out, or choose another --out")  # fmt: skip
+        journal_for(folder, owner, dict.fromkeys(self._names(job), ""), inputs=job.paths, force=self.options.force)
+
+    def _there(self, job: Job) -> dict[str, Any] | None:
+        """Contents of results.json where the job's report is there, whole, from the same inputs by the same version."""
+        folder, seed = self._folder(job), self.options.seed
+        there = read_manifest(folder)
+        if there is None or there.owner != REPORT.owner(job) or not there.files.keys() >= set(self._names(job)):
+            return None
+        if any(sha256_of(folder / name) != digest for name, digest in there.files.items()):
+            return None
+        data = batch_jobs.results_of(folder)
+        same = (
+            data is not None
+            and data.get("software", {}).get("version") == __version__
+            and data.get("job", {}).get("inputs_sha256") == sha256(job.inputs)
+            and data.get("job", {}).get("language", ENGLISH) == job.facts.job.language
+            and data.get("sampling", {}).get("seed", seed) == seed
+        )
+        return data if same else None
+
     def _write(self, number: int, job: Job, files: dict[str, bytes]) -> dict[str, Any]:
-        """Contents of results.json, once all is in place."""
-        folder, owner, records = self.output.folder(job), REPORT.owner(job), self.records
-        with staged(folder, owner, inputs=job.paths, force=self.output.force) as place:
+        folder, owner, records = self._folder(job), REPORT.owner(job), self.records
+        with staged(folder, owner, inputs=job.paths, force=self.options.force) as place:
             ledger = None if records is None else ledger_of(records, job, REPORT.command, folder, files, RESULTS)
             place.write(files, ledger=ledger)
         self.there[number] = 1
@@ -232,29 +274,27 @@ class BatchRun:
 
 def write_batch(
     folders: Sequence[Path], out: Path | None = None, options: BatchOptions | None = None, *, parquet: Path | None = None,
-    stage: Stage | None = None, records: str | Path | None = NONE,
+    stage: Stage = silent, records: str | Path | None = NONE,
 ) -> Batch:  # fmt: skip
     """Report every job in folders and below them, as :func:`~cmm_uq.app.commands.report.write_report` reports one.
 
     ``records``: that reports are recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside
     them. Gives what came of it; a job that fails never stops the others.
     """
-    options, tell, place = options or BatchOptions(), stage or silent, out or REPORTS
+    options, place = options or BatchOptions(), out or REPORTS
     if parquet is not None:
         batch_jobs.check_parquet(parquet, force=options.force)
-    tell("Looking for jobs", 0.0)
+    stage("Looking for jobs", 0.0)
     listed, planned = batch_jobs.jobs_in(folders, place)
     batch = Batch(place, len(listed), planned)
     with opened(records, None if out is None else out / "job") as history:
-        output = batch_jobs.BatchOutput(place, options.seed, options.results_only, options.force)
-        run = BatchRun(listed, options, output, batch, history, tell)
+        run = BatchRun(listed, options, batch, history, stage)
         batch.records = "" if history is None else history.shown
         with interruption.keeping(run.kept):
             run.through()
             if parquet is not None:
-                tell("Writing the table", 1.0)
-                batch_jobs.write_table(
-                    parquet, filter(None, map(batch_jobs.results_of, run.folders())), force=options.force
-                )
+                stage("Writing the table", 1.0)
+                written = filter(None, map(batch_jobs.results_of, run.folders()))
+                batch_jobs.write_table(parquet, written, force=options.force)
                 batch.parquet = parquet
     return batch

@@ -10,24 +10,18 @@ from __future__ import annotations
 import datetime as dt
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from cmm_uq import __version__
 from cmm_uq.app.commands.files import RESULTS, called
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.app.commands.report import REPORT, report_outcome
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.translation import ENGLISH
-from cmm_uq.base.output import read_manifest, sha256_of
-from cmm_uq.base.output.manifest import journal_for
 from cmm_uq.base.output.new_file import new_file, refuse_taken
-from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.content import values
 from cmm_uq.laboratory.records.facts import Heads
@@ -64,53 +58,6 @@ def jobs_in(folders: Iterable[Path], out: Path) -> tuple[list[BatchJob], int]:
             raise CmmUqError(f"has the id {job.id!r}, as {other.folder} has {other.id!r}", where=job.folder,
                              fix="Give each job an id of its own: its report goes to a folder of that name")  # fmt: skip
     return list(jobs.values()), len(planned)
-
-
-@dataclass(frozen=True)
-class BatchOutput:
-    """What is written of each job, in a folder of ``out``; ``results_only``: figures alone; ``force``: over what is there."""
-
-    out: Path
-    seed: int = 0
-    results_only: bool = False
-    force: bool = False
-
-    def folder(self, job: Job) -> Path:
-        return self.out / job.facts.job.id
-
-    def names(self, job: Job) -> list[str]:
-        """Of the files that are certain to be written."""
-        return [RESULTS] if self.results_only else [*REPORT.names(job), RESULTS]
-
-    def check(self, job: Job) -> None:
-        """Make sure, before a job is computed, that it can be written."""
-        folder = self.folder(job)
-        there = read_manifest(folder)
-        own = there is not None and there.owner == REPORT.owner(job)
-        documents = [name for name in REPORT.names(job) if there is not None and name in there.files]
-        if self.results_only and own and documents:
-            raise CmmUqError("would be lost where figures alone are written again", where=str(folder / documents[0]),
-                             fix="Leave --results-only out, or choose another --out")  # fmt: skip
-        names = dict.fromkeys(self.names(job), "")
-        journal_for(folder, REPORT.owner(job), names, inputs=job.paths, force=self.force)
-
-    def done(self, job: Job) -> dict[str, Any] | None:
-        """Contents of results.json where the job's report is there, whole, from the same inputs by the same version."""
-        folder = self.folder(job)
-        there = read_manifest(folder)
-        if there is None or there.owner != REPORT.owner(job) or not there.files.keys() >= set(self.names(job)):
-            return None
-        if any(sha256_of(folder / name) != digest for name, digest in there.files.items()):
-            return None
-        data = results_of(folder)
-        same = (
-            data is not None
-            and data.get("software", {}).get("version") == __version__
-            and data.get("job", {}).get("inputs_sha256") == sha256(job.inputs)
-            and data.get("job", {}).get("language", ENGLISH) == job.facts.job.language
-            and data.get("sampling", {}).get("seed", self.seed) == self.seed
-        )
-        return data if same else None
 
 
 def results_of(folder: Path) -> dict[str, Any] | None:
@@ -154,12 +101,10 @@ COLUMNS = (  # name, type and meaning of each
 
 
 def write_table(path: Path, results: Iterable[Mapping[str, Any]], *, force: bool) -> None:
-    """What reports say as a Parquet file, in their order."""
     write_parquet(path, COLUMNS, (row for one in results for row in rows(one)), force=force)
 
 
 def rows(results: Mapping[str, Any]) -> Iterator[Row]:
-    """Every value of a report, as records keep it."""
     job = results["job"]
     head = (job["id"], job["origin"], job["machine"], job.get("serial", ""), dt.date.fromisoformat(job["date"]))
     tail = (Verdicts.of_results(results).overall, verdict(results), results["software"]["version"])
@@ -202,18 +147,12 @@ def check_parquet(path: Path, *, force: bool) -> None:
 
 def write_parquet(path: Path, columns: Columns, rows: Iterable[Row], *, force: bool) -> None:
     module, parquet, left = arrow("pyarrow"), arrow("pyarrow.parquet"), iter(rows)
-    schema = module.schema(
-        [module.field(name, _type(module, kind), metadata={"meaning": told}) for name, kind, told in columns]
-    )
-    with (
-        new_file(path, force=force) as unfinished,
-        parquet.ParquetWriter(unfinished, schema, compression="zstd") as file,
-    ):
+    fields = [module.field(name, _type(module, kind), metadata={"meaning": told}) for name, kind, told in columns]
+    schema, zstd = module.schema(fields), {"compression": "zstd"}
+    with new_file(path, force=force) as unfinished, parquet.ParquetWriter(unfinished, schema, **zstd) as file:
         while group := list(islice(left, GROUP)):
-            arrays = [
-                module.array(column, type=field.type)
-                for column, field in zip(zip(*group, strict=True), schema, strict=True)
-            ]
+            each = zip(zip(*group, strict=True), schema, strict=True)
+            arrays = [module.array(column, type=field.type) for column, field in each]
             file.write_batch(module.record_batch(arrays, schema=schema))
 
 

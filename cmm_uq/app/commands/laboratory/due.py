@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from cmm_uq.laboratory.due.fleet_model import FleetPrior
     from cmm_uq.laboratory.records.store import Records
 
+Where = str | Path | None  # the records: a file, a URL, or those of the environment
+
 
 @lru_cache(maxsize=1000)
 def _prior(fleet: FleetPrior, model: str, place: str) -> Prior:
@@ -73,7 +75,6 @@ class WhatIsDue:
     items: tuple[DueItem, ...]
 
     def of(self, *states: str) -> list[DueItem]:
-        """Those in some of the states."""
         return [one for one in self.items if one.state(self.on, self.within) in states]
 
     def data(self) -> dict[str, Any]:
@@ -93,14 +94,13 @@ class WhatIsDue:
 
 
 def what_is_due(
-    where: str | Path | None = None,
+    where: Where = None,
     machines: Collection[str] = (),
     *,
     on: dt.date | None = None,
     within: dt.timedelta | None = None,
     fleet: Path | None = None,
 ) -> WhatIsDue:
-    """What is due for calibration when, and why."""
     day, learnt = on or _today(), read_fleet(fleet)
     with open_records(where, read_only=True) as records:
         found = due_in(records, machines, day, learnt)
@@ -194,7 +194,6 @@ def _write(
 
 
 def write_due(found: WhatIsDue, folder: Path, *, force: bool = False) -> dict[str, Path]:
-    """Write ``due.html`` and ``due.json``, all or none."""
     from cmm_uq.certificate.pages.fleet import due_document
 
     document = due_document(found.items, found.on, found.within)
@@ -206,9 +205,8 @@ def _iso(day: dt.date | None) -> str | None:
 
 
 def history_of(
-    machine: str, where: str | Path | None = None, *, on: dt.date | None = None, fleet: Path | None = None
+    machine: str, where: Where = None, *, on: dt.date | None = None, fleet: Path | None = None
 ) -> MachineHistory:
-    """The history of a machine."""
     day, learnt = on or _today(), read_fleet(fleet)
     with open_records(where, read_only=True) as records:
         found = records.machine(machine)
@@ -220,7 +218,6 @@ def history_of(
 
 
 def write_history(found: MachineHistory, folder: Path, *, force: bool = False) -> dict[str, Path]:
-    """Write ``history.html`` and ``history.json``, all or none."""
     from cmm_uq.certificate.pages.history import history_data, history_document
 
     document, data = history_document(found), history_data(found)
@@ -228,13 +225,11 @@ def write_history(found: MachineHistory, folder: Path, *, force: bool = False) -
 
 
 def fleet(
-    where: str | Path | None = None, names: Collection[str] = (), *, seed: int = 1, stage: Stage | None = None
+    where: Where = None, names: Collection[str] = (), *, seed: int = 1, stage: Stage = lambda what, part: None
 ) -> FleetResult:
     """Learn what drift is usual for the machines of the records, and which of them do not belong."""
-    from cmm_uq.app.commands.files import silent
     from cmm_uq.laboratory.due.fleet import fit_fleet, judged
 
-    tell = stage or silent
     with open_records(where, read_only=True) as records:
         frame = records.all_series(names or None)
         adjusted = {one.serial: one.adjusted[-1].toordinal() for one in records.machines() if one.adjusted}
@@ -255,18 +250,17 @@ def fleet(
         quantity, unit = called.get(name, (name, ""))
 
         def told(part: float, i: int = i, quantity: str = quantity) -> None:
-            tell(f"Sampling: {quantity}", (i + part) / len(wanted))
+            stage(f"Sampling: {quantity}", (i + part) / len(wanted))
 
         if not members:
             fix = "Choose another --name"
             raise CmmUqError("no certificate states this value with an uncertainty", where=name, fix=fix)
         learnt.append((name, quantity, unit, members, fit_fleet(members, seed, told), len(rows) - len(usable)))
-    tell("Done", 1.0)
+    stage("Done", 1.0)
     return judged(learnt, seed)
 
 
 def _wanted(frame: pd.DataFrame, names: Collection[str], known: Collection[str]) -> list[str]:
-    """Names of the values to be looked at."""
     there = list(dict.fromkeys(frame["name"]))
     for name in names:
         if name not in there:
@@ -302,7 +296,6 @@ def _members(
 
 
 def write_fleet(found: FleetResult, folder: Path, *, force: bool = False) -> dict[str, Path]:
-    """Write ``fleet.html``, ``fleet.json`` and ``fleet.csv``, all or none."""
     from cmm_uq.certificate.pages.fleet import fleet_document
     from cmm_uq.certificate.pages.fleet_summary import fleet_csv, fleet_data
 

@@ -73,7 +73,6 @@ class Attempt:
 
 
 def write_profile(out: Path, wanted: library.ProfileDraft) -> None:
-    """Write a new profile that reads its own example."""
     if out.suffix != library.ENDING:
         raise CmmUqError("a profile's file ends in .toml", where=str(out), fix=f"Name it {out.stem or 'my-gauge'}.toml")
     content = library.drafted(wanted)
@@ -102,8 +101,6 @@ def simulated_instrument(profile: str, way: str) -> Iterator[str]:
     chosen = next((one for one in WAYS if one == (way or usual)), None)
     if chosen is None or (chosen == "pty" and os.name == "nt"):
         raise CmmUqError(f"{way!r} is no way to a simulated instrument here", where="--way", fix=suggestion(way, WAYS))
-    with (
-        tempfile.TemporaryDirectory(prefix="cmm-uq-") as folder,
-        SimulatedLine(SPEAKERS[profile](), chosen, Path(folder)) as line,
-    ):
+    own = SPEAKERS[profile]()
+    with tempfile.TemporaryDirectory(prefix="cmm-uq-") as folder, SimulatedLine(own, chosen, Path(folder)) as line:
         yield line.port

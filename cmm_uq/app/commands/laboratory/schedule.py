@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.app.commands.files import REPORTS
-from cmm_uq.app.commands.jobs.schemas import shipped
+from cmm_uq.app.commands.forms import shipped
 from cmm_uq.app.commands.laboratory.due import due_in
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError, OutputError, suggestion
@@ -73,20 +73,8 @@ def schedule_of(folders: Sequence[Path], given: Path | None = None) -> Schedule:
     return Schedule(read_schedule(path), path.parent, path)
 
 
-@dataclass(frozen=True)
-class Tried:
-    """What came of a trial message.
-
-    ``why``: it did not, or what is to be remarked; empty where nothing is.
-    """
-
-    channel: str
-    sent: bool
-    why: str
-
-
-def send_trial(found: Schedule, clock: RunClock = CLOCK) -> list[Tried]:
-    """Send a trial message through every channel."""
+def send_trial(found: Schedule, clock: RunClock = CLOCK) -> list[tuple[str, bool, str]]:
+    """Of each channel its name, whether a trial message was sent, and why not, or what is to be remarked."""
     if not found.channels():
         raise CmmUqError("names nobody who is told of anything", where=str(found.path or FILE),
                          fix="Add [[email]] or [[webhook]]; cmm-uq schedule new FILE explains every key")  # fmt: skip
@@ -96,9 +84,9 @@ def send_trial(found: Schedule, clock: RunClock = CLOCK) -> list[Tried]:
         notice = notices.Notice("error", "trial", say("trial"), text, clock.moment())
         try:
             remark = channel.send(notices.OutgoingMessage.of(notice, channel.name, clock.moment()))
-            told.append(Tried(channel.name, True, remark))
+            told.append((channel.name, True, remark))
         except (notices.UndeliveredError, CmmUqError) as error:
-            told.append(Tried(channel.name, False, str(error)))
+            told.append((channel.name, False, str(error)))
     return told
 
 
@@ -135,9 +123,8 @@ def ready_files(
     path = None if schedule is None else schedule.resolve()
     program, user = (sys.executable, "-m", "cmm_uq"), getpass.getuser() if system != "win32" else ""
     whole, chosen = tuple(folder.resolve() for folder in folders), tuple(day for day in DAYS if day in named)
-    return READY[scheduler](
-        ScheduledCall(program, whole, path, home, time_of_day.hour, time_of_day.minute, chosen, user)
-    )
+    call = ScheduledCall(program, whole, path, home, time_of_day.hour, time_of_day.minute, chosen, user)
+    return READY[scheduler](call)
 
 
 def write_ready(files: Mapping[str, str], folder: Path) -> list[Path]:
@@ -172,13 +159,11 @@ def due_notices(records: Records | None, on: dt.date, within: dt.timedelta) -> I
             yield notices.of_due(one.item, one.serial, one.due, on, one.why, beyond=one.beyond)
     if wrong:
         what = f"the newest entry is of {latest.date()}, and the clock says {on}: more may be due than is said"
-        raise CmmUqError(
-            what, where="records", fix="Set the clock; where it is right, cmm-uq records verify says which entry is not"
-        )
+        fix = "Set the clock; where it is right, cmm-uq records verify says which entry is not"
+        raise CmmUqError(what, where="records", fix=fix)
 
 
 def _newest_jobs(records: Records | None, on: dt.date) -> set[str]:
-    """Jobs of the newest certificate or check of each machine."""
     return set() if records is None else {one.job for one in (*records.latest(on, values=False), *records.checks())}
 
 

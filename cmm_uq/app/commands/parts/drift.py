@@ -10,14 +10,14 @@ import datetime as dt
 import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cmm_uq.analysis.machine.state import FREE, MachineState, aged
-from cmm_uq.app.commands.plans.planning import MeasurementPlan, make_plan
+from cmm_uq.app.commands.planning import MeasurementPlan, make_plan
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
@@ -77,8 +77,6 @@ def attached_history(past: MachineHistory, until: dt.date) -> bytes:
 
 
 def known_of(content: bytes) -> KnownChanges:
-    """The history that :func:`attached_history` wrote."""
-
     def series(one: Mapping[str, Any]) -> Series:
         named: dict[str, Any] = {key: str(one[key]) for key in ("name", "quantity", "unit")}
         columns: dict[str, Any] = {name: np.asarray(one[name], dtype=sort) for name, sort in _COLUMNS.items()}
@@ -94,9 +92,8 @@ def known_of(content: bytes) -> KnownChanges:
         values = {str(one["name"]): (series(one), one["adjusted_after"]) for one in said["values"]}
         return KnownChanges(tuple(map(dt.date.fromisoformat, said["adjusted"])), values)
     except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
-        raise CmmUqError(
-            "is no history of a machine", where=FILE, fix="Evaluate the part again, with --records"
-        ) from error
+        fix = "Evaluate the part again, with --records"
+        raise CmmUqError("is no history of a machine", where=FILE, fix=fix) from error
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,20 +176,12 @@ _SHOWN_BY: tuple[tuple[str, Text], ...] = (
 """By the beginning of a column that an error needs and the recording lacks."""
 
 
-@dataclass(frozen=True, eq=False)
-class PlannedSetUps:
-    """What to measure, and the files of the job that plans it, by name."""
+def further_of(
+    calibrated: Job | None, unseen: Iterable[UnseenError]
+) -> tuple[FurtherSetUps | None, Mapping[str, bytes]]:
+    """Further set-ups of the calibration's artefact for errors that it left free or did not see, and files of their job.
 
-    further: FurtherSetUps
-    files: Mapping[str, bytes] = field(default_factory=dict)
-
-
-def further_of(calibrated: Job | None, unseen: Iterable[UnseenError]) -> PlannedSetUps | None:
-    """Further set-ups of the calibration's artefact for errors that it left free or did not see.
-
-    ``calibrated``: job of the calibration; ``None`` where it is not at hand.
-
-    Returns ``None`` where nothing is unseen, or the calibration is not at hand.
+    ``calibrated``: job of the calibration; ``None`` where it is not at hand: then, and where nothing is unseen, ``None``.
     """
     shares: dict[str, float] = {}  # the largest of any characteristic
     for one in unseen:
@@ -200,7 +189,7 @@ def further_of(calibrated: Job | None, unseen: Iterable[UnseenError]) -> Planned
             shares[one.effect] = max(shares.get(one.effect, 0.0), one.share)
     wanted = [every()[name] for name in sorted(shares, key=lambda name: -shares[name])]
     if not wanted or calibrated is None or kind_of(calibrated).observe is None:
-        return None
+        return None, {}
     here = [effect for effect in wanted if _why_not(calibrated, effect) is None][:MOST]
     plan = _plan(calibrated, here)
     found = () if plan is None else _found_by(plan, here)
@@ -208,10 +197,9 @@ def further_of(calibrated: Job | None, unseen: Iterable[UnseenError]) -> Planned
     missed = tuple(name for name in names if name not in found)
     text = sentences([part for part in (_setups(plan, found), _missed(calibrated, missed)) if part])
     if plan is None or not found:
-        return PlannedSetUps(FurtherSetUps(names, 0, text, missed=missed))
+        return FurtherSetUps(names, 0, text, missed=missed), {}
     command, file = f"cmm-uq plan {FOLDER}", f"{FOLDER}/job.toml"
-    further = FurtherSetUps(names, len(plan.to_measure), text, command, file, missed)
-    return PlannedSetUps(further, _files(calibrated, found))
+    return FurtherSetUps(names, len(plan.to_measure), text, command, file, missed), _files(calibrated, found)
 
 
 def _why_not(calibrated: Job, effect: Effect) -> Text | None:
@@ -229,10 +217,8 @@ def _asked(calibrated: Job, names: Iterable[str]) -> list[str]:
 
 
 def _plan(calibrated: Job, wanted: Sequence[Effect]) -> MeasurementPlan | None:
-    facts, wishes = (
-        calibrated.facts,
-        {"criterion": "separation", "more": SET_UPS, "number": None, "candidates": CANDIDATES},
-    )
+    facts = calibrated.facts
+    wishes = {"criterion": "separation", "more": SET_UPS, "number": None, "candidates": CANDIDATES}
     model = facts.model.model_copy(update={"effects": _asked(calibrated, (one.name for one in wanted))})
     changed = facts.model_copy(update={"model": model, "plan": facts.plan.model_copy(update=wishes)})
     try:

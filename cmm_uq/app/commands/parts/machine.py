@@ -49,7 +49,6 @@ def temperatures(job: Job | None) -> Floats | None:
 
 
 def machine_warnings(job: PartJob, standing: CertificateStatus, calibrated: Job | None) -> Iterable[Text]:
-    """What the reader must know of the machine."""
     if standing.origin != MEASURED:
         origin = _ORIGINS.get(standing.origin, Verbatim(standing.origin))
         yield say("The machine's calibration is {origin}: nobody measured this machine.", origin=origin)
@@ -147,17 +146,14 @@ def state_machine(
     machine = _machine(job, stated.job)
     fits(machine)
     state = machine_stated(stated.results, stated.draws, machine, corrected=job.facts.machine_state.corrected)
-    stated_bounds: dict[str, float] = {
-        name: one.largest_um for one in job.facts.machine_state.bound for name in one.errors
-    }
+    stated_bounds = {name: one.largest_um for one in job.facts.machine_state.bound for name in one.errors}
     state = with_bounds(state, stated_bounds)
     # where the calibration modelled the scales' expansion, their errors are those of 20 °C
     expanding = any(column.startswith("temp_") for effect in state.effects for column in effect.columns)
     known_at = None if expanding else standing.temperature_c
     state = replace(state, calibrated=standing.date, valid_until=standing.valid_until, temperature_c=known_at)
-    since = with_drift(
-        state, standing.serial or standing.machine, job.facts.job.date, records, _where(job), kept=history
-    )
+    serial = standing.serial or standing.machine
+    since = with_drift(state, serial, job.facts.job.date, records, _where(job), kept=history)
     state = since.state
     stage("The machine's errors, given the recording of its calibration", 0.15)
     state, path, given = _given(state, stated.job, seed)
@@ -199,7 +195,6 @@ def verified(job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None 
 
 
 def _certified(job: PartJob, found: Verification, *, rerun: bool) -> _Stated:
-    """What a certificate states that verifies."""
     given, where = found.given, _where(job)
     if wrong := found.inquiry.findings:
         more = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
@@ -241,7 +236,6 @@ def _drawn(job: PartJob, given: Given, results: Mapping[str, Any], where: str) -
 
 
 def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
-    """What the machine's job gives when it is analysed here."""
     from cmm_uq.app.commands.report import evaluate_job, outcome_of
     from cmm_uq.certificate.origin import as_json
 
@@ -262,7 +256,6 @@ def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
 
 
 def _machines_folder(job: PartJob) -> Path:
-    """Folder of the machine's job."""
     folder = job.folder / str(job.facts.machine_state.job)
     if folder.resolve() == job.folder.resolve():
         raise CmmUqError("is the part's own job", where=f"{WHERE} job = {job.facts.machine_state.job!r}",
@@ -292,7 +285,6 @@ def with_history(job: PartJob, kept: bytes | None) -> PartJob:
 
 
 def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> CertificateStatus:
-    """The certificate on the day of the measurement."""
     said, facts, on = stated.results["job"], job.facts.machine_state, job.facts.job.date
     date = dt.date.fromisoformat(said["date"])
     where = _where(job)

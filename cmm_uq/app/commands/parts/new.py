@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cmm_uq.app.commands.jobs.schemas import shipped
+from cmm_uq.app.commands.forms import shipped
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
@@ -59,7 +59,6 @@ class Answers:
         return next((name for name in self.machine if name.lower().endswith(_WHOLE)), FOLDER)
 
     def free_name(self, name: str, *, tolerance: bool = False) -> str:
-        """A name that no feature has, or no tolerance."""
         if name in ([one["name"] for one in self.characteristics] if tolerance else self.probed):
             raise CmmUqError(f"{name!r} is there already", fix="Give it another name")
         return name

@@ -120,7 +120,7 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
         for name in shares.characteristics
         for line, share, why in shares.told(name, virtual.named, MATTERS)
     )
-    further = further_of(machine.job, unseen)
+    further, files = further_of(machine.job, unseen)
     influence = prior_influence(virtual, machine.state, simulated.u, seed)
 
     # values, limits, decisions (JCGM 106)
@@ -131,10 +131,10 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
     x, y, z = origin_of(job, machine.state.machine).tolist()
     return PartMeasurement(
         job, plan, circumstances, virtual, simulated, characteristics, measured, shares, unseen,
-        None if further is None else further.further, decisions, together, tuple(reductions),
+        further, decisions, together, tuple(reductions),
         point_errors(virtual, seed=seed), (x, y, z), machine.standing, compare_methods(characteristics, shares, methods),
         digits=options.digits, seed=seed, asked=trials, warnings=machine.warnings,
-        files={} if further is None else further.files, influence=influence,
+        files=files, influence=influence,
     )  # fmt: skip
 
 
@@ -230,17 +230,16 @@ COMMAND = "part"
 
 def write_part(
     folder: Path, out: Path | None = None, *, options: PartOptions | None = None, force: bool = False,
-    stage: Stage | None = None, language: Code | None = None,
+    stage: Stage = silent, language: Code | None = None,
 ) -> Written[PartMeasurement]:  # fmt: skip
     """Evaluate a part's job and write ``part.html``, ``part.pdf``, ``results.json`` and what comes with them, all or none.
 
     ``out``: where to write; ``reports/<job id>`` by default. ``force``: keep what stands in the way as ``NAME.previous``
     instead of refusing.
     """
-    tell = stage or silent
-    tell("Reading the job", 0.0)
+    stage("Reading the job", 0.0)
     job = in_language(read_part(folder), language)
-    return written(job, lambda: evaluate_part(job, options, tell), out, force=force, stage=tell)
+    return written(job, lambda: evaluate_part(job, options, stage), out, force=force, stage=stage)
 
 
 def written(
@@ -264,7 +263,6 @@ def written(
 
 
 def contents_of(found: PartMeasurement, stage: Stage = silent, *, finished: Finished = unchanged) -> dict[str, bytes]:
-    """Bytes of every file, by name."""
     from cmm_uq.certificate.origin import as_json
     from cmm_uq.certificate.part.measurement import part_results
     from cmm_uq.certificate.render import render_html, render_pdf
@@ -300,7 +298,7 @@ def document_of(found: PartMeasurement) -> Document:
     facts = found.job.facts.job
     with lettered_in(facts.language):
         document = part_document(found)
-    told = [
-        say("Figures of this job are simulated or an example's: no part was measured, and nothing here certifies one.")
-    ]
-    return said(marked_as(document, facts.origin, facts.id, told if facts.origin == SIMULATED else []), facts.language)
+    told = say(
+        "Figures of this job are simulated or an example's: no part was measured, and nothing here certifies one."
+    )
+    return said(marked_as(document, facts.origin, facts.id, [told] * (facts.origin == SIMULATED)), facts.language)

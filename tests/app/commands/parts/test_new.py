@@ -15,9 +15,9 @@ from cmm_uq.analysis.parts import plan
 from cmm_uq.analysis.parts.characteristics import CharacteristicEvaluation
 from cmm_uq.analysis.parts.setup import circumstances_of, forms_of, plan_of, poses_of, refuse_unfit, surroundings_of
 from cmm_uq.analysis.parts.virtual import AtPose
+from cmm_uq.app.commands.forms import shipped
 from cmm_uq.app.commands.jobs.check import check_job
 from cmm_uq.app.commands.jobs.new import write_new
-from cmm_uq.app.commands.jobs.schemas import shipped
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine

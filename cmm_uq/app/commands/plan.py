@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.analysis.planning.set_up import join
+from cmm_uq.app.commands import plan_page as words
 from cmm_uq.app.commands.files import Form, Stage, Written, silent
-from cmm_uq.app.commands.plans import page as words
-from cmm_uq.app.commands.plans.planning import MeasurementPlan, Outlook, make_plan
+from cmm_uq.app.commands.jobs.simulate import to_fill_in
+from cmm_uq.app.commands.planning import MeasurementPlan, Outlook, make_plan
 from cmm_uq.app.commands.reading import in_language, read_job
 from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.messages import Text, say
@@ -45,22 +46,20 @@ def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = 
 
 def write_plan(
     job: Path, out: Path | None = None, *, power: bool = True, seed: int = 0, force: bool = False,
-    stage: Stage | None = None, language: Code | None = None,
+    stage: Stage = silent, language: Code | None = None,
 ) -> Written[Outcome]:  # fmt: skip
     """Plan a job and write ``plan.csv``, ``plan.html`` and ``results.json``, all or none.
 
     ``plan.csv`` has the columns of a recording of the artefact, at nominal coordinates; it is left out where nothing is left
     to measure.
     """
-    read, tell = in_language(read_job(job, recorded=False), language), stage or silent
-    outcome = partial(plan_outcome, read, power=power, seed=seed, stage=tell)
-    return PLAN.write(read, outcome, out, force=force, stage=tell)
+    read = in_language(read_job(job, recorded=False), language)
+    outcome = partial(plan_outcome, read, power=power, seed=seed, stage=stage)
+    return PLAN.write(read, outcome, out, force=force, stage=stage)
 
 
 def recording_to_be(plan: MeasurementPlan) -> bytes:
     """The placings that are still to be measured, as the CSV of a recording at nominal coordinates."""
-    from cmm_uq.app.commands.jobs.simulate import to_fill_in
-
     each = {name: getattr(plan.setting.plan, name) for name in ("seconds_per_point", "minutes_per_placing")}
     return to_fill_in(join(plan.to_measure, first=plan.first, **each))
 
@@ -153,19 +152,13 @@ def plan_summary(plan: MeasurementPlan) -> Summary:
     figures: tuple[Figure, ...] = ()
     remarks: list[Text] = [say("No reading shows: {what}.", what=text) for text in plan.free]
     if found is not None:
-        figures = tuple(
-            (
-                words.named(p.unknown),
-                say("u = {u} {unit}", u=words.expected(p, p.u), unit=words.unit_of(p.unknown)),
-                words.STATUS[p.status],
-            )
-            for p in found.parameters
-        )
+        us = (say("u = {u} {unit}", u=words.expected(p, p.u), unit=words.unit_of(p.unknown)) for p in found.parameters)
+        each = zip(found.parameters, us, strict=True)
+        figures = tuple((words.named(p.unknown), u, words.STATUS[p.status]) for p, u in each)
         remarks += [say("Stays free: {what}.", what=words.combination(parts)) for parts in found.free]
         remarks += [say("Could not be told apart: {effects}.", effects=text) for text in words.pairs(found)]
-        remarks += [
-            say("Would be taken for what the job names: {effects}.", effects=text) for text in words.absorbed(found)
-        ]
+        alike = words.absorbed(found)
+        remarks += [say("Would be taken for what the job names: {effects}.", effects=text) for text in alike]
     return Summary(
         words.to_measure_words(plan), verdicts=met, figures=figures, remarks=tuple(remarks),
         details=(heads, *placings) if placings else (),

@@ -129,17 +129,14 @@ class MeasurementPlan:
 
     @property
     def outlook(self) -> Outlook:
-        """Of everything that will have been measured."""
         return self.better or self.start
 
     @property
     def measured(self) -> int:
-        """How many of its placings are recorded already."""
         return len(self.start.placings) if self.name == RECORDED else 0
 
     @property
     def first(self) -> int:
-        """Number of the first measurement that is to be made."""
         return int(self.job.points.measurement.max()) + 1 if self.name == RECORDED else 1
 
     @property

@@ -1,15 +1,23 @@
-"""JSON Schema of every file that is read, with the kinds, effects and standards that other packages offer."""
+"""What a laboratory fills in: JSON Schema of every file that is read, and the form of a standard, clause by clause.
+
+Kinds, effects and standards of other packages are in them; the form is held against the laboratory's own copy.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.resources import files
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from cmm_uq import __version__
+from cmm_uq.analysis.conformity import standards
+from cmm_uq.analysis.conformity.statement import Clause
 from cmm_uq.artefacts import names, table_of
 from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.output.new_file import refuse_taken, write_new
 from cmm_uq.base.plugins import EFFECTS, KINDS, STANDARDS, Plugin, naming_package, offered
 from cmm_uq.jobs.derived_job import Truth
 from cmm_uq.jobs.schema import DRAFT, Schema, chosen_by, job_schema, schema_of
@@ -19,13 +27,11 @@ from cmm_uq.laboratory.schedule.settings import ScheduleFile
 
 
 def tables() -> dict[str, type[ArtefactFacts]]:
-    """Table of ``[artefact]`` of each kind."""
     return {kind: table for kind in names() if (table := table_of(kind)) is not None}
 
 
 def job() -> Schema:
     """Of job.toml, ``[plan]`` with it: what an effect is, its formula, and the columns that it needs."""
-    from cmm_uq.analysis.conformity.standards import names as standard_names
     from cmm_uq.machine.physics.catalogue import every
 
     effects = {
@@ -33,7 +39,7 @@ def job() -> Schema:
         + (f"; needs the columns {', '.join(effect.columns)}." if effect.columns else ".")
         for name, effect in every().items()
     }
-    return job_schema(tables(), effects, standard_names())
+    return job_schema(tables(), effects, standards.names())
 
 
 def budget() -> Schema:
@@ -79,3 +85,56 @@ def shipped(name: str) -> str:
 
 def as_text(schema: Mapping[str, Any]) -> str:
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
+
+
+@naming_package()
+def listed_standards() -> list[tuple[str, tuple[str, ...]]]:
+    """Every standard with its characteristics, then the documents that decisions and budgets go by, which have none."""
+    found: list[tuple[str, tuple[str, ...]]] = []
+    for name in (*standards.names(), *(name for name in standards.CLAUSES if name not in standards.names())):
+        standard = standards.standard_named(name)
+        found.append((name, () if standard is None else tuple(one.name for one in standard.characteristics)))
+    return found
+
+
+@naming_package()
+def clauses_of(name: str) -> Sequence[Clause]:
+    standard = standards.standard_named(name)
+    found = standards.CLAUSES.get(name, ()) if standard is None else standard.clauses
+    if not found:
+        known = [other for other, _ in listed_standards()]
+        problem = "has no clauses here" if name in known else f"no standard {name!r} is decided"
+        raise CmmUqError(problem, where=name, fix=suggestion(name, [other for other in known if other != name]))
+    return found
+
+
+def form(name: str) -> str:
+    clauses = clauses_of(name)
+    parts = [
+        f"# Clauses of {name} as cmm-uq {__version__} takes them. Hold each against your own copy and answer it; then\n"
+        '# name this file in job.toml: [[conformity]] clauses = "FILE". What stays unanswered counts as unread.\n\n'
+        f"standard = {_quoted(name)}\n"
+        'checked_by = ""     # who held the clauses against the copy\n'
+        "# on = 2026-01-31    # when\n"
+        'edition = ""        # of the copy, as on its title page\n'
+    ]
+    parts += [
+        f"\n[clauses.{one.name}]    # {one.title}; words of the standard {'' if one.read else 'not '}read by who wrote this\n"
+        f"does = {_quoted(one.does)}\n"
+        f"source = {_quoted(one.source)}\n"
+        '# agrees = true      # or: agrees = false with differs = "how"; stricter = true where this program asks for more\n'
+        '# clause = ""        # its number in the copy\n'
+        for one in clauses
+    ]
+    return "".join(parts)
+
+
+def write_form(name: str, file: Path) -> Path:
+    content = form(name)
+    refuse_taken(file)
+    write_new(file, content.encode())
+    return file
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)

@@ -9,7 +9,7 @@ import numpy as np
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.analysis.diagnosis.power import POWER, SIZES
 from cmm_uq.analysis.planning.identifiability import Determination, Identifiability
-from cmm_uq.app.commands.plans.planning import RECORDED, MeasurementPlan
+from cmm_uq.app.commands.planning import RECORDED, MeasurementPlan
 from cmm_uq.base.messages import DASH, NOTHING, Message, Text, Verbatim, commas, listed, names, number, plural, say
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import (
