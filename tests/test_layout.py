@@ -26,7 +26,7 @@ MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.pr
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
     "": 140, "base": 2_710, "maths": 10_565, "jobs": 11_375, "machine": 6_063, "analysis": 16_188, "laboratory": 13_814,
-    "certificate": 15_136, "artefacts": 8_509, "app": 14_248,
+    "certificate": 15_136, "artefacts": 8_509, "app": 13_889,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 235, 1499
