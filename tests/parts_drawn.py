@@ -8,8 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise
-from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, PartPose
+from cmm_uq.analysis.parts.causes.cause import CommonCause, normal
+from cmm_uq.analysis.parts.causes.surroundings import FIXTURE, elapsed
+from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, PartPose, Plan
 from cmm_uq.base.points import Floats, Machine
+from cmm_uq.base.units import ARCSECOND, MICROMETRE
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.geometry.association import Association
 
@@ -99,3 +102,13 @@ def block() -> tuple[tuple[PartFeature, ...], tuple[PartCharacteristic, ...]]:
         PartCharacteristic("upright", "perpendicularity", ("h1",), ("A",)),
         PartCharacteristic("corner", "angle", ("B", "C")),
     )
+
+
+def moving_part(plan: Plan, u_shift_um: float, u_turn_arcsec: float = 0.0) -> CommonCause:
+    """A part that has shifted and turned evenly by the end of its measurement."""
+    about = plan.points - plan.points.mean(axis=0)
+    done = elapsed(plan)[:, None]
+    shifts = [MICROMETRE * done * axis for axis in np.eye(3)]
+    turns = [ARCSECOND * done * np.cross(axis, about) for axis in np.eye(3)]
+    sd = np.repeat([u_shift_um, u_turn_arcsec], 3)
+    return CommonCause(name=FIXTURE, factors=("fixture",) * 6, draw=normal(sd), basis=np.array([*shifts, *turns]))

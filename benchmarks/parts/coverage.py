@@ -18,7 +18,8 @@ from dataclasses import replace
 import numpy as np
 
 import cmm_uq
-from cmm_uq.analysis.machine.conditional import given_recording, joint_posterior
+from benchmarks.parts.known_noise import joint_posterior
+from cmm_uq.analysis.machine.conditional import given_recording
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, unmodelled_errors
 from cmm_uq.analysis.parts.plan import PartPose, Plan, Stylus
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions

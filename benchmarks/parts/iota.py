@@ -18,7 +18,8 @@ import numpy as np
 
 import cmm_uq
 from benchmarks.examples.part_iota import COPY, FOLDER, MACHINE, ROOT, chosen, ends
-from cmm_uq.analysis.machine.conditional import given_recording, joint_posterior
+from benchmarks.parts.known_noise import joint_posterior
+from cmm_uq.analysis.machine.conditional import given_recording
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, unmodelled_errors, with_curves
 from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual

@@ -24,8 +24,9 @@ import numpy as np
 from benchmarks.coverage.measuring import kept
 from benchmarks.coverage.study import measure, waiting
 from benchmarks.parts import truth
+from benchmarks.parts.known_noise import joint_posterior
 from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, as_points, joined, plan
-from cmm_uq.analysis.machine.conditional import given_recording, joint_posterior
+from cmm_uq.analysis.machine.conditional import given_recording
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, unmodelled_errors, with_curves
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.evaluation import Evaluator, Known

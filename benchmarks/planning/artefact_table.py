@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq.analysis.planning.candidates import ready_plan
+from cmm_uq.analysis.planning.candidates import FAINT, certified, cosines, gram, imitators, left_of, ready_plan, visible
 from cmm_uq.analysis.planning.identifiability import NOT_TOLD_APART, identifiability
-from cmm_uq.analysis.planning.information import FAINT, certified, cosines, gram, imitators, left_of, visible
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.analysis.planning.setting import Planning, Setting, Volume
 from cmm_uq.artefacts import artefact_facts, kind_named

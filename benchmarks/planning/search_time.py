@@ -7,8 +7,7 @@ import time
 import numpy as np
 from settings import MACHINE, SIX, setting
 
-from cmm_uq.analysis.planning.candidates import candidates
-from cmm_uq.analysis.planning.information import CRITERIA, choose, score_of, set_up_information, step
+from cmm_uq.analysis.planning.candidates import CRITERIA, candidates, choose, score_of, set_up_information, step
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.artefacts import artefact_facts
 

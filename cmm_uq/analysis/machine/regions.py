@@ -23,8 +23,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from cmm_uq.analysis.diagnosis.held_out import thin_out
-from cmm_uq.analysis.machine.conditional import RecordedField
-from cmm_uq.analysis.machine.influence import PriorInfluence, influence_of
+from cmm_uq.analysis.machine.conditional import PriorInfluence, RecordedField, influence_of
 from cmm_uq.analysis.machine.state import Unmodelled, of_machine, unmodelled_errors
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points

@@ -80,8 +80,7 @@ _FACTORS: Mapping[str, Text] = {
     "temperature: warming of scale x": say("Warming of the scale of X while the part is probed"),
     "temperature: warming of scale y": say("Warming of the scale of Y while the part is probed"),
     "temperature: warming of scale z": say("Warming of the scale of Z while the part is probed"),
-    "fixture: fixture": say("Clamping"), "fixture: movement of the part": say("Movement of the part"),
-    "operator: reproducibility of points": say("Reproducibility of a point"),
+    "fixture: fixture": say("Clamping"), "operator: reproducibility of points": say("Reproducibility of a point"),
 }  # fmt: skip
 # beginnings of lines that go on with a name of the user's
 _NAMED: Mapping[str, Callable[[Text], Text]] = {

@@ -1,4 +1,7 @@
-"""Candidate set-ups, the artefact in many places and attitudes inside the machine's volume; and ready plans."""
+"""Candidate set-ups, the artefact in many places and attitudes inside the volume, and ready plans; what each tells.
+
+Information of every unknown (Atkinson, Donev & Tobias 2007, 5.1), by which they are chosen by exchange (Fedorov 1972).
+"""
 
 from __future__ import annotations
 
@@ -7,13 +10,18 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.analysis.planning.set_up import PLANES, Pattern, SetUp, attitudes_of_lines, direction_words
-from cmm_uq.analysis.planning.setting import Setting, Start, Volume
+from cmm_uq.analysis.planning.setting import PlannedNoise, Setting, Start, Volume, uncorrelated
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.base.points import Floats
+from cmm_uq.base.points import Floats, Points
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.model.measurement import ARTEFACT
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.maths.inference.linear_model import Unknown
 
 THIRDS = (0.0, 0.5, 1.0)
 _FIFTHS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -128,3 +136,232 @@ def check_allowed(setting: Setting, direction: Floats, how: str = "") -> None:
             where="job.toml [plan.fixtures] directions",
             fix='Allow the direction, or leave out ready and ask for number = 20 placings by criterion = "D"',
         )
+
+
+_HELD = 1e12  # of a size that its certificate gives without uncertainty, 0.1 nm; more would hide all other by rounding
+SEEN = 1e-6  # part of an effect's information, of what it would be by itself, below which rounding hides it
+FAINT = 1.0  # below which an effect of its prior standard deviation does not stand out of the noise
+_RIDGE = 1e-13
+_PART = 0.1  # share from which on a column counts as part of what looks like another
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """Information of set-ups, one matrix each."""
+
+    unknowns: tuple[Unknown, ...]
+    each: Floats  # (c, k, k) of every set-up; there may be more rows than unknowns, of freedoms that all set-ups share
+    prior: Floats  # (k, k) of the certificates, without that of the effects
+
+    def where(self, effects: Sequence[Effect]) -> list[int]:
+        names = {effect.name for effect in effects}
+        return [i for i, unknown in enumerate(self.unknowns) if unknown.key[0] in names]
+
+    @property
+    def nuisance(self) -> list[int]:
+        """Rows of the artefact's sizes and of what all set-ups share."""
+        effects = [i for i, unknown in enumerate(self.unknowns) if unknown.key[0] != ARTEFACT]
+        return [i for i in range(len(self.prior)) if i not in effects]
+
+
+def set_up_information(setting: Setting, placings: Sequence[SetUp], also: tuple[Effect, ...] = ()) -> Information:
+    """What each set-up tells of the effects that the job names, and of some others."""
+    points = setting.joined(placings)
+    if setting.planning.shared:
+        return shared(setting.model(points, also), setting.noise)
+    numbers = np.unique(points.measurement)
+    models = [setting.model(points.select(points.measurement == number), also) for number in numbers]
+    matrices = [gram(model, np.array([u.prior_mean for u in model.unknowns]), setting.noise) for model in models]
+    return Information(models[0].unknowns, np.stack(matrices), certified(models[0].unknowns))
+
+
+def recording_information(setting: Setting, points: Points, also: tuple[Effect, ...] = ()) -> Floats:
+    """Information (k, k) of a whole recording, in the rows of :func:`set_up_information`, without that of certificates."""
+    model = setting.model(points, also)
+    if setting.planning.shared:
+        return np.asarray(shared(model, setting.noise).each.sum(axis=0), dtype=np.float64)
+    return gram(model, np.array([u.prior_mean for u in model.unknowns]), setting.noise)
+
+
+def gram(model: RecordingModel, values: Floats, noise: PlannedNoise | None = None) -> Floats:
+    """Information (k, k) of a recording about the parameters, without a prior; ``noise`` ``None``: the model's white noise."""
+    white = _white(model, values, noise)
+    return np.asarray(white.T @ white, dtype=np.float64)
+
+
+def by_measurement(model: RecordingModel, values: Floats) -> Floats:
+    """The same for each measurement (c, k, k), in ascending order, under the white noise that the model states."""
+    white = _white(model, values, None)
+    index = np.unique(model.artefact.measurement[model.used], return_inverse=True)[1].ravel()
+    return np.stack([rows.T @ rows for rows in (white[index == i] for i in range(int(index.max()) + 1))])
+
+
+def _white(model: RecordingModel, values: Floats, noise: PlannedNoise | None) -> Floats:
+    """Design (m, k) over the noise, the set-up projected out, in the units of :func:`scales`."""
+    linear = uncorrelated(model, values, noise)
+    return np.asarray(linear.reduced.design * scales(linear.unknowns) / _sigma(model, noise))
+
+
+def scales(unknowns: Sequence[Unknown]) -> Floats:
+    """(k,) unit of each unknown: the prior standard deviation of an effect, a tenth of a millimetre of a size."""
+    return np.array([unknown.scale for unknown in unknowns])
+
+
+def certified(unknowns: Sequence[Unknown], more: int = 0) -> Floats:
+    """Information (k + more, k + more) of the certificates."""
+    values = np.zeros(len(unknowns) + more)
+    for i, unknown in enumerate(unknowns):
+        if unknown.known:
+            values[i] = min((unknown.scale / unknown.prior_sd) ** 2, _HELD) if unknown.prior_sd > 0 else _HELD
+    return np.diag(values)
+
+
+def shared(model: RecordingModel, noise: PlannedNoise | None = None) -> Information:
+    """Information of each measurement of a recording whose set-up's freedoms are common to all of them: a swept bar."""
+    values = np.array([u.prior_mean for u in model.unknowns])
+    linear = uncorrelated(model, values, noise)
+    rows = np.hstack([linear.design * scales(linear.unknowns), linear.freedoms.dense()])
+    rows = rows / (linear.noise_scale[:, None] * _sigma(model, noise))
+    numbers, index = np.unique(model.artefact.measurement, return_inverse=True)
+    each = np.zeros((len(numbers), rows.shape[1], rows.shape[1]))
+    np.add.at(each, index.ravel(), rows[:, :, None] * rows[:, None, :])
+    return Information(linear.unknowns, each, certified(linear.unknowns, linear.freedoms.count))
+
+
+def _sigma(model: RecordingModel, noise: PlannedNoise | None) -> float:
+    sigma = model.sigma if noise is None else noise.coordinate
+    if sigma is None:
+        raise ValueError("the information of a measurement needs the noise")
+    return sigma
+
+
+def left_of(information: Floats, rivals: Sequence[int], base: Sequence[int]) -> Floats:
+    """Information (..., r, r) on rivals once the base (rows) is fitted: the Schur complement. ``information`` (..., k, k)."""
+    rival, fitted = list(rivals), list(base)
+    own = information[..., rival, :][..., :, rival]
+    if not fitted:
+        return np.asarray(own)
+    cross, within = (information[..., fitted, :][..., :, columns] for columns in (rival, fitted))
+    scale = np.sqrt(np.maximum(np.einsum("...ii->...i", within), 1e-300))
+    scaled = within / scale[..., :, None] / scale[..., None, :] + _RIDGE * np.eye(len(fitted))
+    solved = np.linalg.solve(scaled, cross / scale[..., :, None]) / scale[..., :, None]
+    return np.asarray(own - np.swapaxes(cross, -1, -2) @ solved)
+
+
+def cosines(left: Floats, alone: Floats) -> Floats:
+    """Absolute cosines (..., r, r) of effects from what is left, 1 where unseen; ``alone`` (..., r) with nothing else."""
+    seen = visible(left, alone)
+    root = np.sqrt(np.where(seen, np.einsum("...ii->...i", left), 1.0))
+    cosine = np.minimum(np.abs(left) / root[..., :, None] / root[..., None, :], 1.0)
+    both = seen[..., :, None] & seen[..., None, :] & ~np.eye(left.shape[-1], dtype=bool)
+    return np.asarray(np.where(both, cosine, 1.0))
+
+
+def visible(left: Floats, alone: Floats) -> NDArray[np.bool_]:
+    """(..., r) whether anything of each effect is left."""
+    return np.asarray(np.einsum("...ii->...i", left) > np.maximum(SEEN * alone, FAINT))
+
+
+def imitators(information: Floats, row: int, base: Sequence[int]) -> list[int]:
+    """Rows of the base that together look like an effect: least squares of its column on theirs, the smallest solution."""
+    fitted, scale = list(base), np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scaled = information / scale[:, None] / scale[None, :]
+    parts = np.linalg.lstsq(scaled[np.ix_(fitted, fitted)], scaled[fitted, row], rcond=_RIDGE**0.5)[0]
+    return [i for i, part in zip(fitted, parts, strict=True) if abs(part) > _PART]
+
+
+CRITERIA = ("separation", "D", "A", "worst")
+_FLOOR = (
+    1e-3  # square of the sine below which a pair is as good as identical; keeps one such pair from hiding all others
+)
+_GAIN = 1e-6  # least gain in the score by which a set-up is chosen; else the one that tells most of everything
+_BETTER, _MOST_TRIES = 1e-9, 2000
+Score = Callable[[Floats], Floats]  # what is to become small, (c,), of information (c, k, k)
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """What a search ends with."""
+
+    indices: tuple[int, ...]  # of the candidates taken, in ascending order
+    after: float  # after, before: score with and without them; smaller is better
+    before: float
+
+
+def score_of(criterion: str, placings_information: Information, targets: Sequence[int]) -> Score:
+    targets, least, rows = list(targets), 2 if criterion == "separation" else 1, range(len(placings_information.prior))
+    if criterion not in CRITERIA:
+        raise CmmUqError(f"no criterion {criterion!r}", fix=f"Known: {', '.join(CRITERIA)}")
+    if len(targets) < least:
+        raise CmmUqError(f"the criterion {criterion!r} needs at least {least} effects", where="job.toml [plan]",
+                         fix="Name more effects, or rivals to tell apart")  # fmt: skip
+    if criterion == "separation":
+        base, upper = [i for i in rows if i not in targets], np.triu_indices(len(targets), 1)
+
+        def apart(information: Floats) -> Floats:
+            alone = np.einsum("...ii->...i", information)[..., targets]
+            sine = 1 - cosines(left_of(information, targets, base), alone)[..., upper[0], upper[1]] ** 2
+            return np.asarray(-np.log(sine + _FLOOR).mean(axis=-1))
+
+        return apart
+    nuisance = placings_information.nuisance
+    effects = [i for i in rows if i not in nuisance]
+    at = [effects.index(i) for i in targets]
+
+    def uncertain(information: Floats) -> Floats:
+        left = left_of(information, effects, nuisance) + np.eye(len(effects))
+        covariance = np.linalg.inv(left)[..., at, :][..., :, at]
+        if criterion == "D":
+            return np.asarray(np.linalg.slogdet(covariance)[1] / len(targets))
+        variances = np.einsum("...ii->...i", covariance)
+        return np.asarray(np.log(variances.mean(axis=-1) if criterion == "A" else variances.max(axis=-1)))
+
+    return uncertain
+
+
+def step(score: Score, start: Floats, each: Floats) -> Floats:
+    """Score (c,) with each candidate (c, k, k) added to what there is (k, k): one step of the search."""
+    return score(start + each)
+
+
+def choose(
+    placings_information: Information, start: Floats, score: Score, count: int, *, again: bool = False
+) -> Selection:
+    """Take ``count`` candidates, greedily, then exchange them one for one; ``start`` (k, k) information already there."""
+    each, nuisance = placings_information.each, placings_information.nuisance
+    again = again or count > len(each)
+    everything = score_of("D", placings_information, [i for i in range(len(start)) if i not in nuisance])
+    taken: list[int] = []
+    information, before = start.copy(), float(score(start[None])[0])
+    now = before
+    for _ in range(count):
+        scores = _free(step(score, information, each), taken, again)
+        best = int(np.argmin(scores))
+        if scores[best] > now - _GAIN * (1 + abs(now)):
+            best = int(np.argmin(_free(step(everything, information, each), taken, again)))
+        taken.append(best)
+        information, now = information + each[best], float(scores[best])
+    return Selection(*_exchanged(each, information, score, taken, again), before)
+
+
+def _free(scores: Floats, taken: Sequence[int], again: bool) -> Floats:
+    if not again:
+        scores = scores.copy()
+        scores[list(taken)] = np.inf
+    return scores
+
+
+def _exchanged(
+    each: Floats, information: Floats, score: Score, taken: list[int], again: bool
+) -> tuple[tuple[int, ...], float]:
+    now = float(score(information[None])[0])
+    at, unchanged, tries = 0, 0, 0
+    while unchanged < len(taken) and tries < _MOST_TRIES:
+        without = information - each[taken[at]]
+        scores = _free(step(score, without, each), taken, again)
+        best = int(np.argmin(scores))
+        unchanged, tries = unchanged + 1, tries + 1
+        if scores[best] < now - _BETTER * (1 + abs(now)):
+            taken[at], information, now, unchanged = best, without + each[best], float(scores[best]), 0
+        at = (at + 1) % len(taken)
+    return tuple(sorted(taken)), now

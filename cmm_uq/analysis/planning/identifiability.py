@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from cmm_uq.analysis.planning.information import FAINT, certified, cosines, gram, imitators, left_of, scales, visible
+from cmm_uq.analysis.planning.candidates import FAINT, certified, cosines, gram, imitators, left_of, scales, visible
 from cmm_uq.analysis.planning.set_up import SetUp, repeat_points
 from cmm_uq.analysis.planning.setting import PlannedNoise, Setting, uncorrelated, white_noise
 from cmm_uq.base.points import Floats

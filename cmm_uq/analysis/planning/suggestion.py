@@ -15,8 +15,17 @@ import numpy as np
 
 from cmm_uq.analysis.diagnosis.comparison.explanations import shapes
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
-from cmm_uq.analysis.planning import information as content
-from cmm_uq.analysis.planning.information import Information, Selection, left_of, scales
+from cmm_uq.analysis.planning.candidates import (
+    Information,
+    Selection,
+    by_measurement,
+    certified,
+    choose,
+    gram,
+    left_of,
+    scales,
+    shared,
+)
 from cmm_uq.analysis.planning.set_up import ODDS, DetectionChange, DetectionGoal, NextPlan, Separation, SetUp, append
 from cmm_uq.analysis.planning.setting import Planning, Volume, turned_set_ups
 from cmm_uq.base.errors import CmmUqError
@@ -141,14 +150,14 @@ def _information(
     names = tuple(unknown.key[0] for unknown in together.unknowns)
     values = np.array([unknown.prior_mean for unknown in together.unknowns])
     if shared_freedoms:
-        whole = content.shared(together)
+        whole = shared(together)
     else:
-        each, certified = content.by_measurement(together, values), content.certified(together.unknowns)
-        whole = Information(together.unknowns, each, certified)
+        each = by_measurement(together, values)
+        whole = Information(together.unknowns, each, certified(together.unknowns))
     count = len(whole.each) - len(places)
     recorded = whole.each[:count].sum(axis=0)
     if not shared_freedoms and len(names) == len(model.unknowns):  # without observations that were set aside
-        recorded = content.gram(model, values)
+        recorded = gram(model, values)
     names = (*names, *[ARTEFACT] * (len(whole.prior) - len(names)))
     fitted = frozenset({ARTEFACT, *(effect.name for effect in after.effects)})
     return _Information(replace(whole, each=whole.each[count:]), names, fitted, recorded)
@@ -268,9 +277,7 @@ def _fewest(aims: _Aims) -> tuple[Selection, int] | None:
     """As few set-ups as reach all aims, each repeated no more often than that needs; what comes closest where none does."""
 
     def chosen(count: int, repeats: int) -> Selection:
-        return content.choose(
-            replace(aims.known.told, each=aims.added(repeats)), aims.known.recorded, aims.short, count
-        )
+        return choose(replace(aims.known.told, each=aims.added(repeats)), aims.known.recorded, aims.short, count)
 
     most = min(SET_UPS, len(aims.known.told.each))
     best = chosen(most, REPEATS)

@@ -13,8 +13,15 @@ from cmm_uq.analysis.conformity.standards import standard_named
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.analysis.diagnosis.power import DrawnNoise, Power, powers, without_fault
 from cmm_uq.analysis.planning import identifiability as design
-from cmm_uq.analysis.planning.candidates import candidates, ready_plan, thinned
-from cmm_uq.analysis.planning.information import choose, recording_information, score_of, set_up_information
+from cmm_uq.analysis.planning.candidates import (
+    candidates,
+    choose,
+    ready_plan,
+    recording_information,
+    score_of,
+    set_up_information,
+    thinned,
+)
 from cmm_uq.analysis.planning.set_up import SetUp, append, join, split
 from cmm_uq.analysis.planning.setting import Setting, Start, white_noise
 from cmm_uq.app.commands.model import OVERFLOW_FIX, refuse_planned, refuse_unfit

@@ -7,9 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from cmm_uq.analysis.conformity.accuracy import TITLES, UNITS
-from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
+from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, Rival
 from cmm_uq.analysis.diagnosis.location import Place, residual_field
-from cmm_uq.analysis.diagnosis.model_average import Rival
 from cmm_uq.analysis.diagnosis.power import ALLOWED
 from cmm_uq.analysis.diagnosis.smallest import PLACES, POWER, PeriodRange, SmallestEffect
 from cmm_uq.analysis.planning.set_up import ODDS, NextPlan, odds_words, rounded

@@ -14,7 +14,7 @@ import numpy as np
 from cmm_uq import __version__
 from cmm_uq.analysis.conformity.decision import Outcome, rule_name, rule_words
 from cmm_uq.analysis.conformity.limits import LimitDecision
-from cmm_uq.analysis.machine.influence import PriorInfluence
+from cmm_uq.analysis.machine.conditional import PriorInfluence
 from cmm_uq.analysis.parts.budget import PointErrors, VarianceShares, Way
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.methods import method as other_methods

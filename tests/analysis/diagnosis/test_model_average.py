@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.conformity.accuracy import figures
-from cmm_uq.analysis.diagnosis.model_average import REMAINS, SETTLED
+from cmm_uq.analysis.diagnosis.diagnosis import REMAINS, SETTLED
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import evaluate as analyse_observations, outcome_of
 from cmm_uq.artefacts.ballbar import Ballbar

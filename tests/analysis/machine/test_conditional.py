@@ -13,10 +13,10 @@ from scipy.special import sici
 from scipy.stats import binom
 
 import cmm_uq
+from benchmarks.parts.known_noise import joint_posterior
 from cmm_uq.analysis.machine.conditional import (
     RecordedField,
     given_recording,
-    joint_posterior,
     shown,
     stated_noise,
 )

@@ -11,7 +11,6 @@ import pytest
 from cmm_uq.analysis.machine.state import StatedNoise
 from cmm_uq.analysis.parts import budget as in_words, plan
 from cmm_uq.analysis.parts.budget import PLACE, variance_shares
-from cmm_uq.analysis.parts.causes.surroundings import moving_part
 from cmm_uq.analysis.parts.setup import circumstances_of, plan_of
 from cmm_uq.analysis.parts.virtual import Virtual
 from cmm_uq.base.messages import Message, Verbatim, say
@@ -44,8 +43,7 @@ def test_every_line_of_a_budget_has_words() -> None:
     plan = plan_of(job)
     noise = StatedNoise(np.full(3, 1e-3), placing_mm=1e-3, growth_mm=1e-3, longest_mm=500.0, slow_mm=1e-3)
     given = circumstances_of(job, replace(machine(), noise=noise), plan, 2)
-    moving = moving_part(plan, 1.0, 1.0)
-    found = variance_shares(Virtual(plan, replace(given, further=(*given.further, moving))), 64)
+    found = variance_shares(Virtual(plan, given), 64)
     lines = [*found.causes, *found.factors]
     unknown = [line for line in lines if not isinstance(in_words.line_in_words(line, {}), Message)]
     assert all(line.startswith("machine: ") for line in unknown), unknown

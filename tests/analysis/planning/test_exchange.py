@@ -8,8 +8,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.planning.candidates import candidates
-from cmm_uq.analysis.planning.information import Information, choose, score_of, set_up_information
+from cmm_uq.analysis.planning.candidates import Information, candidates, choose, score_of, set_up_information
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model.measurement import ARTEFACT

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from cmm_uq.analysis.planning.candidates import ready_plan
-from cmm_uq.analysis.planning.information import (
+from cmm_uq.analysis.planning.candidates import (
     Information,
     certified,
     cosines,
     gram,
     imitators,
     left_of,
+    ready_plan,
     recording_information,
     scales,
     set_up_information,

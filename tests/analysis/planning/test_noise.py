@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.analysis.planning.candidates import ready_plan
+from cmm_uq.analysis.planning.candidates import gram, ready_plan, recording_information, set_up_information
 from cmm_uq.analysis.planning.identifiability import expected_uncertainty, identifiability
-from cmm_uq.analysis.planning.information import gram, recording_information, set_up_information
 from cmm_uq.analysis.planning.set_up import attitude_along, join
 from cmm_uq.analysis.planning.setting import PlannedNoise, Setting
 from cmm_uq.artefacts import artefact_facts

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import cmm_uq
-from cmm_uq.analysis.diagnosis.model_average import ModelAverage, Rival
+from cmm_uq.analysis.diagnosis.diagnosis import ModelAverage, Rival
 from cmm_uq.analysis.planning.set_up import DetectionChange, NextPlan, Separation
 from cmm_uq.app.commands.diagnose import diagnose_read
 from cmm_uq.app.commands.reading import read_job

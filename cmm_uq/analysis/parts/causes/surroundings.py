@@ -7,9 +7,6 @@ like any other.
 A part is measured at 20 °C (ISO 1), or reduced to it by an expansion coefficient and a temperature that both are uncertain:
 what remains is the difference of two products, drawn as such. A warm scale reads too little. A gradient bends the part.
 
-Where a part lies is no error, but that it moves is one: what is probed later has moved farther. Movement is taken as even over
-the measurement, in the order in which points are probed.
-
 What repeats by different people, days or set-ups scatter by beyond everything else is stated, not computed: from repeats of
 one's own. It is common to a measurement, however often each point is read, and drawn again in the next measurement.
 """
@@ -26,7 +23,7 @@ from cmm_uq.analysis.parts.causes.cause import CommonCause, PartCause, PointScat
 from cmm_uq.analysis.parts.plan import PartFeature, PartPose, Plan
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import AXES, Floats, Points
-from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.base.units import METRE, MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.part.feature import ORIENTED
 from cmm_uq.maths.geometry.feature import frame_about
 
@@ -121,17 +118,6 @@ def _angles(feature: PartFeature, points: Floats) -> Floats:
         raise CmmUqError("undulations need an axis to go round", where=where, fix=fix)
     across = (points - feature.nominal.point) @ frame_about(axis)[:2].T
     return np.asarray(np.arctan2(across[:, 1], across[:, 0]))
-
-
-def moving_part(plan: Plan, u_shift_um: float, u_turn_arcsec: float = 0.0) -> CommonCause:
-    """A part that has shifted and turned evenly by the end of its measurement."""
-    about = plan.points - plan.points.mean(axis=0)
-    done = elapsed(plan)[:, None]
-    shifts = [MICROMETRE * done * axis for axis in np.eye(3)]
-    turns = [ARCSECOND * done * np.cross(axis, about) for axis in np.eye(3)]
-    sd = np.repeat([u_shift_um, u_turn_arcsec], 3)
-    basis, factors = np.array([*shifts, *turns]), ("movement of the part",) * 6
-    return CommonCause(name=FIXTURE, factors=factors, draw=normal(sd), basis=basis)
 
 
 def elapsed(plan: Plan) -> Floats:

@@ -13,7 +13,6 @@ import numpy as np
 from cmm_uq.analysis.conformity.decision import PriorKnowledge
 from cmm_uq.analysis.conformity.limits import LimitDecision, Limits, judge
 from cmm_uq.analysis.parts.budget import DRAWS as SHARED, point_errors, variance_shares, ways
-from cmm_uq.analysis.parts.influence import prior_influence
 from cmm_uq.analysis.parts.methods.of_job import compare_methods, methods_of
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.result import conforming, evaluated, middle, stated, within_bounds
@@ -26,7 +25,7 @@ from cmm_uq.analysis.parts.setup import (
     refuse_out_of_reach,
     refuse_unfit,
 )
-from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
+from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual, prior_influence
 from cmm_uq.app.commands.files import REPORTS, RESULTS, Finished, Stage, Written, silent, unchanged
 from cmm_uq.app.commands.parts.drift import further_of
 from cmm_uq.app.commands.parts.machine import state_machine, with_calibration, with_history

@@ -11,12 +11,12 @@ import pytest
 from cmm_uq.analysis.machine.state import StatedNoise, coefficients_of, noise_of_draws, unmodelled_errors
 from cmm_uq.analysis.parts.causes.cause import MANY, PointScatter, components, field_components
 from cmm_uq.analysis.parts.causes.machine import DEGREES, directions, styli
-from cmm_uq.analysis.parts.causes.surroundings import SurfaceForm, elapsed, moving_part
+from cmm_uq.analysis.parts.causes.surroundings import SurfaceForm, elapsed
 from cmm_uq.analysis.parts.plan import PartCharacteristic, PartFeature, PartPose, Plan, Stylus
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.machine.physics.catalogue import CATALOGUE, effects
 from cmm_uq.maths.inference.draws import Draws
-from tests.parts_drawn import POSE, UP, ball, bore, circle, machine, plane, ring, spot
+from tests.parts_drawn import POSE, UP, ball, bore, circle, machine, moving_part, plane, ring, spot
 
 
 def drawn(plan: Plan, given: MeasurementConditions, n: int = 20_000, *, exact: bool = False) -> np.ndarray:

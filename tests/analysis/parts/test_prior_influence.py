@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.machine.influence import ALL
+from cmm_uq.analysis.machine.conditional import ALL
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, Unmodelled
-from cmm_uq.analysis.parts.influence import prior_influence
 from cmm_uq.analysis.parts.plan import PartCharacteristic, PartPose, Plan
-from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
+from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual, prior_influence
 from cmm_uq.machine.physics.catalogue import effects
 from tests.parts_drawn import MACHINE, spot
 
