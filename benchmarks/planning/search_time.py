@@ -7,7 +7,7 @@ import time
 import numpy as np
 from settings import MACHINE, SIX, setting
 
-from cmm_uq.analysis.planning.candidates import CRITERIA, candidates, choose, score_of, set_up_information, step
+from cmm_uq.analysis.planning.candidates import CRITERIA, candidates, choose, score_of, set_up_information
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.artefacts import artefact_facts
 
@@ -28,7 +28,7 @@ def main() -> None:
         times = []
         for _ in range(5):
             began = time.perf_counter()
-            step(score, start, known.each)
+            score(start + known.each)
             times.append(time.perf_counter() - began)
         began = time.perf_counter()
         choose(known, known.prior, score, 20)

@@ -145,9 +145,8 @@ def _of_this_test(test: Test, found: Indications, chosen: Chosen | None) -> tupl
 def _in_words(items: Sequence[Decided], worst: Decided, stated: TestUncertainty) -> tuple[Text, Text]:
     """Where u comes from, and how many lengths are decided with it."""
     uncertain, u = NOT_STATED, worst.u_um
-    if u > 0 and any(
-        getattr(stated, LINE_KEYS[line]) or stated.declared(line) for line in uncertainty.LENGTH_LINES[1:]
-    ):
+    beside = uncertainty.LENGTH_LINES[1:]
+    if u > 0 and any(getattr(stated, LINE_KEYS[line]) or stated.declared(line) for line in beside):
         uncertain = say("u is the test uncertainty (ISO/TS 23165), {u_um:.3g} µm for the length named.", u_um=u)
     elif u > 0:
         uncertain = say(
@@ -164,12 +163,9 @@ def _in_words(items: Sequence[Decided], worst: Decided, stated: TestUncertainty)
 
 def _again_in_words(items: Sequence[Decided], again: Remeasurement | None) -> Iterator[Text]:
     for standing in ("again", "replaced") if again else ():
-        places = dict.fromkeys(
-            (one.measurement or 0, one.length_mm or 0.0) for one in items if one.standing == standing
-        )
-        each = (
-            say("measurement {measurement}, {length} mm", measurement=m, length=nominal(length)) for m, length in places
-        )
+        of = [item for item in items if item.standing == standing]
+        places = dict.fromkeys((one.measurement or 0, nominal(one.length_mm or 0.0)) for one in of)
+        each = (say("measurement {measurement}, {length} mm", measurement=m, length=length) for m, length in places)
         if again and places:
             repeats, readings, which = again.repeats, again.readings, semicolons(each)
             further = say(
@@ -195,12 +191,8 @@ def volumetric_performance(test: Test) -> Statement:
 
 
 def _bar_budget(test: Test) -> tuple[Budget, Text]:
-    stated, size, micrometre, two = (
-        test.circumstances.uncertainty,
-        test.artefact.sizes[0],
-        unit("µm"),
-        float(np.sqrt(2.0)),
-    )
+    stated, size = test.circumstances.uncertainty, test.artefact.sizes[0]
+    micrometre, two = unit("µm"), float(np.sqrt(2.0))
     expansion = abs(test.circumstances.cte_per_k or 0.0) * size.nominal / MICROMETRE
     lines = [
         BudgetLine(say("temperature of the bar, twice"), stated.u_temperature_k, JUDGEMENT, unit=unit("K"),
@@ -336,11 +328,9 @@ def _of_spheres(
                      repeat=repeat, length_mm=size, set_aside=test.set_aside_in(measurement, repeat))
         for i, measurement, repeat in runs
     )  # fmt: skip
-    remarks, count, number = [remark], len(items), least_favourable(items).measurement or 0
+    remarks, count, largest = [remark], len(items), least_favourable(items).measurement or 0
     if count > 1:
-        remarks.append(
-            say("The largest of {count} spheres: measurement {measurement}.", count=count, measurement=number)
-        )
+        remarks += [say("The largest of {count} spheres: measurement {measurement}.", count=count, measurement=largest)]
     causes = Causes(np.full((count, 1), u), np.zeros(count), np.arange(count))
     return test.stated(quantity, say("points"), items, remarks, signed=signed, causes=causes, budget=budget)
 

@@ -23,9 +23,8 @@ from cmm_uq.jobs.tables.conformity import Rule
 RARE = 50  # Draws beyond a limit, from which on their share is taken for the probability
 FEWEST = 500  # Effective draws of a weighted sample; with fewer the posterior is that of normal distributions
 SCARCE = 0.05  # share of draws, below which those possible say nothing of a zone: it is taken as large as its error
-Ends = tuple[
-    float | None, float | None
-]  # smallest and largest value that a rule accepts; None of a side without a limit
+# smallest and largest value that a rule accepts; None of a side without a limit
+Ends = tuple[float | None, float | None]
 _GRID, _HALVINGS, _NODES, _REACH = 33, 30, 2000, 8.0
 
 

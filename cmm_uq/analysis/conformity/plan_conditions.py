@@ -325,9 +325,8 @@ def sphere_points(
             bare.append(say("points over a hemisphere on the sphere of {name} (part of it {gap:.0f}° from the nearest point)",
                             name=name, gap=gap))  # fmt: skip
     over = say("every direction of a hemisphere within {reach_deg:g}° of a point", reach_deg=reach)
-    return Condition(say("{points} points over the sphere", points=wanted), tuple(lacking)), Condition(
-        over, tuple(bare)
-    )
+    enough = say("{points} points over the sphere", points=wanted)
+    return Condition(enough, tuple(lacking)), Condition(over, tuple(bare))
 
 
 def _farthest(normals: Floats) -> float:

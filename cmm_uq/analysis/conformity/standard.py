@@ -216,10 +216,9 @@ class Test:
     def refuse_nothing_measured(self, measured: bool, what: str) -> None:
         """Refuse a statement on something of which the recording has nothing."""
         if not measured:
-            problem = (
-                f"{self.characteristic.name} of {self.facts.standard} is decided on {what}, and the recording has none"
-            )
-            raise self.error(problem, "characteristic", "Record them, or leave the statement out")
+            asked = f"{self.characteristic.name} of {self.facts.standard} is decided on {what}"
+            fix = "Record them, or leave the statement out"
+            raise self.error(f"{asked}, and the recording has none", "characteristic", fix)
 
     def stated(
         self, quantity: Text, measured: Text, items: tuple[Decided, ...], remarks: Sequence[Text], *,

@@ -333,9 +333,8 @@ def statement(
         artefact, whole = left_out.whole(artefact), left_out.whole(whole)
     if beside is not None:
         artefact, whole = beside(artefact, under.short_gauge), beside(whole, under.short_gauge)
-    return characteristic.statement(
-        Test(standard, characteristic, facts, artefact, whole, accuracy, key, under, left_out)
-    )
+    test = Test(standard, characteristic, facts, artefact, whole, accuracy, key, under, left_out)
+    return characteristic.statement(test)
 
 
 def decidable(
@@ -344,18 +343,16 @@ def decidable(
     """The standard that a job names, and its characteristic, where they can be decided on a kind of measurement."""
     standard, where = standard_named(facts.standard), f"job.toml {key} standard"
     if standard is None:
-        raise CmmUqError(
-            f"no standard {facts.standard!r} is decided", where=where, fix=suggestion(facts.standard, names())
-        )
+        fix = suggestion(facts.standard, names())
+        raise CmmUqError(f"no standard {facts.standard!r} is decided", where=where, fix=fix)
     characteristic = characteristic_of(standard, facts, key)
     if characteristic.observed not in tested:
         raise CmmUqError(f"{facts.standard} is not decided on a {kind}", where=where,
                          fix="Leave the statement out, or record the artefact that the standard asks for")  # fmt: skip
     if None not in (standard.sensing, under.probe.sensing) and standard.sensing != under.probe.sensing:
         problem = f"{facts.standard} is for {standard.sensing} probes, and the recording was made with one that is not"
-        raise CmmUqError(
-            problem, where=where, fix="State ISO 10360-8:2013 of optical probes, or leave the statement out"
-        )
+        fix = "State ISO 10360-8:2013 of optical probes, or leave the statement out"
+        raise CmmUqError(problem, where=where, fix=fix)
     return standard, characteristic
 
 

@@ -46,9 +46,8 @@ class Decided:
     position: Text = NOTHING  # where it was measured, in words
     # again where the standard asks for more readings before it counts, replaced where these were made
     standing: Standing = "counts"
-    set_aside: bool = (
-        False  # whether it is outside for resting on a reading that the screening left out of the estimates
-    )
+    # whether it is outside for resting on a reading that the screening left out of the estimates
+    set_aside: bool = False
 
     @property
     def outcome(self) -> StatementFinding:
@@ -75,9 +74,8 @@ class Statement:
     risks: Risks | None = None  # of all machines alike, for the named quantity; None without a prior
     # readings that the screening left out of the estimates and that have no value, in words: each fails
     outside: tuple[Text, ...] = ()
-    remedies: tuple[
-        Text, ...
-    ] = ()  # of each that is missing, which key would state it; nothing where its words say that
+    # of each that is missing, which key would state it; nothing where its words say that
+    remedies: tuple[Text, ...] = ()
 
     @property
     def missing_with_remedies(self) -> tuple[Text, ...]:
@@ -220,9 +218,8 @@ class Clause:
     title: Text
     does: str
     source: str  # where that comes from
-    read: bool = (
-        False  # whether the words of the standard were read for it, in its text or as its publisher quotes them
-    )
+    # whether the words of the standard were read for it, in its text or as its publisher quotes them
+    read: bool = False
     of: tuple[str, ...] = ()  # characteristics that it is for; all of the standard's by default
 
     def held(self, form: ClausesForm | None) -> HeldClause | None:

@@ -25,10 +25,8 @@ SIZE_LINES, FORM_LINES, REPEAT_LINES = LENGTH_LINES[:3], ("form",), ("repeat",)
 WARM = 0.5  # K from 20 °C from which on an unknown expansion matters
 # what a line that is not stated may well be: of the temperature, of the coefficient (1/K), of all others
 UNSTATED_K, UNSTATED_EXPANSION, UNSTATED_UM = 0.3, 1e-6, 1.0
-NORMAL_EXPANSION = (
-    8e-6,
-    13e-6,
-)  # 1/K; a gauge outside is not of normal expansion (ISO 10360-2:2009, as commonly reported)
+# 1/K; a gauge outside is not of normal expansion (ISO 10360-2:2009, as commonly reported)
+NORMAL_EXPANSION = 8e-6, 13e-6
 STEEL, LARGEST_EXPANSION = 11.5e-6, 25e-6  # 1/K; of what gauges are made of, aluminium expands most
 
 _NAMES = {
@@ -174,13 +172,9 @@ def declared_in_words(lines: Collection[str], stated: TestUncertainty) -> list[T
     for line in ("temperature", "fixturing", *lines) if lines == REPEAT_LINES else lines:
         for table in (stated.negligible, stated.machine):
             if one := getattr(table, line, None):
-                name, by, reason = _NAMES[line], Verbatim(one.by), Verbatim(one.reason.rstrip(". "))
-                negligible = say(
-                    "{line:capital}: declared negligible by {by}: {reason}.", line=name, by=by, reason=reason
-                )
-                own = say(
-                    "{line:capital}: declared the machine's own by {by}: {reason}.", line=name, by=by, reason=reason
-                )
+                about = {"line": _NAMES[line], "by": Verbatim(one.by), "reason": Verbatim(one.reason.rstrip(". "))}
+                negligible = say("{line:capital}: declared negligible by {by}: {reason}.", **about)
+                own = say("{line:capital}: declared the machine's own by {by}: {reason}.", **about)
                 found.append(negligible if table is stated.negligible else own)
     return found
 
@@ -206,9 +200,8 @@ def rated_conditions(circumstances: Circumstances, points: Points) -> tuple[Cond
     rated, used, found = circumstances.rated, circumstances.probe, []
     if rated.temperature_c is None and rated.declared is None:
         what = say("rated conditions: the temperatures for which the limits hold are not stated")
-        found.append(
-            _lacks(what, 'temperature_c in [rated_conditions], or there declared = { by = "…", reason = "…" }')
-        )
+        remedy = 'temperature_c in [rated_conditions], or there declared = { by = "…", reason = "…" }'
+        found.append(_lacks(what, remedy))
     columns = {k: v for k, v in points.columns.items() if k.startswith("temp_") and k.endswith("_c")}
     if rated.temperature_c is not None:
         found.append(_temperature(columns, *rated.temperature_c))
@@ -379,9 +372,7 @@ def _averaged(value: Floats, limit: Floats, shared: Floats, slope: Floats, group
         s, top = slope[order][:, None], limit[order][:, None]
         with np.errstate(divide="ignore", invalid="ignore"):
             ends = np.stack([-top - moved if signed else np.full_like(moved, -np.inf), top - moved]) / s
-            lower, upper = (
-                np.where(s == 0, beyond, end(axis=0)) for beyond, end in ((-np.inf, ends.min), (np.inf, ends.max))
-            )
+            lower, upper = np.where(s == 0, -np.inf, ends.min(axis=0)), np.where(s == 0, np.inf, ends.max(axis=0))
         outside = (s == 0) & ((moved > top) | (signed & (moved < -top)))
         most, least = np.minimum.reduceat(upper, starts), np.maximum.reduceat(lower, starts)
         chance = np.maximum(0.0, scipy.special.ndtr(most) - scipy.special.ndtr(least))

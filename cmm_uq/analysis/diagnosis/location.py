@@ -42,9 +42,8 @@ class Place:
     what: Text
     curve: tuple[Floats, Floats, Floats]  # covariate, function and its standard uncertainty in µm, each (p,)
     k: float = 2.0  # coverage factor of its band for 95 %
-    along: str | None = (
-        None  # axis along which it displaces points; None where it is told by the observations themselves
-    )
+    # axis along which it displaces points; None where it is told by the observations themselves
+    along: str | None = None
     scale: bool = False  # whether it is a scale of that axis
     also: tuple[Text, ...] = ()  # other functions that fit as well and show the same
     # lowest and highest of the covariate among the points of each observation, and what the job's model leaves of it in

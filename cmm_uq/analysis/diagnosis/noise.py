@@ -100,11 +100,8 @@ def with_tails(kind: NoiseKind, residual: Floats, probability: float) -> NoiseKi
 def _tangent(residual: Floats) -> tuple[Floats, float]:
     """Precisions (m,) of the tangent at residuals (m,), and the sum by which ln t exceeds the normal density there."""
     squares, precision = residual**2 / _SHRINK, tail_precision(residual)
-    log_t = (
-        scipy.special.gammaln((_TAILS_DOF + 1) / 2)
-        - scipy.special.gammaln(_TAILS_DOF / 2)
-        - 0.5 * np.log(np.pi * _TAILS_DOF)
-    )
+    gammaln = scipy.special.gammaln
+    log_t = gammaln((_TAILS_DOF + 1) / 2) - gammaln(_TAILS_DOF / 2) - 0.5 * np.log(np.pi * _TAILS_DOF)
     log_t = log_t - 0.5 * (_TAILS_DOF + 1) * np.log1p(squares / _TAILS_DOF) - 0.5 * np.log(_SHRINK)
     weight = precision * _SHRINK
     normal = -0.5 * np.log(2 * np.pi * _SHRINK / weight) - 0.5 * weight * squares

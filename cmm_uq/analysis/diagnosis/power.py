@@ -108,10 +108,8 @@ def powers(
 ) -> Iterator[Power]:  # fmt: skip
     """Of the diagnosis for effects that the model does not name; ``stated``, ``sigma`` of a coordinate, claimed, true, mm."""
     compared = model_comparison(model, stated, 0)
-    rule, points = (
-        _Rule(compared.comparison, sigma, alpha, noise),
-        model.artefact.points.at(model.placed(compared.values)),
-    )
+    rule = _Rule(compared.comparison, sigma, alpha, noise)
+    points = model.artefact.points.at(model.placed(compared.values))
     for effect in effects:
         column = model.seen(effect.basis(points)[:, :, :1], compared.values) / rule.comparison.noise_scale[:, None]
         shown = rule.comparison.rest(column)
@@ -266,10 +264,8 @@ class Thresholds:
             beside = 1 - cosine**2
             room = z**2 - beside * (named * noises) ** 2  # what is left of it for the rival's own z²
             rival, spread = np.sqrt(np.maximum(room, 0.0)), np.sqrt(beside)
-            below = scipy.special.ndtr((rival - cosine * z) / spread) - scipy.special.ndtr(
-                (-rival - cosine * z) / spread
-            )
-            passed *= np.where(room > 0, below, 0.0)
+            upper, lower = (scipy.special.ndtr((end - cosine * z) / spread) for end in (rival, -rival))
+            passed *= np.where(room > 0, upper - lower, 0.0)
         density = np.exp(-0.5 * _Z**2)
         return np.asarray(passed.mean(axis=0) @ density / density.sum())
 

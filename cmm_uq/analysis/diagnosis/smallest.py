@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.analysis.diagnosis.comparison.combinations import EFFECTS
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
-from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, log_prior, tail_probability
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, known_singles, log_prior, tail_probability
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.power import ALLOWED, CERTAIN, LONGEST, SHORTEST, Naming, Thresholds
 from cmm_uq.base.errors import CmmUqError
@@ -150,11 +150,7 @@ def thresholds(view: Visibility, which: Sequence[int], columns: Floats, alpha: f
     data = (sizes[:, :, None] * columns[:, None, :]).reshape(-1, columns.shape[1]).T
     odds = comparison.of_signal(data, view.noise).reshape(len(explanations), len(which), len(SIZES))
     dof, naming = max(view.known + view.left, 1.0), Naming(explanations)
-    single = [
-        e.kind == EFFECT and e.weight == 1 and not e.shaped and i in comparison.visible
-        for i, e in enumerate(explanations)
-    ]
-    count, pair = sum(single), None
+    count, pair = len(known_singles(comparison)), None
     if count > 1:
         pair = float(np.log(EFFECTS[2] / EFFECTS[0]) - np.log(comb(count, 2)) + np.log(NOTHING) + np.log(count - 1))
     for i, index in enumerate(which):
@@ -267,10 +263,7 @@ def smallest_effects(result: SearchResult, alpha: float, model: RecordingModel) 
     visible = [signal for signal in signals if signal.unit_length * ALLOWED > _FAINT]
     which, columns = [s.index for s in visible], np.array([s.column / s.unit_length for s in visible])
     each = dict(zip(which, thresholds(view, which, columns, alpha), strict=True))
-    rows, points = (
-        [signal.smallest(view, each.get(signal.index)) for signal in signals],
-        result.first.model.artefact.points,
-    )
+    rows, points = [s.smallest(view, each.get(s.index)) for s in signals], result.first.model.artefact.points
     # common effects of which nothing shows here, though they could act and all that they need is recorded
     for effect in every().values():
         if effect.name in named | {one.name for one in view.explanations} or effect.tier != CONTRACT or effect.shape:

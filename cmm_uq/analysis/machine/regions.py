@@ -129,12 +129,9 @@ def factor_regions(
     quantities = [Quantity.of_draws(each, of) for each, of in zip(over_all.T, units, strict=True)]
     of_family = np.array([family_of(one) for one in field.effects for _ in one.coefficients])[placed]
     scales = dict(zip(field.field.families, sizes.families.T, strict=True))
+    u, change = np.array([one.u for one in quantities]), whole[same]
     influence = influence_of(
-        over_all,
-        np.array([one.u for one in quantities]),
-        scales,
-        lambda name: further[:, placed] @ np.where(of_family == name, whole[same], 0.0).T,
-        {},
+        over_all, u, scales, lambda name: further[:, placed] @ np.where(of_family == name, change, 0.0).T, {}
     )
     return FactorRegions(
         dict(zip(keys, quantities, strict=True)),

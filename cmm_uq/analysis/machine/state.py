@@ -8,7 +8,6 @@ recording would have shown. Those are drawn on their own: what is stated togethe
 Taken is plain data that somebody else has read and verified: ``results.json`` and the draws beside it. Where records of the
 machine say how its errors drift, that is drawn with them; where nothing is known of it, the errors are named and taken as they
 were, with the age of the certificate.
-
 """
 
 from __future__ import annotations
@@ -65,9 +64,8 @@ class StatedNoise:
     # it is not known, and all of it acts everywhere
     growth_mm: Floats | float = 0.0
     longest_mm: float = 0.0
-    walked_s: float = (
-        600.0  # time after which a random walk has the mean square ``slow_mm²`` from its beginning until then
-    )
+    # time after which a random walk has the mean square ``slow_mm²`` from its beginning until then
+    walked_s: float = 600.0
 
     @property
     def usual_mm(self) -> Floats:
@@ -100,9 +98,8 @@ class MachineState:
     effects: tuple[Effect, ...]  # that the calibration modelled, in the order of their coefficients
     draws: Floats  # (M, k) of the coefficients together, in their units
     noise: StatedNoise = field(default_factory=StatedNoise)  # of its readings
-    shapes: Mapping[str, Sequence[float]] = field(
-        default_factory=dict
-    )  # nonlinear parameters of effects that have some
+    # nonlinear parameters of effects that have some
+    shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
     # by effect, part of its posterior standard deviation that is the prior's own: near 1 where the calibration said nothing
     prior_share: Mapping[str, float] = field(default_factory=dict)
     # by effect, the same of what errors of its family are found to be: near 1 where nothing was seen of it but of others
@@ -110,13 +107,11 @@ class MachineState:
     # (M,) sizes of families of errors over what physics allows, where its recording says how large they are
     scales: Mapping[str, Floats] = field(default_factory=dict)
     unmodelled: tuple[Unmodelled, ...] = ()  # errors that it may have besides
-    drift: Floats = field(
-        default_factory=lambda: np.zeros(0)
-    )  # (k,) rms change of each coefficient since the calibration
+    # (k,) rms change of each coefficient since the calibration
+    drift: Floats = field(default_factory=lambda: np.zeros(0))
     corrected: bool = True  # whether the machine corrects errors that were found, so that what remains is about zero
-    corrections: Floats = field(
-        default_factory=lambda: np.zeros(0)
-    )  # (k,) that it then corrects; their means by default
+    # (k,) that it then corrects; their means by default
+    corrections: Floats = field(default_factory=lambda: np.zeros(0))
     # days of its certificate
     calibrated: date | None = None
     valid_until: date | None = None
@@ -129,11 +124,8 @@ class MachineState:
     def __post_init__(self) -> None:
         k = sum(len(effect.coefficients) for effect in self.effects)
         if self.draws.ndim != 2 or self.draws.shape[1] != k or not len(self.draws):
-            said, fix = (
-                f"draws {self.draws.shape} do not fit {k} coefficients",
-                "Give a row a draw, a column a coefficient",
-            )
-            raise CmmUqError(f"{said} of the machine's errors", where="the posterior", fix=fix)
+            said = f"draws {self.draws.shape} do not fit {k} coefficients of the machine's errors"
+            raise CmmUqError(said, where="the posterior", fix="Give a row a draw, a column a coefficient")
         if not np.isfinite(self.draws).all():
             raise CmmUqError("a draw is no finite number", where="the posterior")
         coordinate = self.noise.coordinate_mm
@@ -228,9 +220,8 @@ def with_bounds(state: MachineState, largest_um: Mapping[str, float]) -> Machine
     may = sorted(one.name for one in every().values() if family_of(one) in (PLAY, PERIODIC))
     for name in largest_um:
         if name not in may and name in every():
-            raise CmmUqError(
-                f"{name} is neither play nor a periodic error", where=BOUNDS, fix=f"Bound {', '.join(may)}"
-            )
+            said = f"{name} is neither play nor a periodic error"
+            raise CmmUqError(said, where=BOUNDS, fix=f"Bound {', '.join(may)}")
         if name not in may:
             raise CmmUqError(f"there is no error {name!r}", where=BOUNDS, fix=suggestion(name, may))
         if name not in known:
@@ -261,17 +252,12 @@ _WHERE, BOUNDS = "the machine's results.json", "job.toml [[machine_state.bound]]
 
 
 def machine_stated(
-    results: Mapping[str, Any],
-    draws: Mapping[str, Floats],
-    machine: Machine,
-    *,
-    corrected: bool,
-    unmodelled: bool = True,
+    results: Mapping[str, Any], draws: Mapping[str, Floats], machine: Machine, *, corrected: bool
 ) -> MachineState:
     """The machine as a certificate states it.
 
     ``results``: the data of ``results.json``. ``draws``: (M,) of its posterior, by name. ``corrected``: whether it corrects
-    what was found. ``unmodelled``: whether errors that the calibration did not model are drawn too.
+    what was found.
     """
     if "estimates" not in results or "identifiability" not in results:
         fix = "Give a certificate whose analysis names errors: of a ballbar, step gauge, plate, sphere, …"
@@ -288,7 +274,7 @@ def machine_stated(
     day = results.get("job", {}).get("date")
     return MachineState(
         machine, found, coefficients_of(found, draws), noise_of_draws(draws), prior_share=shares,
-        unmodelled=unmodelled_errors(modelled, detected) if unmodelled else (), corrected=corrected,
+        unmodelled=unmodelled_errors(modelled, detected), corrected=corrected,
         calibrated=date.fromisoformat(day) if day else None,
     )  # fmt: skip
 

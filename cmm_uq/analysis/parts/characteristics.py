@@ -53,15 +53,12 @@ class CharacteristicEvaluation:
     def __post_init__(self) -> None:
         """What it needs of its features and datums."""
         one, plan = self.characteristic, self.plan
-        where, kinds, asks = (
-            f"characteristic {one.name!r}",
-            [plan.feature(name).kind for name in one.features],
-            ASKS[one.what],
-        )
+        where, asks = f"characteristic {one.name!r}", ASKS[one.what]
+        kinds = [plan.feature(name).kind for name in one.features]
         counts = (1, 2) if asks.alone else (asks.features,)
         if len(kinds) not in counts:
-            said = f"{one.what} is of {' or '.join(map(str, counts))} features, not {len(kinds)}"
-            raise CmmUqError(said, where=where)
+            several = " or ".join(map(str, counts))
+            raise CmmUqError(f"{one.what} is of {several} features, not {len(kinds)}", where=where)
         fitting = (
             asks.alone if len(kinds) < asks.features else (*asks.kinds, *(("cone",) if one.what == "size" else ()))
         )

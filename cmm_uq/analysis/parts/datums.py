@@ -322,11 +322,8 @@ class ProbedCommon(ProbedFeature):
         for motion in rows[~seen]:
             for one in map(as_datum, self.feature.members):
                 if self._moves(one, motion[:3], motion[3:6]):
-                    where, fix = (
-                        f"common datum {self.feature.name!r}",
-                        "Name more features, or probe them at more places",
-                    )
-                    raise CmmUqError(f"its members leave {one.name!r} free to move", where=where, fix=fix)
+                    said, where = f"its members leave {one.name!r} free to move", f"common datum {self.feature.name!r}"
+                    raise CmmUqError(said, where=where, fix="Name more features, or probe them at more places")
 
     def _moves(self, one: PartFeature, shift: Floats, rotation: Floats) -> bool:
         """Whether a motion takes a datum out of itself; rotations are times the extent."""

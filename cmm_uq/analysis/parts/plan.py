@@ -49,9 +49,8 @@ class Stylus:
     u_diameter_um: float = 0.0  # of the effective diameter
     # (3,) of the tip's offset against the tip to which the others are referred; zero of that tip itself
     u_offset_um: Floats = field(default_factory=lambda: np.zeros(3))
-    lobing_um: float = (
-        0.0  # standard deviation of the pre-travel over directions, once size and offset are taken out of it
-    )
+    # standard deviation of the pre-travel over directions, once size and offset are taken out of it
+    lobing_um: float = 0.0
     # (3,) coordinates of the machine where the reference sphere stood: what the machine's errors do there they do not do to
     # the part again. ``None`` where that is not known.
     qualified_at_mm: Floats | None = None
@@ -62,9 +61,8 @@ class Nominal:
     """Where a feature is meant to be."""
 
     point: Floats  # (3,) on it: the centre, or a point of plane, line or axis
-    direction: Floats | None = (
-        None  # (3,) unit vector along line or axis, normal of plane or circle; none of point and sphere
-    )
+    # (3,) unit vector along line or axis, normal of plane or circle; none of point and sphere
+    direction: Floats | None = None
     diameter_mm: float | None = None  # of circle, sphere, cylinder; of a cone at ``point``
     half_angle_rad: float | None = None  # of a cone, which widens along its direction where positive
 
@@ -93,10 +91,8 @@ class PartFeature:
 
     def __post_init__(self) -> None:
         where, least = f"feature {self.name!r}", FEWEST.get(self.kind, 0)
-        for value, known, what in (
-            (self.kind, FEWEST, "kind of feature"),
-            (self.association, ASSOCIATIONS, "association"),
-        ):
+        named = (self.kind, FEWEST, "kind of feature"), (self.association, ASSOCIATIONS, "association")
+        for value, known, what in named:
             if value not in known:
                 raise CmmUqError(f"{value!r} is no {what}", where=where, fix=suggestion(value, known))
         for points, normals in ((self.points, self.normals), (self.surface, self.surface_normals)):

@@ -68,10 +68,8 @@ class Inverse:
     def __call__(self, measured: Floats) -> Floats:
         """True widths of measured ones, negative where these leave none."""
         found = np.interp(measured, self.measured, self.true)
-        for end, inner, beyond in (
-            (0, _ENDS, measured < self.measured[0]),
-            (-1, -1 - _ENDS, measured > self.measured[-1]),
-        ):
+        below, above = measured < self.measured[0], measured > self.measured[-1]
+        for end, inner, beyond in ((0, _ENDS, below), (-1, -1 - _ENDS, above)):
             run = self.measured[end] - self.measured[inner]
             slope = (self.true[end] - self.true[inner]) / run if run else 0.0
             found = np.where(beyond, self.true[end] + slope * (measured - self.measured[end]), found)

@@ -100,9 +100,8 @@ class AtPose:
             *given.further,
             *own,
         ]
-        self.base = mean_errors(given.machine, qualified, pose, beside) + mean_expansion(
-            surroundings, plan, points, pose
-        )
+        self.base = mean_errors(given.machine, qualified, pose, beside)
+        self.base = self.base + mean_expansion(surroundings, plan, points, pose)
         self.pilot = max(pilot // 4, min(pilot, pilot * LARGE // len(plan.points)))
         self._inverses = dict[bool, dict[int, Inverse]]()
         drawn = any(len(feature.surface) for feature in plan.features)

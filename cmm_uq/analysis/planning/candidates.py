@@ -94,9 +94,8 @@ def thinned(placings: Iterator[SetUp], count: int, volume: Volume) -> tuple[SetU
             where="job.toml [plan]",
             fix=f"The volume is {size} mm; allow other directions or heights, or use a smaller artefact",
         )
-    return tuple(
-        found[i] for i in np.unique(np.linspace(0, len(found) - 1, min(count, len(found))).round().astype(int))
-    )
+    some = np.unique(np.linspace(0, len(found) - 1, min(count, len(found))).round().astype(int))
+    return tuple(found[i] for i in some)
 
 
 def everywhere(volume: Volume, ways: Sequence[tuple[Text, Floats]], shape: Pattern | PatternFor) -> Iterator[SetUp]:
@@ -271,9 +270,8 @@ def imitators(information: Floats, row: int, base: Sequence[int]) -> list[int]:
 
 
 CRITERIA = ("separation", "D", "A", "worst")
-_FLOOR = (
-    1e-3  # square of the sine below which a pair is as good as identical; keeps one such pair from hiding all others
-)
+# square of the sine below which a pair is as good as identical; keeps one such pair from hiding all others
+_FLOOR = 1e-3
 _GAIN = 1e-6  # least gain in the score by which a set-up is chosen; else the one that tells most of everything
 _BETTER, _MOST_TRIES = 1e-9, 2000
 Score = Callable[[Floats], Floats]  # what is to become small, (c,), of information (c, k, k)
@@ -319,11 +317,6 @@ def score_of(criterion: str, placings_information: Information, targets: Sequenc
     return uncertain
 
 
-def step(score: Score, start: Floats, each: Floats) -> Floats:
-    """Score (c,) with each candidate (c, k, k) added to what there is (k, k): one step of the search."""
-    return score(start + each)
-
-
 def choose(
     placings_information: Information, start: Floats, score: Score, count: int, *, again: bool = False
 ) -> Selection:
@@ -335,10 +328,10 @@ def choose(
     information, before = start.copy(), float(score(start[None])[0])
     now = before
     for _ in range(count):
-        scores = _free(step(score, information, each), taken, again)
+        scores = _free(score(information + each), taken, again)
         best = int(np.argmin(scores))
         if scores[best] > now - _GAIN * (1 + abs(now)):
-            best = int(np.argmin(_free(step(everything, information, each), taken, again)))
+            best = int(np.argmin(_free(everything(information + each), taken, again)))
         taken.append(best)
         information, now = information + each[best], float(scores[best])
     return Selection(*_exchanged(each, information, score, taken, again), before)
@@ -358,7 +351,7 @@ def _exchanged(
     at, unchanged, tries = 0, 0, 0
     while unchanged < len(taken) and tries < _MOST_TRIES:
         without = information - each[taken[at]]
-        scores = _free(step(score, without, each), taken, again)
+        scores = _free(score(without + each), taken, again)
         best = int(np.argmin(scores))
         unchanged, tries = unchanged + 1, tries + 1
         if scores[best] < now - _BETTER * (1 + abs(now)):

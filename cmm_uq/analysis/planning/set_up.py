@@ -18,10 +18,8 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.physics.catalogue import every
 
-VECTORS: Mapping[str, str] = {
-    "approach": "approach_{}",
-    "normal": "n{}",
-}  # columns of vectors that turn with the artefact
+# columns of vectors that turn with the artefact
+VECTORS: Mapping[str, str] = {"approach": "approach_{}", "normal": "n{}"}
 _LEVEL, _NEGLIGIBLE = 1e-6, 0.02
 _MINUTE = 60.0
 
@@ -148,12 +146,9 @@ def _concatenated(parts: Sequence[Points]) -> Points:
 
 def split(points: Points, title: Callable[[int], Message] | None = None) -> tuple[SetUp, ...]:
     """The set-ups of a recording, in ascending order of their numbers."""
-    return tuple(
-        SetUp(
-            say("measurement {number}", number=n) if title is None else title(n), points.select(points.measurement == n)
-        )
-        for n in np.unique(points.measurement).tolist()
-    )
+    words = title or (lambda number: say("measurement {number}", number=number))
+    numbers = np.unique(points.measurement).tolist()
+    return tuple(SetUp(words(n), points.select(points.measurement == n)) for n in numbers)
 
 
 def _attitude(about: Floats) -> Floats:

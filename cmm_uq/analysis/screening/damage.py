@@ -202,9 +202,8 @@ class DamageSearch:
         xyz, reference = self.points.xyz[rows], self.shape.reference[rows]
         if np.median(self.shape.misfit_of(xyz, reference, self.shape.size)) <= self.shape.tolerance:
             return False
-        found, own = (
-            np.sort(np.linalg.norm(v[:, None] - v[None], axis=2)[np.triu_indices(len(v), 1)]) for v in (xyz, reference)
-        )
+        pairs = np.triu_indices(len(xyz), 1)
+        found, own = (np.sort(np.linalg.norm(v[:, None] - v, axis=2)[pairs]) for v in (xyz, reference))
         return bool(np.abs(found - own).max(initial=0.0) < self.shape.tolerance)
 
 

@@ -183,10 +183,11 @@ def _reversal(item: Finding, points: Points, needed: Collection[str]) -> Finding
     rows = np.flatnonzero(np.isin(points.lines, item.lines)) if len(points.lines) else np.zeros(0, dtype=np.int64)
     for name in needed:
         if any(np.ptp(points.column(name)[points.group == group]) > 0 for group in np.unique(points.group[rows])):
+            used = Verbatim(name)
             why = say(
                 "{why}; the model uses {differing}: number the balls as in the other repeats",
                 why=item.why,
-                differing=Verbatim(name),
+                differing=used,
             )
             return replace(item, kind=REVERSED, set_aside=True, rows=tuple(rows.tolist()), why=why)
     return item

@@ -109,9 +109,8 @@ def stack_members(
 
 _WIDE = 30  # columns of a version from which on its principal axes are kept where it is given
 _KEPT = 12_000_000  # numbers that are kept of the inner products of what was given last
-_FEW = (
-    3  # Observations over columns that are given, from which on it pays to make inner products of those that are kept
-)
+# Observations over columns that are given, from which on it pays to make inner products of those that are kept
+_FEW = 3
 
 MemberKey = tuple[int, int]  # an explanation and its member
 Basis = tuple[MemberKey, bool]  # a member, and whether it is seen along its principal axes in place of its columns
@@ -159,9 +158,8 @@ class Conditioning:
     by_noise: Callable[[Floats], Floats]  # precision times columns (m, b), by kind of noise (k, m, b)
     _products: dict[Basis, Floats] = field(default_factory=dict)
     _axes: dict[MemberKey, tuple[Floats, Floats]] = field(default_factory=dict)
-    _weighed: dict[MemberKey, Floats] = field(
-        default_factory=dict
-    )  # precision times columns (k, m, r) of members given
+    # precision times columns (k, m, r) of members given
+    _weighed: dict[MemberKey, Floats] = field(default_factory=dict)
 
     def beside(
         self, conditions: Sequence[Version], plain: Floats, weighed: Floats, log: Floats, *, own: bool

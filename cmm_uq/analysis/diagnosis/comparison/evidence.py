@@ -30,9 +30,8 @@ from cmm_uq.machine.model.recorded import Display
 
 _KEPT = 8_000_000  # numbers that are kept of what follows from what was given last
 
-_CORRECTED = (
-    3  # columns of a member over those of what is given, from which on its principal axes are corrected for that
-)
+# columns of a member over those of what is given, from which on its principal axes are corrected for that
+_CORRECTED = 3
 
 _BLOCK, _COLUMNS = 150_000, 500  # numbers of a block that a processor's cache holds; columns weighed at a time
 
@@ -234,9 +233,9 @@ class CandidateComparison:
         probability = self.noise_probability(conditions)
         return float(probability @ beside / max(float(probability @ alone), 1e-300))
 
-    def log_evidence_of(self, conditions: Sequence[Version], left: Floats | None = None) -> Floats:
-        """Log evidence (b,) of what is given, at its size, for data (m, b)."""
-        return self._of_given(self._beside(left, conditions))
+    def log_evidence_of(self, conditions: Sequence[Version]) -> Floats:
+        """Log evidence (1,) of what is given, at its size, for the recording."""
+        return self._of_given(self._beside(None, conditions))
 
     def _of_given(self, known: ConditionedData) -> Floats:
         """Log evidence (b,) of what data are beside."""

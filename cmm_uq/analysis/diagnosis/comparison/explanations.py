@@ -159,10 +159,8 @@ def with_shorter_periods(model: RecordingModel, values: Floats, explanation: Exp
     step = STEP / float(np.ptp(points.readings[axis]))
     first = max(1 / member.shape[0] for member in explanation.members if member.shape) + step
     frequencies = np.arange(first, 1 / _FINEST_PERIOD, step)[:_MOST_SHORTER]
-    more = tuple(
-        Member(_seen(model, effect, points, (float(1 / f),), values), (float(1 / f),), float(first / f))
-        for f in frequencies
-    )
+    shorter = (((float(1 / f),), float(first / f)) for f in frequencies)
+    more = (Member(_seen(model, effect, points, shape, values), shape, weight) for shape, weight in shorter)
     return replace(explanation, members=(*explanation.members, *more))
 
 
@@ -240,11 +238,8 @@ def _of_readings(model: RecordingModel, points: Points, values: Floats) -> Itera
         functions = list(_functions(readings, _SAME_PLACE))
         for j, direction in enumerate(AXES):
             members = tuple(Member(model.seen(_along(j, f), values), weight=w, values=f) for f, w in functions)
-            name = say(
-                "error along {direction} as a function of {axis}",
-                direction=Verbatim(direction.upper()),
-                axis=Verbatim(axis.upper()),
-            )
+            ways = {"direction": Verbatim(direction.upper()), "axis": Verbatim(axis.upper())}
+            name = say("error along {direction} as a function of {axis}", **ways)
             term = Nonparametric(f"{axis}_mm", direction)
             yield Explanation(name, UNKNOWN, members, readings, term.of, term)
 

@@ -209,6 +209,12 @@ def robust_statistic_of(normal: CandidateComparison, data: Floats, least: float)
     return found.log_odds()
 
 
+def known_singles(comparison: CandidateComparison) -> list[int]:
+    """Visible effects of the catalogue of one version, of which two are tried together."""
+    known = ((i, e) for i, e in enumerate(comparison.explanations) if e.kind == EFFECT and not e.shaped)
+    return [i for i, e in known if e.weight == 1 and i in comparison.visible]
+
+
 @dataclass(frozen=True, eq=False)
 class _Evidence:
     """Log evidence of data (m, b)."""
@@ -224,10 +230,7 @@ class _Evidence:
     @classmethod
     def of(cls, comparison: CandidateComparison, data: Floats, lead: list[Version] | None = None) -> _Evidence:
         nothing, something = comparison.log_evidence(data)
-        effects = [
-            i for i, e in enumerate(comparison.explanations) if e.kind == EFFECT and e.weight == 1 and not e.shaped
-        ]
-        single = [i for i in effects if i in comparison.visible]
+        single = known_singles(comparison)
         alone, both = np.zeros_like(nothing), np.full_like(something, -np.inf)
         if len(single) > 1:
             lead = best_versions(comparison, data, single) if lead is None else lead

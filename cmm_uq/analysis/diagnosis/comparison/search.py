@@ -187,9 +187,8 @@ def effects_to_assert(combinations: Combinations) -> Key:
     chosen = combinations.most_probable
     if not chosen:
         return _one_by_one(combinations)
-    doubtful = {
-        i for i in chosen if max(combinations.of(i), probability_with_rivals(combinations, chosen, i)) < ASSERTED
-    }
+    together = {i: probability_with_rivals(combinations, chosen, i) for i in chosen}
+    doubtful = {i for i in chosen if max(combinations.of(i), together[i]) < ASSERTED}
     # and effects improbable only because a nonparametric term, which could be the same, describes them as well
     instead = {j for i in chosen for j, odds in combinations.instead(chosen, i).items() if odds > NOT_TOLD_APART}
     besides = frozenset(

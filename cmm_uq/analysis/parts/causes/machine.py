@@ -297,9 +297,9 @@ def noise(state: MachineState, points: Points, pose: PartPose, repeats: int = 1,
         size = np.tile(usual / np.sqrt(repeats), (n, 1))
         found.append(PointScatter.of(NOISE, "reading", size, pose.back(np.eye(3)), _one_of(ratio)))
     found += _scattered("set-up", stated.placing_mm, np.ones(n))
-    far = (
-        np.linalg.norm(points.xyz - points.xyz[first], axis=1) / stated.longest_mm if stated.longest_mm else np.ones(n)
-    )
+    far = np.ones(n)
+    if stated.longest_mm:
+        far = np.linalg.norm(points.xyz - points.xyz[first], axis=1) / stated.longest_mm
     found += _scattered("growing", stated.growth_mm, far / np.sqrt(repeats))
     if np.any(stated.slow_mm) and "time_s" in points.columns:
         kernel = stated.slow_kernel(points.column("time_s"))

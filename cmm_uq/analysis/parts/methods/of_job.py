@@ -14,17 +14,6 @@ from cmm_uq.analysis.parts.budget import FAMILIES, PLACE, VarianceShares, family
 from cmm_uq.analysis.parts.causes.machine import MACHINE, NOISE, STYLUS
 from cmm_uq.analysis.parts.causes.surroundings import FIXTURE, FORM, OPERATOR, TEMPERATURE
 from cmm_uq.analysis.parts.methods import method as methods
-from cmm_uq.analysis.parts.methods.method import (
-    ComparedCharacteristic,
-    Method,
-    MethodComparison,
-    MethodFigure,
-    MethodPair,
-    MethodResult,
-    MethodStatement,
-    Seen,
-    TestCondition,
-)
 from cmm_uq.analysis.parts.plan import ZONES, Plan
 from cmm_uq.analysis.parts.result import StatedCharacteristic, evaluated
 from cmm_uq.analysis.parts.setup import plan_of
@@ -72,7 +61,7 @@ _NO_LENGTH = (*ZONES, "angle")  # characteristics that are none or deviations: t
 _FELT = 1e-6
 
 
-def methods_of(job: PartJob, plan: Plan, measured: Floats | None) -> tuple[MethodResult, ...]:
+def methods_of(job: PartJob, plan: Plan, measured: Floats | None) -> tuple[methods.MethodResult, ...]:
     """What other methods say of a part's characteristics; empty where the job has none.
 
     ``measured``: (c,) values of the part; ``None`` where nothing was measured.
@@ -111,7 +100,7 @@ def _values(repeats: Repeats, plan: Plan) -> Mapping[str, Floats]:
 
 def _calibrated(
     job: PartJob, facts: CalibratedPartFacts, repeats: Repeats, plan: Plan, slopes: Sensitivities, measured: Floats | None
-) -> MethodResult:  # fmt: skip
+) -> methods.MethodResult:  # fmt: skip
     values, figures = _values(repeats, plan), []
     warm = methods.Warmth(facts.temperature_c, facts.u_cte_per_k, job.facts.part.u_cte_per_k)
     place = {one.name: i for i, one in enumerate(plan.characteristics)}
@@ -128,12 +117,12 @@ def _calibrated(
             raise CmmUqError(error.problem, where=where, fix=error.fix) from error
         figures.append(replace(figure, zone=plan.characteristics[i].what in ZONES))
     form = any(one.u_part_um or one.u_part_arcsec for one in facts.characteristic)
-    seen: dict[str, Seen] = {
+    seen: dict[str, methods.Seen] = {
         MACHINE: "systematic", NOISE: "varied", STYLUS: "varied" if facts.qualified_anew else "systematic",
         TEMPERATURE: "stated", FORM: "stated" if form else "unseen", FIXTURE: "varied",
         OPERATOR: "varied" if facts.conditions_varied else "unseen", PLACE: "varied" if facts.place_varied else "unseen",
     }  # fmt: skip
-    return MethodResult("calibrated_part", tuple(figures), _conditions_calibrated(facts, repeats), seen)
+    return methods.MethodResult("calibrated_part", tuple(figures), _conditions_calibrated(facts, repeats), seen)
 
 
 def _certified(one: CalibratedFacts, length: float) -> methods.CalibratedCharacteristic:
@@ -146,7 +135,7 @@ def _certified(one: CalibratedFacts, length: float) -> methods.CalibratedCharact
     )
 
 
-def _conditions_calibrated(facts: CalibratedPartFacts, repeats: Repeats) -> tuple[TestCondition, ...]:
+def _conditions_calibrated(facts: CalibratedPartFacts, repeats: Repeats) -> tuple[methods.TestCondition, ...]:
     cycles, readings = len(np.unique(repeats.group)), len(repeats.group)
     asked = (
         (say("{count} measurements or more of the calibrated part, in {cycles} set-ups or more", count=FEWEST_READINGS,
@@ -159,12 +148,12 @@ def _conditions_calibrated(facts: CalibratedPartFacts, repeats: Repeats) -> tupl
         (say("The repeats show what varies in use: times of day, temperatures, operators"), facts.conditions_varied),
         (say("The calibrated part has a certificate that the job names"), bool(facts.certificate)),
     )  # fmt: skip
-    return tuple(TestCondition(text, met) for text, met in asked)
+    return tuple(methods.TestCondition(text, met) for text, met in asked)
 
 
 def _orientations(
     job: PartJob, facts: OrientationsFacts, repeats: Repeats, plan: Plan, slopes: Sensitivities
-) -> MethodResult:
+) -> methods.MethodResult:
     values, standards = _values(repeats, plan), _standards(job, facts)
     room, part = job.facts.environment, job.facts.part
     warm = methods.PartWarmth(room.part_c, room.u_part_k, part.cte_per_k, part.u_cte_per_k)
@@ -176,14 +165,14 @@ def _orientations(
                 one.name, values[one.name], repeats.group, own, standards, warm, angle=one.what == "angle"
             )
             figures.append(replace(figure, zone=one.what in ZONES))
-    seen: dict[str, Seen] = {
+    seen: dict[str, methods.Seen] = {
         MACHINE: "varied", NOISE: "varied",
         STYLUS: "corrected" if facts.probe_standard else "varied" if facts.qualified_anew else "unseen",
         TEMPERATURE: "stated", FORM: "varied" if facts.points_varied else "unseen", FIXTURE: "varied", OPERATOR: "unseen",
         PLACE: "varied" if facts.place_varied else "unseen",
     }  # fmt: skip
     conditions = _conditions_orientations(facts, repeats, plan, slopes, [figure.name for figure in figures])
-    return MethodResult("orientations", tuple(figures), conditions, seen)
+    return methods.MethodResult("orientations", tuple(figures), conditions, seen)
 
 
 def _felt(slope: float) -> float:
@@ -211,7 +200,7 @@ def _standard(size_mm: float, u_um: float, read: StandardReadings, **more: float
 
 def _conditions_orientations(
     facts: OrientationsFacts, repeats: Repeats, plan: Plan, slopes: Sensitivities, tested: Sequence[str]
-) -> tuple[TestCondition, ...]:
+) -> tuple[methods.TestCondition, ...]:
     counts = np.unique(repeats.group, return_counts=True)[1]
     rows = [i for i, one in enumerate(plan.characteristics) if one.name in tested]
     styli = [name for name, slope in slopes.tips.items() if np.any(np.abs(slope[rows]) >= _FELT)]
@@ -230,39 +219,39 @@ def _conditions_orientations(
     if certificates:
         asked.append((say("Each standard has a certificate that the job names"), all(certificates)))
     asked.append((say("Other points in each orientation, so that the part's form is seen"), facts.points_varied))
-    return tuple(TestCondition(text, met) for text, met in asked)
+    return tuple(methods.TestCondition(text, met) for text, met in asked)
 
 
 MATTERS = 0.05  # share of the variance from which on a cause is told by name
 CHANCE = 0.05  # probability at which a scatter counts as another than the one that is expected
 NEAR = 3.0  # scatters below which a zone counts as nearly nothing
 
-METHODS: Mapping[Method, Text] = {
+METHODS: Mapping[methods.Method, Text] = {
     "virtual": say("the virtual measurements"), "calibrated_part": say("the calibrated part"),
     "orientations": say("several orientations"),
 }  # fmt: skip
 
 
 def compare_methods(
-    stated: Sequence[StatedCharacteristic], shares: VarianceShares, methods: Sequence[MethodResult]
-) -> MethodComparison | None:
-    """Other methods beside the virtual measurement; ``None`` where there are none."""
-    if not methods:
+    stated: Sequence[StatedCharacteristic], shares: VarianceShares, results: Sequence[methods.MethodResult]
+) -> methods.MethodComparison | None:
+    """Other results beside the virtual measurement; ``None`` where there are none."""
+    if not results:
         return None
     found = []
     for one in stated:
-        figures = [(other, figure) for other in methods if (figure := other.of(one.name)) is not None]
+        figures = [(other, figure) for other in results if (figure := other.of(one.name)) is not None]
         if not figures:
             continue
-        virtual = MethodStatement("virtual", one.value, one.u, one.U, one.error)
-        others = (MethodStatement(other.method, figure.value, figure.u, figure.U) for other, figure in figures)
+        virtual = methods.MethodStatement("virtual", one.value, one.u, one.U, one.error)
+        others = (methods.MethodStatement(other.method, figure.value, figure.u, figure.U) for other, figure in figures)
         all_stated = (virtual, *others)
         pairs = tuple(_pairs(all_stated))
         by_family = family_shares(shares, one.name)
         why = [words for other, figure in figures for words in _why(virtual, other, figure, by_family)]
         why += [_apart(pair) for pair in pairs if abs(pair.normalised) > 1]
-        found.append(ComparedCharacteristic(one.name, all_stated, pairs, tuple(why)))
-    return MethodComparison(tuple(methods), tuple(found))
+        found.append(methods.ComparedCharacteristic(one.name, all_stated, pairs, tuple(why)))
+    return methods.MethodComparison(tuple(results), tuple(found))
 
 
 def family_shares(shares: VarianceShares, name: str) -> dict[str, float]:
@@ -275,15 +264,18 @@ def family_shares(shares: VarianceShares, name: str) -> dict[str, float]:
     return {family: share / whole for family, share in found.items()} if whole else {}
 
 
-def _pairs(stated: Sequence[MethodStatement]) -> Iterable[MethodPair]:
+def _pairs(stated: Sequence[methods.MethodStatement]) -> Iterable[methods.MethodPair]:
     for one, other in combinations(stated, 2):
         expanded = hypot(one.U, other.U)
         if one.value is not None and other.value is not None and expanded:
-            yield MethodPair(one.method, other.method, (one.value - other.value) / expanded)
+            yield methods.MethodPair(one.method, other.method, (one.value - other.value) / expanded)
 
 
 def _why(
-    virtual: MethodStatement, method: MethodResult, figure: MethodFigure, shares: Mapping[str, float]
+    virtual: methods.MethodStatement,
+    method: methods.MethodResult,
+    figure: methods.MethodFigure,
+    shares: Mapping[str, float],
 ) -> Iterable[Text]:
     """Sentences on why one method's uncertainty is another than the virtual measurement's."""
     if not virtual.u:
@@ -307,7 +299,7 @@ def _why(
     yield from _scatter(name, virtual, figure, sum(grouped.get("varied", {}).values()))
 
 
-def _zone(name: Text, method: MethodResult, figure: MethodFigure) -> Iterable[Text]:
+def _zone(name: Text, method: methods.MethodResult, figure: methods.MethodFigure) -> Iterable[Text]:
     """What errors do to the width of a zone, which is a size without direction."""
     if not figure.zone:
         return
@@ -320,7 +312,7 @@ def _zone(name: Text, method: MethodResult, figure: MethodFigure) -> Iterable[Te
                   "scatter that {method} does not take off.", name=Verbatim(figure.name), method=name)  # fmt: skip
 
 
-def _grouped(seen: Mapping[str, Seen], shares: Mapping[str, float]) -> dict[str, dict[str, float]]:
+def _grouped(seen: Mapping[str, methods.Seen], shares: Mapping[str, float]) -> dict[str, dict[str, float]]:
     """Shares by how a method takes hold of them, then by family."""
     found: dict[str, dict[str, float]] = {}
     for family, share in shares.items():
@@ -335,12 +327,12 @@ def _named(families: Mapping[str, float]) -> Text:
     return listed([say("{family:small}", family=FAMILIES[family]) for family in kept])
 
 
-def _unseen(name: Text, families: Text, share: Text, figure: MethodFigure) -> Text:
+def _unseen(name: Text, families: Text, share: Text, figure: methods.MethodFigure) -> Text:
     return say("{method:capital} does not show {families}: {share} % of the variance of the virtual measurements.",
                method=name, families=families, share=share)  # fmt: skip
 
 
-def _systematic(name: Text, families: Text, share: Text, figure: MethodFigure) -> Text:
+def _systematic(name: Text, families: Text, share: Text, figure: methods.MethodFigure) -> Text:
     bias = small(abs(figure.systematic or 0.0), angle=figure.angle)
     told = say(
         "{method:capital} has {families}, {share} % of the variance of the virtual measurements, in its systematic error of "
@@ -350,7 +342,7 @@ def _systematic(name: Text, families: Text, share: Text, figure: MethodFigure) -
     return told if figure.corrected else say("{told} It is not corrected, and is added to U.", told=told)
 
 
-def _corrected(name: Text, families: Text, share: Text, figure: MethodFigure) -> Text:
+def _corrected(name: Text, families: Text, share: Text, figure: methods.MethodFigure) -> Text:
     return say(
         "Standards correct {method} for {families}, {share} % of the variance of the virtual measurements: by {bias}.",
         families=families, share=share, method=name,
@@ -358,7 +350,9 @@ def _corrected(name: Text, families: Text, share: Text, figure: MethodFigure) ->
     )  # fmt: skip
 
 
-def _scatter(name: Text, virtual: MethodStatement, figure: MethodFigure, share: float) -> Iterable[Text]:
+def _scatter(
+    name: Text, virtual: methods.MethodStatement, figure: methods.MethodFigure, share: float
+) -> Iterable[Text]:
     """What scattered, beside what the virtual measurement expects to scatter."""
     expected = sqrt(share) * virtual.u
     if share < MATTERS or not expected:
@@ -380,7 +374,7 @@ def _scatter(name: Text, virtual: MethodStatement, figure: MethodFigure, share: 
         yield say("{told}, which chance explains.", told=told)
 
 
-def _apart(pair: MethodPair) -> Text:
+def _apart(pair: methods.MethodPair) -> Text:
     return say(
         "{one:capital} and {other} differ by more than their uncertainties allow (Eₙ = {value}): one of them leaves "
         "something out.",
