@@ -12,16 +12,8 @@ from cmm_uq.analysis.conformity.plans import READY, Condition
 from cmm_uq.analysis.conformity.standards import standard_named
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.analysis.diagnosis.power import DrawnNoise, Power, powers, without_fault
-from cmm_uq.analysis.planning import identifiability as design
-from cmm_uq.analysis.planning.candidates import (
-    candidates,
-    choose,
-    ready_plan,
-    recording_information,
-    score_of,
-    set_up_information,
-    thinned,
-)
+from cmm_uq.analysis.planning import candidates as choice, identifiability as design
+from cmm_uq.analysis.planning.candidates import candidates, ready_plan, thinned
 from cmm_uq.analysis.planning.set_up import SetUp, append, join, split
 from cmm_uq.analysis.planning.setting import Setting, Start, white_noise
 from cmm_uq.app.commands.model import OVERFLOW_FIX, refuse_planned, refuse_unfit
@@ -278,18 +270,18 @@ def _searched(
     # candidates, of a recording those of its first placing
     first = start.placings[0] if name == RECORDED else None
     possible = candidates(setting, Start(setting.model(start.points).artefact, first))
-    known = set_up_information(setting, possible, rivals)
-    existing = known.prior + recording_information(setting, start.points, rivals)
+    known = choice.set_up_information(setting, possible, rivals)
+    existing = known.prior + choice.recording_information(setting, start.points, rivals)
     size = np.diag(known.each.sum(axis=0) + existing)  # only effects of which something could show anywhere
     wanted = known.where(rivals) if plan.criterion == "separation" else known.where(setting.named)
     wanted = [i for i in wanted if size[i] > 1e-12 * size.max()]
     if not wanted:
         raise CmmUqError("no candidate placing shows any of these effects", where="job.toml [model] effects",
                          fix="Name effects that this artefact can show, or use another artefact")  # fmt: skip
-    score = score_of(plan.criterion, known, wanted)
+    score = choice.score_of(plan.criterion, known, wanted)
     count = plan.more or plan.number or (1 if keep else len(start.placings))
     count = _affordable(setting, count, possible, () if name == RECORDED else kept)
-    chosen = choose(known, existing if keep else known.prior, score, count)
+    chosen = choice.choose(known, existing if keep else known.prior, score, count)
     added = tuple(possible[i] for i in chosen.indices)
     return (*kept, *added), len(kept), (float(score(existing[None])[0]), chosen.after)
 
