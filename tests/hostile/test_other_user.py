@@ -27,6 +27,8 @@ CASES = (
      "manifest.json: cannot be read: Permission denied"),
     ("budget truth/budget.toml --out out", "truth", "one's own, 0400", 2, "Permission denied"),
     ("budget truth/budget.toml --out out", "out", READ_ONLY, 3, "out: cannot be written: Permission denied"),
+    ("records import reports/mount --records out/new.db", "reports/mount", "one's own, 0400", 2,
+     "reports/mount: may not be entered: Permission denied"),
 )  # fmt: skip
 
 

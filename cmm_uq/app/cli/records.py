@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime as dt
 import json as json_text
 import os
@@ -92,9 +93,10 @@ def import_reports(
     """Record reports and diagnoses that were written before; what is recorded already is passed over."""
     from cmm_uq.app.commands.laboratory import records as commands
 
-    reports = commands.reports_in(folders)  # before records are made for them
-    with _opened(records, create=True) as opened:
-        done = commands.import_reports(opened, reports)
+    reports, (place, _) = commands.reports_in(folders), _place(records)
+    begun = not isinstance(place, Path) or os.path.exists(place)  # noqa: PTH110 - raises nothing below a closed folder
+    with _opened(records, create=True) if begun else contextlib.nullcontext(Path(place)) as history:
+        done = commands.import_reports(history, reports)
     refused = [{"report": str(path), "error": str(error)} for path, error in done.refused]
     data = {"recorded": len(done.added), "recorded_before": len(done.known),
             "without_inputs": [str(path) for path in done.bare], "refused": refused}  # fmt: skip

@@ -53,16 +53,16 @@ def ledger_of(
     records: Records, job: Job, command: str, folder: Path, files: Mapping[str, bytes], results: str
 ) -> Ledger:
     hashes = {name: sha256(data).hexdigest() for name, data in files.items()}
-    content = content_of(records, files[results], job, command, folder, hashes)
+    content = content_of(records.home, files[results], job, command, folder, hashes)
     return records.ledger(kind_of_entry(content), content)
 
 
 def content_of(
-    records: Records, results: bytes, job: Job | None, command: str, folder: Path, files: Mapping[str, str]
+    home: Path | None, results: bytes, job: Job | None, command: str, folder: Path, files: Mapping[str, str]
 ) -> dict[str, Any]:
     """Content of the entry of a results.json; see :func:`cmm_uq.laboratory.records.content.certificate_content`."""
     return certificate_content(
-        json.loads(results), None if job is None else job.facts, command=command, folder=folder_from(records.home, folder),
+        json.loads(results), None if job is None else job.facts, command=command, folder=folder_from(home, folder),
         results_sha256=sha256(results).hexdigest(), files=files, named=called,
     )  # fmt: skip
 

@@ -102,10 +102,12 @@ def _set_back(state: DriftState, adjusted: NDArray[np.bool_], prior: drift.Drift
 
 def _side_by_side(parts: list[DriftState], order: NDArray[np.intp]) -> DriftState:
     """Machines with few certificates have few tales; the others' further ones have no weight."""
+    parts = [part for part in parts if len(part.log_weight)]
     most = max(part.log_weight.shape[-1] for part in parts)
 
     def joined(arrays: list[Floats], value: float) -> Floats:
-        wide = [np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, most - array.shape[-1])], constant_values=value)
+        wide = [array if array.shape[-1] == most else np.pad(
+            array, [(0, 0)] * (array.ndim - 1) + [(0, most - array.shape[-1])], constant_values=value)
                 for array in arrays]  # fmt: skip
         return np.concatenate(wide, axis=-3).take(order, axis=-3)
 

@@ -165,14 +165,15 @@ class RecordQueries:
         with self.reading() as connection:
             number = _machine_id(connection, machine)
             for row in connection.execute(_stated(names, origin).where(_C.machine == number)):
+                "".join((row.name, row.quantity, row.unit))  # raises of bytes, which SQLite lets somebody put there
                 by_name[row.name].append(row)
             adjusted = _adjusted(connection, [number])[number]
-        return {
-            name: facts.Series.of(name, rows[-1].quantity, rows[-1].unit, [row.limit for row in rows], [
-                (dt.date.fromisoformat(row.day), row.value, row.u, row.u_artefact, row.artefact, row.entry,
-                 adjusted_before(row.adjusted_since, row.day, adjusted), bool(row.interim)) for row in rows
-            ]) for name, rows in by_name.items()
-        }  # fmt: skip
+            return {
+                name: facts.Series.of(name, rows[-1].quantity, rows[-1].unit, [row.limit for row in rows], [
+                    (dt.date.fromisoformat(row.day), row.value, row.u, row.u_artefact, row.artefact, row.entry,
+                     adjusted_before(row.adjusted_since, row.day, adjusted), bool(row.interim)) for row in rows
+                ]) for name, rows in by_name.items()
+            }  # fmt: skip
 
     def all_series(self, names: Collection[str] | None = None, origin: str = "measured") -> pd.DataFrame:
         """Values of all machines, a row each, by machine, name, day, entry; days are ordinals, 0 where unknown."""
@@ -182,18 +183,18 @@ class RecordQueries:
             rows = connection.execute(_stated(names, origin)).all()
             known = {row.id: row for row in connection.execute(select(machines))}
             adjusted = _adjusted(connection, set(known))
-        ordinal = {day: dt.date.fromisoformat(day).toordinal() for day in {row.day for row in rows}}
-        since = [adjusted_before(row.adjusted_since, row.day, adjusted[row.machine]) for row in rows]
-        stated = ("name", "value", "u", "u_artefact", "artefact", "limit", "entry")
-        frame = pd.DataFrame({
-            "machine": [known[row.machine].called for row in rows], "model": [known[row.machine].model for row in rows],
-            "place": [known[row.machine].place for row in rows], "day": [ordinal[row.day] for row in rows],
-            **{name: [getattr(row, name) for row in rows] for name in stated},
-            "adjusted_since": [day.toordinal() if day else 0 for day in since],
-            "interim": [bool(row.interim) for row in rows],
-        })  # fmt: skip
-        frame["limit"] = frame["limit"].astype(float)
-        return frame.sort_values(["machine", "name", "day", "entry"], kind="stable", ignore_index=True)
+            ordinal = {day: dt.date.fromisoformat(day).toordinal() for day in {row.day for row in rows}}
+            since = [adjusted_before(row.adjusted_since, row.day, adjusted[row.machine]) for row in rows]
+            stated = ("name", "value", "u", "u_artefact", "artefact", "limit", "entry")
+            frame = pd.DataFrame({
+                "machine": [known[row.machine].called for row in rows], "model": [known[row.machine].model for row in rows],
+                "place": [known[row.machine].place for row in rows], "day": [ordinal[row.day] for row in rows],
+                **{name: [getattr(row, name) for row in rows] for name in stated},
+                "adjusted_since": [day.toordinal() if day else 0 for day in since],
+                "interim": [bool(row.interim) for row in rows],
+            })  # fmt: skip
+            frame = frame.astype(dict.fromkeys(("value", "u", "u_artefact", "limit"), float))
+            return frame.sort_values(["machine", "name", "day", "entry"], kind="stable", ignore_index=True)
 
     def _certificates(
         self, connection: Connection, query: Select[Any], *, values: bool = True

@@ -180,12 +180,13 @@ def run_ensembles(
     begin = np.vstack([_start(whitened, proposal, walkers, random) for random in _randoms(seed)])
     move = SideBySide(proposal, _randoms(seed))
     sampler = emcee.EnsembleSampler(len(begin), d, whitened, vectorize=True, moves=[move])
-    state, steps = sampler.run_mcmc(begin, burn_in, store=False), 0
+    state, steps, slow = sampler.run_mcmc(begin, burn_in, store=False), 0, 0
     while True:
         state = sampler.run_mcmc(state, steps_at_once, skip_initial_state_check=True)
         steps += steps_at_once
         chains = np.ascontiguousarray(sampler.get_chain().reshape(steps, ENSEMBLES, walkers, d).swapaxes(0, 1))
-        time, effective = _effective_samples(chains)
+        short = min(steps / 50, steps * len(begin) / effective_samples) if steps < MOST_STEPS else np.inf
+        slow, time, effective = _effective_samples(chains, slow, short)
         if progress:
             progress(min(1.0, effective / effective_samples))
         if (effective >= effective_samples and steps > 50 * time) or steps >= MOST_STEPS:
@@ -210,14 +211,18 @@ def _start(density: LogDensity, proposal: Proposes, walkers: int, random: Any) -
     return z
 
 
-def _effective_samples(chains: Floats) -> tuple[float, float]:
-    """Longest integrated autocorrelation time, and the effective samples that follow, over all parameters."""
+def _effective_samples(chains: Floats, first: int, short: float) -> tuple[int, float, float]:
+    """The slowest parameter, its autocorrelation time, and effective samples; from `first` on, as far as all are `short`."""
     ensembles, steps, walkers, d = chains.shape
     merged = chains.transpose(1, 0, 2, 3).reshape(steps, ensembles * walkers, d)
     if (np.ptp(merged, axis=0) == 0).any():  # a walker that never moved has no autocorrelation time yet
-        return float(steps), float(ensembles * walkers)
-    time = max(1.0, *(autocorrelation_time(values) for values in merged.transpose(2, 1, 0)))
-    return time, steps * ensembles * walkers / time
+        return first, float(steps), float(ensembles * walkers)
+    slow, time = first, 1.0
+    for i in sorted(range(d), key=lambda i: i != first):
+        slow, time = max((slow, time), (i, autocorrelation_time(merged[:, :, i].T)), key=lambda one: one[1])
+        if time > short:
+            break
+    return slow, time, steps * ensembles * walkers / time
 
 
 def autocorrelation_time(chains: Floats) -> float:

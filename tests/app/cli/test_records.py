@@ -173,6 +173,35 @@ def test_nothing_is_made_of_folders_without_reports(laboratory: Path, folder: st
     assert not (laboratory / "lab.db").exists()
 
 
+@pytest.mark.parametrize(("script", "command", "words"), [
+    ("UPDATE covariances SET lower = 5", ("release", "K-1", "--by", "A"), "a row is not as it was recorded"),
+    (f"UPDATE covariances SET lower = '{'[' * 3000}'", ("release", "K-1", "--by", "A"), "it is no JSON"),
+    ("DELETE FROM quantities WHERE id = 2", ("affected", "--version", "0.3.0", "--list"), "a row is not as it was recorded"),
+    ("UPDATE certificates SET adjusted_since = 'then'", ("affected", "--version", "0.3.0"), "a row is not as it was recorded"),
+    ("UPDATE certificates SET day = '2026-13-40'", ("history", "77"), "a row is not as it was recorded"),
+    ("UPDATE quantities SET unit = x'ff'", ("history", "77"), "a row is not as it was recorded"),
+    ("UPDATE figures SET value = 'x'", ("fleet",), "a row is not as it was recorded"),
+    ("UPDATE certificates SET day = '2026-13-40'", ("due",), "a row is not as it was recorded"),
+])  # fmt: skip
+def test_rows_that_somebody_altered_are_refused_in_a_line_and_verification_says_so(
+    laboratory: Path, script: str, command: tuple[str, ...], words: str
+) -> None:
+    behind(laboratory / PLACE, script)
+    done = run(*command, "--records", PLACE, cwd=laboratory)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert f"{PLACE}: " in done.stderr
+    assert words in done.stderr
+    assert run("records", "verify", "--records", PLACE, cwd=laboratory).returncode == 4
+
+
+def test_nothing_is_made_of_reports_that_are_all_refused(laboratory: Path) -> None:
+    (laboratory / "reports" / "mount" / "certificate.html").write_text("better", encoding="utf-8")
+    done = run("records", "import", "reports", "--records", "new/lab.db", cwd=laboratory)
+    assert (done.returncode, done.stdout) == (2, "0 recorded, 0 recorded before, 1 refused\n")
+    assert "certificate.html: was altered or removed after it was written" in done.stderr
+    assert not (laboratory / "new").exists()
+
+
 def test_a_retention_says_first_and_removes_then(laboratory: Path) -> None:
     folder = laboratory / "reports" / "mount"
     older(folder, "0.4.0", lambda results: results["job"].update(date="2001-01-01"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import datetime as dt
 import json
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
@@ -18,6 +19,7 @@ from cmm_uq.base.files.content import content_of as whole_file
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.output import MANIFEST, finish_interrupted, read_manifest, sha256_of
 from cmm_uq.jobs.job import Job
+from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.facts import RecordedCertificate
 
 if TYPE_CHECKING:
@@ -37,28 +39,37 @@ class ImportedReports:
     bare: tuple[Path, ...]
 
 
-def import_reports(records: Records, folders: Iterable[Path]) -> ImportedReports:
-    """Record reports and diagnoses that were written before, oldest first, all in one transaction."""
+def import_reports(records: Records | Path, folders: Iterable[Path]) -> ImportedReports:
+    """Record reports and diagnoses that were written before, oldest first, all in one transaction.
+
+    ``records``: opened, or the file in which they are begun where something is to be recorded.
+    """
+    opened, home = (None, records.absolute().parent) if isinstance(records, Path) else (records, records.home)
     found = reports_in(folders)
     contents: dict[str, tuple[Path, dict[str, Any]]] = {}
     known, refused, bare = [], [], []
     for path in found:
         try:
             digest = sha256_of(path / RESULTS) or ""
-            if digest in contents or records.has_results(digest) is not None:
+            if digest in contents or (opened is not None and opened.has_results(digest) is not None):
                 known.append(path)
                 continue
             job: Job | None = None
             with contextlib.suppress(CmmUqError):  # its PDF is gone, or its inputs are not read any more
                 job = job_of(inputs_of(path))
-            contents[digest] = path, _content(records, path, job)
+            contents[digest] = path, _content(home, path, job)
             if job is None:
                 bare.append(path)
         except CmmUqError as error:
             refused.append((path, error))
     ordered = sorted(contents.values(), key=lambda one: (one[1]["day"], one[1]["job"], one[1]["command"]))
     if ordered:
-        records.append_all(("imported", content, None) for _, content in ordered)
+        with (
+            open_records(records, create=True)
+            if isinstance(records, Path)
+            else contextlib.nullcontext(records) as history
+        ):
+            history.append_all(("imported", content, None) for _, content in ordered)
     return ImportedReports(tuple(path for path, _ in ordered), tuple(known), tuple(refused), tuple(bare))
 
 
@@ -73,9 +84,13 @@ def reports_in(folders: Iterable[Path]) -> list[Path]:
 
 
 def report_folders(folder: Path) -> Iterator[Path]:
-    """Folders with a set of files that a report or a diagnosis wrote, sorted."""
+    """Folders with a set of files that a report or a diagnosis wrote, sorted; none is passed over since it is closed."""
     if not folder.is_dir():
         raise CmmUqError("no such folder", where=str(folder), fix="Name folders that hold reports")
+    for place in (folder, *folder.glob("*/**")):
+        if not place.name.startswith(".") and place.is_dir() and not os.access(place, os.R_OK | os.X_OK):
+            fix = "Mend its permissions, or name the folders beside it"
+            raise CmmUqError("may not be entered: Permission denied", where=str(place), fix=fix)
     for manifest in sorted((folder / MANIFEST, *folder.glob(f"*/**/{MANIFEST}"))):
         if manifest.parent.name.startswith("."):
             continue
@@ -104,7 +119,7 @@ def inputs_of(folder: Path) -> dict[str, bytes]:
     return {name: attached[name] for name in wanted}
 
 
-def _content(records: Records, folder: Path, job: Job | None) -> dict[str, Any]:
+def _content(home: Path | None, folder: Path, job: Job | None) -> dict[str, Any]:
     """Content of the entry of a folder whose files are as they were written."""
     manifest = read_manifest(folder)
     if manifest is None:
@@ -114,7 +129,7 @@ def _content(records: Records, folder: Path, job: Job | None) -> dict[str, Any]:
             raise CmmUqError("was altered or removed after it was written", where=str(folder / name),
                              fix="Only reports as they were written are recorded")  # fmt: skip
     results = whole_file(folder / RESULTS, TABLE_BYTES, "Name a folder with a report")
-    return content_of(records, results, job, manifest.owner.command, folder, manifest.files)
+    return content_of(home, results, job, manifest.owner.command, folder, manifest.files)
 
 
 def _results(folder: Path) -> Mapping[str, Any]:
