@@ -287,8 +287,10 @@ def rule_words(rule: Rule, band: float | None = None) -> Text:
     if isinstance(rule, GuardBand):
         return say("guard band {guard_band:g} U, k = 2 (ILAC-G8:09/2019)", guard_band=rule.guard_band)
     if isinstance(rule, FalseAccept):
-        most = {"max_false_accept": rule.max_false_accept}
-        return say("probability of false acceptance at most {max_false_accept:g} (JCGM 106:2012, 9.5)", **most)
+        risk = rule.max_false_accept
+        return say(
+            "probability of false acceptance at most {max_false_accept:g} (JCGM 106:2012, 9.5)", max_false_accept=risk
+        )
     if (least := least_probability(rule)) is not None:
         return say("posterior probability of conforming at least {least:g} (JCGM 106:2012, 8.3)", least=least)
     if (share := largest_share(rule)) is not None:

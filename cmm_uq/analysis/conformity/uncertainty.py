@@ -172,9 +172,9 @@ def declared_in_words(lines: Collection[str], stated: TestUncertainty) -> list[T
     for line in ("temperature", "fixturing", *lines) if lines == REPEAT_LINES else lines:
         for table in (stated.negligible, stated.machine):
             if one := getattr(table, line, None):
-                about = {"line": _NAMES[line], "by": Verbatim(one.by), "reason": Verbatim(one.reason.rstrip(". "))}
-                negligible = say("{line:capital}: declared negligible by {by}: {reason}.", **about)
-                own = say("{line:capital}: declared the machine's own by {by}: {reason}.", **about)
+                name, by, why = _NAMES[line], Verbatim(one.by), Verbatim(one.reason.rstrip(". "))
+                negligible = say("{line:capital}: declared negligible by {by}: {reason}.", line=name, by=by, reason=why)
+                own = say("{line:capital}: declared the machine's own by {by}: {reason}.", line=name, by=by, reason=why)
                 found.append(negligible if table is stated.negligible else own)
     return found
 

@@ -238,8 +238,8 @@ def _of_readings(model: RecordingModel, points: Points, values: Floats) -> Itera
         functions = list(_functions(readings, _SAME_PLACE))
         for j, direction in enumerate(AXES):
             members = tuple(Member(model.seen(_along(j, f), values), weight=w, values=f) for f, w in functions)
-            ways = {"direction": Verbatim(direction.upper()), "axis": Verbatim(axis.upper())}
-            name = say("error along {direction} as a function of {axis}", **ways)
+            along, of = Verbatim(direction.upper()), Verbatim(axis.upper())
+            name = say("error along {direction} as a function of {axis}", direction=along, axis=of)
             term = Nonparametric(f"{axis}_mm", direction)
             yield Explanation(name, UNKNOWN, members, readings, term.of, term)
 

@@ -106,9 +106,14 @@ class LiveSource(Protocol):
 class Clock:
     """Time, as the system tells it; a test has one of its own."""
 
-    utc_ns = staticmethod(time.time_ns)
-    monotonic_ns = staticmethod(time.monotonic_ns)
-    sleep = staticmethod(time.sleep)
+    def utc_ns(self) -> int:
+        return time.time_ns()
+
+    def monotonic_ns(self) -> int:
+        return time.monotonic_ns()
+
+    def sleep(self, s: float) -> None:
+        time.sleep(s)
 
 
 SYSTEM = Clock()
