@@ -47,8 +47,8 @@ def shown(where: str | Path) -> str:
 
 
 @contextlib.contextmanager
-def told(place: str | Path) -> Iterator[None]:
-    """What a database refuses, in one line."""
+def told(place: str | Path, *, rows: bool = False) -> Iterator[None]:
+    """What a database refuses, in one line; ``rows``: and that what is read of it is not what records write."""
     from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
     try:
@@ -59,11 +59,14 @@ def told(place: str | Path) -> Iterator[None]:
         raise OutputError(f"the database fails: {_first_line(str(error))}", where=shown(place)) from error
     except sqlite3.Error as error:
         raise _in_words(str(error), shown(place)) from error
-    except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError) as error:
-        fix = "cmm-uq records verify says which entry"  # altered, perhaps to thousands of lists in each other
-        no_json = isinstance(error, json.JSONDecodeError | RecursionError)
-        what = "an entry is not as it was recorded: it is no JSON" if no_json else "a row is not as it was recorded"
-        raise CmmUqError(what, where=shown(place), fix=fix) from error
+    except (json.JSONDecodeError, RecursionError) as error:  # altered, perhaps to thousands of lists in each other
+        fix = "cmm-uq records verify says which entry"
+        raise CmmUqError("an entry is not as it was recorded: it is no JSON", where=shown(place), fix=fix) from error
+    except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError) as error:
+        if not rows:
+            raise
+        fix = "cmm-uq records verify says which entry; where it finds them sound, please report it"
+        raise CmmUqError("a row is not as it was recorded", where=shown(place), fix=fix) from error
 
 
 _MEND, _RESTORE = "Mend the permissions of the file and its folder", "Restore a backup: cmm-uq records restore FILE"

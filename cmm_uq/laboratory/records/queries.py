@@ -49,7 +49,7 @@ class RecordQueries:
     @contextlib.contextmanager
     def reading(self) -> Iterator[Connection]:
         """A connection; what the database refuses is said in words."""
-        with told(self.place), self.engine.connect() as connection:
+        with told(self.place, rows=True), self.engine.connect() as connection:
             yield connection
 
     def machines(self) -> list[facts.RecordedMachine]:
