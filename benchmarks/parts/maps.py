@@ -17,16 +17,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.coverage.measuring import kept
-from benchmarks.parts import machines, truth
+from benchmarks.parts import truth
 from benchmarks.parts.curved import Cell, drawn, study
-from benchmarks.parts.regions import EVERY, NOISE_MM
+from benchmarks.parts.regions import EVERY, calibrated
 from cmm_uq.analysis.machine.correction import field_map
-from cmm_uq.app.commands.estimation import with_noise
-from cmm_uq.machine.model.measurement import RecordingModel
-from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.compensation import Compensation
 from cmm_uq.machine.physics.map_interpolation import ErrorMaps
-from cmm_uq.maths.inference.posterior import Doubt, sample_with_noise
+from cmm_uq.maths.inference.posterior import Doubt
 
 BEGIN, END = "<!-- written by benchmarks.parts.maps -->", "<!-- end of maps -->"
 PAIRS = 60
@@ -45,15 +42,9 @@ def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
 
 
 def _measured(cell: Cell, hidden: truth.Truth, random: np.random.Generator) -> dict[str, Any]:
-    one = machines.Cell(cell.artefact, cell.noise, 0.0)
-    offset = NOISE_MM * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
-    artefact = machines.calibrated(one, hidden, NOISE_MM, offset, random)
-    model = RecordingModel(artefact, machines.NAMED, NOISE_MM if cell.noise == "stated" else None)
-    model, estimate, _ = with_noise(model)
-    seed = int(random.integers(2**31))
-    posterior = sample_with_noise(estimate.linear, noise_of(model), estimate.least_squares, seed)
-    found = field_map(model, posterior, Doubt(()), lambda points: artefact, seed)
-    made, machine = found.error_map, artefact.points.machine
+    model, posterior, seed = calibrated(cell, hidden, random)
+    found = field_map(model, posterior, Doubt(()), lambda points: model.artefact, seed)
+    made, machine = found.error_map, model.artefact.points.machine
     low, high = np.transpose(truth.TRAVEL)
     read = random.uniform(low, high, (2 * PAIRS, 3))
     true = hidden.true(read, np.zeros(3), np.zeros_like(read))

@@ -24,7 +24,7 @@ from cmm_uq.analysis.machine.regions import factor_regions
 from cmm_uq.app.commands.estimation import with_noise
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import noise_of
-from cmm_uq.maths.inference.posterior import Doubt, sample_with_noise
+from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior, sample_with_noise
 
 BEGIN, END = "<!-- written by benchmarks.parts.regions -->", "<!-- end of regions -->"
 NOISE_MM, EACH = 0.7e-3, 9
@@ -67,15 +67,22 @@ def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
     return {"cell": cell.name, "number": number, **found, "seconds": round(time.process_time() - start, 3)}
 
 
-def _measured(cell: Cell, hidden: truth.Truth, random: np.random.Generator) -> list[list[float]]:
+def calibrated(
+    cell: Cell, hidden: truth.Truth, random: np.random.Generator
+) -> tuple[RecordingModel, NoisyPosterior, int]:
+    """The machine calibrated with the cell's artefact and noise: the named model, its posterior, and a seed for more."""
     one = machines.Cell(cell.artefact, cell.noise, 0.0)
     offset = NOISE_MM * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
     artefact = machines.calibrated(one, hidden, NOISE_MM, offset, random)
     model = RecordingModel(artefact, machines.NAMED, NOISE_MM if cell.noise == "stated" else None)
     model, estimate, _ = with_noise(model)
     seed = int(random.integers(2**31))
-    posterior = sample_with_noise(estimate.linear, noise_of(model), estimate.least_squares, seed)
-    regions = factor_regions(model, posterior, Doubt(()), lambda points: artefact, seed)
+    return model, sample_with_noise(estimate.linear, noise_of(model), estimate.least_squares, seed), seed
+
+
+def _measured(cell: Cell, hidden: truth.Truth, random: np.random.Generator) -> list[list[float]]:
+    model, posterior, seed = calibrated(cell, hidden, random)
+    regions = factor_regions(model, posterior, Doubt(()), lambda points: model.artefact, seed)
     whole, *eighths = (factors(hidden, ends) for ends in ENDS)
     rows = []
     for i, name in enumerate(truth.SIX):
