@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -37,6 +37,10 @@ def told(*, stated: Quantity | None = None, tolerance: float | None = None, **ch
     model = result.job.facts.model.model_copy(update={"tolerances": {} if tolerance is None else {KEY[0]: tolerance}})
     job = replace(result.job, facts=result.job.facts.model_copy(update={"model": model}))
     return replace(result, job=job, parameters=parameters, all_errors=lambda: found)
+
+
+class Averaged(Result):
+    averaged = 2  # type: ignore[assignment]
 
 
 def scale(value: float, u: float) -> Quantity:
@@ -130,6 +134,14 @@ def test_a_factor_that_all_errors_deny_is_withdrawn_with_both_figures_shown() ->
     assert (data["disagree"], data["recorded"]["scale_x"]["ppm"]["value"]) == (["scale_x.ppm"], 16.0)
     assert KEY not in kept.not_given
     assert not regions_warnings(kept)
+
+
+def test_of_an_average_over_explanations_no_figure_of_the_named_errors_alone_is_said() -> None:
+    result = told(stated=scale(10.2, 0.5), recorded={KEY: scale(16.0, 0.5)}, disagree=(KEY,))
+    (warning,) = regions_warnings(Averaged(**{one.name: getattr(result, one.name) for one in fields(result)}))
+    assert (
+        str(warning) == "Scale error of X is not given: with errors beside the named ones the recording contradicts it."
+    )
 
 
 def test_why_nothing_is_stated_is_said() -> None:

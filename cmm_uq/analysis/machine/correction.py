@@ -57,9 +57,8 @@ class HeldOutCorrection:
 class FieldMap:
     error_map: ErrorMap  # with its covariance
     omitted: tuple[str, ...]  # errors of the machine that neither map nor covariance hold, by name
-    range_um: tuple[
-        float, float
-    ]  # root mean square error of a coordinate in the measuring range, as it is and corrected
+    # root mean square error of a coordinate in the measuring range, as it is and corrected
+    range_um: tuple[float, float]
     disagree: tuple[Key, ...]  # named errors of which all errors together say something else of the recorded set-ups
     held_out: HeldOutCorrection | None  # ``None`` where too little is left to make a map without a part of it
 

@@ -49,7 +49,7 @@ FILES = {
     "correction_table.csv": "correction table, for compensate",
     "job.toml": "the job",
     "truth.toml": "what it was drawn from",
-    "compensation.json": "how the coordinates came about",
+    "compensation.json": "how coordinates or map came about",
     "points-u.csv": "standard uncertainties of the coordinates",
     "error-map.csv": "the error map",
     "error-map-covariance.npy": "the covariance of its figures",

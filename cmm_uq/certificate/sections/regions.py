@@ -96,7 +96,7 @@ def regions_warnings(result: Result) -> list[Text]:
         name, alone = wording.title_of(key, result), wording.with_uncertainty(one)
         texts.append(
             say("{name} is not given: with errors beside the named ones the recording contradicts it.", name=name)
-            if together is None
+            if together is None or result.averaged  # then what is stated is no estimate of the named errors alone
             else say(
                 "{name} is not given: {alone} {unit} by the named errors alone, {together} {unit} of the same set-ups by all "
                 "errors together, which their joint uncertainty does not allow.",

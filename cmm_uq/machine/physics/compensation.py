@@ -75,13 +75,6 @@ class Compensation:
         e, extrapolated = self.error(indicated, when)
         return indicated + e, extrapolated
 
-    def standard_uncertainty(self, indicated: Floats, when: PointConditions = NOMINAL) -> Floats | None:
-        """Of corrected coordinates (n, 3), mm, by the covariance of the map; ``None`` where nobody states it."""
-        (one, *_), readings = self.maps.maps, indicated + np.asarray(self.origin)
-        if one.covariance is None:
-            return None
-        return one.covariance.standard_uncertainty(one, readings, tip=when.tip, chain=self.chain)
-
     def indicated_from_true(self, true: Floats, when: PointConditions = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
         """Coordinates (n, 3) in mm that the machine indicates at true coordinates; the inverse of :meth:`compensate`."""
         # on the way a point of the edge may lie outside by its own error; where it ends is what counts

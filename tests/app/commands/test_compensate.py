@@ -168,8 +168,20 @@ def test_a_new_map_says_what_it_is_worth(new_map: Path) -> None:
 
 def test_a_recording_is_not_corrected_by_the_map_that_was_made_of_it(new_map: Path, tmp_path: Path) -> None:
     job = some_bars(ROOT / "examples" / "iota-1102-20C", tmp_path / "job", range(1, 21, 2))
-    with pytest.raises(CmmUqError, match=r"error-map\.csv was made of this very recording"):
+    head, *rows = (job / "ballbar.csv").read_text(encoding="utf-8").splitlines()
+    (job / "ballbar.csv").write_text("\n".join([head, *reversed(rows)]) + "\n", encoding="utf-8")  # in another order
+    with pytest.raises(CmmUqError, match="was made of this very recording") as told:
         write_compensated(with_new_map(job, new_map), tmp_path / "out")
+    assert str(told.value.where).endswith("error-map.csv")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_map_of_a_simulated_recording_corrects_no_measured_one(job: Path, new_map: Path, tmp_path: Path) -> None:
+    job = with_new_map(job, new_map)
+    text = (job / "error-map.csv").read_text(encoding="utf-8")
+    (job / "error-map.csv").write_text(text.replace("of a measured", "of a simulated", 1), encoding="utf-8")
+    with pytest.raises(CmmUqError, match="was made of a simulated recording"):
+        write_compensated(job, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

@@ -29,7 +29,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.beside import log_of
 from cmm_uq.jobs.reports import DescribedDigitizer, digitizer_of
 from cmm_uq.jobs.source import sha256
-from cmm_uq.jobs.tables.identification import first_line
+from cmm_uq.jobs.tables.identification import SIMULATED, first_line
 from cmm_uq.machine.model.predicted_errors import maps_of
 from cmm_uq.machine.physics.compensation import Compensation, circumstances, compensate_points, machine_compensation
 from cmm_uq.machine.physics.digitizer import POSE, DigitizedCloud, Digitizer, columns_for
@@ -52,7 +52,7 @@ def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict
     """
     maps = maps_of(job)
     refuse_planned(job)
-    _refuse_own_map(job)
+    _refuse_map(job, job.points)
     if not job.facts.artefact.with_recording:
         raise kind_of(job).refused("compensated")
     log = log_of(job.facts.machine, job.inputs, job.folder)
@@ -181,8 +181,13 @@ def _map_files(read: Job, found: FieldMap) -> dict[str, bytes]:
 
 def _made_of(read: Job) -> str:
     """The line that a new map begins with, by which the recording that it was made of is known."""
-    digest = hashlib.sha256(read.inputs[read.facts.recording.file]).hexdigest()
-    return f"# error map by {PROGRAM} of a {read.origin} recording, sha256 {digest}; see {PROVENANCE}\n"
+    return f"# error map by {PROGRAM} of a {read.origin} recording, points {_digest(read.points)}; see {PROVENANCE}\n"
+
+
+def _digest(points: Points) -> str:
+    """Of the coordinates of a recording, whatever the order of its rows, their numbers and the form of its file."""
+    xyz = np.round(points.xyz, 6) + 0.0  # no negative zeros
+    return hashlib.sha256(np.ascontiguousarray(xyz[np.lexsort(xyz.T)]).tobytes()).hexdigest()
 
 
 def _figure(value: float) -> float:
@@ -205,33 +210,36 @@ def _refuse(read: Job) -> None:
                          fix="Compensate each as a job of its own, then name the earlier result")  # fmt: skip
 
 
-def _refuse_own_map(job: Job) -> None:
-    """Refuse a map that was made of this very recording, whose errors would then seem smaller than they are."""
-    name = job.facts.recording.file
-    digest = hashlib.sha256(job.inputs.get(name, b"")).hexdigest().encode()
+def _refuse_map(job: Job, points: Points | None = None) -> None:
+    """Refuse a map made of a simulated recording for a measured one, and for the points that it was made of.
+
+    Corrected by it, these would seem to have smaller errors than they have.
+    """
     for one in job.facts.machine.error_map:
-        if digest in job.inputs[one.file].partition(b"\n")[0]:
-            problem = f"the error map {one.file} was made of this very recording"
+        line, where = job.inputs[one.file].partition(b"\n")[0], str(job.folder / one.file)
+        if b"of a simulated recording" in line and job.origin != SIMULATED:
+            raise CmmUqError("was made of a simulated recording, and corrects no measured one", where=where,
+                             fix="Make a map of a recording of the machine")  # fmt: skip
+        if points is not None and _digest(points).encode() in line:
             fix = f"Compensate another recording of the machine; {PROVENANCE} beside the map says what it is worth to others"
-            raise CmmUqError(problem, where=str(job.folder / name), fix=fix)
+            raise CmmUqError("was made of this very recording", where=where, fix=fix)
 
 
 def _files(read: Job, beyond: Beyond, text: Mapping[str, bytes]) -> dict[str, bytes]:
     """Every file of the compensated job; ``text`` are maps written in the contractors' form."""
     points, provenance = compensate_job(read, beyond=beyond)
-    with_u = uncertain_map(maps_of(read))
-    if with_u is not None:
+    compensation = machine_compensation(read.points, ErrorMaps(maps_of(read)), beyond=beyond)
+    if (stated := uncertain_map(compensation.maps.maps)) is not None:
         probe = _with_probe(read)
-        readings = probe.xyz + np.asarray(read.points.machine.origin_mm)
-        tip, chain = circumstances(probe).tip, read.points.machine.chain
-        u = with_u[1].standard_uncertainty(with_u[0], readings, tip=tip, chain=chain) / MICROMETRE
+        readings, tip = probe.xyz + np.asarray(compensation.origin), circumstances(probe).tip
+        u = stated[1].standard_uncertainty(stated[0], readings, tip=tip, chain=compensation.chain) / MICROMETRE
         places = np.column_stack([points.measurement, points.point, points.repeat])
         lines = [f"{m},{p},{r},{x:.4f},{y:.4f},{z:.4f}" for (m, p, r), (x, y, z) in zip(places, u, strict=True)]
         heads = "measurement,point,repeat,u_x_um,u_y_um,u_z_um"
         text = {**text, POINTS_U: ("\n".join([heads, *lines]) + "\n").encode()}
         sample = SampledPoints(200)
         sample.add(readings, points.xyz, tip)
-        provenance["distances"] = sample.distances(*with_u, chain)
+        provenance["distances"] = sample.distances(*stated, compensation.chain)
     told = {"software": PROGRAM, "inputs_sha256": sha256(read.inputs), **provenance}
     files = {
         **kept_inputs(read),
@@ -271,6 +279,7 @@ def write_compensated_cloud(
     files = cloud_files(cloud)
     if cloud.suffix not in FORMS and not cloud.is_dir():
         raise CmmUqError("is no cloud by its ending", where=str(cloud), fix=f"Clouds are {', '.join(FORMS)}")
+    _refuse_map(read)
     maps = ErrorMaps(maps_of(read))
     compensation = replace(machine_compensation(read.points, maps, beyond=beyond), origin=np.zeros(3))
     chain, digitizer = _chain(read, cloud, compensation)
