@@ -2,8 +2,9 @@
 """Runs cmm-uq, or its tests, on a machine that has nothing but Python 3.11 or newer.
 
     python3 start.py report examples/iota-1102-20C     any cmm-uq command
-    python3 start.py test                              lint, types and tests
-    python3 start.py test --numprocesses=auto --cov    the same, with the lines that the tests run (twice as long)
+    python3 start.py test                              lint, types and tests, but those that take long
+    python3 start.py test --all                        lint, types and every test
+    python3 start.py test --numprocesses=auto --cov    every test, with the lines that they run (twice as long)
     python3 start.py docs                              the documentation as a site, in build/site
 
 Makes a virtual environment in .venv (or in the folder that CMM_UQ_ENV names) on the first call and reuses it until
@@ -24,6 +25,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent
 ENVIRONMENT = Path(os.environ.get("CMM_UQ_ENV") or ROOT / ".venv")
 SITE = ("--fail-on-warning", "--keep-going", "--quiet", "--conf-dir", "docs")  # a link that leads nowhere is an error
+TESTS = ("--numprocesses=auto", "--dist=loadfile", "--no-loadscope-reorder")
 SCRIPTS = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
 
 
@@ -80,14 +82,18 @@ def compile_sources(folder: Path) -> None:
 
 
 def test(arguments: list[str]) -> int:
-    """Lint, types beside the tests; all run even when one fails. Tests run on all cores, each with one thread."""
+    """Lint, types beside the tests; all run even when one fails. Tests run on all cores, each with one thread.
+
+    Without arguments the tests that take long are left out; with ``--all`` none is; others go to pytest, which then runs all.
+    """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each command that tests start compiles the package again
+    usual = TESTS if arguments else (*TESTS, "--quick")
     results = [run("ruff", "check"), run("ruff", "format", "--check")]
     with subprocess.Popen(  # told when the tests are done, or its lines would stand among theirs
         [str(SCRIPTS / "mypy")], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     ) as types:
-        results += [run("pytest", *(arguments or ["--numprocesses=auto", "--dist=loadfile", "--no-loadscope-reorder"]))]
+        results += [run("pytest", *(arguments if arguments not in ([], ["--all"]) else usual))]
         print(types.communicate()[0], end="")
     return max(*results, types.returncode)
 

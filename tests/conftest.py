@@ -33,6 +33,10 @@ settings.register_profile("same", derandomize=True, deadline=None)  # one commit
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--quick", action="store_true", help="leave out what takes more than some two seconds a test")
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Workers of one run share what takes long to make: see tests/artefacts/simulated.py."""
     os.environ["CMM_UQ_RECORDS"] = "none"  # what is tested of records names them
@@ -94,11 +98,20 @@ def names_in(function: Callable[..., object]) -> frozenset[str]:
     return frozenset(found)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def left_out(item: pytest.Item) -> bool:
+    """Whether a quick run does without a test: one that takes long, or, of a grid, all but the cases named by its mark."""
+    mark = item.get_closest_marker("long")
+    return mark is not None and not ("but" in mark.kwargs and mark.kwargs["but"] in item.name)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark what starts a browser, a server or a process, and begin with the files that take longest.
 
     Files of a folder otherwise stay in their order, in every worker.
     """
+    if config.getoption("quick"):
+        config.hook.pytest_deselected(items=[item for item in items if left_out(item)])
+        items[:] = [item for item in items if not left_out(item)]
     for item in items:
         if isinstance(item, pytest.Function):
             fixtures = [made[-1].func for made in item._fixtureinfo.name2fixturedefs.values()]

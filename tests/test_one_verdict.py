@@ -359,6 +359,7 @@ def test_the_certificate_shows_that_box(seed: int) -> None:
         assert " ".join(f"{name} {said}".split()) in page
 
 
+@pytest.mark.long
 def test_the_commands_on_a_machine_that_is_out_of_tolerance(tmp_path: Path) -> None:
     """Scale Z is 14 ppm and squareness XY 12″, with tolerances of 12 ppm and 8″; no standard decides on anything."""
     job = Path(shutil.copytree(ROOT / "examples" / "triangle-simulated", tmp_path / "jobs" / "triangle"))

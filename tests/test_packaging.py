@@ -58,6 +58,7 @@ EXTRAS = [
 """What only extras install, and a report does without."""
 
 
+@pytest.mark.long
 def test_it_reports_from_an_empty_folder(unpacked: Path, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples" / "iota-1102-20C", tmp_path / "job")
     script = (
@@ -113,6 +114,7 @@ def compiled_at_start(tree: Path, home: Path, give_up: Callable[[], None]) -> se
     return set(re.findall(rf"^# code object from {re.escape(str(tree))}/(\S+\.py)$", done.stderr, re.MULTILINE))
 
 
+@pytest.mark.long
 @pytest.mark.process
 @pytest.mark.parametrize("way", ["nobody compiled", "pip", "start.py"])
 def test_who_may_not_write_to_the_installation_compiles_nothing_at_each_start(

@@ -68,6 +68,7 @@ def test_two_steps_are_right_when_the_sweep_is_even_about_the_fixed_ball() -> No
     np.testing.assert_allclose(two_steps.factors[:3], TRUTH[:3], atol=0.3)
 
 
+@pytest.mark.long
 def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     inside, points = 0, swept()
     for seed in range(200):

@@ -99,6 +99,7 @@ def refused(kind: Kind, what: str, run: Callable[[], object], out: Path) -> None
     assert not out.exists()
 
 
+@pytest.mark.long(but="ballbar")
 @pytest.mark.parametrize("name", [*BUILT_IN, OUTSIDE])
 def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(
     name: str, installed: None, tmp_path: Path, request: pytest.FixtureRequest

@@ -143,6 +143,7 @@ def test_where_the_gauge_stands_along_its_line_does_not_matter(seed: int) -> Non
     assert np.abs(gauge.deviations()).max() < 1e-11
 
 
+@pytest.mark.long
 def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     """200 simulated recordings: squared distance from the truth over the covariance is χ² with six degrees of freedom."""
     truth, inside = [100.0, -60.0, 20.0, 30.0, -12.0, 5.0], 0

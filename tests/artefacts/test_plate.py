@@ -167,6 +167,7 @@ def test_a_beam_of_balls_is_a_plate_on_one_line() -> None:
     assert found.degrees_of_freedom == 3 * 5 - 5 - 1
 
 
+@pytest.mark.long
 def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     truth, inside, points = [100.0, -60.0, 20.0, 30.0, -12.0, 5.0], 0, plate(pitch=200.0, side=3)
     for seed in range(200):

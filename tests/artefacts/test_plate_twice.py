@@ -77,6 +77,7 @@ def test_both_recordings_bring_their_noise() -> None:
     np.testing.assert_allclose(np.diag(compared.covariance)[:4], 1.25 * np.diag(alone.covariance)[:4], rtol=1e-6)
 
 
+@pytest.mark.long
 def test_intervals_cover_the_change_as_often_as_they_say() -> None:
     points, inside = uncertain_plate(), 0
     for seed in range(100):

@@ -90,6 +90,7 @@ def test_normals_of_rough_length_are_brought_to_unit_length() -> None:
     assert len(free(estimated(UNKNOWN_BALL, points, ["probe_radius"]))) == 1
 
 
+@pytest.mark.long
 def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     names, truth, inside = ["probe_radius", "probe_lobing"], [2.0, 1.5, -0.5], 0
     exact = artefact_facts(kind="sphere", length_mm=25.0)

@@ -95,6 +95,7 @@ def test_the_source_s_equations_recover_the_truth() -> None:
     np.testing.assert_allclose(solve_equations(triangle).values, TRUTH, atol=0.01)
 
 
+@pytest.mark.long
 def test_both_ways_cover_the_truth_and_the_joint_fit_is_never_the_wider() -> None:
     """100 recordings with 0.5 µm: squared distance over covariance is χ² with 15 degrees of freedom (95 %: 24.996)."""
     linear = solve_equations(Triangle(EXACT, seven())).per_coordinate

@@ -152,6 +152,7 @@ def test_the_copied_position_is_told_and_said_to_count_once(document: Document) 
     )
 
 
+@pytest.mark.long
 def test_a_recording_that_contradicts_its_model_is_a_warning_and_the_diagnosis_is_printed_on_demand(job: Path) -> None:
     path = job / "job.toml"
     text = re.sub(r"(?m)^effects = .*", 'effects = ["scale_x", "scale_y", "scale_z"]', path.read_text(encoding="utf-8"))

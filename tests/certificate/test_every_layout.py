@@ -129,6 +129,7 @@ def whole(page: Page, width: int) -> None:
     assert page.evaluate(OVERLAPS) == []
 
 
+@pytest.mark.long(but="iota-1102-20C-compensated")
 @pytest.mark.parametrize("name", NAMES)
 def test_on_a_narrow_screen_nothing_is_cut_and_every_figure_of_a_listed_table_has_its_heading_and_unit(
     page: Page, name: str, folder: str, tmp_path: Path
@@ -148,6 +149,7 @@ def test_on_a_narrow_screen_nothing_is_cut_and_every_figure_of_a_listed_table_ha
     assert labelled == wide
 
 
+@pytest.mark.long(but="triangle-simulated")
 @pytest.mark.parametrize("name", NAMES)
 def test_on_a_wide_screen_nothing_is_cut_and_axe_finds_nothing(
     page: Page, name: str, folder: str, tmp_path: Path
@@ -169,6 +171,7 @@ def test_every_picture_has_words_in_its_place(name: str, folder: str) -> None:
     assert all(plot.alternative != plot.caption for plot in plots)
 
 
+@pytest.mark.long(but="step-gauge-simulated")
 @pytest.mark.parametrize("name", NAMES)
 def test_printed_from_the_browser_nothing_is_wider_than_the_page_nor_split_nor_alone(
     page: Page, name: str, folder: str, tmp_path: Path

@@ -100,6 +100,7 @@ def page(browser: Browser) -> Iterator[Page]:
     page.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("width", [360, 1280])
 def test_nothing_overlaps_or_leaves_the_page(page: Page, certificate: Document, tmp_path: Path, width: int) -> None:
     page.set_viewport_size({"width": width, "height": 800})
@@ -109,6 +110,7 @@ def test_nothing_overlaps_or_leaves_the_page(page: Page, certificate: Document, 
     assert page.evaluate(LABELS_COLLIDING) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("width", [360, 1280])
 def test_hostile_text_stays_on_the_page(page: Page, tmp_path: Path, width: int) -> None:
     page.set_viewport_size({"width": width, "height": 800})
@@ -133,6 +135,7 @@ def test_a_wide_table_scrolls_in_its_own_frame(page: Page, certificate: Document
     assert any(frames)
 
 
+@pytest.mark.long
 def test_text_has_enough_contrast(page: Page, certificate: Document, tmp_path: Path) -> None:
     """WCAG 2.2, 1.4.3: at least 4.5 : 1 for text of every size that is used."""
     Opened(page, certificate, tmp_path)
@@ -141,6 +144,7 @@ def test_text_has_enough_contrast(page: Page, certificate: Document, tmp_path: P
     assert min(ratios) >= 4.5
 
 
+@pytest.mark.long
 def test_on_paper_nothing_is_wider_than_the_page(page: Page, certificate: Document, tmp_path: Path) -> None:
     page.set_viewport_size({"width": 643, "height": 900})  # 170 mm at 96 px an inch
     Opened(page, certificate, tmp_path)
@@ -149,6 +153,7 @@ def test_on_paper_nothing_is_wider_than_the_page(page: Page, certificate: Docume
     assert page.evaluate(OVERLAPS) == []
 
 
+@pytest.mark.long
 def test_every_printed_page_says_which_it_is(page: Page, certificate: Document, tmp_path: Path) -> None:
     Opened(page, certificate, tmp_path)
     printed = PdfReader(io.BytesIO(page.pdf(prefer_css_page_size=True)))
@@ -162,6 +167,7 @@ def test_every_printed_page_says_which_it_is(page: Page, certificate: Document, 
     assert (float(width), float(height)) == pytest.approx((595.3, 841.9), abs=1.0)
 
 
+@pytest.mark.long
 def test_a_table_over_several_sheets_has_its_heading_on_each(page: Page, certificate: Document, tmp_path: Path) -> None:
     rows = tuple((f"place {k}", f"{404 + k / 1000:.4f}") for k in range(150))
     table = Table("Lengths", (Column("Position", numeric=False), Column("Length", "mm")), rows)

@@ -115,6 +115,7 @@ def test_html_and_pdf_say_in_which_language_they_are(code: Code) -> None:
         assert b"pdfaid:part" in opened.Root.Metadata.read_bytes()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("code", ["de", "fr"])
 def test_both_views_have_the_figures_of_the_english_ones(code: Code, monkeypatch: pytest.MonkeyPatch) -> None:
     """Read back by the locale, of every text, title, picture and foot: no figure is lost, added or another.
@@ -231,6 +232,7 @@ def test_a_job_asks_for_its_language(tmp_path: Path) -> None:
         read_job(folder)
 
 
+@pytest.mark.long(but="de")
 @pytest.mark.parametrize("code", CODES)
 def test_nothing_is_cut_hidden_or_runs_together(browser: Browser, code: Code, tmp_path: Path) -> None:
     needs_font(code)

@@ -44,6 +44,7 @@ def signed(made: Document, warnings: Sequence[Text] = ()) -> Document:
     )  # fmt: skip
 
 
+@pytest.mark.long(but="-ja")
 @pytest.mark.parametrize("code", ["en", *LANGUAGES])
 @pytest.mark.parametrize("name", REPORTED)
 def test_verdict_limits_statements_and_signature_stand_on_the_first_page(name: str, code: Code) -> None:

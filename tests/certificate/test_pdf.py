@@ -173,6 +173,7 @@ def test_markup_in_the_data_is_text() -> None:
         assert text.count(piece) > 10
 
 
+@pytest.mark.long
 def test_a_word_without_a_break_stays_on_the_page() -> None:
     pdf = PdfReader(io.BytesIO(render_pdf(document_of(f"{HOSTILE} {UNBREAKABLE}"), {})))
     edges: list[float] = []
@@ -197,6 +198,7 @@ def test_a_plot_that_is_no_svg_is_said_clearly(certificate: Document) -> None:
         render_pdf(broken, {})
 
 
+@pytest.mark.long
 @settings(max_examples=25, deadline=None)
 @given(text=st.text(st.characters(), max_size=30))
 def test_no_text_is_refused(text: str) -> None:

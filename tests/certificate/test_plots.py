@@ -226,6 +226,7 @@ def test_dots_in_one_place_have_an_extent_without_which_viewers_of_pdf_leave_the
         assert f'd="{path}"' in as_svg(figure)
 
 
+@pytest.mark.long
 def test_long_names_that_begin_alike_keep_their_ends() -> None:
     names = [Verbatim(f"Drawing 4711-0815 sheet 3 of the cover, balloon number {i}") for i in range(1, 21)]
     found = told_apart(names, NAMES_MM)

@@ -58,6 +58,7 @@ def test_a_complete_test_passes_with_nothing_missing() -> None:
     assert not any("missing" in remark for remark in verdict.remarks)
 
 
+@pytest.mark.long
 def test_without_an_uncertainty_no_probability_is_printed(tmp_path: Path) -> None:
     job = tmp_path / "job"
     shutil.copytree(ROOT / "examples" / "gauge-blocks-simulated", job)

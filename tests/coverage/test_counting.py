@@ -74,6 +74,7 @@ def test_a_run_is_taken_up_where_it_was_cut_off(tmp_path: Path, monkeypatch: pyt
     assert study.waiting([cell], tmp_path, 3, 2) == []
 
 
+@pytest.mark.long
 def test_a_recording_goes_through_the_api_and_comes_back_with_every_truth() -> None:
     found = measured((Cell("gauge blocks", "axis × 2"), 1, 0))
     assert "fault" not in found

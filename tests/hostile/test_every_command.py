@@ -42,6 +42,7 @@ def test_each_command_line_ends_well_on_files_that_nobody_altered(number: int, t
     assert done.returncode == line.ends, done.stderr
 
 
+@pytest.mark.long
 def test_a_command_reads_hostile_files_or_refuses_them_in_one_line(tmp_path: Path) -> None:
     numbers = [number for number, line in enumerate(LINES) if line.command not in DEAR]
     records = list(run_all(numbers, 3, 1, tmp_path, "commands"))
@@ -76,6 +77,7 @@ def test_a_refused_report_makes_no_records(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["job"]
 
 
+@pytest.mark.long
 def test_records_whose_entry_is_no_json_are_refused_in_words(tmp_path: Path) -> None:
     write_report(ROOT / "examples" / "plane-simulated", tmp_path / "out", records=tmp_path / "records.db")
     with open_records(tmp_path / "records.db") as records:

@@ -9,6 +9,7 @@ import pytest
 from benchmarks.hostile.kernels import EXAMPLES, compared, differences, kernels
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_figures_do_not_depend_on_the_kernel(example: str, tmp_path: Path) -> None:
     found = kernels()

@@ -25,6 +25,7 @@ def side_by_side(
         return [(what, problems) for (what, _), problems in zip(runs, found, strict=True) if problems]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not available(), reason="strace is not here, or may not trace")
 def test_a_kill_at_any_call_that_moves_a_file_leaves_a_set_after_the_next_run(tmp_path: Path) -> None:
     where = [call for call in calls("simulate", over=True) if call[0].startswith("rename")]
@@ -34,12 +35,14 @@ def test_a_kill_at_any_call_that_moves_a_file_leaves_a_set_after_the_next_run(tm
     assert side_by_side([(kill.what, lambda place, kill=kill: strike(kill, place)) for kill in kills], tmp_path) == []
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not available(), reason="strace is not here, or may not trace")
 def test_a_kill_that_does_not_come_is_counted_as_none(tmp_path: Path) -> None:
     outcome, found = strike(Kill("simulate", over=True, signal="SIGKILL", call=("rename", 1000)), tmp_path / "place")
     assert (outcome.code, found) == (0, ["the signal never came"])
 
 
+@pytest.mark.long
 def test_commands_that_meet_in_one_folder_lose_nothing(tmp_path: Path) -> None:
     given = [c for c in collisions(CHEAP) if not c.force]
     met = [c for c in given if c.relation == "--out is strangers"]
@@ -48,6 +51,7 @@ def test_commands_that_meet_in_one_folder_lose_nothing(tmp_path: Path) -> None:
     assert side_by_side([(c.what, lambda place, c=c: meet(c, place)) for c in met], tmp_path) == []
 
 
+@pytest.mark.long
 def test_a_place_that_cannot_be_written_to_is_told_in_one_line(tmp_path: Path) -> None:
     wanted = (
         "files of at most 1000 bytes",

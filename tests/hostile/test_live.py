@@ -20,6 +20,7 @@ def warm() -> Iterator[Warm]:
         yield made
 
 
+@pytest.mark.long(but="SIGKILL2")
 @pytest.mark.parametrize("number", range(6), ids=lambda number: what(2, number)[:7])
 def test_a_session_that_is_killed_has_every_accepted_point_and_goes_on(number: int, warm: Warm, tmp_path: Path) -> None:
     outcome, found, accepted = strike(2, number, tmp_path / "session", warm)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import tracemalloc
 
 import numpy as np
+import pytest
 
 from benchmarks.hostile.parts import case, outcome
 from cmm_uq.maths.geometry.repeated import Repeated
 
 
+@pytest.mark.long
 def test_a_damaged_job_of_a_part_is_evaluated_or_refused() -> None:
     ended = [(number, outcome(case(1, number)[1])) for number in range(150)]
     assert [one for one in ended if one[1] not in ("evaluated", "refused")] == []

@@ -75,6 +75,7 @@ def test_what_can_do_more_than_be_looked_at_is_refused(content: bytes, why: str)
     assert why in str(refused.value)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("content", [png(), svg()], ids=["png", "svg"])
 def test_it_stands_at_the_head_of_both_views_and_is_an_input(tmp_path: Path, content: bytes) -> None:
     job = tmp_path / "job"

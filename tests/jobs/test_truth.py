@@ -60,6 +60,7 @@ def test_what_no_noise_can_be_is_refused_with_its_key(line: str) -> None:
         checked(f"[noise]\n{line}\n".encode(), TRUTH, Truth)
 
 
+@pytest.mark.long
 def test_components_are_drawn_in_their_sizes(ballbar_points) -> None:  # type: ignore[no-untyped-def]
     """Standard deviations over many drawings; slow noise needs a time; a display shows multiples of its steps."""
     from dataclasses import replace

@@ -124,6 +124,7 @@ def test_parameters_are_drawn_from_their_priors_and_stay_where_nothing_is_known(
     assert stats.kstest(np.ravel(noise), "norm").pvalue > 1e-3
 
 
+@pytest.mark.long
 def test_a_recording_is_drawn_and_every_parameter_and_size_ranked() -> None:
     found = ranked((Case("gauge blocks"), 1, 0))
     assert "fault" not in found

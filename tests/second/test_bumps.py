@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from benchmarks.second.bumps import bumps, p_values
 from benchmarks.second.cases import case, outside
@@ -17,6 +18,7 @@ def test_the_nearest_bump_has_the_form_of_a_dent() -> None:
     assert cosine.max() > np.exp(-3 / 16)
 
 
+@pytest.mark.long
 def test_what_is_told_less_sees_no_more() -> None:
     """A dent of √λ = 9.2 in twenty bars whose Z reads worse: told its form it is seen, told the family it is not."""
     told, family = p_values(case(20261122, "outside", 57), 57)

@@ -18,6 +18,7 @@ def without(made: Case) -> Case:
     return replace(made, y=made.y - seen)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [0, 1, 2])
 def test_what_is_nine_times_its_uncertainty_is_seen_and_named_and_without_it_there_is_no_more_than_noise(
     number: int,

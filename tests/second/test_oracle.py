@@ -10,6 +10,7 @@ from benchmarks.second.noises import of_coordinates, of_observations
 from benchmarks.second.oracle import Forms, Likelihood, Search, Shape, forms, searched
 
 
+@pytest.mark.long(but="False-0")
 @pytest.mark.parametrize("number", range(4))
 @pytest.mark.parametrize("knows", [True, False])
 def test_one_effect_of_known_size_without_noise_is_found_alone(number: int, knows: bool) -> None:

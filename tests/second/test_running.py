@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from benchmarks.second.cases import KINDS, case, write
 from benchmarks.second.expansions import estimated
 from benchmarks.second.running import diagnosed, done, kept, lines, sealed, tasks
 
 
+@pytest.mark.long
 def test_a_consistent_recording_has_the_same_verdict_whether_its_posterior_is_sampled_or_not(tmp_path: Path) -> None:
     made = case(31, "nothing, real", 0)
     write(made, tmp_path)
@@ -31,6 +34,7 @@ def test_a_run_is_taken_up_where_it_was_left_and_sealed_before_it_begins(tmp_pat
     assert book[0].startswith(f"{mark}  2 cases, 0 of them diagnosed before, ")
 
 
+@pytest.mark.long
 def test_a_candidate_that_only_the_noise_of_an_attitude_shows_ends_no_diagnosis(tmp_path: Path) -> None:
     """A level plate displayed in steps of 5 µm: its own squareness YZ follows these, and least squares ran away with it."""
     made = case(20261124, "nothing, display", 258)
@@ -38,6 +42,7 @@ def test_a_candidate_that_only_the_noise_of_an_attitude_shows_ends_no_diagnosis(
     assert "artefact_squareness_yz" not in diagnosed(tmp_path / made.name, whole=True)["effects"]
 
 
+@pytest.mark.long
 def test_an_expansion_is_estimated_where_one_is_concealed() -> None:
     assert estimated((5, 3)) is None
     name, _, _, pull = estimated((5, 0)) or ("", False, False, 9.0)

@@ -123,6 +123,7 @@ def looks(read: dict[Path, Read], browser: Browser) -> dict[str, Look]:
     return found
 
 
+@pytest.mark.long
 def test_every_link_leads_to_a_page_and_a_place_in_it(read: dict[Path, Read]) -> None:
     broken = []
     for path, page in read.items():
@@ -155,6 +156,7 @@ def tab(browser: Browser) -> Iterator[Page]:
     context.close()
 
 
+@pytest.mark.long
 def test_axe_finds_nothing_on_any_page(looks: dict[str, Look]) -> None:
     """By WCAG 2.2 A and AA; what stands around the text and the theme's colours are alike, and are read on some pages."""
     assert {page: look.wrong for page, look in looks.items() if look.wrong} == {}

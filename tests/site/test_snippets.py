@@ -43,6 +43,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.long(but="howto")
 @pytest.mark.parametrize("page", having("python", "console"))
 def test_a_page_runs_from_its_top_to_its_end(page: Path, project: Path) -> None:
     scope: dict[str, object] = {}
@@ -139,6 +140,7 @@ def test_what_the_tutorial_adds_completes_the_certificate(project: Path) -> None
     assert "17025" not in checked.stdout
 
 
+@pytest.mark.long
 def test_the_job_of_a_laboratory_with_everything_stated_passes(project: Path) -> None:
     """Readings are simulated, with a temperature beside them; on the form every clause is answered."""
     page = ROOT / "docs" / "howto" / "laboratory.md"

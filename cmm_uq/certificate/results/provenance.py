@@ -48,13 +48,16 @@ def packages() -> dict[str, str]:
 
 LOCK = Path(__file__).parents[3] / "pylock.toml"
 _INSTALLERS = {"cmm-uq", "pip", "setuptools", "uv", "wheel"}
+_STATED = re.compile(r"^(Name|Version):[ \t]*(.*?)[ \t\r]*$", re.MULTILINE)
 _LOCKED = re.compile(r'^name = "([^"]+)"\nversion = "([^"]+)"$', re.MULTILINE)
 
 
 @cache
 def environment() -> dict[str, str]:
     """The project's lock, where whatever is installed is of it, else all that is installed; each with its SHA-256."""
-    here = {re.sub(r"[-_.]+", "-", one.name).lower(): one.version for one in distributions()}
+    texts = (one.read_text("METADATA") or one.read_text("PKG-INFO") or "" for one in distributions())
+    heads = (dict(_STATED.findall(text.partition("\n\n")[0])) for text in texts)  # ten times as fast as a mail's parser
+    here = {re.sub(r"[-_.]+", "-", one["Name"]).lower(): one["Version"] for one in heads if len(one) == 2}
     content = LOCK.read_bytes() if LOCK.is_file() else b""
     locked = set(_LOCKED.findall(content.decode()))  # of some packages several, for versions of Python
     if locked and all(one in locked for one in here.items() if one[0] not in _INSTALLERS):

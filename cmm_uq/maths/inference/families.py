@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
@@ -220,15 +221,29 @@ class FieldModel:
         larger by (covariance with the p places) · ``shown(impulse)``ᵀ · w.
         """
         table = np.column_stack([*vars(sizes).values(), scales])
-        _, first, which = np.unique(table, axis=0, return_index=True, return_inverse=True)
-        found = np.empty((len(scales), len(self.linear.unknowns) + sum(map(self._width, self.errors))))
-        for place, i in enumerate(first):
-            rows = np.flatnonzero(which.ravel() == place)
+        order = np.lexsort(table.T[::-1])
+        new = np.append(True, np.any(np.diff(table[order], axis=0) != 0, axis=1))
+        found = np.empty((len(scales), len(self.linear.unknowns) + len(self._stacked[2])))
+        for rows in np.split(order, np.flatnonzero(new)[1:]):
+            i = int(rows[0])
             found[rows] = self._drawn(sizes.at(slice(i, i + 1)), scales[i], len(rows), random)
         return found
 
-    def _width(self, one: FieldErrors) -> int:
-        return int(one.columns.shape[1]) + (0 if one.covariance is None else int(self.into.shape[1]))
+    @cached_property
+    def _stacked(self) -> tuple[Floats, Floats, Ints, NDArray[np.bool_]]:
+        """Of the t numbers of a draw's errors: columns (n, t), gains (n, t), sizes (t,), and which (t,) are drawn beforehand.
+
+        Gains: by how much each changes with the weight of each combination, at the size one.
+        """
+        seen, gains, sized, own = [np.zeros((self.into.shape[1], 0))], list[Floats](), list[int](), list[bool]()
+        for one, columns in zip(self.errors, self._each, strict=True):
+            n, j = columns.shape
+            more = 0 if one.covariance is None else n
+            seen.append(np.hstack([columns, np.zeros((n, more))]))
+            gains.append(np.hstack([np.zeros_like(columns), np.eye(n)]) if more else columns)
+            sized += [len(self.families) if one.family is None else self.families.index(one.family)] * (j + more)
+            own += [True] * j + [False] * more
+        return np.hstack(seen), np.hstack([seen[0], *gains]), np.array(sized, dtype=np.int64), np.array(own, dtype=bool)
 
     def _drawn(self, sizes: Sizes, scale: Floats, count: int, random: np.random.Generator) -> Floats:
         known, noise = len(self._known), self.noise
@@ -241,25 +256,14 @@ class FieldModel:
         if noise.slow.shape[1] and sizes.slow[0] > 0:
             waves = self.shown(noise.waves(sizes))
             left -= random.standard_normal((count, waves.shape[1])) @ waves.T
-        beforehand = [self._size(one, scale) * one.draw(random, count) for one in self.errors]
-        for drawn, seen in zip(beforehand, self._each, strict=True):
-            left -= drawn @ seen.T
+        seen, gain, sized, beforehand = self._stacked
+        size, errors = np.append(scale, 1.0)[sized], np.zeros((count, len(sized)))
+        errors[:, beforehand] = np.hstack([np.zeros((count, 0)), *(one.draw(random, count) for one in self.errors)])
+        errors *= size
+        left -= errors @ seen.T
         weight = scipy.linalg.cho_solve(factor, left.T).T
-        found = [self._parameters(own + weight @ self._seen[:, :known])]
-        for one, drawn, gain in zip(self.errors, beforehand, self._gains(scale), strict=True):
-            found.append(np.hstack([drawn, np.zeros((count, self._width(one) - drawn.shape[1]))]) + weight @ gain)
-        return np.hstack(found)
-
-    def _size(self, one: FieldErrors, scale: Floats) -> float:
-        return 1.0 if one.family is None else float(scale[self.families.index(one.family)])
-
-    def _gains(self, scale: Floats) -> list[Floats]:
-        """(n, …) of each error, by how much each number of a draw changes with the weight of each combination."""
-        found = list[Floats]()
-        for one, seen in zip(self.errors, self._each, strict=True):
-            gain = seen if one.covariance is None else np.hstack([np.zeros_like(seen), np.eye(len(seen))])
-            found.append(self._size(one, scale) ** 2 * gain)
-        return found
+        errors += weight @ (gain * size**2)
+        return np.hstack([self._parameters(own + weight @ self._seen[:, :known]), errors])
 
     def _parameters(self, own: Floats) -> Floats:
         found = np.full((len(own), len(self.linear.unknowns)), np.nan)
@@ -271,16 +275,12 @@ class FieldModel:
         known = len(self._known)
         whole = self._covariance(sizes, scale[None])[0]
         sd = self.linear.effective_sd[self._known]
-        prior, seen = [np.ones(known)], [self._seen[:, :known]]
-        gains = [seen[0] * sd, *self._gains(scale)]
-        for one, own in zip(self.errors, self._each, strict=True):
-            more = np.zeros((len(whole), self._width(one) - own.shape[1]))
-            prior += [np.full(own.shape[1], self._size(one, scale)), np.zeros(more.shape[1])]
-            seen += [own, more]
-        units = np.concatenate([sd, np.ones(sum(map(self._width, self.errors)))])
-        root = units * np.concatenate(prior)
-        to_each = np.linalg.solve(whole, np.hstack(gains)).T
-        residue = np.diag(root) - to_each @ (np.hstack(seen) * np.concatenate(prior))
+        columns, gain, sized, beforehand = self._stacked
+        size = np.append(scale, 1.0)[sized]
+        prior = np.append(np.ones(known), np.where(beforehand, size, 0.0))
+        seen = np.hstack([self._seen[:, :known], columns]) * prior
+        to_each = np.linalg.solve(whole, np.hstack([self._seen[:, :known] * sd, gain * size**2])).T
+        residue = np.diag(np.append(sd, np.ones(len(sized))) * prior) - to_each @ seen
         noise = self._noise(sizes)[0]
         mean = to_each @ self._seen[:, -1]
         mean[:known] += self.linear.prior_mean[self._known]

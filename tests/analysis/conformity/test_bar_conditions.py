@@ -102,6 +102,7 @@ def test_a_bar_between_two_others_does_not_take_the_place_of_both() -> None:
     assert with_it[0] == without[0] == "at least 3 positions of the bar: 2"
 
 
+@pytest.mark.long
 @given(st.integers(1, 8), st.data())
 def test_no_other_set_of_bars_far_from_each_other_is_larger(count: int, data: st.DataObject) -> None:
     """By trying all sets."""

@@ -247,6 +247,7 @@ def test_a_recording_with_an_optical_probe_is_refused_before_anything_is_compute
         read_job(job(tmp_path, change, more))
 
 
+@pytest.mark.long
 def test_a_certificate_warns_of_a_warm_gauge_of_unknown_expansion(tmp_path: Path) -> None:
     """Recorded at 23 °C; the example states 11.5e-6 /K."""
     folder = job(tmp_path, {"cte_per_k = 1.15e-05\n": ""})

@@ -48,6 +48,7 @@ def lengths(file: Path) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     return np.linalg.norm(xyz[1::2] - xyz[::2], axis=1)
 
 
+@pytest.mark.long
 def test_corrected_figures_are_those_of_the_recording_before_the_squareness_was_added(found: JobDiagnosis) -> None:
     assert [item.effect for item in found.diagnosis.effects] == ["squareness_xy"]
     assert found.consequences is not None

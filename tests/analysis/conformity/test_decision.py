@@ -183,6 +183,7 @@ def test_rules_of_probability_keep_their_promise(value: float, u: float, signed:
         assert (found.outcome == "pass") == (found.probability_conforming >= 1 - risk - 1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("signed", [True, False])
 @pytest.mark.parametrize(
     ("rule", "risk"),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
 from hypothesis import HealthCheck, Phase, assume, example, given, settings, strategies as st
 
 from cmm_uq.analysis.conformity.decision import Outcome, decide
@@ -127,6 +128,7 @@ def test_a_larger_uncertainty_makes_no_pass_and_by_iso_14253_1_no_fail(
         assert rule != '"ISO 14253-1"' or other != "fail" or one == "fail"
 
 
+@pytest.mark.long
 @given(base=tests, rule=rules, sign=signs, error=errors, line=st.sampled_from([*INPUTS]), declared=st.booleans())
 @FEW
 def test_a_statement_left_out_makes_no_pass_and_by_iso_14253_1_no_fail(
@@ -179,6 +181,7 @@ PARTS = [
 ]
 
 
+@pytest.mark.long
 @given(
     base=tests, rule=rules, error=errors, parts=st.lists(st.sampled_from(PARTS), min_size=1, max_size=2, unique=True)
 )
@@ -198,6 +201,7 @@ def test_a_removed_row_never_completes_a_test(
     assert "pass" not in now
 
 
+@pytest.mark.long
 @given(base=tests, first=st.sampled_from(PARTS), second=st.sampled_from(PARTS))
 @FEW
 def test_an_incomplete_test_stays_incomplete_with_less(

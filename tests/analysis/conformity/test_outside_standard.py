@@ -70,6 +70,7 @@ def test_it_is_not_stated_of_what_offers_no_lengths(installed: None) -> None:
         statement(ConformityFacts(standard=NAME, limit_um=3.0), sphere(), {}, "[[conformity]] 1", [FORMS])
 
 
+@pytest.mark.long
 def test_a_report_states_it_and_names_the_package(installed: None, bar: Path) -> None:
     found = cmm_uq.report(bar)
     assert list(found.conformity["standard"]) == ["ASME B89.4.1-1997", NAME]

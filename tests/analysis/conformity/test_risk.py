@@ -19,6 +19,7 @@ def test_prior_and_measurement_add_their_precisions() -> None:
     assert (found.mean, found.sd) == pytest.approx((6.4, 2.4))
 
 
+@pytest.mark.long
 @given(st.floats(-20, 20), st.floats(0.01, 30), st.floats(0.1, 30))
 def test_probabilities_within_and_beyond_are_those_of_the_standard_library(
     mean: float, sd: float, limit: float

@@ -82,6 +82,7 @@ def deformation_rms(holes_um: Floats) -> float:
     return float(np.sqrt(np.mean(left**2)))
 
 
+@pytest.mark.long
 def test_in_two_attitudes_a_pattern_of_holes_is_the_plates_own() -> None:
     found = diagnosed(recorded([AS_IT_LIES, TURNED], own_pattern()))
     assert [item.effect for item in found.effects] == ["artefact_pattern"]
@@ -92,6 +93,7 @@ def test_in_two_attitudes_a_pattern_of_holes_is_the_plates_own() -> None:
     assert found.improvement.elpd_gain > 5 * found.improvement.elpd_gain_se, "one set-up predicts the other"
 
 
+@pytest.mark.long
 def test_in_two_attitudes_a_machine_that_yaws_is_the_machine() -> None:
     found = diagnosed(recorded([AS_IT_LIES, TURNED], yaw=40.0))
     assert [item.effect for item in found.effects] == ["rotation_x_z"]
@@ -100,6 +102,7 @@ def test_in_two_attitudes_a_machine_that_yaws_is_the_machine() -> None:
     assert abs(size.value - 40.0) < 4 * size.u
 
 
+@pytest.mark.long
 def test_in_two_attitudes_holes_drilled_by_a_machine_that_yaws_are_the_plates_own() -> None:
     found = diagnosed(recorded([AS_IT_LIES, TURNED], like_a_yaw(40.0)))
     assert [item.effect for item in found.effects] == ["artefact_rotation_x_z"]
@@ -107,6 +110,7 @@ def test_in_two_attitudes_holes_drilled_by_a_machine_that_yaws_are_the_plates_ow
     assert abs(size.value - 40.0) < 4 * size.u
 
 
+@pytest.mark.long
 def test_in_two_attitudes_a_plate_out_of_square_is_neither_a_sagging_bar_nor_a_guideway_across_it() -> None:
     """Along its diagonal it is as a bar of another length; a straightness of Z is the same all over a level plate."""
     sheared = np.zeros((9, 3))
@@ -120,6 +124,7 @@ def test_in_two_attitudes_a_plate_out_of_square_is_neither_a_sagging_bar_nor_a_g
     assert "artefact_sag" not in {str(name) for name, _ in found.rivals}
 
 
+@pytest.mark.long
 def test_both_are_found_beside_each_other_with_their_sizes() -> None:
     found = diagnosed(recorded([AS_IT_LIES, TURNED], like_a_yaw(40.0), yaw=-25.0))
     sizes = {item.effect: item.parameters["arcsec_per_m"] for item in found.effects}
@@ -128,6 +133,7 @@ def test_both_are_found_beside_each_other_with_their_sizes() -> None:
     assert abs(sizes["artefact_rotation_x_z"].value - 40.0) < 4 * sizes["artefact_rotation_x_z"].u
 
 
+@pytest.mark.long
 def test_in_one_attitude_nothing_tells_the_plate_from_the_machine() -> None:
     (group,) = one_attitude().indistinguishable
     assert set(group[:2]) == {"rotation_x_z", "artefact_rotation_x_z"}
@@ -137,6 +143,7 @@ def test_in_one_attitude_nothing_tells_the_plate_from_the_machine() -> None:
     assert item.together > 0.98
 
 
+@pytest.mark.long
 def test_in_one_attitude_a_certificate_speaks_for_the_plate_as_far_as_its_uncertainty() -> None:
     """Nothing else tells the two apart: holes 5 µm off, by a certificate of 0.5 µm, may be the machine's or the plate's."""
     certified = artefact_facts(kind="plate", u_um=0.5)
@@ -159,6 +166,7 @@ def test_in_one_attitude_a_pattern_is_an_offset_of_each_hole_and_no_machines_err
     assert found.noise.placing.value == pytest.approx(deformation_rms(own_pattern()), rel=0.2)
 
 
+@pytest.mark.long
 def test_a_plate_half_a_kelvin_cooler_on_the_later_date_is_not_a_scale_of_the_machine() -> None:
     """A plate that nobody certified, compared with itself: all distances shrink by 11.5 ppm/K."""
     facts = artefact_facts(kind="plate", cte_per_k=11.5e-6)

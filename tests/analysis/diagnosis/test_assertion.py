@@ -165,6 +165,7 @@ def test_of_effects_whose_sizes_are_open_together_the_least_probable_goes_first(
     assert (found.chosen, [each.effect for each in withheld]) == (frozenset({0, 1}), ["2"])
 
 
+@pytest.mark.long
 def test_what_held_out_placings_do_not_bear_out_is_said_to_be_withheld(monkeypatch: pytest.MonkeyPatch) -> None:
     """By a comparison that finds no gain; what remains is unexplained."""
     monkeypatch.setattr(diagnosis, "improvement", lambda *_: Improvement(4.0, 1.0, 4.0, 4.0, 0.5, 1.0))

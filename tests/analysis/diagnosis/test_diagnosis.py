@@ -66,6 +66,7 @@ def diagnosed(points: Points, stated_um: float | None = SIGMA_UM, named: tuple[s
     return diagnose(model, stated_um=stated_um, alpha=0.01, seed=0)
 
 
+@pytest.mark.long
 def test_told_only_of_scale_the_real_recording_shows_its_squareness() -> None:
     """Against the machine's own calibration, which it never saw: −173″ (Harris 2004, table 7)."""
     job = read_job(ROOT / "examples" / "iota-1102-20C")
@@ -102,6 +103,7 @@ def test_two_hidden_effects_are_both_named_with_their_size() -> None:
         assert item.probability > 0.9
 
 
+@pytest.mark.long
 def test_a_hidden_periodic_error_is_found_with_its_period() -> None:
     points = recording({}, Noise(1e-3))
     error = np.zeros_like(points.xyz)
@@ -112,6 +114,7 @@ def test_a_hidden_periodic_error_is_found_with_its_period() -> None:
     assert found.effects[0].parameters["amplitude_um"].value == pytest.approx(4.0, abs=1.0)
 
 
+@pytest.mark.long
 def test_an_effect_that_nobody_knows_is_called_unexplained_and_located() -> None:
     points = recording({}, Noise(1e-3))
     error = np.zeros_like(points.xyz)
@@ -125,6 +128,7 @@ def test_an_effect_that_nobody_knows_is_called_unexplained_and_located() -> None
     assert low < 600.0 < high
 
 
+@pytest.mark.long
 def test_false_alarms_are_as_frequent_as_the_p_value_says() -> None:
     """Sixteen sound recordings: p-values are uniform (Kolmogorov–Smirnov at 0.1 %), at most two lie below 1 % (1 in 1900)."""
     values = []
@@ -140,6 +144,7 @@ def test_false_alarms_are_as_frequent_as_the_p_value_says() -> None:
     assert sum(value < 0.01 for value in values) <= 2
 
 
+@pytest.mark.long
 def test_noise_that_is_twice_what_was_stated_is_noise_and_contradicts_it() -> None:
     found = diagnosed(recording({}, Noise(2e-3)))
     assert found.verdict == "consistent"
@@ -148,12 +153,14 @@ def test_noise_that_is_twice_what_was_stated_is_noise_and_contradicts_it() -> No
     assert low < 2.0 < high
 
 
+@pytest.mark.long
 def test_set_up_offsets_are_noise_of_the_placing() -> None:
     found = diagnosed(recording({}, Noise(1e-3, placing=1.5e-3)))
     assert found.verdict == "consistent"
     assert found.noise.placing.value == pytest.approx(1.5, rel=0.5)
 
 
+@pytest.mark.long
 def test_effects_with_one_signature_are_named_together_with_a_measurement_that_parts_them() -> None:
     """Bars in one plane of constant y: squareness XY and the roll of X along it cannot be told apart from others."""
     machine = Machine("m", "XYZ", TRAVEL)
@@ -187,6 +194,7 @@ def test_the_held_out_error_of_least_squares_is_the_press_residual() -> None:
     assert improvement(model, model).heldout_rms_before_um == pytest.approx(wanted, rel=2e-3)
 
 
+@pytest.mark.long
 def test_the_false_alarm_rate_is_asked_for() -> None:
     points = recording({"straightness_y_x": 1.0}, Noise(1e-3))
     model = RecordingModel(Ballbar(bar_facts(), points), effects(SIX))
@@ -196,6 +204,7 @@ def test_the_false_alarm_rate_is_asked_for() -> None:
     assert weak.p_value == pytest.approx(near, abs=4 * np.sqrt(near * (1 - near) / 200))
 
 
+@pytest.mark.long
 def test_a_jump_is_located_between_the_readings_about_it() -> None:
     points = recording({}, Noise(1e-3))
     error = np.zeros_like(points.xyz)
@@ -207,6 +216,7 @@ def test_a_jump_is_located_between_the_readings_about_it() -> None:
     assert high - low < 60.0
 
 
+@pytest.mark.long
 def test_a_known_mechanism_of_another_form_is_named_in_part() -> None:
     """Straightness as an asymmetric bow, which the effect's symmetric one describes but in part."""
     points = recording({}, Noise(1e-3))
@@ -221,6 +231,7 @@ def test_a_known_mechanism_of_another_form_is_named_in_part() -> None:
 SCALES = ("scale_x", "scale_y", "scale_z")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("truth", "named"),
     [([0, 0, 0, 600, 600, 600], ()), ([0, 0, 0, 1500, -1500, 900], SCALES)],
@@ -266,6 +277,7 @@ def test_they_are_consistent_without_an_outlier(points: Points) -> None:
     assert not found.remaining.rivals
 
 
+@pytest.mark.long
 def test_a_gauge_on_seven_lines_shows_a_machine_out_of_adjustment_and_not_its_own_temperature() -> None:
     """Drawn by equations written apart from the package: one effect with six coefficients would explain as much."""
     hidden, named, verdict = case(13, of_gauge=True)

@@ -51,6 +51,7 @@ def in_order(points: Points, order: np.ndarray[tuple[int], np.dtype[np.int64]]) 
     )  # fmt: skip
 
 
+@pytest.mark.long
 @settings(max_examples=2, deadline=None, phases=[Phase.generate])
 @given(st.randoms(use_true_random=False))
 def test_order_of_rows_numbers_and_origin_change_no_figure(random: object) -> None:
@@ -73,6 +74,7 @@ def test_order_of_rows_numbers_and_origin_change_no_figure(random: object) -> No
     assert [w.what for w in found.where] == [w.what for w in plain.where]
 
 
+@pytest.mark.long
 def test_a_mirrored_axis_changes_no_verdict_and_no_figure_that_is_printed() -> None:
     """Steps between the same places are tried from the other end: probabilities differ in their third digit at most."""
     points = recording()
@@ -90,6 +92,7 @@ def test_a_mirrored_axis_changes_no_verdict_and_no_figure_that_is_printed() -> N
     assert one.parameters["gap_um"].value == pytest.approx(other.parameters["gap_um"].value, rel=1e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("factor", "start"), [(1.0, 1.7e9), (60.0, 0.0)], ids=["epoch", "minutes"])
 def test_a_clock_that_started_long_ago_or_counts_in_minutes_changes_no_verdict(factor: float, start: float) -> None:
     """Of a backlash of 24 µm, far from the rate: where times differ in their last digit, other shapes of slow noise stand for

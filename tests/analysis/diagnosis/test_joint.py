@@ -44,6 +44,7 @@ def plate(places: Floats) -> Diagnosis:
     return diagnose(model, stated_um=None, alpha=0.01, seed=0)
 
 
+@pytest.mark.long
 def test_five_places_at_equal_distances_do_not_tell_a_period_from_its_aliases() -> None:
     """Sampled every 5 mm, frequencies that differ or sum up to a multiple of 1/5 mm⁻¹ are one (sampling theorem)."""
     found = plate(PITCH * np.arange(5))
@@ -104,6 +105,7 @@ def test_peaks_are_parted_where_the_evidence_between_them_is_a_tenth_of_the_lowe
     assert parts == [[0, 1], [2, 3, 4, 5, 6]], "0.05 of 0.6 is less than a tenth, 0.07 of 0.5 is more"
 
 
+@pytest.mark.long
 def test_places_at_unequal_distances_do() -> None:
     found = plate(np.sort(np.random.default_rng(4).uniform(0, 400, 24)).round(2))
     (item,) = found.effects

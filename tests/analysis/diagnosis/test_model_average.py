@@ -93,6 +93,7 @@ def results(outcome: Outcome) -> dict[str, Any]:
     return dict(json.loads(as_json(outcome.results)))
 
 
+@pytest.mark.long
 def test_several_explanations_remain_and_the_true_one_is_among_them(found: JobDiagnosis) -> None:
     remaining = found.diagnosis.remaining
     assert set(TRUTH) in [set(rival.effects) for rival in remaining.rivals]

@@ -59,6 +59,7 @@ def jumped(tmp_path_factory: pytest.TempPathFactory) -> RecordingModel:
     return screened_model(read_job(Path(folder) / made.name))[0]
 
 
+@pytest.mark.long
 def test_few_shapes_say_of_a_jump_with_time_what_many_say(
     jumped: RecordingModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -80,6 +81,7 @@ def test_noise_that_is_slow_for_want_of_a_jump_is_not_all_that_is_kept(jumped: R
     assert sum(bool(kind.slow.size) for kind in normal) >= 2
 
 
+@pytest.mark.long
 def test_without_a_time_there_is_no_jump_to_reckon_with(jumped: RecordingModel) -> None:
     """The same kinds of noise, whatever functions of other covariates are candidates."""
     functions = [replace(f, covariate_name=None) for f in unknown_functions(jumped, jumped.estimate().about)]

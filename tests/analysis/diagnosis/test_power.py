@@ -34,6 +34,7 @@ def predicted() -> dict[str, Power]:
     return {power.effect: power for power in found}
 
 
+@pytest.mark.long
 def test_power_grows_with_the_effect_and_naming_needs_more_than_detection() -> None:
     power = predicted()["rotation_y_y"]
     assert power.detectable is not None
@@ -60,6 +61,7 @@ def test_twins_are_detected_and_never_named() -> None:
         assert not np.isfinite(predicted()[name].named_at).any()
 
 
+@pytest.mark.long
 def test_the_gate_opens_as_often_as_predicted() -> None:
     """Six simulated recordings: the count lies within the central 99.9 % of the predicted binomial."""
     power = predicted()["rotation_y_y"]

@@ -43,6 +43,7 @@ def gauge(noise: float = 1e-3) -> tuple[SearchResult, dict[str, SmallestEffect]]
     return found, rows(found)
 
 
+@pytest.mark.long
 def test_the_closed_form_is_within_a_fifth_of_recordings_drawn_and_tested() -> None:
     """The amplitude that 90 of 100 drawn recordings show lies so close to the one computed."""
     found, smallest = gauge()
@@ -64,6 +65,7 @@ def test_twins_are_seen_and_never_named() -> None:
         assert smallest[name].named is None
 
 
+@pytest.mark.long
 def test_twice_the_noise_hides_effects_twice_as_large() -> None:
     """The same draws of the noise, twice as large: all is in proportion, but for thresholds from two hundred draws each."""
     small, large = gauge()[1], gauge(2e-3)[1]
@@ -118,6 +120,7 @@ def test_a_period_that_divides_the_pitch_is_not_resolved() -> None:
     assert not any(low < 60.0 / 1.5 < high for low, high in periods.unresolved)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("job", ["digitizer-simulated", "plate-simulated", "step-gauge-simulated"])
 def test_sag_is_of_bars_and_gauges_alone(job: str) -> None:
     """A digitizer's mount moves along lines past its sphere, and neither sphere nor plate is shortened along a line."""

@@ -248,6 +248,7 @@ def test_a_noise_that_could_as_well_be_errors_left_out_is_that_of_the_certificat
     assert np.mean(safe.noise.usual_mm) > np.mean(found.noise.usual_mm)
 
 
+@pytest.mark.long
 def test_an_error_that_was_left_out_does_not_make_intervals_of_parts_too_narrow() -> None:
     """100 hidden machines with a roll of carriage x: 95 % intervals of a distance hold where the roll is reckoned with.
 

@@ -87,6 +87,7 @@ def test_a_displacement_and_a_turn_of_everything_move_all_points_as_one_body(cha
         np.testing.assert_allclose(root[:, :, 3 + k], np.cross(np.eye(3)[k], readings), atol=1e-9)
 
 
+@pytest.mark.long
 def test_the_map_of_a_step_gauge_corrects_distances_to_within_their_uncertainty() -> None:
     """The example was simulated with nine-fold scales and squarenesses that are known, and nothing else: what they truly make
     of distances between 40 pairs of places, 2·u of which at least nine in ten hold, and of which little is left."""
@@ -108,6 +109,7 @@ def test_the_map_of_a_step_gauge_corrects_distances_to_within_their_uncertainty(
     assert np.std(now - truly) < 0.2 * np.std(asread - truly)
 
 
+@pytest.mark.long
 def test_set_ups_that_were_held_out_are_predicted_as_well_as_was_foretold() -> None:
     """Twenty bars of a real machine. Uncorrected, or corrected with the sign turned round, they are off by far more."""
     held = mapped("iota-1102-20C").held_out
@@ -123,6 +125,7 @@ def test_a_map_says_which_errors_it_does_not_hold() -> None:
     assert not {*SCALE, *SQUARE} & set(mapped("iota-1102-20C").omitted)
 
 
+@pytest.mark.long
 def test_a_plate_that_lies_flat_leaves_the_axis_across_it_uncorrected() -> None:
     before, after = mapped("plate-simulated").range_um
     assert after > 0.9 * before > 100

@@ -20,6 +20,7 @@ def test_printed_figures_come_out_again(figures: Callable[[], list[Figure]]) -> 
     assert [one for one in figures() if not one.holds] == []
 
 
+@pytest.mark.long
 def test_distances_of_a_real_machine_are_stated_as_its_error_map_has_them() -> None:
     """J. O. Harris, Ph.D. thesis, McMaster University, 2004, figures C 1 and C 2: before and after compensation."""
     distances = elsewhere(trials=5000)
@@ -38,6 +39,7 @@ def test_a_reference_pair_gives_form_size_direction_and_place_to_a_picometre(kin
         assert off < 1e-9, name
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("times", [1.0, 3.0])
 def test_what_was_measured_small_may_be_large_where_errors_are(times: float) -> None:
     """Whatever direction is left of it: the upper end fails in 2.5 %, to three standard deviations of 400 measurements."""

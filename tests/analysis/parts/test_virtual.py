@@ -164,6 +164,7 @@ def test_a_free_body_in_a_gradient_of_temperature_bends_to_a_circle() -> None:
     assert sagitta == pytest.approx(alpha * gradient * 1e-3 * length**2 / 8, rel=1e-9)
 
 
+@pytest.mark.long
 @settings(max_examples=15)
 @given(st.lists(st.floats(-1, 1), min_size=6, max_size=6))
 def test_where_the_part_lies_is_no_error_of_it(numbers: list[float]) -> None:
@@ -416,6 +417,7 @@ def test_a_mean_error_is_taken_off_what_was_measured_once(what: str) -> None:
     assert np.abs(evaluated(plan, measured) - left).max() > 1e-4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("digits", "least"), [(1, 100_000), (3, 200_000)])
 def test_as_many_are_drawn_as_the_digits_need(digits: int, least: int) -> None:
     """u of a distance by two readings, √2 · 1 µm, to better than 1 %, by a hundred thousand at least (JCGM 101:2008, 7.9)."""

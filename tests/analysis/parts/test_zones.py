@@ -64,6 +64,7 @@ def test_draws_of_a_place_are_those_of_the_noncentral_distribution(found: float)
             assert stats.ncx2.sf(found**2, 2, theta**2) == pytest.approx(p, abs=0.01)
 
 
+@pytest.mark.long(but="0.5-place")
 @pytest.mark.parametrize("name", WIDTHS)
 @pytest.mark.parametrize("true", [0.0, 0.5, 1.0, 2.0, 5.0])
 def test_intervals_hold_however_small_the_zone(name: str, true: float) -> None:

@@ -85,6 +85,7 @@ def test_without_offset_and_growth_it_is_what_white_noise_leaves(kind: str) -> N
     np.testing.assert_allclose(found, np.sqrt(np.diag(estimate.covariance))[there], rtol=1e-6)
 
 
+@pytest.mark.long
 def test_estimates_of_simulated_recordings_scatter_as_expected() -> None:
     """Of 400 recordings the standard deviation lies within the central 99.9 % of χ² for each of six factors."""
     chosen = setting(artefact_facts(kind="ballbar", length_mm=400.0, u_um=0.0), repeats=3)

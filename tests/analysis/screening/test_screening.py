@@ -113,6 +113,7 @@ def test_a_gross_outlier_is_found_and_only_it(ballbar_points: Points) -> None:
     assert noisy(ballbar_points, 1, offset=0.05)[0] == [5]
 
 
+@pytest.mark.long
 def test_false_outliers_are_as_rare_as_their_probability(ballbar_points: Points) -> None:
     """One in a thousand recordings by design: more than six in a thousand happens once in 10⁴ such studies."""
     assert sum(bool(noisy(ballbar_points, seed)[0]) for seed in range(1000)) <= 6

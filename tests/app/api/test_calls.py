@@ -59,12 +59,14 @@ def test_every_name_of_the_api_is_there_and_another_is_none() -> None:
         cmm_uq.nothing  # noqa: B018
 
 
+@pytest.mark.long
 def test_a_job_from_a_frame_gives_the_figures_of_the_folder() -> None:
     ours, theirs = cmm_uq.report(from_frame(date="2004-09-01")), cmm_uq.report(IOTA)
     assert ours.estimates.equals(theirs.estimates)
     assert ours.figures.equals(theirs.figures)
 
 
+@pytest.mark.long
 def test_a_job_from_a_frame_is_written_as_a_folder_that_reads_back_to_it(tmp_path: Path) -> None:
     job = from_frame(id="bar-7", conformity=[{"standard": "ASME B89.4.1-1997", "limit_um": 60.0}])
     job.write(str(tmp_path / "job"))

@@ -42,12 +42,14 @@ def results(written: Path) -> dict[str, Any]:
     return dict(json.loads((written / "results.json").read_bytes()))
 
 
+@pytest.mark.long
 def test_nothing_is_written_before_it_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     cmm_uq.report(IOTA)
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_it_writes_the_bytes_that_the_command_writes(found: Report, written: Path, tmp_path: Path) -> None:
     files = found.write(str(tmp_path / "out"))
     assert sorted(files) == sorted(path.name for path in written.iterdir())
@@ -119,6 +121,7 @@ def test_provenance_names_program_inputs_and_seed(found: Report, results: dict[s
     assert found.origin == "measured"
 
 
+@pytest.mark.long
 def test_a_kind_without_named_draws_says_so() -> None:
     shift = cmm_uq.report(ROOT / "examples" / "shift-simulated")
     assert shift.estimates.loc["scale_x.ppm", "unit"] == "ppm"
@@ -128,6 +131,7 @@ def test_a_kind_without_named_draws_says_so() -> None:
         without.covariance  # noqa: B018
 
 
+@pytest.mark.long
 def test_a_diagnosis_names_what_was_left_out_with_its_probability() -> None:
     found = cmm_uq.diagnose(ROOT / "examples" / "iota-1102-maps")
     said = {each["effect"]: each["probability"] for each in found.diagnosis["effects"]}
@@ -136,6 +140,7 @@ def test_a_diagnosis_names_what_was_left_out_with_its_probability() -> None:
     assert found.effects.loc["thermal_scale_y.cte_per_k", "probability"] == said["thermal_scale_y"]
 
 
+@pytest.mark.long
 def test_a_plan_lists_its_placings_and_writes_the_recording_to_fill_in(tmp_path: Path) -> None:
     found = cmm_uq.plan(ROOT / "examples" / "plan-ballbar", power=False)
     assert len(found.placings) == 20
@@ -148,6 +153,7 @@ def part() -> Part:
     return cmm_uq.part(job, trials=1000, seed=2, language="de")
 
 
+@pytest.mark.long
 def test_figures_are_tables_by_characteristic(part: Part) -> None:
     assert list(part.characteristics.index) == ["1", "2"]
     row = part.characteristics.loc["1"]

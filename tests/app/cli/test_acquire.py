@@ -118,6 +118,7 @@ def many_bars(folder: Path) -> Path:
     return job_folder(folder, plan="measurement,point,repeat,x_mm,y_mm,z_mm,time_s\n" + "\n".join(rows) + "\n")
 
 
+@pytest.mark.long
 def test_what_was_shown_as_accepted_survives_a_kill_and_it_goes_on(tmp_path: Path) -> None:
     """Once; benchmarks/acquisition/kills.py does it a thousand times."""
     folder = many_bars(tmp_path / "job")
@@ -136,6 +137,7 @@ def test_what_was_shown_as_accepted_survives_a_kill_and_it_goes_on(tmp_path: Pat
     assert len(read_job(folder).points) == len(kept) // 2 * 2
 
 
+@pytest.mark.long
 def test_on_a_full_disk_nothing_is_accepted_and_it_goes_on_when_there_is_room(tmp_path: Path) -> None:
     folder = many_bars(tmp_path / "job")
     with operating(folder, limit=6000) as operator:
@@ -153,6 +155,7 @@ def test_on_a_full_disk_nothing_is_accepted_and_it_goes_on_when_there_is_room(tm
     assert len(read_job(folder).points) == len(POINTS)
 
 
+@pytest.mark.long
 def test_a_machine_and_a_logger_at_real_sockets_one_of_them_unplugged(tmp_path: Path) -> None:
     machine = SimulatedIppServer()
     with SimulatedLine(Lines(), "socket") as logger:
@@ -210,6 +213,7 @@ values = {{ value1 = "x_mm", value2 = "y_mm", value3 = "z_mm", value4 = "temp_ar
 """
 
 
+@pytest.mark.long
 def test_points_taken_from_scales_as_fast_as_keys_are_pressed_are_reported_at_once(tmp_path: Path) -> None:
     """Their times are of the program's own clock, so that 0.2 s from ball to ball are no minutes."""
     speaker = Lines()
@@ -236,6 +240,7 @@ def test_points_taken_from_scales_as_fast_as_keys_are_pressed_are_reported_at_on
     assert "looks like minutes or hours" in changed.stderr
 
 
+@pytest.mark.long
 def test_answers_that_nobody_asked_for_are_counted_on_the_certificate(tmp_path: Path) -> None:
     class Twice(Readout1502):
         def answer(self, command: str) -> bytes:
@@ -262,6 +267,7 @@ values = {{ temp_c = "temp_artefact_c" }}
     assert bar.units == {}  # it says them itself
 
 
+@pytest.mark.long
 def test_a_folder_of_results_is_read_as_they_come(tmp_path: Path) -> None:
     folder = job_folder(tmp_path / "job", 'folder = "drop"\n')
     (folder / "drop").mkdir()
@@ -278,6 +284,7 @@ def test_a_folder_of_results_is_read_as_they_come(tmp_path: Path) -> None:
     assert "Points were read from result.csv." in str(job.acquired.sentence)  # type: ignore[union-attr]
 
 
+@pytest.mark.long
 def test_the_screen_takes_keys_shows_what_comes_next_and_leaves_the_terminal_as_it_was(tmp_path: Path) -> None:
     import pty
 
@@ -310,6 +317,7 @@ def test_the_screen_takes_keys_shows_what_comes_next_and_leaves_the_terminal_as_
     assert [point.columns["z_mm"] for point in read_story(folder / "acquisition").points.values()] == [-300.0]
 
 
+@pytest.mark.long
 def test_an_interruption_ends_it_at_once_and_says_that_what_was_accepted_is_written(tmp_path: Path) -> None:
     folder = job_folder(tmp_path / "job")
     with operating(folder) as operator:

@@ -39,6 +39,7 @@ def archive(laboratory: Path) -> Path:
     return laboratory
 
 
+@pytest.mark.long
 def test_a_wrong_figure_is_found_told_and_replaced_by_a_draft(archive: Path) -> None:
     stated = json.loads((archive / "reports" / "mount" / "results.json").read_bytes())["artefact"]["U1_mm"]
     asked = ("affected", "--version", "0.4.0", "--records", "lab.db")

@@ -139,6 +139,7 @@ def test_the_page_and_its_data_are_written_together(three: Path, tmp_path: Path)
     assert json.loads((tmp_path / "out" / "due.json").read_bytes())["items"][0]["serial"] == "1101"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

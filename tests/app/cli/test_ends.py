@@ -49,6 +49,7 @@ def test_a_strict_budget_ends_with_4_where_monte_carlo_is_not_stable(
     assert ("not stable" in told["reason"]) is (code == 4)
 
 
+@pytest.mark.long
 def test_a_strict_diagnosis_ends_with_4_where_something_was_left_out_and_with_0_where_not(
     job: Path, tmp_path: Path
 ) -> None:
@@ -58,6 +59,7 @@ def test_a_strict_diagnosis_ends_with_4_where_something_was_left_out_and_with_0_
     assert run("diagnose", job, "--out", tmp_path / "b", "--strict", "--quiet").returncode == 4
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
 def test_a_full_standard_output_ends_with_3_and_the_files_are_there(budget: Path, tmp_path: Path) -> None:
     with Path("/dev/full").open("w") as full:
@@ -68,6 +70,7 @@ def test_a_full_standard_output_ends_with_3_and_the_files_are_there(budget: Path
     assert (tmp_path / "out" / "manifest.json").is_file()
 
 
+@pytest.mark.long(but=">&- 2>&-")
 @pytest.mark.skipif(os.name == "nt", reason="shell of POSIX")
 @pytest.mark.parametrize("redirection", [">&-", "2>&-", "<&-", ">&- 2>&-"])
 def test_closed_streams_end_without_a_traceback(budget: Path, tmp_path: Path, redirection: str) -> None:
@@ -96,6 +99,7 @@ def test_an_unknown_option_is_one_line() -> None:
     assert "--bogus" in done.stderr
 
 
+@pytest.mark.long
 def test_a_fault_of_the_program_is_one_line_too(budget: Path, tmp_path: Path) -> None:
     """A library that breaks: here one that cannot even be imported."""
     (tmp_path / "jinja2").mkdir()
@@ -111,6 +115,7 @@ def test_a_fault_of_the_program_is_one_line_too(budget: Path, tmp_path: Path) ->
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_a_fault_after_the_files_are_written_says_that_they_are(budget: Path, tmp_path: Path) -> None:
     """Here the summary breaks, as a library on a terminal may."""
     program = (

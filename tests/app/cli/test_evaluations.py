@@ -31,6 +31,7 @@ def told_of_scale_only(job: Path) -> Path:
     return job
 
 
+@pytest.mark.long
 def test_it_names_what_was_left_out_and_keeps_the_contract(told_of_scale_only: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = run("diagnose", told_of_scale_only, "--out", out)
@@ -52,6 +53,7 @@ def test_it_names_what_was_left_out_and_keeps_the_contract(told_of_scale_only: P
         assert kept.returncode == 0, kept.stdout
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_bytes(iota: Path, tmp_path: Path) -> None:
     for name in ("a", "b"):
         assert run_apart("diagnose", iota, "--out", tmp_path / name, "--quiet").stdout == ""
@@ -104,6 +106,7 @@ def test_the_plan_is_read_as_a_recording_of_the_job(planned: Path, tmp_path: Pat
     np.testing.assert_allclose(np.linalg.norm(bars, axis=1), 400.0, atol=1e-6)
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_plan(planned: Path, tmp_path: Path) -> None:
     for name in ("a", "b"):
         assert run_apart("plan", planned, "--out", tmp_path / name, "--no-power", "--quiet").returncode == 0
@@ -222,6 +225,7 @@ def german(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "de"
 
 
+@pytest.mark.long
 def test_the_documents_are_in_the_language(german: Path) -> None:
     page = (german / "certificate.html").read_text(encoding="utf-8")
     assert '<html lang="de">' in page

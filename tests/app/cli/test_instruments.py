@@ -86,6 +86,7 @@ def garbled(line: UnreliableLine) -> None:
     line.mischief.garbled = True
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("speaker", "spoil", "told"), [
     (Silent(), None, "nothing came; expected like t:   20.013 C<CR>. Check power and cable (crossed or straight), the "
                      "settings (the profile has 2400 8N1), that it is set to be asked"),

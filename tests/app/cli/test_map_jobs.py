@@ -33,6 +33,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.long
 def test_a_diagnosis_is_a_page_and_results(out: Path) -> None:
     assert sorted(path.name for path in out.iterdir()) == [
         "diagnosis.html",
@@ -116,6 +117,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.long
 def test_a_report_has_its_correction_table_also_inside_the_pdf(report: Path) -> None:
     names = [
         "certificate-simulated.html", "certificate-simulated.pdf", "certificate-simulated.xml",
@@ -126,6 +128,7 @@ def test_a_report_has_its_correction_table_also_inside_the_pdf(report: Path) -> 
         assert set(pdf.attachments) == {"job.toml", "recording.csv", *names[2:]} - {"manifest.json"}
 
 
+@pytest.mark.long
 def test_compensating_by_the_table_brings_the_error_down(report: Path, tmp_path: Path) -> None:
     """What is left of about 27 µm is within the uncertainty of the curve: the job calibrates itself a second time."""
     job = tmp_path / "job"
@@ -171,6 +174,7 @@ def test_what_a_shift_job_cannot_have_is_one_line_and_exit_code_2(command: str, 
 PLATE = ROOT / "examples" / "shift-plate-simulated"
 
 
+@pytest.mark.long
 def test_a_plates_table_compensates_the_machine_too(tmp_path: Path) -> None:
     """Residuals of the true places by the example's own formula, after the best rigid motion, of all 525 readings."""
     assert run("report", PLATE, "--out", tmp_path / "report").returncode == 0

@@ -66,6 +66,7 @@ def run(site: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
                           env={**os.environ, "PYTHONPATH": paths})  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", ["report", "diagnose", "plan"])
 def test_a_kind_that_fails_is_named_in_one_line(site: Path, tmp_path: Path, command: str) -> None:
     odd_kind(site, AT_ONCE)
@@ -164,6 +165,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return work
 
 
+@pytest.mark.long
 def test_a_plan_determines_it(work: Path) -> None:
     data = results(work / "plan")
     (better,) = (p for p in data["better"]["determined"] if p["effect"] == "beam_twist")
@@ -214,6 +216,7 @@ def test_without_the_package_its_effect_is_unknown(work: Path, tmp_path: Path) -
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", ["report", "diagnose"])
 def test_a_package_that_cannot_be_used_is_named_and_nothing_is_written(
     work: Path, tmp_path: Path, command: str

@@ -242,6 +242,7 @@ def test_what_is_no_certificate_is_refused_in_one_line(content: bytes | None, to
     assert done.stdout == ""
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not SCHEMAS.exists(), reason="PTB's schemas are not at hand")
 def test_the_schema_is_asked_as_well_and_must_be_in_the_folder(tmp_path: Path) -> None:
     assert run("read", SAMPLE, "--schema", SCHEMAS, "-q").returncode == 0

@@ -73,6 +73,7 @@ def test_the_pdf_carries_the_job_and_the_results(
     assert attached["ballbar.csv"] == (iota / "ballbar.csv").read_bytes()
 
 
+@pytest.mark.long
 def test_a_second_run_gives_the_same_bytes(
     done: tuple[Path, subprocess.CompletedProcess[str]], iota: Path, tmp_path: Path
 ) -> None:
@@ -126,6 +127,7 @@ def test_a_file_where_the_folder_should_be_is_refused(iota: Path, tmp_path: Path
     assert "Sampling" not in process.stderr
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_leaves_no_half_report(iota: Path, tmp_path: Path, number: signal.Signals) -> None:
@@ -169,6 +171,7 @@ def test_the_version_is_printed() -> None:
     assert run_apart("--version").stdout.strip() == f"cmm-uq {__version__}"
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals of POSIX")
 def test_on_a_terminal_there_are_progress_and_a_decision_in_colour(iota: Path, tmp_path: Path) -> None:
     code, shown = on_terminal("report", iota, "--out", tmp_path / "out", columns=60)
@@ -180,6 +183,7 @@ def test_on_a_terminal_there_are_progress_and_a_decision_in_colour(iota: Path, t
     assert max(len(line) for line in lines if not line.startswith("Written to")) <= 60
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_ctrl_c_wipes_the_bar_away_and_leaves_one_line(iota: Path, tmp_path: Path) -> None:
     import pty

@@ -80,6 +80,7 @@ def test_no_key_is_written_over(key: Path) -> None:
     assert key.read_bytes() == before
 
 
+@pytest.mark.long
 def test_a_signed_report_is_one_set_and_says_who_signed(key: Path, laboratory: Path) -> None:
     out = laboratory / "signed"
     done = run("report", laboratory / "job", "--out", out, "--records", "none", "--sign", key)
@@ -290,6 +291,7 @@ def test_nobody_at_the_keyboard_is_no_passphrase(key: Path, laboratory: Path, mo
     assert "CMM_UQ_SIGN_PASSPHRASE_FILE" in done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="terminals of Unix")
 def test_a_passphrase_that_is_typed_is_not_shown(key: Path, laboratory: Path) -> None:
     import pty

@@ -83,6 +83,7 @@ def test_what_windows_writes_into_a_pipe_keeps_what_it_can(monkeypatch: pytest.M
     assert written("−1 ± 2 µm…", "cp1252", monkeypatch) == "-1 ± 2 µm…"
 
 
+@pytest.mark.long
 @given(st.text())
 def test_json_is_the_same_data_in_every_encoding(text: str) -> None:
     for codec in ("ascii", "cp1252", "utf-8"):

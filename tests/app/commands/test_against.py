@@ -58,6 +58,7 @@ def refused(points: pd.DataFrame, prediction: pd.DataFrame, **simulation: object
 # ---- whole diagnoses
 
 
+@pytest.mark.long
 def test_what_a_prediction_leaves_out_is_found_with_its_size_and_written(tmp_path: Path) -> None:
     """A file that lies outside the job is compared with, hashed, and named on the page."""
     job(RECORDED).write(tmp_path / "job")
@@ -97,6 +98,7 @@ def test_the_command_says_what_is_wrong_and_writes_nothing(tmp_path: Path) -> No
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_an_effect_of_the_wrong_sign_is_found_twice_as_large_and_said_to_be_contained() -> None:
     wrong = table(predicted(TRUE, errors(scale_x=30.0, scale_y=-20.0, square_xy=-25.0)))
     found = cmm_uq.diagnose(job(RECORDED, wrong, effects=["squareness_xy"]))
@@ -105,6 +107,7 @@ def test_an_effect_of_the_wrong_sign_is_found_twice_as_large_and_said_to_be_cont
     assert any("The simulation contains it" in str(line) for line in found.outcome.summary.remarks)
 
 
+@pytest.mark.long
 def test_nothing_is_asserted_within_the_uncertainty_of_the_prediction() -> None:
     """The squareness left out moves a length by 48 µm at most; predictions are uncertain by 60 µm."""
     found = cmm_uq.diagnose(job(RECORDED, WITHOUT_SQUARENESS, u_um=60.0))

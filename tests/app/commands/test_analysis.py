@@ -175,6 +175,7 @@ def test_a_measurement_that_is_not_there_cannot_be_set_aside(job: Path) -> None:
         analyse(job)
 
 
+@pytest.mark.long
 def test_a_stated_noise_that_the_residuals_contradict_is_not_believed(job: Path) -> None:
     state(job, r'^file = "ballbar.csv"', 'file = "ballbar.csv"\nu_coordinate_um = 1.0')
     found = analyse(job)
@@ -209,6 +210,7 @@ def test_a_recording_with_too_few_bars_is_refused(job: Path) -> None:
         analyse(job)
 
 
+@pytest.mark.long
 def test_no_effect_at_all_is_a_model_too(job: Path) -> None:
     state(job, r"^effects = .*", "effects = []")
     found = analyse(job)
@@ -216,6 +218,7 @@ def test_no_effect_at_all_is_a_model_too(job: Path) -> None:
     assert found.parameters == {}
 
 
+@pytest.mark.long
 def test_a_display_of_coarse_steps_is_part_of_the_noise_and_of_a_reading(tmp_path: Path) -> None:
     """Coordinates of the simulated plate, 0.7 µm of noise, rounded to 5 µm: no reading is better than 5/√12 = 1.44 µm."""
     job = tmp_path / "job"
@@ -255,6 +258,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("jobs")
 
 
+@pytest.mark.long
 def test_scales_and_slopes_of_a_step_gauge_have_the_temperature_in_u(place: Path) -> None:
     """0.15 K of 11.5·10⁻⁶/K are 1.725 ppm; 0.3 µm of the longest length come to it; no value changes."""
     before, after = analysed("step-gauge-simulated"), stated("step-gauge-simulated", place)
@@ -268,6 +272,7 @@ def test_scales_and_slopes_of_a_step_gauge_have_the_temperature_in_u(place: Path
         assert other.scale_ppm[0] == pytest.approx(np.sqrt(one.scale_ppm[0] ** 2 + 1.725**2 + clamped**2), rel=1e-3)
 
 
+@pytest.mark.long
 def test_figures_of_a_bar_and_the_second_way_have_it_too(place: Path) -> None:
     """30 µm of clamping in each of forty lengths: alike in all they move the mean length, each by itself the range."""
     before, after = analysed("iota-1102-20C"), stated("iota-1102-20C", place, "u_fixturing_um = 30")
@@ -291,6 +296,7 @@ def test_jobs_that_state_nothing_have_no_cause() -> None:
     assert not [cause for cause in analysed("step-gauge-simulated").causes if cause.name != CALIBRATION]
 
 
+@pytest.mark.long
 def test_intervals_hold_where_the_thermometer_errs_as_stated() -> None:
     """Twelve machines at 22 °C, 36 scales: without what is stated two in five are missed, with it hardly one."""
     without, with_it = held("step_gauge", 12, 1, common=True)[0]

@@ -43,6 +43,7 @@ def done(jobs: Path, out: Path, **asked: Any) -> Batch:
     return write_batch([jobs], out, BatchOptions(**{"workers": 1, **asked}))
 
 
+@pytest.mark.long
 def test_a_batch_writes_what_report_writes_whatever_the_number_of_workers(tmp_path: Path) -> None:
     jobs = tmp_path / "jobs"
     folders = [small_job(jobs, f"plane-{i}", shift_um=0.2 * i) for i in range(3)]

@@ -83,6 +83,7 @@ def test_an_unknown_name_in_an_expression_is_refused(file: Path, tmp_path: Path)
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_the_command_prints_the_result_and_refuses_code(file: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "cmm_uq", "budget", str(file), "--out", str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, check=False, encoding="utf-8")

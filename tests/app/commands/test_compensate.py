@@ -136,6 +136,7 @@ def with_new_map(job: Path, new_map: Path) -> Path:
     return job
 
 
+@pytest.mark.long
 def test_a_map_of_a_calibration_corrects_other_recordings_and_says_how_well(new_map: Path, tmp_path: Path) -> None:
     """Ten bars of a real machine that the map was not made of: corrected they agree far better, each coordinate has its u."""
     job = some_bars(ROOT / "examples" / "iota-1102-20C", tmp_path / "job", range(2, 21, 2))

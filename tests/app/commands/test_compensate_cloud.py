@@ -241,6 +241,7 @@ def test_a_cloud_is_read_line_by_line_wherever_its_blocks_end(tmp_path: Path, mo
         write_compensated_cloud(job, tmp_path / "cloud.csv", tmp_path / "out")
 
 
+@pytest.mark.long
 def test_a_signal_in_the_middle_leaves_nothing(tmp_path: Path) -> None:
     job, folder = square(tmp_path), tmp_path / "cloud"
     folder.mkdir()

@@ -81,6 +81,7 @@ def test_three_rows_are_too_few_for_any_artefact(example: str, tmp_path: Path) -
     assert error.value.fix
 
 
+@pytest.mark.long(but="plane-simulated")
 @pytest.mark.parametrize("example", [name for name in KINDS if not name.startswith(("iota", "bryan", "digitizer"))])
 def test_a_single_placing_is_diagnosed_by_its_points(example: str, tmp_path: Path) -> None:
     """No placing can be held out, so its points are, each with its repeats."""
@@ -102,6 +103,7 @@ def test_a_triangle_without_one_of_its_corners_is_refused(row: int, tmp_path: Pa
         diagnose_read(read_job(job))
 
 
+@pytest.mark.long
 def test_more_observations_than_memory_holds_are_refused_before_the_estimate(tmp_path: Path) -> None:
     """Each coordinate of a ball is an observation; a flat grid of them passes everything else."""
     balls = np.arange(OBSERVATIONS.most // 3 + 1)
@@ -249,6 +251,7 @@ def result() -> Result:
     return found
 
 
+@pytest.mark.long
 def test_the_average_is_far_from_what_the_line_along_x_says(result: Result) -> None:
     assert result.averaged
     scale = result.parameters["scale_x"]["ppm"]
@@ -258,6 +261,7 @@ def test_the_average_is_far_from_what_the_line_along_x_says(result: Result) -> N
     assert abs(scale.value - line.alone.value) > np.hypot(scale.expanded, line.alone.expanded)
 
 
+@pytest.mark.long
 def test_it_is_not_given_on_any_page_nor_to_programs_while_that_of_z_is(result: Result) -> None:
     outcome = outcome_of(result)
     assert any("the line of measurement 1 alone says" in text for text in outcome.summary.warnings)

@@ -154,6 +154,7 @@ def maps_job(folder: Path, squareness: dict[int, tuple[float, ...]]) -> Path:
     return job
 
 
+@pytest.mark.long
 def test_the_diagnosis_of_maps_lists_their_squareness_side_by_side(tmp_path: Path) -> None:
     found = diagnose_read(read_job(maps_job(tmp_path, TABLE_7)))
     told = maps_results(found, 0)["diagnosis"]["squareness_arcsec"]

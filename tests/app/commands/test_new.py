@@ -74,6 +74,7 @@ def test_every_built_in_kind_and_a_plate_that_is_shifted_can_be_begun() -> None:
     assert set(titles()) == {*NAMES, PLAN, PART, BUDGET}
 
 
+@pytest.mark.long(but="sphere")
 @pytest.mark.parametrize("name", NAMES)
 def test_a_new_job_is_reported_at_once_as_simulated_and_agrees_with_its_model(name: str) -> None:
     """Nothing but white noise was drawn, so the diagnosis finds nothing and every statement is a complete pass."""
@@ -194,6 +195,7 @@ def test_what_cannot_be_begun_is_refused_and_nothing_is_written(
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.long
 def test_a_new_plan_is_planned_and_a_new_budget_is_evaluated(tmp_path: Path) -> None:
     write_new(PLAN, tmp_path / "plan", {"artefact": {"kind": "step_gauge"}})
     planned = write_plan(tmp_path / "plan", tmp_path / "planned", power=False)

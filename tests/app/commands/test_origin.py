@@ -70,6 +70,7 @@ def report(simulated: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.long
 def test_its_documents_say_so_in_their_names_titles_and_on_every_page(report: Path) -> None:
     names = sorted(path.name for path in report.iterdir())
     documents = [
@@ -105,6 +106,7 @@ def test_its_results_say_so(report: Path, simulated: Path) -> None:
     assert job["id"] == read_job(simulated).facts.job.id
 
 
+@pytest.mark.long
 def test_its_diagnosis_and_its_plan_say_so_too(simulated: Path, tmp_path: Path) -> None:
     write_diagnosis(simulated, tmp_path / "d")
     write_plan(simulated, tmp_path / "p", power=False)
@@ -112,6 +114,7 @@ def test_its_diagnosis_and_its_plan_say_so_too(simulated: Path, tmp_path: Path) 
         assert BANNER in page.read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_without_out_commands_write_beside_each_other(
     simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -156,6 +159,7 @@ def test_a_plan_is_no_recording(job: Path, tmp_path: Path) -> None:
     assert not read_job(tmp_path / "drawn").planned
 
 
+@pytest.mark.long
 def test_a_recording_that_was_changed_after_it_was_simulated_stays_simulated_and_says_so(
     simulated: Path, tmp_path: Path
 ) -> None:

@@ -68,6 +68,7 @@ def test_without_wishes_the_plan_is_the_standard_one(tmp_path: Path) -> None:
     assert all(condition.met for condition in plan.conditions)
 
 
+@pytest.mark.long
 def test_as_many_placings_by_a_criterion_are_at_least_as_good(tmp_path: Path) -> None:
     for criterion in ("D", "A", "worst", "separation"):
         plan = planned(tmp_path, f'criterion = "{criterion}"\ncandidates = 120')
@@ -77,6 +78,7 @@ def test_as_many_placings_by_a_criterion_are_at_least_as_good(tmp_path: Path) ->
         assert plan.kept == 0
 
 
+@pytest.mark.long
 def test_placings_more_keep_the_standard_ones_and_part_what_these_leave_alike(tmp_path: Path) -> None:
     plan = planned(tmp_path, 'criterion = "separation"\nmore = 3')
     assert plan.kept == 20
@@ -132,6 +134,7 @@ def test_further_placings_of_a_recording_are_of_the_artefact_that_was_recorded(t
     assert plan.measured == 7
 
 
+@pytest.mark.long
 def test_a_budget_of_time_bounds_the_placings_that_are_searched_for(tmp_path: Path) -> None:
     plan = planned(tmp_path, 'criterion = "D"\nbudget_min = 62\nminutes_per_placing = 5\nrepeats = 3')
     assert len(plan.to_measure) == 10  # six minutes each
@@ -149,6 +152,7 @@ def test_shift_series_say_what_they_cannot_show() -> None:
     assert "every 10 mm" in plan.free[0]
 
 
+@pytest.mark.long
 def test_power_comes_for_every_effect_that_the_job_does_not_name(tmp_path: Path) -> None:
     plan = planned(tmp_path, 'rivals = ["rotation_x_z", "artefact_sag"]\nrepeats = 1', power=True)
     found = {power.effect: power for power in plan.start.powers}
@@ -185,6 +189,7 @@ def test_set_up_offsets_make_what_is_expected_worse_by_what_the_repeats_share(tm
     assert plan.worth.enough == 4
 
 
+@pytest.mark.long
 def test_what_the_diagnosis_would_find_is_larger_under_set_up_offsets(tmp_path: Path) -> None:
     found = []
     for offset in ("0.0", "2.0"):
@@ -218,6 +223,7 @@ def test_what_cannot_be_planned_is_refused_with_its_reason(
         planned(tmp_path, plan, effects, length)
 
 
+@pytest.mark.long
 def test_where_the_standard_plan_is_not_possible_a_criterion_finds_another(tmp_path: Path) -> None:
     """A stand that holds the bar level only: no diagonal of the standard in height."""
     fixtures = "\n[plan.fixtures]\ndirections = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0]]"
@@ -315,6 +321,7 @@ def test_results_hold_finite_numbers_only(tmp_path: Path) -> None:
     assert {p["u"] for p in data["start"]["determined"] if p["status"] == "free"} == {None}
 
 
+@pytest.mark.long
 def test_what_is_not_known_of_the_noise_is_said(tmp_path: Path) -> None:
     page = render_html(plan_document(plan_of(tmp_path, "")))
     assert "averaged over the prior" in page
@@ -329,6 +336,7 @@ def test_what_is_not_known_of_the_noise_is_said(tmp_path: Path) -> None:
     assert "a minute of one more placing lowers every expected uncertainty more" in page
 
 
+@pytest.mark.long
 def test_repeats_beyond_what_they_are_worth_are_named(tmp_path: Path) -> None:
     page = render_html(plan_document(plan_of(tmp_path, "placing_um = 5.0\ngrowth_um = 0.0\nrepeats = 5")))
     assert "With 1 or more repeats" in page
@@ -427,6 +435,7 @@ def test_copies_of_a_line_are_placed_again(tmp_path: Path) -> None:
     assert [placing.title for placing in plan.to_measure] == ["along Y"]
 
 
+@pytest.mark.long
 def test_a_plan_without_the_placings_of_b89_is_not_called_one(tmp_path: Path) -> None:
     """Six placings by the criterion D replace the twenty of the ready plan."""
     plan = planned(tmp_path, 'criterion = "D"\nnumber = 6')

@@ -58,6 +58,7 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> Ran:
     return Ran(proof, folder, tuple(told))
 
 
+@pytest.mark.long
 def test_the_truth_is_on_the_disk_and_told_before_anything_is_said_of_it(ran: Ran) -> None:
     """The fixture looks when the hash is told."""
     assert ran.told == (ran.proof.sha256,)
@@ -72,6 +73,7 @@ def test_the_truth_is_on_the_disk_and_told_before_anything_is_said_of_it(ran: Ra
     assert set(truth["inputs_sha256"]) == {"job.toml", "recording.csv"}
 
 
+@pytest.mark.long
 def test_one_process_says_what_two_do(ran: Ran) -> None:
     alone, _ = prove_job(read_job(JOB), ProofOptions(CASES, 1))
     assert alone.truth == ran.proof.truth

@@ -152,6 +152,7 @@ def laboratory(tmp_path: Path) -> Path:
     return reported(tmp_path)
 
 
+@pytest.mark.long
 def test_the_same_figures_with_another_address_are_compared_and_none_differs(laboratory: Path) -> None:
     replacing(laboratory, 'changed = "address of the customer; no figure"\nfigures_changed = false')
     done = again(laboratory)
@@ -167,6 +168,7 @@ def test_the_same_figures_with_another_address_are_compared_and_none_differs(lab
     assert released.returncode == 0, released.stderr
 
 
+@pytest.mark.long
 def test_another_diameter_is_printed_before_and_after_and_no_figure_is_refused(laboratory: Path) -> None:
     (recording,) = (laboratory / "job").glob("*.csv")
     job = replacing(laboratory, 'changed = "no figure changed"')
@@ -191,6 +193,7 @@ def test_another_diameter_is_printed_before_and_after_and_no_figure_is_refused(l
     assert f"{found['differences'][0]['before']}" in digital
 
 
+@pytest.mark.long
 def test_results_that_are_gone_are_compared_with_what_the_records_have_of_them(laboratory: Path) -> None:
     replacing(laboratory, 'changed = "address of the customer"')
     shutil.rmtree(laboratory / "reports" / "mount")
@@ -200,6 +203,7 @@ def test_results_that_are_gone_are_compared_with_what_the_records_have_of_them(l
     assert found["compared"] > 5
 
 
+@pytest.mark.long
 def test_without_records_the_certificate_says_that_nothing_was_compared_and_is_not_released_where_it_can_be(
     laboratory: Path,
 ) -> None:
@@ -217,6 +221,7 @@ def test_without_records_the_certificate_says_that_nothing_was_compared_and_is_n
     assert "K-2 replaces K-1, which these records have, and does not say what differs" in refused.stderr
 
 
+@pytest.mark.long
 def test_a_named_file_of_another_machine_is_refused(laboratory: Path) -> None:
     job = replacing(laboratory, 'changed = "address"\nresults = "before.json"')
     data = json.loads((laboratory / "reports/mount/results.json").read_bytes())

@@ -52,6 +52,7 @@ def started(jobs: Path) -> subprocess.Popen[str]:
                             text=True)  # fmt: skip
 
 
+@pytest.mark.long
 def test_two_schedulers_on_one_folder_make_one_certificate_and_one_message(jobs: Path) -> None:
     taken = Taken()
     with web_server(taken) as port:
@@ -72,6 +73,7 @@ def test_two_schedulers_on_one_folder_make_one_certificate_and_one_message(jobs:
     assert all(sha256_of(folder / name) == digest for name, digest in manifest.files.items())
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGTERM that a process can see")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_a_run_that_is_ended_in_the_middle_leaves_nothing_half_and_the_next_one_goes_on(
@@ -183,6 +185,7 @@ def test_ready_files_are_printed_or_written(jobs: Path, tmp_path: Path) -> None:
     assert "--scheduled" in (tmp_path / "cmm-uq-schedule.xml").read_text(encoding="utf-16")
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("faketime") is None, reason="faketime gives a process another clock")
 def test_by_another_clock_and_in_another_zone_what_stands_is_told_weekly_and_never_hidden(jobs: Path) -> None:
     """400 days ahead for one run, and back: the wrong clock is named, and no fault is taken for told by it."""

@@ -52,6 +52,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("records")
 
 
+@pytest.mark.long
 def test_changes_that_records_told_are_computed_again_from_the_history_inside(folder: Path, tmp_path: Path) -> None:
     files = contents_of(aged(folder))
     said = json.loads(files["results.json"])
@@ -63,6 +64,7 @@ def test_changes_that_records_told_are_computed_again_from_the_history_inside(fo
     assert any("follow from its history inside" in note for note in found.inquiry.notes)
 
 
+@pytest.mark.long
 def test_another_history_than_the_figures_were_made_of_is_found(folder: Path, tmp_path: Path) -> None:
     """Hashes and attachments are those of a machine that does not drift; the figures are not."""
     found = aged(folder)
@@ -74,6 +76,7 @@ def test_another_history_than_the_figures_were_made_of_is_found(folder: Path, tm
     assert wrong.check == "again"
 
 
+@pytest.mark.long
 def test_a_machine_held_to_trusted_signers_is_held_to_them_again(tmp_path: Path) -> None:
     pytest.importorskip("pyhanko")
     from cmm_uq.certificate.sign import sign_pdf

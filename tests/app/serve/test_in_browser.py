@@ -50,6 +50,7 @@ def tab(browser: Browser, server: RecordsServer) -> Iterator[Tab]:
     context.close()
 
 
+@pytest.mark.long
 def test_no_page_is_wider_than_the_screen_or_complains_or_asks_for_anything_elsewhere(
     tab: Tab, addresses: list[str]
 ) -> None:
@@ -66,6 +67,7 @@ def test_no_page_is_wider_than_the_screen_or_complains_or_asks_for_anything_else
     assert [complaint for complaint in tab.complaints if "404" not in complaint] == []
 
 
+@pytest.mark.long
 def test_axe_finds_nothing_on_any_page(tab: Tab, addresses: list[str]) -> None:
     """By WCAG 2.2 A and AA, and its best practices, in light and in dark, wide and narrow."""
     alike = ("certificates?decision=fail", "certificates?text=nothing", addresses[-2], addresses[9])
@@ -86,6 +88,7 @@ def test_axe_finds_nothing_on_any_page(tab: Tab, addresses: list[str]) -> None:
     assert found == {}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_text_has_enough_contrast_in_pictures_too(tab: Tab, scheme: str) -> None:
     """WCAG 2.2, 1.4.3: at least 4.5 : 1; axe does not look into SVG."""
@@ -106,6 +109,7 @@ CUT_OFF = """() => [...document.querySelectorAll('figure svg')].flatMap(svg => {
 })"""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("serial", ["100000", "K3", "K1"])
 def test_words_in_a_picture_are_whole_and_do_not_collide(tab: Tab, serial: str) -> None:
     for width in (360, 1280):
@@ -133,6 +137,7 @@ def tabbed_to(tab: Tab, text: str, most: int = 60) -> None:
     raise AssertionError(f"no Tab leads to {text!r}")
 
 
+@pytest.mark.long
 def test_everything_is_reached_by_the_keyboard_alone(tab: Tab) -> None:
     tab.open("")
     tabbed_to(tab, "To the content", 1)
@@ -158,6 +163,7 @@ def test_everything_is_reached_by_the_keyboard_alone(tab: Tab) -> None:
     assert tab.page.locator(".notice .head").first.inner_text().endswith("The records agree with their chain")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("number", "altered", "told"), [
     ("k-1", b"", "Known and released"), ("k-4", b"", "Known, but withdrawn: do not rely on it"),
     ("k-1", b" ", "Altered: not the file that was recorded"), ("elsewhere", b"", "Unknown: no certificate of these records"),
@@ -172,6 +178,7 @@ def test_a_chosen_file_is_looked_up(tab: Tab, number: str, altered: bytes, told:
     assert tab.complaints == []
 
 
+@pytest.mark.long
 def test_a_file_is_dropped_on_the_field_without_a_script_of_the_page(tab: Tab) -> None:
     page = tab.open("file")
     content = files("k-1")["results.json"].decode()
@@ -195,6 +202,7 @@ def test_a_recorded_page_shows_itself_and_can_do_nothing_here(tab: Tab, laborato
     assert page.evaluate("origin") == "null"
 
 
+@pytest.mark.long
 def test_on_paper_the_list_is_a_list(tab: Tab) -> None:
     page = tab.open("")
     printed = PdfReader(io.BytesIO(page.pdf(prefer_css_page_size=True)))

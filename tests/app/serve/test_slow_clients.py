@@ -150,6 +150,7 @@ def test_no_more_are_open_than_there_is_room_for_however_many_addresses_ask(
         assert gone(lines[0])
 
 
+@pytest.mark.long
 def test_a_page_that_is_being_worked_out_keeps_its_place(host: Host, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its browser waits for the server, and not the server for it."""
     monkeypatch.setattr(server, "OF_ONE_PEER", 2)
@@ -169,6 +170,7 @@ def test_a_browser_that_closes_its_half_after_asking_is_answered_and_one_that_do
             assert (b"page" in b"".join(iter(lambda: line.recv(65536), b""))) is served
 
 
+@pytest.mark.long
 def test_whatever_a_slow_browser_does_its_time_is_over(host: Host, monkeypatch: pytest.MonkeyPatch) -> None:
     """Deadlines of head, body and answer, each as a whole, however often a byte comes."""
     for name in ("HEAD_S", "BODY_S", "ANSWER_S"):

@@ -180,6 +180,7 @@ def test_what_is_no_calibration_is_refused_with_what_it_lacks(tmp_path: Path, co
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_a_simulated_calibration_serves_no_measured_cloud(tmp_path: Path) -> None:
     write_report(ROOT / "examples" / "digitizer-simulated", tmp_path / "report")
     content = (tmp_path / "report" / "results.json").read_text(encoding="utf-8")

@@ -23,6 +23,7 @@ CHANCE = 1e-4 / (2 * 4 * 3)
 """Of one bound, of two for each of four coverages in three cases: together they fail once in ten thousand by chance."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("which", [1, 3, 5])
 def test_intervals_hold_the_truth_as_often_as_they_say(which: int) -> None:
     """Scans with all that may be in doubt, centres with stated noise, centres with noise to be found."""

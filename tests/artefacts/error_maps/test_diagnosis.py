@@ -69,6 +69,7 @@ def test_without_noise_the_expansion_is_that_of_the_differences() -> None:
     assert np.median(expansion_of(compared, compared.effect)) == pytest.approx(8e-6, rel=1e-3)
 
 
+@pytest.mark.long
 def test_scale_errors_of_the_maps_themselves_count_in_the_interval_of_an_expansion() -> None:
     """Slopes of 3 ppm over the contrast that no expansion makes, no noise: by numerical integration over their size s,
     p(c₁ − α·√50 K) ∝ ∫ N(c₁ − α·√50 K; s) N(3 ppm; s) / (1 + (s/2 ppm)²) ds; a t with few degrees of freedom."""
@@ -196,6 +197,7 @@ def harris() -> MapsDiagnosis:
     return diagnosed(*columns_of(maps)[0])
 
 
+@pytest.mark.long
 def test_the_real_maps_show_the_expansion_of_two_scales(harris: MapsDiagnosis) -> None:
     """Harris 2004, 3.4: steel, 12 ppm/K; Y in good agreement (106 − 52 µm over 550 mm and 10 K), Z less (36 over 500)."""
     printed = {"thermal_scale_y": 54 / 550 / 10 * 1e-3, "thermal_scale_z": 36 / 500 / 10 * 1e-3}

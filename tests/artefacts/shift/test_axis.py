@@ -36,6 +36,7 @@ def paper() -> CurveEstimate:
     return estimate_curve(shifted_series(points, "x", np.array([0.0, 20.0]), 0.5), KNOWN)
 
 
+@pytest.mark.long
 def test_the_chains_converge(paper: CurveEstimate) -> None:
     assert paper.chains.converged
 
@@ -76,6 +77,7 @@ def test_without_noise_three_placings_give_the_curve_and_the_artefact() -> None:
     np.testing.assert_allclose(estimate.artefact.mean(axis=0), places - places[0], atol=0.2e-3)
 
 
+@pytest.mark.long
 def test_points_missing_in_a_placing_cost_little() -> None:
     points = read(bent, PITCH_20, (0.0, 20.0, 47.0), 0.2e-3, 3)
     gone = ((points.measurement == 2) & (points.point == 7)) | ((points.measurement == 3) & (points.point > 18))
@@ -112,6 +114,7 @@ def forth_and_back(rate: float, noise: float) -> tuple[Points, Points]:
     return replace(drifting, columns={"time_s": time}), drifting
 
 
+@pytest.mark.long
 def test_drift_is_told_from_the_curve_where_series_are_read_forth_and_back() -> None:
     """6 µm/h; read one way only, a drift makes b − a change linearly along the axis, as a parabola of errors would."""
     timed, blind = forth_and_back(6e-3, 0.0)
@@ -142,6 +145,7 @@ def test_without_a_known_length_and_shift_the_curve_is_zero_at_both_ends() -> No
     np.testing.assert_allclose(ends.draws, 0.0, atol=1e-12)
 
 
+@pytest.mark.long
 def test_a_shift_known_exactly_gives_the_scale() -> None:
     """50 ppm: a shift of 20 mm, read without noise, shows 1 nm a µm of scale."""
     points = read(lambda x: 50e-6 * x, PITCH_20, (0.0, 20.0))
@@ -149,6 +153,7 @@ def test_a_shift_known_exactly_gives_the_scale() -> None:
     assert estimate.scale.mean() == pytest.approx(50e-6, abs=0.5e-6)
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_draws() -> None:
     points = read(bent, PITCH_20, (0.0, 20.0), NOISE, 2)
     series = shifted_series(points, "x", np.array([0.0, 20.0]), 0.5)
@@ -212,6 +217,7 @@ def of_series(job: Path, kept: set[str]) -> None:
     path.write_text("\n".join([header, *(r for r in rows if r.split(",")[0] in kept)]) + "\n", encoding="utf-8")
 
 
+@pytest.mark.long
 def test_the_true_error_lies_within_four_standard_uncertainties_everywhere(example: ShiftResult) -> None:
     curve = example.estimate.curve
     away = curve.error - (truth(curve.position) - truth(curve.position[:1]))
@@ -242,6 +248,7 @@ def test_three_placings_have_no_integration_of_two(example: ShiftResult) -> None
     assert not example.integrated
 
 
+@pytest.mark.long
 def test_two_placings_show_the_sources_integrations_beside_the_curve(tmp_path: Path) -> None:
     job = edited(tmp_path, (r"shifts_mm = .*", "shifts_mm = [0.0, 20.0]"))
     of_series(job, {"1", "2"})
@@ -254,6 +261,7 @@ def test_two_placings_show_the_sources_integrations_beside_the_curve(tmp_path: P
     assert result.undetermined.patterns.shape[1] == 0
 
 
+@pytest.mark.long
 def test_without_a_known_length_there_is_no_scale(tmp_path: Path) -> None:
     result = analyse(edited(tmp_path, (r"known = .*\n", "")))
     assert isinstance(result, ShiftResult)

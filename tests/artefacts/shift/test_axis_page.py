@@ -74,6 +74,7 @@ def test_what_the_shifts_leave_open_is_warned_of(document: Document) -> None:
     assert any("1 combination of the errors" in text for text in document.warnings)
 
 
+@pytest.mark.long
 def test_without_a_known_length_the_certificate_says_that_there_is_no_scale(two_placings: ShiftResult) -> None:
     document = outcome_of(two_placings).document
     assert any("mean sensitivity of the axis is not determined" in text for text in document.warnings)

@@ -42,6 +42,7 @@ def true_along(estimate: PlaneEstimate, which: int) -> Floats:
     return first_order(readings, errors, squareness)[:, :2]
 
 
+@pytest.mark.long
 def test_the_chains_converge(estimate: PlaneEstimate) -> None:
     assert estimate.chains.converged
 
@@ -105,6 +106,7 @@ def for_means(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("for_means")
 @pytest.mark.parametrize(("plane", "chain"), [("xy", "YXZ"), ("zx", "XYZ"), ("xy", "XFYZ")])
 def test_compensated_by_the_table_the_machine_measures_the_plate_rightly(plane: str, chain: str) -> None:

@@ -107,6 +107,7 @@ def test_results_keep_their_contract(result: PlaneShiftResult) -> None:
     assert "diagnosis" not in found
 
 
+@pytest.mark.long
 def test_a_plate_that_is_only_shifted_states_no_scale_and_no_squareness(only_shifted: PlaneShiftResult) -> None:
     assert not {"squareness_xy", "scale_x", "scale_y"} & set(only_shifted.scalars)
     assert "Not determined by these placings: scale of X, scale of Y and squareness X–Y" in warnings(only_shifted)[0]

@@ -34,6 +34,7 @@ def listed_in(results: Any, place: str) -> float:
     return float(results["value"] if isinstance(results, dict) else results)
 
 
+@pytest.mark.long
 def test_the_covariance_has_the_variances_of_all_estimates_first(found: Any) -> None:
     names = list(found.estimates.index)
     assert list(found.covariance.index)[: len(names)] == list(found.covariance.columns)[: len(names)] == names
@@ -84,6 +85,7 @@ def test_the_file_has_the_draws_that_results_json_speaks_of(found: Any) -> None:
     np.testing.assert_allclose((kept - found.posterior.array[:, :: said["every"]]) / spread, 0, atol=1e-5)
 
 
+@pytest.mark.long
 def test_in_every_draw_the_curve_ends_where_the_scale_leads() -> None:
     """Between the ends of the first series the curve rises by the mean sensitivity error times the way."""
     found = cmm_uq.report(ROOT / "examples" / AXIS)

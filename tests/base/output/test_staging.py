@@ -301,6 +301,7 @@ def test_a_process_that_is_just_putting_files_in_place_is_waited_for(
     assert is_set(tmp_path, NEW)
 
 
+@pytest.mark.long
 @settings(deadline=None)  # it waits for the disk
 @given(st.dictionaries(st.sampled_from(["a", "b", "sub/c", "d.csv"]), st.binary(max_size=20), min_size=1),
        st.dictionaries(st.sampled_from(["a", "b", "sub/c", "d.csv"]), st.binary(max_size=20), min_size=1))  # fmt: skip

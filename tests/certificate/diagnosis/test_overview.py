@@ -64,6 +64,7 @@ def plots(document: Document) -> list[Plot]:
     return [block for section in document.sections for block in section.blocks if isinstance(block, Plot)]
 
 
+@pytest.mark.long
 def test_what_was_found_is_said_with_its_sense_its_place_and_what_to_do(explained: JobDiagnosis) -> None:
     """−173″ by the machine's own calibration (Harris 2004, table 7): the angle is smaller than 90°."""
     told = rows(explained)
@@ -77,6 +78,7 @@ def test_what_was_found_is_said_with_its_sense_its_place_and_what_to_do(explaine
     assert overview_of(explained).standing == "open"
 
 
+@pytest.mark.long
 def test_a_consistent_recording_has_one_picture_and_nothing_before_and_after() -> None:
     document = diagnosis_document(consistent())
     assert len(plots(document)) == 1
@@ -158,6 +160,7 @@ def test_a_p_value_is_told_as_a_share_of_recordings(p: float, told: str) -> None
     assert share_of(p) == told
 
 
+@pytest.mark.long
 def test_the_verdict_is_said_in_colour_by_a_sign_and_in_words(explained: JobDiagnosis) -> None:
     for found, sign, name in ((consistent(), "✓", "good"), (explained, "!", "open")):
         page = render_html(diagnosis_document(found))
@@ -167,6 +170,7 @@ def test_the_verdict_is_said_in_colour_by_a_sign_and_in_words(explained: JobDiag
         assert page.index('class="overview') < page.index('class="particulars"')
 
 
+@pytest.mark.long
 def test_the_terminal_says_the_same_four_lines_first(explained: JobDiagnosis, tmp_path: Path) -> None:
     job = explained.job.folder
     remarks = cmm_uq.diagnose(job).outcome.summary.remarks
@@ -202,6 +206,7 @@ def test_what_remains_as_probable_without_what_is_asserted_is_said_beside_it(exp
     assert overview_of(alone).verdict == "Explained: the cause is found"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("job", ["iota-1102-20C-against-simulation", "plate-simulated"])
 def test_no_table_is_without_rows(job: str) -> None:
     tables = [block for section in diagnosed(job).sections for block in section.blocks if isinstance(block, Table)]

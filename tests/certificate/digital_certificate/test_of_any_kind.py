@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import pytest
 from hypothesis import given, strategies as st
 from lxml import etree
 
@@ -42,6 +43,7 @@ def checked(data: Mapping[str, Any], job: Job) -> Certificate:
     return made
 
 
+@pytest.mark.long
 @given(TEXTS.filter(bool), ANYTHING)
 def test_any_report_of_another_package_makes_a_valid_certificate(key: str, value: Any) -> None:
     plain = {

@@ -48,6 +48,7 @@ def odd(found: FleetResult) -> FleetResult:
     return replace(found, values=(replace(of, belongs=np.arange(len(of.members)) > 0),))
 
 
+@pytest.mark.long
 def test_every_text_of_the_page_can_be_translated() -> None:
     """Of one machine, of two, of two of which one does not belong, and of thousands."""
     for found in (alone(), two(), odd(two()), many()):
@@ -85,6 +86,7 @@ def test_one_table_has_all_values_and_how_many_machines_matter() -> None:
     assert tables(fleet_document(alone()))[ALL_VALUES].rows[0][3:] == ("not compared", "–", "–")
 
 
+@pytest.mark.long
 def test_ten_times_the_machines_make_neither_the_page_nor_the_terminal_longer() -> None:
     few, more = many(3000), many(30_000)
     for a, b in zip(tables(fleet_document(few)).values(), tables(fleet_document(more)).values(), strict=True):
@@ -170,6 +172,7 @@ def page(browser: Browser) -> Iterator[Page]:
     context.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fleet", [alone, many])
 def test_nothing_is_off_a_screen_of_any_width_and_everybody_can_read_it(
     page: Page, fleet: Callable[[], FleetResult], tmp_path: Path

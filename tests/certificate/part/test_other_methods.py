@@ -51,6 +51,7 @@ def test_a_job_without_other_methods_has_no_such_section() -> None:
     assert methods_data(None) is None
 
 
+@pytest.mark.long
 def test_each_method_has_a_row_with_value_u_and_U(comparison: MethodComparison, section: Section) -> None:  # noqa: N802
     rows = [row for row in table(section, "Lengths by each method").rows if row[0] == SIZE]
     assert [row[1] for row in rows] == ["The virtual measurements", "The calibrated part", "Several orientations"]
@@ -92,6 +93,7 @@ def test_it_says_which_descriptions_it_follows(section: Section) -> None:
     assert "public summary of ISO/DTS 15530-2" in told
 
 
+@pytest.mark.long
 def test_it_stands_on_the_part_s_page(comparison: MethodComparison) -> None:
     job = with_methods()
     found = replace(found_of(job, points=measured_points(job), draws=500), methods=comparison)

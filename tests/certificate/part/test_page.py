@@ -128,6 +128,7 @@ def agrees(text: str, value: float) -> bool:
     return abs(float(shown) - value) <= 1.0001 * half or (value > 0 and 0 <= float(shown) / value - 1 < 0.06)
 
 
+@pytest.mark.long
 def test_every_figure_of_the_results_is_what_was_found(measured: PartMeasurement) -> None:
     (table,) = tables(page(measured), "Results")
     assert [column.unit for column in table.columns] == ["", "", "mm", "µm", "", "mm"]
@@ -151,6 +152,7 @@ def test_every_figure_of_the_results_is_what_was_found(measured: PartMeasurement
             assert figure(value).as_tuple().exponent == min(figure(U).as_tuple().exponent - 3, figure(U).adjusted() - 4)  # type: ignore[operator]
 
 
+@pytest.mark.long
 def test_angles_are_stated_in_degrees_and_seconds(every_kind: PartMeasurement) -> None:
     lengths, angles = tables(page(every_kind), "Results")
     assert [column.unit for column in angles.columns] == ["", "", "°", "″", "", "°"]
@@ -419,6 +421,7 @@ def test_every_text_can_be_translated(which: str, request: pytest.FixtureRequest
     assert [text for text in strangers(page(found), known) if not text.endswith("…")] == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("which", ["planned", "every_kind"])
 def test_nothing_runs_into_anything_on_a_screen_or_a_phone(
     which: str, request: pytest.FixtureRequest, browser: Browser, tmp_path: Path
@@ -450,6 +453,7 @@ def test_a_machine_that_was_calibrated_on_the_same_day(measured: PartMeasurement
     assert "2026-03-01, the day of the measurement" in said(machine_section(replace(measured, standing=same)).blocks)
 
 
+@pytest.mark.long
 def test_of_many_characteristics_those_nearest_to_their_limits_are_told_of_in_detail() -> None:
     """Twelve limits on one diameter, the tightest last: of the first two there is no budget, and of the first six no way."""
     many = [
@@ -468,6 +472,7 @@ def test_of_many_characteristics_those_nearest_to_their_limits_are_told_of_in_de
     assert in_section(ways_section(without))[0].notes[-1] == "Shown are the first 6 characteristics."
 
 
+@pytest.mark.long
 def test_no_key_of_a_job_file_stands_on_the_report_of_a_part(
     planned: PartMeasurement, measured: PartMeasurement, every_kind: PartMeasurement
 ) -> None:

@@ -54,6 +54,7 @@ def with_sizes(found: PartMeasurement) -> PartMeasurement:
     return replace(found, given=replace(found.given, machine=replace(machine(), scales=scales)))
 
 
+@pytest.mark.long
 def test_sizes_are_those_of_the_draws_times_what_physics_allows(found: PartMeasurement) -> None:
     """30 µm of play; of eight waves of 30″ with weights 1/k the first two have 30″·√((1 + 1/4)/Σ 1/k²) = 27.14″."""
     sized = with_sizes(found)

@@ -123,12 +123,14 @@ def resaved(path: Path, change: Callable[[pikepdf.Pdf], None]) -> None:
         pdf.save(path, fix_metadata_version=False, object_stream_mode=pikepdf.ObjectStreamMode.disable)
 
 
+@pytest.mark.long
 def test_a_page_that_was_drawn_over_is_named(certificate: Path, again: Again) -> None:
     resaved(certificate / "certificate.pdf", lambda pdf: pdf.pages[1].contents_add(b"q 1 1 1 rg 50 50 100 9 re f Q"))
     found = checked(certificate, again)
     assert any(one.place.startswith("page 2: /Contents") for one in found.inquiry.findings), told(found)
 
 
+@pytest.mark.long
 def test_a_pdf_written_anew_is_not_the_file_that_was_made(certificate: Path, again: Again) -> None:
     resaved(certificate / "certificate.pdf", lambda pdf: None)
     assert "written anew" in told(checked(certificate, again))
@@ -144,6 +146,7 @@ def test_a_missing_and_a_further_attachment_are_named(certificate: Path, again: 
     assert "attachment ballbar.csv" in found
 
 
+@pytest.mark.long
 def test_a_folder_whose_manifest_has_other_hashes_is_named(made: Path, tmp_path: Path, again: Again) -> None:
     folder = Path(shutil.copytree(made, tmp_path / "report"))
     assert checked(folder, again).inquiry.word == "VERIFIED"
@@ -253,6 +256,7 @@ def test_a_decision_of_another_version_is_decided_again_from_the_inputs(
     ]
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("uncorrected")
 def test_a_page_of_another_version_is_held_to_the_hash_inside_the_pdf(
     certificate: Path, again: Again, monkeypatch: pytest.MonkeyPatch
@@ -295,6 +299,7 @@ def test_other_kernels_change_nearly_every_figure_and_a_forger_one() -> None:
     assert len(list(beyond_sampling(sampled(9.0), plain, far))) == 20
 
 
+@pytest.mark.long
 def test_the_exit_code_says_what_came_out(certificate: Path) -> None:
     from cmm_uq.app.cli.commands import app
 

@@ -60,6 +60,7 @@ def test_without_an_anchor_it_is_said_that_nobody_is_known(signed: Path, again: 
     assert {one.what for one in found.unchecked} == {"who signed certificate.pdf", "who signed certificate.xml"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("ahead", "word"), [
     (dt.timedelta(days=60), "NOT WHOLLY CHECKED"), (dt.timedelta(minutes=9), "VERIFIED"),
 ])  # fmt: skip
@@ -95,6 +96,7 @@ def test_a_signature_of_somebody_else_is_named(certificate: Path, again: Again, 
     assert inquiry(certificate, again, trusted).word == "NOT VERIFIED"
 
 
+@pytest.mark.long
 def test_a_test_key_is_named(certificate: Path, again: Again, tmp_path: Path, trusted: list[Path]) -> None:
     key = tmp_path / "key.p12"
     key.write_bytes(signing.trial_key("A. Huber", "open", SIGNED - dt.timedelta(days=1)).key)
@@ -126,6 +128,7 @@ def test_a_byte_of_what_was_signed_breaks_the_signature(signed: Path, again: Aga
     assert "signature 1" in "\n".join(one.place for one in inquiry(signed, again, trusted).findings)
 
 
+@pytest.mark.long
 def test_a_revision_after_the_signature_is_named(signed: Path, again: Again, trusted: list[Path]) -> None:
     import io
 
@@ -180,6 +183,7 @@ def test_a_document_type_in_xml_is_refused(certificate: Path, made: Path, again:
         inquiry(certificate, again, None)
 
 
+@pytest.mark.long
 def test_the_digital_certificate_is_held_to_the_schema_where_one_is_given(made: Path, again: Again) -> None:
     folder = ROOT.parent / "shared" / "schemas"
     if not folder.is_dir():

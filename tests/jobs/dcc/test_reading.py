@@ -22,6 +22,7 @@ def refused(text: str | bytes) -> CmmUqError:
     return caught.value
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("text", "told"), [
     (BOMB, "line 2: has a document type"), (OUTSIDE, "line 2: has a document type"),
     ("", "is no XML: no element found"), ("<a>", "is no XML: no element found"), ("<a/>", "is no DCC: its root is a"),

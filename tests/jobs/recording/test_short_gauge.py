@@ -82,6 +82,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
+@pytest.mark.long
 def test_a_certificate_names_it_its_file_and_how_often_it_was_taken(folder: Path) -> None:
     """Along row 1 of the plate, and rows within 100 mm of it; its own error there is 2 µm."""
     found = analyse(folder)

@@ -174,6 +174,7 @@ def test_what_is_made_from_it_has_the_temperatures_and_the_log_beside_them(
                                    rtol=1e-9)  # fmt: skip
 
 
+@pytest.mark.long
 def test_the_log_is_an_input_of_the_certificate(job: Path, tmp_path: Path) -> None:
     report = write_report(logged(job), tmp_path / "out")
     assert "thermocouples.csv" in json.loads(report.results)["job"]["inputs_sha256"]

@@ -36,6 +36,7 @@ def learnt() -> Fleet:
     return fit_fleet(members(), seed=1)
 
 
+@pytest.mark.long
 def test_the_sampling_converged(learnt: Fleet) -> None:
     assert learnt.chains.converged
     assert learnt.learnt_from == 11
@@ -88,6 +89,7 @@ def test_the_prior_of_a_model_is_narrower_than_that_of_an_unknown_one(learnt: Fl
     assert np.all(start.mean[0, 1] < start.mean[0, 0])
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_figures() -> None:
     one, other = (fit_fleet(members()[:2], seed=3) for _ in range(2))
     np.testing.assert_array_equal(one.theta, other.theta)

@@ -23,6 +23,7 @@ def answers(tasks: dict[int, Any], workers: int) -> dict[int, Record]:
     return found
 
 
+@pytest.mark.long
 def test_a_run_that_was_killed_goes_on_with_every_answer_that_it_had(tmp_path: Path) -> None:
     folder = tmp_path / "kept"
     command = [sys.executable, "-m", "tests.laboratory.proving.interrupted", str(folder), "0.15"]

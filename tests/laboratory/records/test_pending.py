@@ -124,6 +124,7 @@ def both_or_neither(place: Path, before: bool) -> bool:
     return there
 
 
+@pytest.mark.long
 @needs_fork
 def test_a_process_killed_at_any_write_leaves_both_or_neither(start: tuple[Path, bool], tmp_path: Path) -> None:
     folder, before = start
@@ -150,6 +151,7 @@ def test_a_process_killed_while_it_makes_the_records_leaves_them_to_be_made(tmp_
     assert 2 < n < MOST - 1
 
 
+@pytest.mark.long
 def test_a_write_that_fails_anywhere_leaves_both_or_neither(start: tuple[Path, bool], tmp_path: Path) -> None:
     def full() -> None:
         raise OSError(28, "No space left on device")

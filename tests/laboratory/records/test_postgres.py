@@ -47,6 +47,7 @@ def database(server: str, name: str) -> str:
     return server.replace("/postgres?", f"/{name}?")
 
 
+@pytest.mark.long
 def test_a_server_keeps_the_same_entries_and_answers_the_same_as_a_file(url: str, tmp_path: Path) -> None:
     with open_records(url, create=True) as server, open_records(tmp_path / "records.db", create=True) as file:
         for records in (server, file):
@@ -75,6 +76,7 @@ def test_the_server_refuses_to_change_entries_and_what_was_changed_is_found(url:
         assert [(one.kind, one.entry) for one in records.verify(files=False)] == [("chain", 2)]
 
 
+@pytest.mark.long(but="DROP")
 @pytest.mark.parametrize(("change", "problem"), [
     ("ALTER TABLE entries DISABLE TRIGGER entries_no_change", "the trigger entries_no_change 27 O entries_stay BEGIN"),
     ("CREATE OR REPLACE TRIGGER entries_no_change BEFORE UPDATE OR DELETE ON entries FOR EACH ROW WHEN (false) "
@@ -108,6 +110,7 @@ def test_a_server_whose_tables_and_triggers_are_not_as_they_are_made_is_found(
     assert problem in found[0].problem
 
 
+@pytest.mark.long
 def test_a_certificate_is_a_witness_of_a_server_that_was_rewritten_or_is_shorter(url: str, server: str) -> None:
     """The second certificate states the first entry; the server's chain is made anew, sound in itself, with another one."""
     with open_records(url, create=True) as records:
@@ -154,6 +157,7 @@ def test_writers_at_the_same_time_make_one_chain(url: str) -> None:
         assert records.verify() == []
 
 
+@pytest.mark.long
 def test_a_backup_of_a_server_is_a_file_and_is_restored_into_an_empty_database(
     url: str, server: str, tmp_path: Path
 ) -> None:
@@ -214,6 +218,7 @@ def test_another_programs_database_is_left_alone(url: str) -> None:
         open_records(url, create=True)
 
 
+@pytest.mark.long
 def test_lists_are_the_same_on_a_server_as_in_a_file(url: str, tmp_path: Path) -> None:
     """Texts in any case, pages, each machine's newest certificate, courses: what ``listing`` asks."""
     choices = [

@@ -205,6 +205,7 @@ def test_the_inputs_in_a_pdf_are_those_of_the_job(reported: Path) -> None:
     assert files == {path.name: path.read_bytes() for path in (reported.parent / "job").iterdir()}
 
 
+@pytest.mark.long
 def test_a_correction_is_found_computed_again_and_replaced_by_a_draft(
     records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

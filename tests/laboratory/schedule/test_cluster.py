@@ -60,6 +60,7 @@ def local(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
             process.wait()
 
 
+@pytest.mark.long
 def test_it_answers_as_processes_here_do_also_where_a_process_or_a_worker_is_killed(
     local: Cluster, tmp_path: Path
 ) -> None:

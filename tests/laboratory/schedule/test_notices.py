@@ -194,6 +194,7 @@ def test_what_went_out_is_not_sent_again_while_the_records_are_locked(tmp_path: 
     assert list(box.folder.iterdir()) == []
 
 
+@pytest.mark.long
 def test_many_messages_go_one_by_one_up_to_a_number_and_the_rest_in_one(tmp_path: Path) -> None:
     kept = Kept()
     box = outbox(tmp_path, kept)

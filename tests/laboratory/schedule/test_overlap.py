@@ -42,6 +42,7 @@ def overlapping(root: Path, place: str, outs: list[str]) -> list[dict[str, Any]]
     return [json.loads(text) for text, _ in told]
 
 
+@pytest.mark.long
 @pytest.mark.process
 @pytest.mark.parametrize(
     "outs", [["reports"] * RUNS, [f"reports-{i}" for i in range(RUNS)]], ids=["one folder", "folders"]

@@ -45,6 +45,7 @@ def _without_waiting_for_the_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("os.fsync", lambda descriptor: None)
 
 
+@pytest.mark.long
 def test_a_year_of_daily_runs(tmp_path: Path) -> None:
     made(tmp_path, "a")
     jobs = Jobs(tmp_path, now=FIRST, settings={"quiet_s": 0, "at": "06:15"})

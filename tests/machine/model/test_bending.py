@@ -84,6 +84,7 @@ def by_emcee(points: Points) -> Floats:
     return np.asarray(sampler.get_chain(discard=2000, thin=10, flat=True))
 
 
+@pytest.mark.long
 def test_bent_draws_are_those_of_emcee_on_the_exact_density(parallel: Points) -> None:
     """Draws of the linear model would predict lengths with several times the spread that the bars allow."""
     model = RecordingModel(Ballbar(bar_facts(LENGTH, 0.0), parallel), effects(PLANE), SIGMA)

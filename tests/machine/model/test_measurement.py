@@ -82,6 +82,7 @@ def test_estimates_scatter_as_their_covariance_says(seed: int) -> None:
     assert deviation @ inverse @ deviation < 41.0  # a thousand such cases exceed it three times in 10⁴
 
 
+@pytest.mark.long
 def test_coverage_of_the_least_squares_interval_is_95_percent() -> None:
     points = bars(np.random.default_rng(7), 40, 400.0, Machine("m", "XYZ", TRAVEL))
     inside: list[Floats] = []

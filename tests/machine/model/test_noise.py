@@ -44,6 +44,7 @@ def seen(model: RecordingModel, noise: Noise, draws: int) -> Floats:
     return model.artefact.project(model.placed(model.estimate().least_squares.value), each).T
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", ["iota-1102-20C", "step-gauge-simulated", "plate-simulated", "sphere-simulated", "digitizer-simulated"]
 )

@@ -184,6 +184,7 @@ def test_the_range_of_acceptance_can_be_narrowed():
         offset_plane(direction, CONTACTS, 1.0, acceptance=0.49, u_point=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_the_covariance_is_that_of_drawn_planes(side):
     rng = np.random.default_rng(6)

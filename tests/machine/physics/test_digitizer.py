@@ -151,6 +151,7 @@ def test_alpha_and_beta_come_from_three_points_of_the_scan_plane(alpha, beta):
     assert np.degrees([found.alpha % (2 * np.pi), found.beta]) == pytest.approx([alpha % 360, beta], abs=1e-10)
 
 
+@pytest.mark.long
 def test_the_uncertainty_of_the_scan_plane_is_that_of_drawn_points():
     E, rng = euler_313(*np.radians([80.0, 70.0, 0.0])), np.random.default_rng(3)
     exact_points = np.array([[-20.0, -20, 0], [25, -10, 0], [3, 28, 0]]) @ E.T
@@ -274,6 +275,7 @@ def test_all_nine_equations_weighted_know_the_offset_better_than_six():
     assert (mount_offset(alignments(readings_of(SPHERE))).u < six).all()
 
 
+@pytest.mark.long
 def test_the_covariance_is_that_of_drawn_readings():
     rng = np.random.default_rng(5)
     found = [mount_offset(alignments(readings_of(SPHERE, rng.normal(size=(3, 3)) * U))) for _ in range(4000)]

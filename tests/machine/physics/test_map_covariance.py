@@ -44,6 +44,7 @@ def random_factor(columns: int = 5) -> Floats:
     return 2e-3 * np.random.default_rng(3).standard_normal((COUNT, columns)) * figure_units(NOTHING)[:, None] / 1e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("chain", ["XYZ", "YXZ", "XFYZ"])
 def test_u_of_a_point_and_of_a_distance_is_the_scatter_of_corrections_by_maps_that_are_drawn(chain: str) -> None:
     """Monte Carlo (JCGM 101) of the compensation itself; 20 000 maps, 0.5 % of a standard deviation; three times that."""

@@ -182,6 +182,7 @@ def test_a_truth_of_a_common_size_is_drawn_with_exactly_that_size_by_its_seed(na
         effect.from_reported({})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [0.3, 1.0, 4.0])
 def test_the_interval_of_a_common_size_holds_it_whatever_noise_the_coefficients_have(size: float) -> None:
     """Sixty-eight errors of a known mean square, each estimated with noise of one: 100 recordings, binomial limit of 0.1 %."""

@@ -283,6 +283,7 @@ def test_what_cannot_be_associated_is_refused_with_what_is_missing(ask, message)
         ask()
 
 
+@pytest.mark.long
 def test_a_half_shell_has_no_inscribed_cylinder():
     where, normals, _ = surface("cylinder", 40, 3, angle=2.5)
     points = where + 1e-3 * np.sin(where[:, :1] * 40) * normals[:, 0]

@@ -29,6 +29,7 @@ def test_a_reference_set_gives_its_cylinder_to_a_picometre(place, arc, radius, l
     assert np.linalg.norm(np.cross(cylinder.point - placed.origin, placed.axis)) < 1e-9
 
 
+@pytest.mark.long
 def test_the_covariance_is_that_of_repeated_measurement(arc):
     radial, height = arc(2.0, 30.0, 40, seed=1)
     rng = np.random.default_rng(2)
@@ -97,6 +98,8 @@ def test_the_apex_lies_where_the_surface_ends(arc):
     np.testing.assert_allclose(cone.apex, [0, 0, -8.0 / np.tan(0.5)], atol=1e-10)
 
 
+@pytest.mark.long
+@pytest.mark.long
 def test_the_covariance_is_that_of_repeated_measurement_of_cone(arc):
     radial, height = arc(2 * np.pi, 30.0, 40, seed=1)
     surface, normals, _ = cone_surface(radial, height, 20.0, 0.4)

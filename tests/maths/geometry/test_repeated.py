@@ -68,6 +68,7 @@ def test_each_draw_is_the_least_squares_feature_of_its_points(kind):
             assert abs(drawn.size[i] - 2 * (fit.radius + along * np.tan(fit.half_angle))) < 1e-9
 
 
+@pytest.mark.long
 def test_a_bore_that_is_off_along_its_axis_by_a_part_of_its_length_settles_where_fits_one_by_one_do():
     angle, height = np.meshgrid(np.arange(8) * np.pi / 4, [0.0, 9.0, 17.0])
     points = np.stack([10 * np.cos(angle), 10 * np.sin(angle), height], axis=-1).reshape(-1, 3)

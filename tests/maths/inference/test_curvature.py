@@ -141,6 +141,7 @@ def test_the_marginal_of_a_period_is_that_of_direct_integration() -> None:
     assert draws.std() == pytest.approx(sd, rel=4 / np.sqrt(posterior.ess_min) + 0.02)
 
 
+@pytest.mark.long
 def test_a_size_of_half_a_metre_known_to_a_nanometre_does_not_blur_the_period() -> None:
     random = np.random.default_rng(7)
     x = np.sort(random.uniform(0, 100, M))
@@ -168,6 +169,7 @@ def test_two_modes_keep_their_probabilities() -> None:
     assert abs(amplitude.mean() - 0.05) < 4 * amplitude.std()
 
 
+@pytest.mark.long
 def test_intervals_of_period_amplitude_and_noise_hold_the_truth_as_often_as_they_say() -> None:
     """Twelve recordings, 95 % intervals: at least 9 of 12 (binomial, 0.2 %)."""
     random = np.random.default_rng(6)

@@ -279,6 +279,7 @@ def model_freedoms(freedoms: Freedoms | Floats, m: int, seed: int) -> LinearMode
     return LinearModel(design @ [1.3, 0.8] + random.standard_normal(m), design, unknowns, freedoms, np.ones(m), None)
 
 
+@pytest.mark.long
 @settings(max_examples=25)
 @given(placings(), st.integers(0, 100))
 def test_the_density_of_the_noise_is_that_of_the_whole_matrix_in_its_covariance(freedoms: Freedoms, seed: int) -> None:
@@ -307,6 +308,7 @@ def test_the_density_of_the_noise_is_that_of_the_whole_matrix_in_its_covariance(
     np.testing.assert_allclose(np.diff(found), np.diff(wanted), atol=1e-6)
 
 
+@pytest.mark.long
 def test_least_squares_of_many_placings_holds_no_more_than_some_columns() -> None:
     """20 000 observations in 4000 placings: the columns with all their zeros are 1.9 GB, a square matrix 3.2 GB."""
     m = 20_000

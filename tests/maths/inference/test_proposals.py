@@ -152,6 +152,7 @@ def test_what_matters_is_standard_normal_beforehand() -> None:
     assert abs(np.corrcoef(found[both, 1], found[both, 2])[0, 1]) < 4 / np.sqrt(both.sum())
 
 
+@pytest.mark.long
 def test_sizes_depend_on_nothing_else() -> None:
     """What does not matter is drawn anew: the sizes of the noise stay."""
     before = latent()

@@ -251,6 +251,7 @@ def test_a_joint_sample_is_drawn_row_by_row(read: Read) -> None:
     assert simulate(model, 1000).u[0] == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("text", "says"),
     [

@@ -68,6 +68,7 @@ def direct(c: CandidateComparison, chosen: tuple[int, ...]) -> float:
     return float(special.logsumexp(total)) + 0.5 * Q.shape[1] * np.log(2 * np.pi)
 
 
+@pytest.mark.long
 def test_the_evidence_of_two_together_is_that_of_a_multivariate_normal() -> None:
     """Their sizes summed one at a time about the joint best, against every pair of sizes: to a tenth in the logarithm."""
     random = np.random.default_rng(1)

@@ -74,6 +74,7 @@ def _signals(c: CandidateComparison, members: tuple[Member, ...] | None) -> list
     return signals
 
 
+@pytest.mark.long
 def test_the_evidence_is_that_of_a_multivariate_normal() -> None:
     c = comparison()
     nothing, something = c.log_evidence()
@@ -220,6 +221,7 @@ def test_what_the_baseline_absorbs_has_no_evidence() -> None:
     assert something[0, 0] == -np.inf
 
 
+@pytest.mark.long
 def test_strong_evidence_for_nothing_is_as_rare_as_it_says() -> None:
     """P(p(y|M)/p(y|0) ≥ k) ≤ 1/k under p(y|0), whatever M is; the data are drawn from all of p(y|0), noise included."""
     c = comparison()

@@ -60,6 +60,7 @@ def lighter(monkeypatch: pytest.MonkeyPatch, given: MeasurementConditions) -> Vi
     return Virtual(PLAN, given)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", [None, 0.004])
 def test_errors_of_large_features_are_distributed_as_those_of_every_coordinate(
     monkeypatch: pytest.MonkeyPatch, form: float | None

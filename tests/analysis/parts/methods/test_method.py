@@ -181,6 +181,7 @@ def test_a_tip_moves_what_it_probes_alone() -> None:
     assert found.tips["two"] == pytest.approx([0.0], abs=1e-9)
 
 
+@pytest.mark.long
 def test_intervals_hold_where_each_orientation_has_errors_of_its_own() -> None:
     """2000 machines with a scale, a tip and errors of orientations that nobody knows: 95 % intervals hold 93 to 97 %."""
     random, held, n = np.random.default_rng(3), 0, 2000

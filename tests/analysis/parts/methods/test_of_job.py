@@ -168,6 +168,7 @@ def test_what_a_method_sees_follows_from_how_it_was_done() -> None:
     assert moved.seen["place on the table"] == moved.seen["stylus"] == "varied"
 
 
+@pytest.mark.long
 def test_the_part_s_command_finds_them_and_check_says_what_they_lack(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -208,6 +209,7 @@ def example_truth() -> dict[str, float]:
     return dict(zip([one.name for one in plan.characteristics], values, strict=True))
 
 
+@pytest.mark.long
 def test_the_example_is_what_its_script_draws() -> None:
     """Its true values follow from how its bores are made, and stand in its remarks.
 
@@ -228,6 +230,7 @@ def test_the_example_is_what_its_script_draws() -> None:
     assert told in read_part(EXAMPLE).facts.job.remarks
 
 
+@pytest.mark.long
 def test_the_example_has_all_methods_compared(monkeypatch: pytest.MonkeyPatch) -> None:
     """With few draws; eleven of its twelve intervals hold the true value, and E_n beyond 1 tells of the twelfth."""
     monkeypatch.setattr("cmm_uq.app.commands.parts.part.ways", lambda *_, **__: [])
@@ -247,6 +250,7 @@ def test_the_example_has_all_methods_compared(monkeypatch: pytest.MonkeyPatch) -
     assert set(results_keys(part_results(found)["other_methods"], "other_methods")) == told
 
 
+@pytest.mark.long
 def test_a_position_s_systematic_error_has_the_sign_of_the_direction_that_its_part_deviates_in() -> None:
     """A bore is read 5 µm too far along x: where it is off along x its position is 10 µm too large, else as much too small."""
     job = plate()

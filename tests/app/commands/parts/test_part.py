@@ -58,6 +58,7 @@ def shifted() -> PartMeasurement:
     return evaluate_part(plate_of(by_results(), off, **THERE), PartOptions(trials=TRIALS))
 
 
+@pytest.mark.long
 def test_a_certificate_is_verified_and_its_recording_conditions_the_errors() -> None:
     standing = plain().standing
     assert (standing.source, standing.verdict, standing.given_recording) == ("certificate", "NOT WHOLLY CHECKED", True)
@@ -71,6 +72,7 @@ def test_a_certificate_is_verified_and_its_recording_conditions_the_errors() -> 
     assert not [one for one in plain().given.machine.unmodelled if one.effect.name == "rotation_x_x"]  # drawn together
 
 
+@pytest.mark.long
 def test_figures_and_draws_alone_are_taken_too_and_said_to_be_less() -> None:
     standing = shifted().standing
     assert (standing.source, standing.given_recording) == ("results", False)
@@ -280,6 +282,7 @@ def test_a_certificate_holds_until_its_last_day(last: dt.date) -> None:
     assert found.standing.valid_until == last
 
 
+@pytest.mark.long
 def test_a_certificate_of_another_version_is_computed_again_but_where_a_correction_touches_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -34,6 +34,7 @@ def returned(heard: Listener, since: int, at: float) -> float:
     return heard.times[place] - at
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("way", ["pty", "socket", "rfc2217"])
 def test_an_instrument_that_was_unplugged_is_read_again_within_two_seconds(way: Way, tmp_path: Path) -> None:
     with (
@@ -54,6 +55,7 @@ def test_an_instrument_that_was_unplugged_is_read_again_within_two_seconds(way: 
         assert back.after_s > 0.5
 
 
+@pytest.mark.long(but="socket")
 @pytest.mark.parametrize(("name", "way"), [("sylvac-rs232", "pty"), ("sylvac-rs232", "socket"), ("fluke-1529", "pty")])
 def test_an_instrument_that_hung_is_read_again_within_two_seconds(name: str, way: Way, tmp_path: Path) -> None:
     profile = hasty(name, answer_within_s=0.5)
@@ -227,6 +229,7 @@ def unasked(heard: Listener) -> list[Reading]:
     return [one for one in heard.of(Reading) if isinstance(one, Reading) and one.unasked]
 
 
+@pytest.mark.long(but="pty")
 @pytest.mark.parametrize("way", ["pty", "socket", "rfc2217"])
 def test_a_second_answer_to_one_question_is_named_and_never_a_value(way: Way, tmp_path: Path) -> None:
     speaker = Generous()
@@ -251,6 +254,7 @@ def test_a_profile_says_that_there_are_more_messages_than_questions(poll: str, s
         assert not unasked(heard)
 
 
+@pytest.mark.long
 def test_what_came_before_a_question_is_none_of_its_answers(tmp_path: Path) -> None:
     """A value that is sent by a key, whole or begun, while the line is quiet between two questions."""
     profile = asked_profile(every_s=0.6)

@@ -280,6 +280,7 @@ def test_picked_points_keys_and_errors_are_readings(machine: UnreliableIppServer
     assert not machine.state.session
 
 
+@pytest.mark.long
 def test_positions_are_asked_for_as_often_as_is_said(machine: UnreliableIppServer) -> None:
     machine.state.position = [4.0, 5.0, 6.0]
     with listening(open_source(declared(machine, "ipp-position"))) as heard:
@@ -298,6 +299,7 @@ def test_positions_are_asked_for_as_often_as_is_said(machine: UnreliableIppServe
         heard.until(lambda one: one.good(since))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cut", ["closed", "hung"])
 def test_a_machine_that_was_lost_is_heard_again_within_two_seconds(cut: str, machine: UnreliableIppServer) -> None:
     with listening(open_source(declared(machine))) as heard:

@@ -114,6 +114,7 @@ def followers(pattern: str) -> int:
     return max(1, *out.values())
 
 
+@pytest.mark.long
 @settings(max_examples=400, deadline=None)
 @given(pattern=PATTERNS, text=TEXTS)
 def test_an_accepted_pattern_tries_no_more_than_its_runs_have_followers(pattern: str, text: str) -> None:
@@ -128,6 +129,7 @@ def test_an_accepted_pattern_tries_no_more_than_its_runs_have_followers(pattern:
     assert counted.attempts <= max(runs, 1) * (len(text) + 1) * followers(pattern) * looks
 
 
+@pytest.mark.long
 @settings(max_examples=400, deadline=None)
 @given(pattern=PATTERNS, text=TEXTS)
 def test_a_pattern_accepted_for_a_search_tries_no_more_from_all_places_together(pattern: str, text: str) -> None:
@@ -140,6 +142,7 @@ def test_a_pattern_accepted_for_a_search_tries_no_more_from_all_places_together(
     assert counted.attempts <= (max(runs, 1) + 1) * (len(text) + 1) * followers(pattern) * looks
 
 
+@pytest.mark.long
 @settings(max_examples=400, deadline=None)
 @given(pattern=PATTERNS, text=TEXTS)
 def test_a_separator_reads_nothing_again_and_again(pattern: str, text: str) -> None:
