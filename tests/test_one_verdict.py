@@ -317,6 +317,7 @@ def test_the_pages_of_the_records(seed: int, recorded: Callable[[int], Records])
     assert ("states no conformity" in said) if of.overall == "none" else (f"decision: {of.overall}" in said)
 
 
+@pytest.mark.long(but="a")
 @each
 def test_a_release_asks_for_a_word_unless_all_passes(seed: int, tmp_path: Path) -> None:
     of, asked = drawn(seed), list[str]()

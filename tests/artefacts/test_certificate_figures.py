@@ -210,7 +210,7 @@ def read_back(example: str) -> Results:
     return found
 
 
-@pytest.mark.long(but="step-gauge-simulated")
+@pytest.mark.long(but="bryan")
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_every_printed_number_stands_in_results_json(example: str) -> None:
     results = read_back(example)

@@ -230,6 +230,7 @@ def test_an_outside_kind_is_listed_after_the_built_in_ones(installed: None) -> N
     assert names() == (*BUILT_IN, OUTSIDE)
 
 
+@pytest.mark.long
 def test_its_own_keys_are_checked_as_those_of_a_built_in_kind(tracker: Path) -> None:
     (tracker / "job.toml").write_text(TRACKER_JOB.replace("u_um_per_m", "u_um_per_mm"), encoding="utf-8")
     with pytest.raises(CmmUqError, match=r"job\.toml line \d+: \[artefact\] u_um_per_mm: unknown key.*u_um_per_m"):

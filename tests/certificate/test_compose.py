@@ -195,6 +195,7 @@ def test_the_first_page_says_what_every_statement_comes_to(document: Document) -
     assert rows["Decision rule"].startswith("ISO 14253-1:2017")
 
 
+@pytest.mark.long
 def test_the_first_page_has_the_picture_and_no_other_has_it_again() -> None:
     made = outcome_of(analysed("step-gauge-simulated")).document
     first = [section for section in made.sections if section.first]

@@ -120,6 +120,7 @@ def test_hostile_text_stays_on_the_page(page: Page, tmp_path: Path, width: int) 
     assert opened.complaints == []
 
 
+@pytest.mark.long
 def test_the_browser_asks_for_nothing_and_complains_of_nothing(
     page: Page, certificate: Document, tmp_path: Path
 ) -> None:
@@ -128,6 +129,7 @@ def test_the_browser_asks_for_nothing_and_complains_of_nothing(
     assert opened.complaints == []
 
 
+@pytest.mark.long
 def test_a_wide_table_scrolls_in_its_own_frame(page: Page, certificate: Document, tmp_path: Path) -> None:
     page.set_viewport_size({"width": 360, "height": 800})
     Opened(page, certificate, tmp_path)

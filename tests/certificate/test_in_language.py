@@ -106,6 +106,7 @@ def texts(value: object) -> Iterator[Text]:
             yield from texts(getattr(value, field.name))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("code", CODES)
 def test_html_and_pdf_say_in_which_language_they_are(code: Code) -> None:
     needs_font(code)

@@ -44,7 +44,7 @@ def signed(made: Document, warnings: Sequence[Text] = ()) -> Document:
     )  # fmt: skip
 
 
-@pytest.mark.long(but="-ja")
+@pytest.mark.long(but="iota-1102-20C-ja")
 @pytest.mark.parametrize("code", ["en", *LANGUAGES])
 @pytest.mark.parametrize("name", REPORTED)
 def test_verdict_limits_statements_and_signature_stand_on_the_first_page(name: str, code: Code) -> None:
@@ -66,6 +66,7 @@ MANY = (
 )  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["iota-1102-20C", "triangle-simulated"])
 def test_of_many_warnings_each_sort_is_named_on_the_first_page_and_every_one_stands_in_full_behind_it(
     name: str,
@@ -84,6 +85,7 @@ def test_of_many_warnings_each_sort_is_named_on_the_first_page_and_every_one_sta
     assert html.index("27morebehindthispage") < html.index("Dr.A.Muster") < html.index("Measurement29repeats")
 
 
+@pytest.mark.long
 def test_a_long_remark_begins_on_the_first_page_and_stands_whole_behind_it() -> None:
     remark = Verbatim("The table was cleaned. " * 60)
     made = signed(document("step-gauge-simulated"))
@@ -149,6 +151,7 @@ def texts(value: Any) -> Iterator[str]:
         yield value
 
 
+@pytest.mark.long
 def test_both_say_every_text_of_the_document(certificate: Document, html_text: str, pdf_text: str) -> None:
     expected = [squeezed(text) for text in texts(certificate.as_data()) if text]
     assert len(expected) > 200

@@ -108,6 +108,7 @@ def test_a_big_recording_is_not_a_big_picture(count: int) -> None:
     assert all(len(plot.svg) < 300_000 for plot in pictures)
 
 
+@pytest.mark.long
 def test_the_three_projections_have_one_scale() -> None:
     """Bars of 100 mm along X, Y and Z are drawn equally long in the projections that show them."""
     drawn = [stroke for colour in DIVERGING for d in Drawing(volume([1.0, -1.0, 0.0]).svg).drawn(stroke=colour)

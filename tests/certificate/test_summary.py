@@ -146,6 +146,7 @@ def test_lines_of_a_gauge_keep_to_it_too() -> None:
     assert "lines.slope_ppm" in outcome.results["cmc"]["raised"]
 
 
+@pytest.mark.long
 def test_without_a_capability_nothing_changes(result: Result) -> None:
     plain, empty = outcome_of(result), stated(result, Capability())
     assert "cmc" not in plain.results

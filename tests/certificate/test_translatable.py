@@ -72,6 +72,7 @@ def units(document: Document) -> Iterator[str]:
             yield from (row[place] for row in table.rows if column.heading == "Unit")
 
 
+@pytest.mark.long(but="triangle")
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_every_text_of_every_document_is_a_message_or_the_user_s(name: str) -> None:
     made, known = documents(name), known_to(ROOT / "examples" / name)

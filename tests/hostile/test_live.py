@@ -28,6 +28,7 @@ def test_a_session_that_is_killed_has_every_accepted_point_and_goes_on(number: i
     assert accepted >= 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("words", [
     "instruments test: it babbles, from the first", "instruments watch: it vanishes, while it is listened to",
     "acquire: an instrument vanishes, and the operator quits", "acquire: the operator's terminal vanishes, of its session",

@@ -15,6 +15,7 @@ from benchmarks.hostile.toml_text import dumps
 DEAR = ("report", "diagnose", "plan")  # commands that compute for seconds: they are part of the whole study
 
 
+@pytest.mark.long(but="1")
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_mutated_input_is_read_or_refused_in_one_line(seed: int, tmp_path: Path) -> None:
     numbers = [number for number in range(120) if not set(case(seed, number).command[:1]) & set(DEAR)]

@@ -42,7 +42,7 @@ def test_states_are_of_another_user_and_of_this_one_with_and_without_write_permi
     }
 
 
-@pytest.mark.long(but="due---0-")
+@pytest.mark.long
 @pytest.mark.skipif(not available(), reason="this user cannot become another, or another may not read the package")
 @pytest.mark.parametrize(("words", "place", "state", "code", "says"), CASES)
 def test_a_folder_that_is_closed_is_named_and_left(words: str, place: str, state: str, code: int, says: str) -> None:

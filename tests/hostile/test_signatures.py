@@ -23,6 +23,7 @@ def of() -> Iterator[World]:
         yield made
 
 
+@pytest.mark.long(but="xml-")
 @pytest.mark.parametrize(("form", "name"), ATTACKS, ids=lambda each: each)
 def test_an_attack_is_not_taken_for_good(form: str, name: str, of: World) -> None:
     assert verdict(form, *forged(of, form, name, random.Random(f"{form} {name}"))) in ALLOWED

@@ -111,6 +111,7 @@ def test_the_noise_of_a_coordinate_is_drawn_from_the_density_that_the_sampler_ta
     assert np.mean(sizes.placing == 0) == pytest.approx(0.5, abs=0.04)  # five standard errors
 
 
+@pytest.mark.long
 def test_parameters_are_drawn_from_their_priors_and_stay_where_nothing_is_known() -> None:
     known = Unknown(("scale_x", "ppm"), unit("ppm"), 3.0, 2.0, 1.0)
     anywhere = Unknown(("artefact", "length_mm"), unit("mm"), 400.0, np.inf, 1.0)

@@ -137,6 +137,7 @@ def test_a_case_is_the_same_whenever_it_is_made_and_its_seal_with_it() -> None:
     assert seal([first.truth]) == seal([again.truth]) != seal([other.truth])
 
 
+@pytest.mark.long(but="ballbar")
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "maps"])
 def test_every_kind_can_be_hidden_in_every_artefact_that_it_is_dealt_to(kind: str) -> None:
     for number in range(5):

@@ -178,6 +178,7 @@ def test_the_search_works_without_a_network(site: Path, tab: Page) -> None:
     assert "effects.html" in " ".join(tab.eval_on_selector_all("#search-results li a", "all => all.map(a => a.href)"))
 
 
+@pytest.mark.long
 def test_the_first_address_leads_to_the_documentation(site: Path, tab: Page) -> None:
     tab.goto((site / "index.html").as_uri())
     tab.wait_for_url("**/docs/index.html*")

@@ -43,7 +43,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.long(but="howto")
+@pytest.mark.long(but="howto/part")
 @pytest.mark.parametrize("page", having("python", "console"))
 def test_a_page_runs_from_its_top_to_its_end(page: Path, project: Path) -> None:
     scope: dict[str, object] = {}

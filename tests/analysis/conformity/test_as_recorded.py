@@ -261,6 +261,7 @@ def test_a_gauge_block_of_one_repeat_far_off_is_measured_again_and_of_two_fails(
         assert decided(along_line(made, chosen, 10.0), facts, **ISO).finding == outcome
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("across", [False, True])
 def test_a_ball_of_a_plate_that_is_far_off_fails(across: bool) -> None:
     """10 mm along the plate, or off it: square to a distance that hardly changes its length, and is outside all the same."""

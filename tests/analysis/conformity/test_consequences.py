@@ -69,5 +69,6 @@ def test_a_decision_that_the_squareness_spoilt_is_mended_by_its_correction(found
     assert after.missing == before.missing == ("1 of 20 positions: 19 distinct, measurement 18 is a copy of 14",)
 
 
+@pytest.mark.long
 def test_nothing_found_changes_nothing() -> None:
     assert diagnose_read(read_job(EXAMPLE)).consequences is None

@@ -147,6 +147,7 @@ def test_a_statement_left_out_makes_no_pass_and_by_iso_14253_1_no_fail(
     assert rule != '"ISO 14253-1"' or after != "fail" or before == "fail"
 
 
+@pytest.mark.long
 @given(base=tests, rule=rules, error=errors, what=st.sampled_from(["no temp", "no approach", "no rated_conditions",
        "no artefact.cte_per_k", "no machine.travel_mm", "no probe", "no test_uncertainty"]))  # fmt: skip
 @FEW

@@ -176,6 +176,7 @@ def test_a_length_with_one_repeat_has_no_range_and_is_named() -> None:
 # --- nothing left out improves the finding ------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("line", "most"),
     [("u_cte_per_k", 1e-6), ("u_temperature_k", 0.3), ("u_alignment_um", 1.0), ("u_fixturing_um", 1.0)],

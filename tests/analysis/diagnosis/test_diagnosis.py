@@ -92,6 +92,7 @@ def test_with_all_six_factors_the_real_recording_is_consistent() -> None:
     assert not found.where
 
 
+@pytest.mark.long
 def test_two_hidden_effects_are_both_named_with_their_size() -> None:
     truth = {"hysteresis_x": 5.0, "straightness_x_z": -9.0}
     found = diagnosed(recording(truth, Noise(1e-3)))

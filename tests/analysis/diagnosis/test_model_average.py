@@ -133,6 +133,7 @@ def test_the_average_has_the_moments_of_the_mixture(certified: Result) -> None:
     assert np.all(np.abs(np.array(certified.covariance.matrix) - covariance) < 5 * products.std(axis=0) / few)
 
 
+@pytest.mark.long
 def test_a_certificate_states_the_average_wherever_it_states_an_estimate(
     results: dict[str, Any], outcome: Outcome
 ) -> None:

@@ -74,6 +74,7 @@ def test_few_shapes_say_of_a_jump_with_time_what_many_say(
     assert odds[0].max() > np.log(100)
 
 
+@pytest.mark.long
 def test_noise_that_is_slow_for_want_of_a_jump_is_not_all_that_is_kept(jumped: RecordingModel) -> None:
     functions = [f for f in unknown_functions(jumped, jumped.estimate().about) if f.covariate_name == "time_s"]
     normal = [kind for kind in noise_kinds(jumped, functions) if kind.name != "tails"]

@@ -235,6 +235,7 @@ def test_components_of_a_recording_act_on_a_part_as_they_did_there() -> None:
     assert (np.asarray(found.placing_mm)[0], np.asarray(found.slow_mm)[0]) == pytest.approx((3e-3, 5e-3))
 
 
+@pytest.mark.long
 def test_a_noise_that_could_as_well_be_errors_left_out_is_that_of_the_certificate(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

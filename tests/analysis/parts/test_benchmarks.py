@@ -15,6 +15,7 @@ from cmm_uq.jobs.part.feature import Kind
 from cmm_uq.maths.geometry.association import Association
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("figures", [circles, polar, arcs])
 def test_printed_figures_come_out_again(figures: Callable[[], list[Figure]]) -> None:
     assert [one for one in figures() if not one.holds] == []

@@ -48,6 +48,7 @@ def all_of(
     return stated(simulated, measured, plan, errors), each, together, decided
 
 
+@pytest.mark.long
 @given(
     kinds=st.lists(st.tuples(st.booleans(), errors_of, numbers, limits_of, numbers), min_size=1, max_size=4),
     seed=st.integers(0, 2**32 - 1),

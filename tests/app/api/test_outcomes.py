@@ -170,6 +170,7 @@ def test_it_says_itself_in_a_line_and_in_a_notebook(part: Part) -> None:
     assert part.conforming == (part.found.outcome == "pass")
 
 
+@pytest.mark.long
 def test_it_writes_what_the_command_writes(part: Part, tmp_path: Path) -> None:
     files = part.write(tmp_path / "out")
     data = json.loads(files["results.json"].read_bytes())

@@ -262,6 +262,7 @@ def test_a_machine_that_is_not_known_is_answered_with_those_near(drifting: Path,
     assert "1102" in done.stderr
 
 
+@pytest.mark.long
 def test_a_history_without_a_picture_waits_for_nothing_that_draws_or_fits() -> None:
     heavy = ["matplotlib", "pandas", "scipy", "jinja2", "emcee"]
     code = f"import sys, cmm_uq.app.commands.laboratory.due; print([m for m in {heavy} if m in sys.modules])"

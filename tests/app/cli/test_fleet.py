@@ -37,6 +37,7 @@ def written(lab: Path) -> tuple[CompletedProcess[str], Path]:
     return run("fleet", "--records", lab, "--name", NAME, "--out", lab.parent / "out"), lab.parent / "out"
 
 
+@pytest.mark.long
 def test_it_says_what_is_usual_and_writes_page_and_data(written: tuple[CompletedProcess[str], Path]) -> None:
     done, out = written
     assert (done.returncode, done.stderr) == (0, "")
@@ -46,6 +47,7 @@ def test_it_says_what_is_usual_and_writes_page_and_data(written: tuple[Completed
     assert "Usual drift" in (out / "fleet.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_the_data_have_every_machine_and_a_prior_that_is_the_fleet_s(
     written: tuple[CompletedProcess[str], Path], lab: Path
 ) -> None:

@@ -169,6 +169,7 @@ assert round(scipy.stats.norm.cdf(1.96), 3) == 0.975
 """
 
 
+@pytest.mark.long
 def test_what_is_not_used_is_not_loaded_until_it_is() -> None:
     run = subprocess.run([sys.executable, "-c", COMMAND], capture_output=True, check=False, text=True)
     assert (run.returncode, run.stderr) == (0, "")

@@ -51,6 +51,7 @@ def test_a_message_stands_beside_what_was_understood(tmp_path: Path) -> None:
     assert "fluke-1502a: maker HART, model 1502A, serial A24680, firmware 1.10" in done.stdout
 
 
+@pytest.mark.long
 def test_a_source_of_a_job_is_tried_by_its_name(tmp_path: Path) -> None:
     job = tmp_path / "job"
     shutil.copytree(ROOT / "examples" / "iota-1102-20C", job)

@@ -82,6 +82,7 @@ def test_its_arithmetic_is_no_fault_of_the_input(site: Path, tmp_path: Path) -> 
         cmm_uq.report(job_of(tmp_path / "job", kind="odd"))
 
 
+@pytest.mark.long
 def test_a_standard_that_fails_is_named(site: Path, tmp_path: Path) -> None:
     install(OUTSIDE_STANDARDS, site)
     path = site / "interim_check.py"

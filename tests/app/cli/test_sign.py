@@ -146,6 +146,7 @@ def test_what_the_seal_shows_stands_below_the_text(key: Path, laboratory: Path) 
     assert "Electronically" not in text(0, 0, 595, 808)
 
 
+@pytest.mark.long
 def test_four_eyes_look_and_sign_afterwards_and_the_records_still_verify(
     laboratory: Path, tmp_path: Path, held: Held, curve_held: Held  # noqa: F811
 ) -> None:  # fmt: skip

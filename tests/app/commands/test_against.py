@@ -85,6 +85,7 @@ def test_what_a_prediction_leaves_out_is_found_with_its_size_and_written(tmp_pat
         assert kept.returncode == 0, kept.stdout
 
 
+@pytest.mark.long
 def test_a_complete_prediction_is_consistent_whatever_the_job_names() -> None:
     """The job names a prediction without the squareness, the call another one."""
     assert cmm_uq.diagnose(job(RECORDED, WITHOUT_SQUARENESS), against=COMPLETE).verdict == "consistent"
@@ -115,6 +116,7 @@ def test_nothing_is_asserted_within_the_uncertainty_of_the_prediction() -> None:
     assert found.diagnosis["noise"]["coordinate_um"]["value"] >= 60.0
 
 
+@pytest.mark.long
 def test_what_it_contains_can_be_estimated_anew_as_corrections() -> None:
     """The simulation has a scale of 20 ppm, the machine one of 30."""
     near = table(predicted(TRUE, errors(scale_x=20.0, scale_y=-20.0, square_xy=25.0)))

@@ -153,6 +153,7 @@ def test_a_gross_outlier_is_set_aside_from_the_fit_but_counts_in_the_figures(job
         assert abs(here.value - there.value) < 2 * there.u
 
 
+@pytest.mark.long
 def test_a_measurement_that_the_lab_sets_aside_is_not_used(job: Path) -> None:
     state(job, r'^file = "ballbar.csv"', 'file = "ballbar.csv"\nset_aside = [18]')
     found = analyse(job)
@@ -161,6 +162,7 @@ def test_a_measurement_that_the_lab_sets_aside_is_not_used(job: Path) -> None:
     assert len(found.artefact.measurement) == 20
 
 
+@pytest.mark.long
 def test_the_copy_of_a_measurement_that_is_set_aside_counts(job: Path, uncompensated: Result) -> None:
     state(job, r'^file = "ballbar.csv"', 'file = "ballbar.csv"\nset_aside = [14]')
     found = analyse(job)

@@ -59,6 +59,7 @@ def test_a_batch_writes_what_report_writes_whatever_the_number_of_workers(tmp_pa
     assert all(conforming(json.loads(whole[f"plane-{i}/results.json"])) for i in range(3)) == (not one.not_conforming)
 
 
+@pytest.mark.long
 def test_figures_alone_are_the_same_and_nothing_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     job = small_job(tmp_path, "plane")
     monkeypatch.setattr(
@@ -68,6 +69,7 @@ def test_figures_alone_are_the_same_and_nothing_is_drawn(tmp_path: Path, monkeyp
     assert list(found) == ["results.json"]
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("canned")
 def test_a_job_that_fails_hangs_or_kills_its_process_stops_no_other(tmp_path: Path) -> None:
     jobs = tmp_path / "jobs"

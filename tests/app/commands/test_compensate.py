@@ -186,6 +186,7 @@ def test_a_map_of_a_simulated_recording_corrects_no_measured_one(job: Path, new_
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 def test_a_map_is_made_of_recordings_that_name_errors_of_a_machine_alone(tmp_path: Path) -> None:
     for name in ("shift-simulated", "iota-1102-maps"):
         with pytest.raises(CmmUqError):

@@ -141,6 +141,7 @@ def test_measured_coordinates_without_any_scatter_are_refused_with_a_remedy(run:
         run(bars_along_x(0.0, "measured"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("noise_mm", "origin", "digits"), [(0.0, "simulated", 9), (0.0, "measured", 4)])
 def test_bars_along_one_axis_determine_its_scale_and_nothing_else(noise_mm: float, origin: str, digits: int) -> None:
     """U of the scale is that of the certificate, 0.4 µm in 400 mm; what the digits leave open is less."""

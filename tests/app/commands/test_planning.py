@@ -201,6 +201,7 @@ def test_what_the_diagnosis_would_find_is_larger_under_set_up_offsets(tmp_path: 
     assert 1.5 < found[1] / found[0] < 3.6
 
 
+@pytest.mark.long(but="separation")
 @pytest.mark.parametrize(("plan", "effects", "length", "said"), [
     ("", "", 400.0, "no effect is named"),
     ("", SIX, 1000.0, "long along"),
@@ -265,6 +266,7 @@ def plan_of(folder: Path, plan: str, length: str = "400.0") -> MeasurementPlan:
     return make_plan(read_job(folder, recorded=False), power=False)
 
 
+@pytest.mark.long
 def test_a_free_scale_is_said_in_words(tmp_path: Path) -> None:
     plan = plan_of(tmp_path, "length_mm = 400.0", length="")
     page = render_html(plan_document(plan))
@@ -283,6 +285,7 @@ def test_combinations_in_words(parts: dict[tuple[str, str], float], said: str) -
     assert combination(parts) == said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", EVERY_KIND)
 def test_every_artefact_has_a_picture_of_each_placing(kind: str) -> None:
     facts, wishes = EVERY_KIND[kind]
@@ -310,6 +313,7 @@ def test_a_shift_job_says_what_no_reading_shows() -> None:
     assert "No reading shows: errors that repeat every 10 mm" in render_html(plan_document(plan))
 
 
+@pytest.mark.long
 def test_conditions_that_are_not_met_are_a_warning(tmp_path: Path) -> None:
     plan = plan_of(tmp_path, "budget_min = 60")
     assert "Not met: at most 60 min: 120 min." in plan_document(plan).warnings

@@ -81,6 +81,7 @@ def test_one_process_says_what_two_do(ran: Ran) -> None:
     assert sorted((ran.kept / RECORDS).read_bytes().splitlines()) == sorted(alone.answers.splitlines())
 
 
+@pytest.mark.long
 def test_the_command_goes_on_with_what_was_kept_and_writes_one_set(ran: Ran, tmp_path: Path) -> None:
     shutil.copytree(ran.kept, tmp_path / UNFINISHED)
     done = run("prove", JOB, "--cases", CASES, "--workers", 2, "--out", tmp_path)

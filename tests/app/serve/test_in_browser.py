@@ -196,6 +196,7 @@ def test_a_file_is_dropped_on_the_field_without_a_script_of_the_page(tab: Tab) -
     assert page.locator(".notice .head").inner_text().endswith("Known and released")
 
 
+@pytest.mark.long
 def test_a_recorded_page_shows_itself_and_can_do_nothing_here(tab: Tab, laboratory: Path) -> None:
     page = tab.open(f"recorded?entry={entry_of(laboratory, 'k-1')}&name=certificate.html")
     assert page.locator("bdi").inner_text() == "k-1"

@@ -231,6 +231,7 @@ def test_beyond_this_machine_it_answers_to_numbers_and_to_names_that_it_was_told
         assert made.url == f"http://127.0.0.1:{port}/"
 
 
+@pytest.mark.long
 def test_ctrl_c_ends_it_at_once_and_says_so(laboratory: Path) -> None:
     import signal
 

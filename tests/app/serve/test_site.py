@@ -70,6 +70,7 @@ def test_nothing_in_the_records_can_become_part_of_a_page(looked: Looked) -> Non
     assert TURNED.replace("\u202e", "\\u202e") in Shown(page).texts
 
 
+@pytest.mark.long
 def test_every_link_leads_to_a_page_of_this_site(looked: Looked) -> None:
     links = {link for address in every_address(looked) for link in Shown(looked.text(address)).links}
     assert len(links) > 40

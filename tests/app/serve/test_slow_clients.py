@@ -100,6 +100,7 @@ def test_while_forty_are_slow_another_is_served_at_once(host: Host, kind: str) -
             time.sleep(0.1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", SLOW)
 def test_one_at_the_same_address_takes_the_place_of_the_slowest(host: Host, kind: str) -> None:
     """As behind a proxy, where all have one address."""
@@ -131,6 +132,7 @@ def gone(line: socket.socket) -> bool:
         return True
 
 
+@pytest.mark.long
 def test_no_more_are_open_than_there_is_room_for_however_many_addresses_ask(
     host: Host, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -141,6 +141,7 @@ def cloud(folder: Path) -> tuple[Path, Floats]:
     return folder / "cloud.csv", true
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("named", ["hymarc", "hymarc/", "hymarc/results.json", "hymarc.json"])
 def test_a_calibration_is_read_back_to_compensate_a_cloud(tmp_path: Path, calibrated: Path, named: str) -> None:
     folder = job(tmp_path / "use", f'digitizer = {{ calibration = "{named}" }}')

@@ -34,6 +34,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(which: int) -> None:
     assert np.all(u > 1)
 
 
+@pytest.mark.long
 def test_noise_is_found_where_set_ups_in_doubt_outnumber_the_observations() -> None:
     """Six points in each of three attitudes, 21 parameters: what 9 µm of noise leave, by the residuals' own scatter."""
     case = cases()[1]

@@ -87,6 +87,7 @@ def test_points_missing_in_a_placing_cost_little() -> None:
     assert np.all(np.abs(away[u > 1e-7]) < 5 * u[u > 1e-7])
 
 
+@pytest.mark.long
 def test_an_artefact_turned_a_little_sideways_reads_shorter_by_its_cosine() -> None:
     """2 mrad: 440 mm shorten by 0.88 µm in that placing alone; the other coordinates tell."""
     points = read(lambda x: 0 * x, PITCH_20, (0.0, 20.0))
@@ -137,6 +138,7 @@ def test_repeats_tell_the_repeatability_apart_from_the_drift() -> None:
     assert scatters[1].sigma > 2 * NOISE
 
 
+@pytest.mark.long
 def test_without_a_known_length_and_shift_the_curve_is_zero_at_both_ends() -> None:
     points = read(bent, PITCH_20, (0.0, 20.0), NOISE, 3)
     estimate = estimate_curve(shifted_series(points, "x", np.array([0.0, 20.0]), 0.5))

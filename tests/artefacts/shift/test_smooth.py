@@ -26,6 +26,7 @@ def test_the_density_is_that_of_scipys_normal_distribution(way: SmoothMarginal) 
     np.testing.assert_allclose(way.log_likelihood(SD, GROWTH, SIGMA), expected, rtol=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("way", WAYS)
 def test_draws_have_the_mean_and_covariance_of_the_conditional(way: SmoothMarginal) -> None:
     """By the formula for partitioned normal vectors (Rasmussen & Williams 2006, A.6); 200 000 draws, five of their errors."""

@@ -48,6 +48,7 @@ def test_what_goes_beyond_a_limit_is_refused_with_its_line(within: str, beyond: 
         cells(beyond)
 
 
+@pytest.mark.long
 def test_rows_and_cells_are_counted_while_they_are_read() -> None:
     three = Limit(3, "rows", "test", "it is one")
     assert len(cells("a\n1\n2\n3\n", three).rows) == 3
@@ -114,6 +115,7 @@ def test_a_cell_is_read_exactly_as_the_grammar_says(cell: str) -> None:
         assert numbers(["1", cell], place)[1] == float(expected)
 
 
+@pytest.mark.long
 @given(st.lists(WRITTEN, max_size=30))
 def test_a_column_is_read_as_its_cells_are(cells: list[str]) -> None:
     bad = [i for i, cell in enumerate(cells) if meant(cell) is None]

@@ -61,6 +61,7 @@ def test_no_sentence_begins_or_ends_with_a_blank_that_a_translator_would_lose() 
     assert [pattern for key in wanted_sentences() for pattern in key if pattern != pattern.strip()] == []
 
 
+@pytest.mark.long
 def test_every_plural_has_both_forms_where_it_is_called() -> None:
     """Else each form would be an entry by itself, without the forms that a language has for it."""
     trees = [(path.name, ast.parse(path.read_text(encoding="utf-8"))) for path in sorted(PACKAGE.rglob("*.py"))]

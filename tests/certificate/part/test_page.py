@@ -165,6 +165,7 @@ def test_angles_are_stated_in_degrees_and_seconds(every_kind: PartMeasurement) -
     assert agrees(angles.rows[0][5].split(" to ")[0], np.degrees(one.interval[0]))
 
 
+@pytest.mark.long
 def test_of_a_planned_measurement_only_its_uncertainty_is_stated(planned: PartMeasurement) -> None:
     document = page(planned)
     (table,) = tables(document, "Results")
@@ -437,6 +438,7 @@ def test_nothing_runs_into_anything_on_a_screen_or_a_phone(
         opened.close()
 
 
+@pytest.mark.long
 def test_the_pdf_is_made_of_the_same(every_kind: PartMeasurement) -> None:
     import io
 

@@ -111,6 +111,7 @@ def test_the_signature_stands_where_the_schema_of_the_dcc_has_it() -> None:
     assert [one.get("ref") for one in sequence.iterchildren(f"{xs}element")][-1] == "ds:Signature"
 
 
+@pytest.mark.long
 @settings(max_examples=40)
 @given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
 def test_one_altered_bit_is_found_or_changes_nothing(signed: bytes, trust: Trust, place: float, bit: int) -> None:

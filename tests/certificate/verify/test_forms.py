@@ -53,6 +53,7 @@ def test_a_certificate_is_verified_in_any_choice_of_its_forms(certificate: Path,
     assert any("no electronic signature" in note for note in found.inquiry.notes)
 
 
+@pytest.mark.long
 def test_computed_again_from_the_file_alone_everything_is_the_same(made: Path) -> None:
     """The only test that computes: what is in the PDF gives the PDF to the byte."""
     found = verify([made])
@@ -136,6 +137,7 @@ def test_a_pdf_written_anew_is_not_the_file_that_was_made(certificate: Path, aga
     assert "written anew" in told(checked(certificate, again))
 
 
+@pytest.mark.long
 def test_a_missing_and_a_further_attachment_are_named(certificate: Path, again: Again) -> None:
     def change(pdf: pikepdf.Pdf) -> None:
         del pdf.attachments["ballbar.csv"]
@@ -154,6 +156,7 @@ def test_a_folder_whose_manifest_has_other_hashes_is_named(made: Path, tmp_path:
     assert "whose hash manifest.json has" in told(checked(folder, again))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("change", "where"), [
     (lambda data: data["files"]["results.json"].update(bytes=1), "files.results.json"),
     (lambda data: data["files"]["results.json"].update(U="0.1 µm"), "files.results.json"),

@@ -48,12 +48,14 @@ def inquiry(folder: Path, again: Again, trust: list[Path] | None) -> Inquiry:
     return verify([folder], trust=trust, compute=lambda given, job: again).inquiry
 
 
+@pytest.mark.long
 def test_a_signed_certificate_is_verified(signed: Path, again: Again, trusted: list[Path]) -> None:
     found = inquiry(signed, again, trusted)
     assert found.word == "VERIFIED", found.findings + found.unchecked
     assert sum("by A. Huber, on 2026-03-02 09:30 UTC" in note for note in found.notes) == 2
 
 
+@pytest.mark.long
 def test_without_an_anchor_it_is_said_that_nobody_is_known(signed: Path, again: Again) -> None:
     found = inquiry(signed, again, None)
     assert found.word == "NOT WHOLLY CHECKED"
@@ -81,6 +83,7 @@ def test_a_signature_of_the_future_is_neither_verified_nor_altered(
     assert early == [f"when {path.name} was signed" for path in (pdf, xml) if word != "VERIFIED"]
 
 
+@pytest.mark.long
 def test_a_stripped_signature_is_missed(signed: Path, made: Path, again: Again, trusted: list[Path]) -> None:
     """The PDF as it was before it was signed is sound in itself."""
     (signed / "certificate.pdf").write_bytes((made / "certificate.pdf").read_bytes())
@@ -88,6 +91,7 @@ def test_a_stripped_signature_is_missed(signed: Path, made: Path, again: Again, 
     assert [one.problem for one in found.findings] == ["carries no signature, and --trust asks for one"]
 
 
+@pytest.mark.long
 def test_a_signature_of_somebody_else_is_named(certificate: Path, again: Again, trusted: list[Path]) -> None:
     pdf = certificate / "certificate.pdf"
     pdf.write_bytes(
@@ -123,6 +127,7 @@ def test_without_what_signatures_need_all_else_is_checked(
     assert found.done["figures"] > 10
 
 
+@pytest.mark.long
 def test_a_byte_of_what_was_signed_breaks_the_signature(signed: Path, again: Again, trusted: list[Path]) -> None:
     spoil(signed / "certificate.pdf", lambda content: content.replace(b"/Creator", b"/Creatoe", 1))
     assert "signature 1" in "\n".join(one.place for one in inquiry(signed, again, trusted).findings)
@@ -192,6 +197,7 @@ def test_the_digital_certificate_is_held_to_the_schema_where_one_is_given(made: 
     assert found.word == "VERIFIED", told_of(found)
 
 
+@pytest.mark.long
 def test_a_folder_without_schemas_is_refused(made: Path, again: Again, tmp_path: Path) -> None:
     with pytest.raises(CmmUqError, match="no schema of DCC"):
         verify([made], schema=tmp_path, compute=lambda given, job: again)

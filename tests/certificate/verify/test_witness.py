@@ -162,6 +162,7 @@ def test_computed_again_from_the_head_that_it_states_it_is_the_same_to_the_byte(
     assert any(note.startswith(stated) for note in found.notes)
 
 
+@pytest.mark.long
 def test_records_that_were_rewritten_are_found_by_number_and_both_hashes(laboratory: Path) -> None:
     before = entries(laboratory / PLACE)[1]
     rewritten(laboratory / PLACE, by_another)
@@ -173,6 +174,7 @@ def test_records_that_were_rewritten_are_found_by_number_and_both_hashes(laborat
         assert f"that entry has the hash {now.hash}: they were rewritten, though they have the certificate" in problem
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("witness", ["certificate.pdf", "certificate.xml", "results.json", "."])
 def test_every_certificate_in_other_hands_is_a_witness(witness: str, laboratory: Path, tmp_path: Path) -> None:
     customer = shutil.copytree(laboratory / "reports" / "second", tmp_path / "customer") / witness
@@ -335,6 +337,7 @@ def now() -> dt.datetime:
     return dt.datetime.now(dt.UTC).replace(microsecond=0)
 
 
+@pytest.mark.long
 def test_a_signature_lies_between_the_entry_that_it_names_and_the_one_that_has_it(laboratory: Path) -> None:
     with open_records(laboratory / PLACE) as records:
         records.append("sent", {"key": "another's"})

@@ -62,6 +62,7 @@ def off_and_outward(
     return off + (np.abs(height) if kind == "circle" else 0), np.einsum("ni,ni->n", normals, out) / size
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kind", "keys", "strategy", "count"), PATTERNS)
 @given(w=directions, place=places)
 def test_points_lie_on_their_surface_wherever_it_is(

@@ -280,6 +280,7 @@ def test_a_recording_without_times_is_not_joined(job: Path) -> None:
         read_job(naming(job))
 
 
+@pytest.mark.long
 def test_a_plan_needs_no_log_yet(job: Path, tmp_path: Path) -> None:
     naming(job)
     (job / "ballbar.csv").unlink()

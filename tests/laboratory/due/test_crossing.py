@@ -29,6 +29,7 @@ def test_from_a_known_state_the_day_is_that_of_a_wiener_process_with_drift(rate:
     assert np.abs(found.probability[1:] - exact).max() < 3 * 0.5 / np.sqrt(2048)  # three standard errors of 2048 paths
 
 
+@pytest.mark.long
 def test_between_two_limits_with_steps_and_an_uncertain_state_it_is_that_of_paths_walked_day_by_day() -> None:
     of, prior = machine([0, 1, 2], [0.0, 1.2, 1.9], 0.6, 0.3), one_node(rate=0.5, rate_sd=0.8)
     found = crossing(of, 5.0, prior)

@@ -70,6 +70,7 @@ def test_an_untouched_chain_is_sound(whole: Path) -> None:
 COLUMNS = ("number", "at", "kind", "content", "previous", "hash")
 
 
+@pytest.mark.long
 @settings(max_examples=25, deadline=None)
 @given(data=st.data())
 def test_any_entry_altered_in_any_part_is_found(
@@ -88,6 +89,7 @@ def test_any_entry_altered_in_any_part_is_found(
     assert ("chain", number) in findings(path)
 
 
+@pytest.mark.long
 @settings(max_examples=15, deadline=None)
 @given(numbers=st.sets(st.integers(1, 30), min_size=1, max_size=4))
 def test_entries_deleted_before_the_last_are_found(

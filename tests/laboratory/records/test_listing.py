@@ -67,6 +67,7 @@ def every(place: Path) -> Iterator[tuple[Records, list[RecordedCertificate], dic
         yield records, found, {one.serial: one.name for one in records.machines()}
 
 
+@pytest.mark.long
 @given(choice=CHOICES, most=st.integers(1, 7), left_out=st.integers(0, 9))
 def test_a_page_has_what_fits_newest_first(
     every: tuple[Records, list[RecordedCertificate], dict[str, str]], choice: CertificateFilter, most: int, left_out: int

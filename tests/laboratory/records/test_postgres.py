@@ -63,6 +63,7 @@ def test_a_server_keeps_the_same_entries_and_answers_the_same_as_a_file(url: str
         assert server.verify(server.head()[1], files=False) == []
 
 
+@pytest.mark.long
 def test_the_server_refuses_to_change_entries_and_what_was_changed_is_found(url: str) -> None:
     with open_records(url, create=True) as records:
         records.append_all(history(2, 2))
@@ -139,6 +140,7 @@ def test_a_certificate_is_a_witness_of_a_server_that_was_rewritten_or_is_shorter
         assert records.heads("report", "any").now == ChainHead(0, BEGINNING, None)
 
 
+@pytest.mark.long
 def test_writers_at_the_same_time_make_one_chain(url: str) -> None:
     def write(who: int) -> None:
         with open_records(url, create=True) as records:
@@ -187,6 +189,7 @@ def test_an_older_version_on_a_server_is_migrated(url: str) -> None:
         assert records.verify(files=False) == []
 
 
+@pytest.mark.long
 def test_a_report_whose_server_goes_away_is_recorded_when_it_is_back(url: str, tmp_path: Path) -> None:
     """The server ends all connections after the files were announced; the next opening finds them in place, or back."""
     folder = tmp_path / "k-1"

@@ -122,6 +122,7 @@ def test_portions_are_a_hundred_jobs_and_shrink_towards_the_end() -> None:
     assert len(next(_chunks(((i, b"x" * 3 * 2**20) for i in range(100)), 100, 1))) == 3
 
 
+@pytest.mark.long
 def test_a_cluster_that_loses_its_workers_is_said(local: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "LOOK_S", 0.2)
     monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)

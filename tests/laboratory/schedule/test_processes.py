@@ -49,6 +49,7 @@ def test_a_task_that_ends_every_process_is_given_up_and_the_others_go_on() -> No
     assert found[1].value["square"] == 1
 
 
+@pytest.mark.long
 def test_a_task_that_hangs_is_stopped_at_its_limit_and_not_tried_again() -> None:
     began = time.monotonic()
     found = answered({0: "hang", 1: None}, 1, seconds=1.0)

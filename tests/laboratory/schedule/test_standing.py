@@ -174,6 +174,7 @@ def test_what_cannot_be_remembered_at_first_is_in_the_exit_code_all_the_same(
     assert jobs.channel.titles == ["fail: CMM 3 (job a)"]
 
 
+@pytest.mark.long
 def test_a_clock_400_days_ahead_for_one_run_and_right_again_hides_nothing(jobs: Jobs) -> None:
     """What became due by the wrong clock was told then; it is told again, and sent again, when it truly is."""
     due = dt.date(2027, 1, 15)

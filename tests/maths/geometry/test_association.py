@@ -199,6 +199,7 @@ def test_a_tangent_line_touches_outside():
 KINDS = st.sampled_from(["line", "plane", "circle", "sphere", "cylinder"])
 
 
+@pytest.mark.long
 @settings(max_examples=12)
 @given(kind=KINDS, seed=st.integers(0, 10_000), scale=st.sampled_from([1e-2, 1.0, 50.0]))
 def test_turned_carried_mixed_and_scaled_points_have_the_same_zone(kind, seed, scale):
@@ -216,6 +217,7 @@ def test_turned_carried_mixed_and_scaled_points_have_the_same_zone(kind, seed, s
         assert other.size == pytest.approx(scale * one.size, abs=1e-9)
 
 
+@pytest.mark.long
 @settings(max_examples=8)
 @given(kind=st.sampled_from(ROUND), seed=st.integers(0, 10_000))
 def test_the_inscribed_lies_inside_and_the_circumscribed_about_the_zone(kind, seed):

@@ -115,6 +115,7 @@ def shaped(x: Floats, nodes: Floats) -> Shaped:
     return Shaped((1, 2), nodes, np.stack([wave(x, period) for period in nodes]))
 
 
+@pytest.mark.long
 def test_the_marginal_of_a_period_is_that_of_direct_integration() -> None:
     """Mean and standard deviation against sums over the grid of exact Gaussian evidences, to 4 sampling errors."""
     random = np.random.default_rng(1)

@@ -86,6 +86,7 @@ def test_the_density_is_that_of_the_model_written_out() -> None:
     np.testing.assert_allclose(found - found[0], np.array(expected) - expected[0], rtol=1e-10)
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_draws_and_another_seed_others() -> None:
     model = linear(3, 12, None)
     first, again, other = (sample(model, seed) for seed in (1, 1, 2))

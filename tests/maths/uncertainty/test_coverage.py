@@ -39,6 +39,7 @@ def by_definition(draws: np.ndarray, p: float) -> list[float]:
     return [y[shortest], y[shortest + q], y[r], y[r + q]]
 
 
+@pytest.mark.long
 @given(draws=st.lists(st.floats(-1e3, 1e3), min_size=100, max_size=150), p=st.sampled_from([0.5, 0.68, 0.8, 0.9, 0.95]))
 def test_both_intervals_are_those_of_the_definition(draws: list[float], p: float) -> None:
     assert both_intervals(np.sort(draws), p).tolist() == by_definition(np.array(draws), p)

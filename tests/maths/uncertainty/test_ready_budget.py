@@ -160,6 +160,7 @@ def test_a_ballbar_s_lines_enter_by_its_direction(tmp_path: Path) -> None:
     assert mean_u * 1e3 == pytest.approx(np.sqrt(scatter / 20 + limits + square + warm), rel=1e-9)
 
 
+@pytest.mark.long
 def test_a_sphere_has_the_scatter_of_repeated_fits_and_the_form_of_its_ball(tmp_path: Path) -> None:
     """Second method: 300 fits of a cap with 9 µm of noise know u to 4 %; form along the line of sight 1.2 µm (docs)."""
     random, directions = np.random.default_rng(7), cap_directions(np.radians(85.0), 4000)

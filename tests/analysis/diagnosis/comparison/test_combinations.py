@@ -143,6 +143,7 @@ def test_one_in_the_place_of_another_is_not_in_that_of_a_third_that_is_merely_le
     assert found.instead(both, 1) == {}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [2, 5, 7])
 def test_as_many_effects_are_found_as_act(count: int) -> None:
     """More than four are looked for where four are the most probable; where fewer are, nothing is otherwise than before."""

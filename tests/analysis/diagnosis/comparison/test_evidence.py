@@ -317,6 +317,7 @@ def test_noise_of_a_shape_has_its_covariance() -> None:
     assert np.cov(drawn) == pytest.approx(wanted, abs=5 * np.sqrt(2 / 40_000) * wanted.max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("slow", [0.0, 6.0])
 def test_the_shapes_that_are_kept_stand_for_all(slow: float) -> None:
     """Evidence for a rival, with set-up offsets or slow noise in the data: of what is kept, and of all that were drawn."""

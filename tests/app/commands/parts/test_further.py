@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 
+import pytest
+
 from cmm_uq.app.commands.parts.drift import further_of
 from cmm_uq.app.commands.planning import make_plan
 from cmm_uq.app.commands.reading import job_of, read_job
@@ -39,6 +41,7 @@ def planned() -> tuple[FurtherSetUps, Mapping[str, bytes]]:
     return further, files
 
 
+@pytest.mark.long
 def test_errors_of_the_machine_are_told_by_their_largest_share() -> None:
     assert planned()[0].effects == ("rotation_x_y", "periodic_scale_x")
 

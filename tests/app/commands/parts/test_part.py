@@ -87,6 +87,7 @@ def test_chain_travel_and_place_are_the_certificates_where_the_job_leaves_them_o
     np.testing.assert_allclose((read.min(axis=0) + read.max(axis=0)) / 2, [450, 600, -300], atol=0.5)
 
 
+@pytest.mark.long
 def test_a_machines_job_states_the_same_as_its_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Draws of one posterior, of which a file has some in single precision: means and spreads agree to a few of a hundred."""
     monkeypatch.setattr("cmm_uq.app.commands.parts.machine._given", lambda state, job, seed: (state, say(""), False))

@@ -124,6 +124,7 @@ class Counting(Speaker):
         return f"{self.readings[0]:.0f}\n".encode()
 
 
+@pytest.mark.long
 def test_at_a_hundred_readings_a_second_none_is_lost_or_twice(tmp_path: Path) -> None:
     with (
         UnreliableLine(Counting(), "pty", tmp_path) as line,
@@ -300,6 +301,7 @@ class Begun(Generous):
         return b"88\r\n" + super().answer(command) if self.number == 2 else super().answer(command)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("within_s", "told", "raw"), [
     (3.0, "it began before the question", b"T=888\r\n"), (0.3, "it may be the rest of the message before", b"88\r\n"),
 ])  # fmt: skip
@@ -317,6 +319,7 @@ def test_a_value_that_began_before_the_question_is_none_of_its_answers(
         assert [one.values["temp_c"] for one in heard.good()[:4]] == [1, 2, 3, 4]
 
 
+@pytest.mark.long
 def test_an_answer_that_may_be_that_of_several_questions_is_no_value_and_it_is_asked_anew(tmp_path: Path) -> None:
     with UnreliableLine(Generous(), "pty", tmp_path) as line, listening(opened(asked_profile(), line.port)) as heard:
         heard.until(lambda one: len(one.good()) >= 2)
@@ -339,6 +342,7 @@ class Streaming(Generous):
         return b"T=999\r\n"
 
 
+@pytest.mark.long
 def test_what_streams_is_no_answer_and_it_is_said_that_nothing_can_be_asked(tmp_path: Path) -> None:
     with UnreliableLine(Streaming(), "pty", tmp_path) as line, listening(opened(asked_profile(), line.port)) as heard:
         heard.until(lambda one: one.of(Gap) and len(unasked(one)) >= 20)

@@ -33,6 +33,7 @@ EXPLODES = [
 """Each takes a time that grows faster than its text: exponentially, or with a power of it."""
 
 
+@pytest.mark.long(but="a")
 @pytest.mark.parametrize("pattern", EXPLODES)
 def test_what_grows_faster_than_the_text_is_refused_however_it_is_used(pattern: str) -> None:
     for use in ("fullmatch", "search"):

@@ -57,6 +57,7 @@ def test_there_is_a_simulated_instrument_for_every_profile_of_messages() -> None
     assert set(SPEAKERS) == {name for name in ready() if profile_named(name).protocol == "messages"}
 
 
+@pytest.mark.long(but="a")
 @pytest.mark.parametrize(("name", "way"), EACH)
 def test_values_are_what_the_instrument_measures_and_raw_is_what_it_sent(name: str, way: Way, tmp_path: Path) -> None:
     speaker = SPEAKERS[name]()
@@ -111,6 +112,7 @@ NUMBERS = st.decimals(-999, 999, places=2, allow_nan=False).map(str)
 WORDS = st.sampled_from(["T=", " mm;", "(", ") [", " ' ", "*.", "CH", " %", ",", "<STX>"])
 
 
+@pytest.mark.long
 @given(parts=st.lists(st.tuples(WORDS, NUMBERS), min_size=1, max_size=5))
 def test_any_line_of_words_and_numbers_makes_a_profile_that_reads_it(parts: list[tuple[str, str]]) -> None:
     line = "".join(word + " " + number for word, number in parts) + "<CR><LF>"
