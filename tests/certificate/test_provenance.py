@@ -5,9 +5,10 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
+import re
 import tomllib
 from collections import defaultdict
-from importlib.metadata import version
+from importlib.metadata import distributions, version
 from pathlib import Path
 
 import pytest
@@ -93,14 +94,15 @@ def test_the_platform_names_the_kernels_that_decide_over_last_bits_and_no_machin
     assert told["blas"]
 
 
-def installed(monkeypatch: pytest.MonkeyPatch, **packages: str) -> dict[str, str]:
+def installed(monkeypatch: pytest.MonkeyPatch, folder: Path, **packages: str) -> dict[str, str]:
     """What is said of an environment with these packages."""
-
-    class Installed:
-        def __init__(self, name: str, version: str) -> None:
-            self.name, self.version = name, version
-
-    monkeypatch.setattr(installation, "distributions", lambda: [Installed(*one) for one in packages.items()])
+    for name, number in packages.items():
+        head = f"Metadata-Version: 2.4\nName: {name}\nVersion: {number}\r\nSummary: Name: none\n\nName: other\nVersion: 0\n"
+        place = folder / f"{name}-{number}.dist-info"
+        place.mkdir(parents=True)
+        (place / "METADATA").write_text(head, newline="")
+    (folder / "broken-1.dist-info").mkdir()
+    monkeypatch.setattr(installation, "distributions", lambda: distributions(path=[str(folder)]))
     return installation.environment.__wrapped__()
 
 
@@ -110,13 +112,18 @@ def test_an_environment_of_the_lock_is_named_by_its_hash_and_any_other_by_its_pa
     lock = (ROOT / "pylock.toml").read_bytes()
     packages = {one["name"]: one["version"] for one in tomllib.loads(lock.decode())["packages"] if "version" in one}
     by_lock = {"lock": "pylock.toml", "sha256": hashlib.sha256(lock).hexdigest()}
-    assert installed(monkeypatch, **packages, pip="1", **{"cmm-uq": "9"}) == by_lock
-    assert installed(monkeypatch, numpy=packages["numpy"], Jinja2=packages["jinja2"]) == by_lock
+    assert installed(monkeypatch, tmp_path / "a", **packages, pip="1", **{"cmm-uq": "9"}) == by_lock
+    assert installed(monkeypatch, tmp_path / "b", numpy=packages["numpy"], Jinja2=packages["jinja2"]) == by_lock
     listed = "jinja2==0.1 numpy==1.0"
     other = {"packages": listed, "sha256": hashlib.sha256(listed.encode()).hexdigest()}
-    assert installed(monkeypatch, numpy="1.0", Jinja2="0.1") == other
+    assert installed(monkeypatch, tmp_path / "c", numpy="1.0", Jinja2="0.1") == other
+    monkeypatch.undo()
+    here = {re.sub(r"[-_.]+", "-", one.metadata["Name"]).lower(): one.version for one in distributions()}
     monkeypatch.setattr(installation, "LOCK", tmp_path / "pylock.toml")
-    assert "lock" not in installed(monkeypatch, **packages)
+    assert installation.environment.__wrapped__()["packages"] == " ".join(
+        f"{name}=={here[name]}" for name in sorted(here)
+    )
+    assert "lock" not in installed(monkeypatch, tmp_path / "d", **packages)
 
 
 CLOCKS = {
