@@ -28,6 +28,7 @@ from benchmarks.parts.known_noise import joint_posterior
 from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, as_points, joined, plan
 from cmm_uq.analysis.machine.conditional import given_recording
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, unmodelled_errors, with_curves
+from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.evaluation import Evaluator, Known
 from cmm_uq.analysis.parts.plan import PartPose
@@ -35,6 +36,7 @@ from cmm_uq.analysis.parts.result import evaluated, stated
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
+from cmm_uq.base.points import Machine
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
@@ -150,16 +152,19 @@ def _measured(cell: Cell, random: np.random.Generator, made: Made) -> dict[str, 
 
 
 def on_machine(
-    cell: Cell, hidden: truth.Truth, random: np.random.Generator, made: Made, sigma: float
+    cell: Cell, hidden: truth.Truth, random: np.random.Generator, made: Made, sigma: float, machine: Machine = MACHINE
 ) -> dict[str, Any]:
-    """A machine with a hidden truth, calibrated, corrected, measuring the part; ``sigma``: its noise, mm."""
+    """A machine with a hidden truth, calibrated, corrected, measuring the part.
+
+    ``sigma``: its noise, mm. ``machine``: as it is known, its axes read as is stated.
+    """
     unmodelled = tuple(one for one in UNMODELLED if made.periods or not one.effect.name.startswith("periodic"))
     offset = sigma * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
     model = RecordingModel(calibrated(cell, hidden, sigma, offset, random), NAMED)
     given = sigma if cell.noise == "stated" else None
     _, mean, _ = joint_posterior(model, (), sigma)
-    certificate = with_curves(MachineState(MACHINE, NAMED, mean[None], StatedNoise(np.full(3, sigma)),
-                                           unmodelled=unmodelled, corrections=mean))  # fmt: skip
+    certificate = with_curves(MachineState(machine, NAMED, mean[None], StatedNoise(np.full(3, sigma)),
+                                           unmodelled=with_readings(unmodelled, machine), corrections=mean))  # fmt: skip
     state = given_recording(certificate, model, given, TRIALS, int(random.integers(2**31)))
     growth = (PART.cte_per_k + PART.u_cte_per_k * random.standard_normal()) * (
         PART.temperature_c - 20 + PART.u_temperature_k * random.standard_normal()
@@ -180,7 +185,13 @@ def on_machine(
     simulated = simulate(Source(virtual.names, lambda _, n: np.ascontiguousarray(errors[:n].T)), TRIALS)
     rows = {one.name: [true[one.name], one.value, one.u, *one.interval]
             for one in stated(simulated, evaluated(plan(), points), plan(), errors)}  # fmt: skip
-    return {"intervals": rows, "sigma_um": round(1e3 * sigma, 3), "offset_um": round(1e3 * offset, 3)}
+    denied = [one.axis for one in state.statements if one.denied]
+    return {
+        "intervals": rows,
+        **({"denied": denied} if machine.read_by else {}),
+        "sigma_um": round(1e3 * sigma, 3),
+        "offset_um": round(1e3 * offset, 3),
+    }
 
 
 GROUPS = {"all": ("",), "bars": ("bars, ",), "free bars": ("free bars, ",), "step gauge": ("step gauge, ",),

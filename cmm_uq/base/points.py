@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,8 @@ class Machine:
     # as job files have it, where the other levers are so much longer
     tip_on_every_carriage: bool = False
     axes: tuple[str, ...] = tuple(AXES)  # names of the axes that are read
+    # by axis, how it is read, as somebody states it: ``AxisFacts`` of a job
+    read_by: Mapping[str, Any] = field(default_factory=dict)
 
     def coordinates(self, readings: Floats) -> Floats:
         """Recorded coordinates (n, 3), mm, of scale readings (n, axes)."""

@@ -31,7 +31,7 @@ from cmm_uq.jobs.source import FilesInFolder, FilesInMemory, JobFiles, check_dis
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.tables.conformity import ClausesForm, ConformityFacts, Standards, needed, uncertainty_missing
 from cmm_uq.jobs.tables.identification import REPLACED, altered, check_examples, check_mark, is_planned
-from cmm_uq.jobs.tables.machine import MachineFacts
+from cmm_uq.jobs.tables.machine import MachineFacts, stated_axes
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.recording.certified import CertifiedValues
@@ -331,4 +331,5 @@ def _no_points(machine: Machine) -> Points:
 def _machine(facts: MachineFacts) -> Machine:
     travel = np.array([getattr(facts.travel_mm, axis) or [np.nan, np.nan] for axis in AXES], dtype=np.float64)
     axes = tuple(axis for axis in AXES if axis.upper() in facts.chain)
-    return Machine(facts.name, facts.chain, travel, np.array(facts.origin_mm, dtype=np.float64), axes=axes)
+    origin = np.array(facts.origin_mm, dtype=np.float64)
+    return Machine(facts.name, facts.chain, travel, origin, axes=axes, read_by=stated_axes(facts.axes))

@@ -7,6 +7,11 @@ random field: each error of a size that its family has, the families' sizes and 
 recording says; what the machine corrects stays what its certificate states. What the recording does not see of a family keeps
 the size that the family is seen to have; of a family that it does not see at all, what physics allows.
 
+How an axis is stated to be read is taken as it is stated, unless the recording denies it. All sizes integrated out, the
+observations have the density p as stated, and pₐ with nothing stated of the axis a; where pₐ/p is beyond 20, what is stated of
+the axis is not used. Of correct statements one in twenty is denied at most (Markov's inequality: pₐ/p has the mean one). So
+are those of all axes together. What is denied most goes first, and the others are looked at anew without it.
+
 How far figures rest on what was taken to be known beforehand: sizes of families are half-normal then. With that prior half as
 wide, or twice, every draw of a machine has another weight, p′(s)/p(s), so that means and variances of what the machine does
 follow without drawing anew. Where such weights have no finite variance, as those of a family that the recording does not show
@@ -17,20 +22,20 @@ theirs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.analysis.machine.state import MachineState, StatedNoise, Unmodelled
+from cmm_uq.analysis.machine.state import AxisStatement, MachineState, StatedNoise, Unmodelled
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.machine.model.field import GivenPeriod, covariance, family_of, linear
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import growing_lengths, noise_of
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import PeriodicScale
-from cmm_uq.maths.inference.families import HELD, FieldErrors, FieldModel, sample_sizes
+from cmm_uq.maths.inference.families import HELD, FieldErrors, FieldModel, log_evidence, sample_sizes
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import sample_with_noise
 
@@ -139,7 +144,8 @@ def _duration(model: RecordingModel) -> float:
     return max(float(np.ptp(seconds)), 1e-9)
 
 
-DRAWS = 10_000
+DRAWS, _EVIDENCE_SEED = 10_000, 43
+_MOST_LOG = 700.0  # of a number that is not infinite
 # ratio of the 95 % to the 5 % quantile of the noise from which on the recording does not tell it from errors left out
 _UNTOLD = 100.0
 
@@ -160,8 +166,10 @@ def given_recording(
     ``model``: of the calibration, without the observations that its certificate set aside. ``sigma_mm``: standard deviation
     of one recorded coordinate, where the noise is known and white; else it is sampled.
     """
-    whole, random = RecordedField.of(model, state.unmodelled), np.random.default_rng(seed)
     known = None if sigma_mm is None else white(sigma_mm)
+    others, statements = as_recorded_allows(model, state.unmodelled, known)
+    state = replace(state, unmodelled=others, statements=statements)
+    whole, random = RecordedField.of(model, state.unmodelled), np.random.default_rng(seed)
     noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
     sizes = sample_sizes(whole.field, draws, seed, known)
     if known is None:
@@ -217,6 +225,45 @@ def _shares(state: MachineState, scales: Mapping[str, Floats] | None = None) -> 
             each = np.array([effect.share(own) ** 2, size])
         squares[effect.name] = squares.get(effect.name, np.zeros(2)) + each
     return {name: float(np.sqrt(left / prior)) if prior else 0.0 for name, (left, prior) in squares.items()}
+
+
+def as_recorded_allows(
+    model: RecordingModel, others: Sequence[Unmodelled], known: Sizes | None = None
+) -> tuple[tuple[Unmodelled, ...], tuple[AxisStatement, ...]]:
+    """Errors that were not modelled, without what the recording denies of what is stated of them; and what it says of each.
+
+    ``known``: sizes of the noise, one draw, where these are not to be found.
+    """
+    held, found = tuple(others), dict[str, AxisStatement]()
+    recorded = model.artefact.points.columns
+    every = dict.fromkeys(_axis(one) for one in held if one.unstated)
+    seen = {_axis(one) for one in held if one.unstated and all(name in recorded for name in one.effect.columns)}
+    while left := [axis for axis in AXES if axis in seen and not (axis in found and found[axis].denied)]:
+        alone, sets = _evidence(model, held, known), [(axis,) for axis in left] + [tuple(left)] * (len(left) > 1)
+        logs = {some: _evidence(model, _without(held, some), known) - alone for some in sets}
+        found |= {
+            some[0]: AxisStatement(some[0], float(np.exp(min(logs[some], _MOST_LOG))))
+            for some in sets
+            if len(some) == 1
+        }
+        worst = max(sets, key=lambda some: logs[some])
+        denied = {axis: AxisStatement(axis, float(np.exp(min(logs[worst], _MOST_LOG)))) for axis in worst}
+        if not any(one.denied for one in denied.values()):
+            break
+        held, found = _without(held, worst), found | denied
+    return held, tuple(found.get(axis, AxisStatement(axis, np.nan)) for axis in AXES if axis in every)
+
+
+def _axis(one: Unmodelled) -> str:
+    return str(getattr(one.effect, "axis", ""))
+
+
+def _without(others: Iterable[Unmodelled], axes: Collection[str]) -> tuple[Unmodelled, ...]:
+    return tuple(one.unstated if one.unstated is not None and _axis(one) in axes else one for one in others)
+
+
+def _evidence(model: RecordingModel, others: Sequence[Unmodelled], known: Sizes | None) -> float:
+    return log_evidence(RecordedField.of(model, others).field, _EVIDENCE_SEED, known)
 
 
 ALL = "all"

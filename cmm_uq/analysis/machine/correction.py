@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from cmm_uq.analysis.diagnosis.held_out import FOLDS, held_out_groups, predicted
 from cmm_uq.analysis.machine.conditional import RecordedField
-from cmm_uq.analysis.machine.regions import DrawnErrors, Key, columns_of, disagreeing, doubted_draws, other_errors
-from cmm_uq.analysis.machine.state import of_machine
+from cmm_uq.analysis.machine.regions import DrawnErrors, Key, columns_of, disagreeing, doubted_draws
+from cmm_uq.analysis.machine.state import AxisStatement, of_machine
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import AXES, Floats, Machine, Points
@@ -61,6 +61,7 @@ class FieldMap:
     range_um: tuple[float, float]
     disagree: tuple[Key, ...]  # named errors of which all errors together say something else of the recorded set-ups
     held_out: HeldOutCorrection | None  # ``None`` where too little is left to make a map without a part of it
+    statements: tuple[AxisStatement, ...]  # what the recording says of what is stated of axes
 
 
 def field_map(model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, observe: Observed, seed: int) -> FieldMap:
@@ -99,7 +100,7 @@ def field_map(model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, ob
     error_map = replace(_filled(blank, figures @ mean), covariance=covariance)
     rms = float(np.sqrt(before) / MICROMETRE), float(np.sqrt(after) / MICROMETRE)
     denied = disagreeing(model, posterior, drawn.recorded(model, posterior))
-    return FieldMap(error_map, _omitted(model, drawn, held), rms, denied, _held_out(drawn.model, seed))
+    return FieldMap(error_map, _omitted(model, drawn, held), rms, denied, _held_out(drawn, seed), drawn.statements)
 
 
 def _of_place(effect: Effect) -> bool:
@@ -107,7 +108,7 @@ def _of_place(effect: Effect) -> bool:
 
 
 def _omitted(model: RecordingModel, drawn: DrawnErrors, held: dict[Effect, Floats]) -> tuple[str, ...]:
-    others = other_errors(model)
+    others = drawn.others
     without = [others[i].effect for i in range(len(others)) if i not in drawn.field.which]
     left = [one for one in drawn.field.effects if one not in held and not isinstance(one, GivenPeriod)]
     own = [one for one in model.effects if of_machine(one) and one not in held]
@@ -205,9 +206,10 @@ def _beside(drawn: DrawnErrors, machine: Machine) -> Floats:
     return np.sqrt(variance)
 
 
-def _held_out(model: RecordingModel, seed: int) -> HeldOutCorrection | None:
+def _held_out(drawn: DrawnErrors, seed: int) -> HeldOutCorrection | None:
     """Of observations that are left out in turn; the errors' sizes, too, are found without them."""
-    others, estimate = other_errors(model), model.estimate()
+    model, others = drawn.model, drawn.others
+    estimate = model.estimate()
     linear, whole = estimate.linear, RecordedField.of(model, others)
     smooth = [one for one in whole.effects if isinstance(one, AxisFunction)]
     seen = [model.seen(model.columns(one, (), estimate.about), estimate.about) for one in smooth]

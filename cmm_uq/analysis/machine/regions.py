@@ -23,8 +23,9 @@ import numpy as np
 from scipy.special import ndtri
 
 from cmm_uq.analysis.diagnosis.held_out import thin_out
-from cmm_uq.analysis.machine.conditional import PriorInfluence, RecordedField, influence_of
-from cmm_uq.analysis.machine.state import Unmodelled, of_machine, unmodelled_errors
+from cmm_uq.analysis.machine.conditional import PriorInfluence, RecordedField, as_recorded_allows, influence_of
+from cmm_uq.analysis.machine.state import AxisStatement, Unmodelled, of_machine, unmodelled_errors
+from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.machine.model.field import ALLOWED, curves, family_of
@@ -61,6 +62,7 @@ class FactorRegions:
     scales: Mapping[str, Floats]  # (N,) sizes of each family, of what physics allows
     influence: tuple[PriorInfluence, ...]  # of other priors on the factors over the measuring range, in their order
     observations: tuple[int, int]  # reckoned with, and of how many
+    statements: tuple[AxisStatement, ...] = ()  # what the recording says of what is stated of axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,16 +74,20 @@ class DrawnErrors:
     sizes: FieldSizes
     own: Floats  # (N, k) of the coefficients of the named effects
     further: Floats  # (N, f) of those of the field's effects
+    others: tuple[Unmodelled, ...]  # errors beside the named ones
+    statements: tuple[AxisStatement, ...]  # what the recording says of what is stated of axes
 
     @classmethod
     def of(cls, model: RecordingModel, observe: Observed, seed: int, draws: int = DRAWS) -> DrawnErrors:
         """Raises ``CmmUqError`` where the machine's travel is not stated, or the recording does not allow it."""
         count, random = int(model.used.sum()), np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(37,)))
         thinned = thin_out(model, observe, seed, _MOST * count // max(_quantities(model), 1))
-        field = RecordedField.of(thinned, other_errors(model))
+        others, statements = as_recorded_allows(thinned, other_errors(model))
+        field = RecordedField.of(thinned, others)
         sizes = sample_sizes(field.field, draws, seed, effort=BRIEF)
         drawn = field.coefficients(sizes.noise, sizes.families, random)
-        return cls(thinned, field, sizes, drawn[:, : field.modelled], drawn[:, field.modelled :])
+        own, further = drawn[:, : field.modelled], drawn[:, field.modelled :]
+        return cls(thinned, field, sizes, own, further, others, statements)
 
     def recorded(self, model: RecordingModel, posterior: NoisyPosterior) -> Floats:
         """Draws (N, k) of the named effects as means over the recorded set-ups, as an estimate of them alone has them."""
@@ -89,8 +95,8 @@ class DrawnErrors:
 
 
 def other_errors(model: RecordingModel) -> list[Unmodelled]:
-    """What a machine may have beside the named errors, curves in place of their simplest forms."""
-    others = unmodelled_errors([one.name for one in model.effects], {})
+    """What a machine may have beside the named errors, as its axes are read; curves in place of their simplest forms."""
+    others = with_readings(unmodelled_errors([one.name for one in model.effects], {}), model.artefact.points.machine)
     return [one for one in others if family_of(one.effect) not in ALLOWED] + [
         Unmodelled(one, np.array([c.prior_sd for c in one.coefficients])) for one in curves()
     ]
@@ -141,6 +147,7 @@ def factor_regions(
         scales,
         influence,
         (int(drawn.model.used.sum()), int(model.used.sum())),
+        drawn.statements,
     )
 
 

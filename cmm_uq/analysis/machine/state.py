@@ -32,6 +32,9 @@ POWER_QUANTILE = 1.6449  # of a normal error one in ten, in size, is larger than
 OTHERWISE = ("artefact", "probe")
 _SURROUNDINGS = "temp_"  # what begins the columns of effects that the temperatures of the part's measurement drive
 _TIMES = 200  # draws of a slow wander of which its covariance is the mean
+# times as probable as what is stated of an axis, beyond which a recording denies it ("strong"), and below which it supports
+# it ("positive": Kass, Raftery 1995, J. Am. Stat. Assoc. 90, 3.2)
+_DENIED, _SUPPORTED = 20.0, 1 / 3
 FREE = 0.5  # share of the prior in a posterior standard deviation from which on the calibration left an error free
 
 
@@ -44,11 +47,31 @@ class Unmodelled:
     # size of its (first) reported parameter that the calibration would have found; ``None`` where it would not have, or does
     # not say
     detected: float | None = None
+    # what it is taken for where how its axis is read is not regarded; ``None`` where nobody states that
+    unstated: Unmodelled | None = None
 
     @property
     def bounded(self) -> bool:
         """Whether the calibration bounds it more tightly than physics does."""
         return bool(self.sd[0] < self.effect.coefficients[0].prior_sd)
+
+
+@dataclass(frozen=True)
+class AxisStatement:
+    """What a recording says of what is stated of an axis."""
+
+    axis: str
+    # how probable the recording is with nothing stated of the axis, over that with what is stated; not a number where the
+    # recording has nothing by which to tell
+    ratio: float
+
+    @property
+    def denied(self) -> bool:
+        return self.ratio > _DENIED
+
+    @property
+    def supported(self) -> bool:
+        return self.ratio < _SUPPORTED
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +130,7 @@ class MachineState:
     # (M,) sizes of families of errors over what physics allows, where its recording says how large they are
     scales: Mapping[str, Floats] = field(default_factory=dict)
     unmodelled: tuple[Unmodelled, ...] = ()  # errors that it may have besides
+    statements: tuple[AxisStatement, ...] = ()  # what its recording says of what is stated of its axes
     # (k,) rms change of each coefficient since the calibration
     drift: Floats = field(default_factory=lambda: np.zeros(0))
     corrected: bool = True  # whether the machine corrects errors that were found, so that what remains is about zero
@@ -234,6 +258,12 @@ def with_bounds(state: MachineState, largest_um: Mapping[str, float]) -> Machine
             one = replace(one, effect=effect, sd=np.array([c.prior_sd for c in effect.coefficients]))
         found.append(one)
     return replace(state, unmodelled=tuple(found))
+
+
+def stated_as(one: Unmodelled, effect: Effect) -> Unmodelled:
+    """An error as it is stated how its axis is read, in place of what physics allows."""
+    stated = np.array([c.prior_sd for c in effect.coefficients])
+    return Unmodelled(effect, np.minimum(stated, one.sd) if one.bounded else stated, one.detected, one)
 
 
 def noise_of_draws(reported: Mapping[str, Floats]) -> StatedNoise:

@@ -15,6 +15,7 @@ from cmm_uq.certificate.document import Column, Paragraph, Section, Table, secti
 from cmm_uq.certificate.part.figures import CharacteristicFigures, by_margin, critical, figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement, UnseenError
 from cmm_uq.certificate.part.plots import shares_plots
+from cmm_uq.certificate.sections.read_axes import readings_table
 from cmm_uq.certificate.sections.regions import changes_table, resting, sizes_table
 from cmm_uq.certificate.wording import effect_title
 
@@ -223,11 +224,12 @@ def best_words(one: CharacteristicFigures) -> Text:
 def priors_section(found: PartMeasurement) -> Section:
     """Sizes of the families, and what would change with other priors."""
     title = say("What the recording says of the machine's errors, and what it does not")
+    read_by = readings_table(found.given.machine.machine, found.given.machine.statements)
     if not found.influence:
-        return section(title, _stated_bounds(found))
+        return section(title, read_by, _stated_bounds(found))
     told = Paragraph(priors_words(found), "warning" if resting_on_priors(found) else "plain")
     changes = changes_table(found.influence, [Verbatim(one.name) for one in found.characteristics])
-    return section(title, told, sizes_table(found.given.machine.scales), _stated_bounds(found), changes)
+    return section(title, told, sizes_table(found.given.machine.scales), read_by, _stated_bounds(found), changes)
 
 
 def resting_on_priors(found: PartMeasurement) -> list[str]:

@@ -16,8 +16,9 @@ from cmm_uq.certificate import wording
 from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.sections.read_axes import readings_data, readings_table, readings_warnings
 from cmm_uq.certificate.wording import effect_title
-from cmm_uq.machine.model.field import FAMILIES, allowed
+from cmm_uq.machine.model.field import FAMILIES, READ, allowed
 from cmm_uq.maths.uncertainty.quantity import Quantity, rounded
 
 _TITLE = say("Where the error factors hold")
@@ -58,7 +59,8 @@ def regions_section(result: Result) -> Section:
         "value or U changes by a tenth of U or more with it: {names}.",
         names=rests,
     )
-    tables = sizes_table(regions.scales), changes_table(regions.influence, names)
+    read_by = readings_table(result.model.artefact.points.machine, regions.statements)
+    tables = sizes_table(regions.scales), read_by, changes_table(regions.influence, names)
     return section(
         _TITLE, Paragraph(words), _table(result, regions, ranged), Paragraph(prior) if rests else None, *tables
     )
@@ -91,6 +93,7 @@ def regions_warnings(result: Result) -> list[Text]:
     regions, texts, open_there = result.regions, list[Text](), list[Text]()
     if not isinstance(regions, FactorRegions):
         return texts
+    texts += readings_warnings(regions.statements, regions.scales)
     for key in result.denied:
         one, together = result.parameters[key[0]][key[1]], regions.recorded.get(key)
         name, alone = wording.title_of(key, result), wording.with_uncertainty(one)
@@ -149,6 +152,7 @@ def regions_data(result: Result) -> dict[str, Any]:
         return {}
     given = "other errors as large as regions.families says"
     some, count = regions.observations
+    read_by = readings_data(result.model.artefact.points.machine, regions.statements)
     return {
         "over_range": by_effect.pop("over_range"),
         "regions": {
@@ -157,6 +161,7 @@ def regions_data(result: Result) -> dict[str, Any]:
             **by_effect,
             "disagree": [".".join(key) for key in regions.disagree],
             "families": families_data(regions.scales),
+            **({"axes": read_by} if read_by else {}),
             "of_priors": [".".join(key) for key in regions.whole],
             "priors": priors_data(regions.influence),
         },
@@ -182,7 +187,7 @@ def resting(influence: Iterable[PriorInfluence], k: Floats) -> list[int]:
 def family_words(name: str) -> Text:
     if name == ALL:
         return say("All of them together")
-    return FAMILIES.get(name) or effect_title(name)
+    return FAMILIES.get(name) or READ.get(name) or effect_title(name)
 
 
 def sizes_table(scales: Mapping[str, Floats]) -> Table | None:

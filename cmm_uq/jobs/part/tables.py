@@ -17,7 +17,7 @@ from cmm_uq.base.units import REFERENCE_TEMPERATURE
 from cmm_uq.jobs.part.feature import CharacteristicFacts, Count, Degrees, FeatureFacts, FormFacts, Name
 from cmm_uq.jobs.tables.conformity import Prior, Rule, needs_prior
 from cmm_uq.jobs.tables.identification import MEASURED, Identification, Laboratory, Origin
-from cmm_uq.jobs.tables.machine import Travel, check_carriages
+from cmm_uq.jobs.tables.machine import AxesFacts, Travel, check_carriages
 
 Expansion = Annotated[float, Field(ge=-1e-4, le=1e-3)]  # A coefficient of expansion, 1/K: steel has 11.5e-6.
 SmallExpansion = Annotated[float, Field(ge=0, le=1e-4)]
@@ -78,6 +78,7 @@ class MachineStateFacts(JobTable):
     origin_mm: Triple = [0.0, 0.0, 0.0]
     """Scale reading of the origin of the coordinates that `[placing]` speaks of."""
     corrected: bool = key(True, "Whether the machine corrects the errors that its calibration found.")
+    axes: AxesFacts = key([], "How axes are read; as the certificate says where left out.")
     bound: Annotated[list[BoundFacts], Field(max_length=LISTED.most)] = []
     """Bounds of errors that the calibration's recording cannot show, with their sources."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
@@ -12,6 +12,8 @@ from cmm_uq.base.files.limits import COLUMNS, LISTED, MAPS
 from cmm_uq.base.files.table import (
     Column,
     JobTable,
+    Length,
+    Limit,
     Number,
     Positive,
     Range,
@@ -175,6 +177,63 @@ def check_carriages(chain: str) -> None:
         raise ValueError(f"chain = {chain!r}: give X, Y, Z once each, and F for the frame if the workpiece moves")
 
 
+Reading = Literal[
+    "exposed optical grating", "sealed optical grating", "laser interferometer", "inductive scale", "magnetic scale",
+    "rack and rotary encoder", "ball screw and rotary encoder", "unknown",
+]  # fmt: skip
+SCREW = "ball screw and rotary encoder"
+Interval = Annotated[list[Length], Field(min_length=2, max_length=2)]  # mm, and the largest deviation within, µm
+
+
+class AxisFacts(JobTable):
+    """One ``[[axes]]``: how axes are read, as a data sheet states it; what is left out is as published of the kind."""
+
+    names: Annotated[list[Literal["x", "y", "z"]], Field(min_length=1, max_length=3)] = required("Axes that it is of.")
+    reading: Reading = required("What its coordinate is read by; unknown leaves all to the recording.")
+    source: Annotated[str, Field(max_length=200)] = key("", "Who states this: data sheet or nameplate, with its date.")
+    period_mm: Length | None = None
+    """Period of a scale's signal (20 µm: 0.02); of a screw its lead, of a rack the travel for one turn of its pinion."""
+    interpolation_um: Limit | None = key(None, "Largest deviation within one period, to either side.")
+    deviation: Annotated[list[Interval], Field(max_length=8)] = []
+    """Largest deviations to either side within sections: `[[1000, 5], [10, 0.275]]` is a scale of ±5 µm in a metre and
+    ±0.275 µm in 10 mm."""
+    grade: Literal[1, 3, 5, 7] | None = key(None, "Tolerance grade of a ball screw by ISO 3408-3.")
+    play_um: Limit | None = key(None, "Largest difference of readings of one place reached from either side.")
+
+    def problems(self) -> Iterator[str]:
+        figures = [
+            name for name in ("period_mm", "interpolation_um", "deviation", "grade", "play_um") if getattr(self, name)
+        ]
+        if self.reading == "unknown" and (figures or self.source):
+            yield f'reading = "unknown" knows no {(figures or ["source"])[0]}: leave it out, or say how the axis is read'
+        if self.reading != "unknown" and not self.source.strip():
+            yield 'nobody states this: name the data sheet with its date, source = "…"'
+        if self.grade is not None and (self.reading != SCREW or self.deviation):
+            yield f'grade is of reading = "{SCREW}", in place of its deviation: leave one out'
+        for name in ("interpolation_um", "grade"):
+            if getattr(self, name) is not None and self.period_mm is None:
+                yield f"{name} is of a period, of a screw its lead: give period_mm"
+        if self.interpolation_um is not None and self.period_mm and self.interpolation_um > 500 * self.period_mm:
+            yield f"interpolation_um = {self.interpolation_um:g} is more than half of period_mm = {self.period_mm:g}"
+        if self.reading.startswith(("rack", "ball")) and self.period_mm is not None and self.period_mm < 0.1:
+            yield f"period_mm = {self.period_mm:g}: of a screw the lead, of a rack the travel for one turn of its pinion"
+
+
+def _each_once(axes: list[AxisFacts]) -> list[AxisFacts]:
+    every = [name for one in axes for name in one.names]
+    for name in sorted({name for name in every if every.count(name) > 1}):
+        raise ValueError(f"how {name} is read is stated twice: leave one out")
+    return axes
+
+
+AxesFacts = Annotated[list[AxisFacts], Field(max_length=3), AfterValidator(_each_once)]
+
+
+def stated_axes(axes: Iterable[AxisFacts]) -> dict[str, AxisFacts]:
+    """By axis, of those of which something is known."""
+    return {name: one for one in axes if one.reading != "unknown" for name in one.names}
+
+
 class MachineFacts(JobTable):
     """``[machine]``."""
 
@@ -188,6 +247,7 @@ class MachineFacts(JobTable):
     travel_mm: Travel = key(Travel(), "Lowest and highest scale reading of each axis.")
     origin_mm: Triple = [0.0, 0.0, 0.0]
     """Scale reading of the recording's origin: scale reading = recorded coordinate + origin."""
+    axes: AxesFacts = key([], "How axes are read: what is known beforehand of their periodic errors and play.")
     error_map: Annotated[list[ErrorMapFile], Field(max_length=MAPS.most), AfterValidator(_of_all_or_none)] = []
     """Error maps of the machine; several are interpolated by the temperature of the scales."""
     squareness_arcsec: SquarenessFacts | None = key(None, "Squareness of the axes beside an error map.")

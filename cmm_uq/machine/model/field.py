@@ -35,7 +35,7 @@ from cmm_uq.machine.physics.effects.drives import Hysteresis, PeriodicScale, Sca
 from cmm_uq.machine.physics.effects.rigid_body import Rotation, Straightness, turned
 
 PERIODIC, PLAY, POSITION, STRAIGHTNESS, ROTATION = "periodic", "play", "position", "straightness", "rotation"
-_LONG, _SHORT = " long", " short"
+_LONG, _SHORT, STATED = " long", " short", " as stated"
 WAVES, LONG = 8, 2  # of a function; those that count as long
 FAMILIES: Mapping[str, Text] = {
     PERIODIC: say("Periodic errors of the scales"), PLAY: say("Play of the drives"),
@@ -44,19 +44,24 @@ FAMILIES: Mapping[str, Text] = {
     STRAIGHTNESS + _LONG: say("Straightnesses, long waves"), STRAIGHTNESS + _SHORT: say("Straightnesses, short waves"),
     ROTATION + _LONG: say("Rotations, long waves"), ROTATION + _SHORT: say("Rotations, short waves"),
 }  # fmt: skip
+READ: Mapping[str, Text] = {  # of axes of which it is stated how they are read
+    PERIODIC + STATED: say("Periodic errors of scales that are stated, over what is stated"),
+    PLAY + STATED: say("Play of axes that are stated, over what is stated"),
+}
 # root mean square that physics allows: µm along an axis beyond its scale, µm across it, ″
 ALLOWED = {POSITION: 20.0, STRAIGHTNESS: 50.0, ROTATION: 30.0}
 _SAME = 1e-6  # of the shortest period: a distance over which nothing changes
 _LOOKED_AT = 61  # readings
 TRIED = 64  # periods: correlations of errors at two places are then off by less than a tenth in the root mean square
+_EACH = 4  # of these in each band, where the size of an error goes by its period
 
 
 def family_of(effect: Effect) -> str | None:
     """Family whose size its errors share; ``None`` of an effect with a size of its own."""
     if isinstance(effect, AxisFunction):
         return effect.family
-    if effect.stated:
-        return None
+    if effect.of_family or effect.stated:
+        return effect.of_family
     kinds: dict[type[Effect], str] = {
         PeriodicScale: PERIODIC,
         GivenPeriod: PERIODIC,
@@ -105,6 +110,20 @@ def bounded(effect: Effect, largest_um: float) -> Effect:
     return found
 
 
+def as_read(effect: Effect, largest_um: float, errors: Sequence[Sequence[tuple[float, float, float]]] = ()) -> Effect:
+    """An error of an axis as it is stated, with those of other such axes a family of its own.
+
+    ``largest_um``: as of :func:`bounded`. ``errors``: of a periodic error, those that it is the sum of, each in bands of
+    periods with the amplitude that 95 of 100 do not exceed, µm.
+    """
+    found = bounded(effect, largest_um)
+    found.of_family = (PERIODIC if isinstance(effect, PeriodicScale) else PLAY) + STATED
+    if isinstance(found, PeriodicScale):
+        sd = found.coefficients[0].prior_sd / largest_um
+        found.errors = tuple(tuple((low, high, sd * most) for low, high, most in bands) for bands in errors)
+    return found
+
+
 def curves() -> tuple[AxisFunction, ...]:
     """Of a machine of three axes."""
     each = [one for one in EVERY.values() if isinstance(one, Family) and family_of(one) in ALLOWED]
@@ -112,7 +131,9 @@ def curves() -> tuple[AxisFunction, ...]:
 
 
 def allowed(family: str) -> tuple[float, str]:
-    """Root mean square of an error of a family that physics allows, and its unit; of play the gap."""
+    """Root mean square of an error of a family that physics allows, and its unit; of play the gap; one of what is stated."""
+    if family.endswith(STATED):
+        return 1.0, "1"
     one = next(effect for effect in (*EVERY.values(), *curves()) if family_of(effect) == family)
     return float(np.sqrt(sum(c.prior_sd**2 for c in one.coefficients))), str(one.coefficients[0].unit)
 
@@ -121,15 +142,20 @@ class EveryPeriod(Effect):
     """All trial periods of an effect at once; without a shape of its own."""
 
     def __init__(self, effect: Effect) -> None:
-        self.of = effect
-        self.at = tuple(product(*(_evenly(shape.low, shape.high) for shape in effect.shape)))
-        share = 1 / np.sqrt(len(self.at))
+        self.of, sd = effect, effect.coefficients[0].prior_sd
+        several = effect.errors if isinstance(effect, PeriodicScale) else ()
+        # of each error its trials, with the part of the effect's prior that each has
+        errors: list[list[tuple[tuple[float, ...], float]]] = [
+            [((at,), own / sd) for low, high, own in bands for at in _evenly(low, high, _EACH)] for bands in several
+        ] or [[(at, 1.0) for at in product(*(_evenly(one.low, one.high, TRIED) for one in effect.shape))]]
+        self.at, self.counts = tuple(at for each in errors for at, _ in each), tuple(map(len, errors))
+        share = [part / np.sqrt(len(each)) for each in errors for _, part in each]
         self.name, self.title, self.formula = effect.name, effect.title, effect.formula
         self.mechanism, self.points_to = effect.mechanism, effect.points_to
         self.columns, self.tier, self.along_motion = effect.columns, effect.tier, effect.along_motion
         self.coefficients = tuple(
-            replace(one, name=f"{one.name} {i}", prior_sd=float(one.prior_sd * share))
-            for i in range(1, len(self.at) + 1)
+            replace(one, name=f"{one.name} {i}", prior_sd=float(one.prior_sd * part))
+            for i, part in enumerate(share, 1)
             for one in effect.coefficients
         )
 
@@ -149,6 +175,7 @@ class GivenPeriod(Effect):
 
     def __init__(self, effect: PeriodicScale, readings: Floats, into: Floats) -> None:
         self.of, self.sum, self.readings, self.into = effect, EveryPeriod(effect), readings, into
+        self.of_family, self.stated = effect.of_family, bool(effect.of_family)
         self.name, self.title, self.formula = effect.name, effect.title, effect.formula
         self.mechanism, self.points_to = effect.mechanism, effect.points_to
         self.axis = self.along_motion = effect.axis
@@ -167,16 +194,19 @@ class GivenPeriod(Effect):
         return np.hstack([waves, covariance(self.of, reading, self.readings) @ self.into])
 
     def beforehand(self, random: np.random.Generator, count: int) -> Floats:
-        """Draws (N, j) of the coefficients over their standard deviations, without the recording: of one trial period each.
+        """Draws (N, j) of the coefficients over their standard deviations, without the recording.
+
+        Of one trial period each, of every error of which it is the sum.
 
         Mean and covariance are those of all at once; errors of a linear estimate are then distributed as those of machines
         with one period.
         """
-        trials, waves = len(self.sum.at), len(self.of.coefficients)
-        found = np.zeros((count, trials, waves))
-        found[np.arange(count), random.integers(trials, size=count)] = np.sqrt(trials) * random.standard_normal(
-            (count, waves)
-        )
+        waves, start = len(self.of.coefficients), 0
+        found = np.zeros((count, len(self.sum.at), waves))
+        for trials in self.sum.counts:
+            drawn = np.sqrt(trials) * random.standard_normal((count, waves))
+            found[np.arange(count), start + random.integers(trials, size=count)] = drawn
+            start += trials
         return np.hstack([found.reshape(count, -1), np.zeros((count, self.into.shape[1]))])
 
     def share(self, draws: Floats) -> float:
@@ -189,21 +219,23 @@ class GivenPeriod(Effect):
 def covariance(effect: PeriodicScale, one: Floats, other: Floats) -> Floats:
     """(n, p) mm², of an error whose period nobody knows, at readings (n,) and (p,), mm.
 
-    The mean of σ²·cos(2πd/λ) over ln λ: σ²·(Ci(2πd/λ₀) − Ci(2πd/λ₁))/ln(λ₁/λ₀).
+    The mean of σ²·cos(2πd/λ) over ln λ: σ²·(Ci(2πd/λ₀) − Ci(2πd/λ₁))/ln(λ₁/λ₀); where σ goes by λ, of each band by its part.
     """
-    (shape,), sd = effect.shape, MICROMETRE * effect.coefficients[0].prior_sd
-    apart = 2 * np.pi * np.abs(np.subtract.outer(one, other))
-    same = apart < _SAME * shape.low
-    apart[same] = 1.0
-    found = sici(apart / shape.low)[1] - sici(apart / shape.high)[1]
-    found /= np.log(shape.high / shape.low)
-    found[same] = 1.0
-    return np.asarray(sd**2 * found)
+    (shape,), own = effect.shape, effect.coefficients[0].prior_sd
+    distance, whole = 2 * np.pi * np.abs(np.subtract.outer(one, other)), np.zeros(())
+    for bands in effect.errors or (((shape.low, shape.high, own),),):
+        same, every = distance < _SAME * bands[0][0], np.log(bands[-1][1] / bands[0][0])
+        apart = np.where(same, 1.0, distance)
+        for low, high, sd in bands:
+            found = sici(apart / low)[1] - sici(apart / high)[1]
+            found[same] = np.log(high / low)
+            whole = whole + (MICROMETRE * sd) ** 2 * (found / every)
+    return np.asarray(whole)
 
 
-def _evenly(low: float, high: float) -> list[float]:
-    """The middle of each of as many equal parts of the logarithm, which have the same share of the prior each."""
-    each: list[float] = np.exp(np.log(low) + np.log(high / low) * (np.arange(TRIED) + 0.5) / TRIED).tolist()
+def _evenly(low: float, high: float, count: int) -> list[float]:
+    """The middle of each of ``count`` equal parts of the logarithm, which have the same share of the prior each."""
+    each: list[float] = np.exp(np.log(low) + np.log(high / low) * (np.arange(count) + 0.5) / count).tolist()
     return each
 
 

@@ -89,6 +89,7 @@ class Effect(ABC):
     )
     of_artefact: bool = False  # whether it is a fault of the artefact itself, which only that artefact can say in full
     stated: bool = False  # whether its prior sd is of a bound that somebody states, and not what physics allows
+    of_family: str | None = None  # family of errors whose size it shares, where that is not the one of its class
     mostly: float = 1.0  # part of its prior sd that it mostly keeps to, where a certificate says so and may be wrong
     means: Text = NOTHING  # what a reported amount means at the machine, in words with blanks; see :meth:`meaning`
     sense: tuple[Text, Text] = (NOTHING, NOTHING)  # a word for a positive and for a negative amount, where these differ

@@ -15,7 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import scipy
@@ -28,7 +27,7 @@ from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel, reach
 from cmm_uq.maths.inference.marginal import SIGMA_BOUNDS, Marginal, cholesky
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import start
-from cmm_uq.maths.inference.proposals import LogDensity, Proposal, highest_power, moments, weights
+from cmm_uq.maths.inference.proposals import NEVER, LogDensity, weighed, weights
 
 Drawn = Callable[[np.random.Generator, int], Floats]
 # of the residuals' scatter: an observation that each coefficient, as large as physics allows, moves less shows only noise, as
@@ -40,8 +39,7 @@ _NUMBERS = 2_000_000  # in the matrices that are factorised at once
 _LEAST_WORTH = 50.0  # of weighed draws of sizes, below which a sampler draws them
 _EFFECTIVE, _STEPS = 400, 40  # sizes are few and smooth: what follows from them needs no more of them
 HELD = 250  # sizes that all draws of a part's machine have among them
-_COUNT = 0.1  # draws that must count, over those of a round
-_STEP, _MOST_STEPS, _FLATTEST, _WIDER, _NEVER = 0.05, 60, 0.5, 1.3, -1e30
+_STEP, _MOST_STEPS, _FLATTEST, _WIDER = 0.05, 60, 0.5, 1.3
 _SMALLEST = 1e-4  # of a family's size
 
 
@@ -310,10 +308,49 @@ def sample_sizes(
     ``known``: of the noise, one draw, where it is not to be found. Raises ``CmmUqError`` where they cannot be had with the
     effort.
     """
-    d = 0 if known is not None else model.noise.dimension
     count = len(model.families)
     if known is not None and not count:
         return FieldSizes(known.at(np.zeros(draws, dtype=np.int64)), np.zeros((draws, 0)), np.inf, None)
+    density, sizes, d, begin = _density(model, known)
+    centre, factor = _laplace(density, np.append(begin, np.zeros(count)))
+    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(29,))))
+    latent, log, proposal = weighed(density, centre, _WIDER * factor, random, effort.each, effort.worth, effort.most)
+    weight = weights(log)
+    worth, chains = float(1 / np.sum(weight**2)), None
+    if worth >= _LEAST_WORTH:
+        # as many of each as its weight says, evenly spread
+        place = np.searchsorted(np.cumsum(weight), (np.arange(effort.held) + 0.5) / effort.held * (1 - 1e-12))
+        latent = latent[np.minimum(place, len(latent) - 1)]
+    elif not effort.sampler:
+        raise CmmUqError("how large its errors are cannot be drawn in a short time", where="the recording")
+    else:
+        chains = run_ensembles(density, proposal, seed, effective_samples=_EFFECTIVE, steps_at_once=_STEPS)
+        latent, worth = (
+            chains.draws[np.linspace(0, len(chains.draws) - 1, effort.held).astype(np.int64)],
+            chains.ess_min,
+        )
+    latent = latent[np.arange(draws) % len(latent)]
+    return FieldSizes(sizes(latent), size_of(latent[:, d:]), worth, chains)
+
+
+def log_evidence(model: FieldModel, seed: int, known: Sizes | None = None, effort: Effort = BRIEF) -> float:
+    """Logarithm of the probability density of the observations, all sizes integrated out by their priors.
+
+    Up to a constant that all models of a recording with the same parameters share. ``known``: as of :func:`sample_sizes`.
+    """
+    count = len(model.families)
+    density, _, _, begin = _density(model, known)
+    if not len(begin) + count:
+        return float(density(np.zeros((1, 0)))[0])
+    centre, factor = _laplace(density, np.append(begin, np.zeros(count)))
+    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(41,))))
+    _, log, _ = weighed(density, centre, _WIDER * factor, random, effort.each, effort.worth, effort.most)
+    return float(np.logaddexp.reduce(log) - np.log(len(log)) - 0.5 * count * np.log(2 * np.pi))
+
+
+def _density(model: FieldModel, known: Sizes | None) -> tuple[LogDensity, Callable[[Floats], Sizes], int, Floats]:
+    """Of latent sizes (w, d + F), those of the noise first; what sizes of the noise they are, d, and where to begin (d,)."""
+    d = 0 if known is not None else model.noise.dimension
 
     def sizes(latent: Floats) -> Sizes:
         return model.noise.sizes(latent[:, :d]) if known is None else known.at(np.zeros(len(latent), dtype=np.int64))
@@ -335,49 +372,7 @@ def sample_sizes(
 
     begin, _ = start(Marginal(model.linear, model.noise, model.estimate))
     inside_of = begin[:d]
-    centre, factor = _laplace(density, np.append(begin[:d], np.zeros(count)))
-    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(29,))))
-    latent, weight, proposal = _weighed(density, centre, _WIDER * factor, random, effort)
-    worth, chains = float(1 / np.sum(weight**2)), None
-    if worth >= _LEAST_WORTH:
-        # as many of each as its weight says, evenly spread
-        place = np.searchsorted(np.cumsum(weight), (np.arange(effort.held) + 0.5) / effort.held * (1 - 1e-12))
-        latent = latent[np.minimum(place, len(latent) - 1)]
-    elif not effort.sampler:
-        raise CmmUqError("how large its errors are cannot be drawn in a short time", where="the recording")
-    else:
-        chains = run_ensembles(density, proposal, seed, effective_samples=_EFFECTIVE, steps_at_once=_STEPS)
-        latent, worth = (
-            chains.draws[np.linspace(0, len(chains.draws) - 1, effort.held).astype(np.int64)],
-            chains.ess_min,
-        )
-    latent = latent[np.arange(draws) % len(latent)]
-    return FieldSizes(sizes(latent), size_of(latent[:, d:]), worth, chains)
-
-
-def _weighed(
-    density: LogDensity, centre: Floats, factor: Floats, random: Any, effort: Effort
-) -> tuple[Floats, Floats, Proposal]:
-    """Draws (N, d) with their weights (N,), and the last of the t distributions that they are of.
-
-    Each has the moments of the density, as far as enough of all draws before count, and a draw of any of them is weighed
-    against all (Cornuet, Marin, Mira, Robert 2012, Scand. J. Stat. 39, 798).
-    """
-    proposals, latent, value = list[Proposal](), np.zeros((0, len(centre))), np.zeros(0)
-    while True:
-        proposals.append(Proposal.single(centre, factor))
-        more = proposals[-1].parameters(proposals[-1].draws(effort.each, random))
-        latent, value = np.vstack([latent, more]), np.append(value, density(more))
-        of_all = np.logaddexp.reduce([one.log_probability(latent) for one in proposals], axis=0) - np.log(
-            len(proposals)
-        )
-        log = np.maximum(value - of_all, _NEVER)
-        weight = weights(log)
-        if 1 / np.sum(weight**2) >= effort.worth or len(latent) >= effort.most:
-            return latent, weight, proposals[-1]
-        power = highest_power(log, np.zeros(len(log)), 0.0, _COUNT * effort.each)
-        centre, covariance = moments(latent, weights(power * log))
-        factor = np.linalg.cholesky(covariance + 1e-9 * np.trace(covariance) * np.eye(len(centre)))
+    return density, sizes, d, inside_of
 
 
 def _laplace(density: LogDensity, start_at: Floats) -> tuple[Floats, Floats]:
@@ -385,7 +380,7 @@ def _laplace(density: LogDensity, start_at: Floats) -> tuple[Floats, Floats]:
     d, steps = len(start_at), _STEP * np.eye(len(start_at))
 
     def fall(at: Floats) -> tuple[float, Floats]:
-        values = np.maximum(density(np.vstack([at, at + steps, at - steps])), _NEVER)
+        values = np.maximum(density(np.vstack([at, at + steps, at - steps])), NEVER)
         return -float(values[0]), -(values[1 : d + 1] - values[d + 1 :]) / (2 * _STEP)
 
     found = scipy.optimize.minimize(fall, start_at, jac=True, method="L-BFGS-B", options={"maxiter": _MOST_STEPS})

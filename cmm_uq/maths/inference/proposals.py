@@ -23,7 +23,8 @@ _DOF = 6.0
 # times the curvature's width at which a skewed density is first looked at: too wide costs draws, too narrow misses a tail
 _WIDER, _LOOKS = 2.0, 3
 # letting in by degrees: part of the draws that must count, rounds at most, least gain that is reckoned with
-_ENOUGH, _MOST_LOOKS, _NEVER = 0.2, 25, -1e30
+_ENOUGH, _MOST_LOOKS, NEVER = 0.2, 25, -1e30
+_COUNT = 0.1  # draws of a round that must count, where each is weighed against all
 _STUCK = 1.01  # times the power from round to round below which one distribution does not do
 # distributions of a mixture; weight of one more as wide as all; their variance over that of all to begin with
 _PARTS, _WIDE, _NARROWER = 8, 0.1, 0.3
@@ -165,7 +166,7 @@ def tempered(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> 
         z = proposal.draws(count, random)
         theta = proposal.parameters(z)
         from_begin = -0.5 * np.sum(((theta - begin) @ back.T) ** 2, axis=1)
-        gain = np.maximum(density(theta) - from_begin, _NEVER)
+        gain = np.maximum(density(theta) - from_begin, NEVER)
         known = from_begin - proposal.log_density(z)
         before, power = power, highest_power(gain, known, power, _ENOUGH * count)
         if power < min(1.0, _STUCK * before):
@@ -193,7 +194,7 @@ def _mixture(density: LogDensity, centre: Floats, factor: Floats, random: Any) -
     while len(proposals) <= _MOST_LOOKS or (power == 1.0 and len(tried) < _FITS):
         z = proposals[-1].draws(count, random)
         draws = [*draws, z][-_RECALLED:]
-        gain = np.maximum(density(proposals[-1].parameters(z)) + 0.5 * np.sum(z**2, axis=1), _NEVER)
+        gain = np.maximum(density(proposals[-1].parameters(z)) + 0.5 * np.sum(z**2, axis=1), NEVER)
         gains = [*gains, gain][-_RECALLED:]
         if power == 1.0:
             own = -0.5 * np.sum(z**2, axis=1) - proposals[-1].log_density(z)
@@ -264,3 +265,29 @@ def weights(log: Floats) -> Floats:
 def worth(log: Floats) -> float:
     """How many draws those are worth whose density over that proposed has the logarithm (w,)."""
     return float(1 / np.sum(weights(log) ** 2))
+
+
+def weighed(
+    density: LogDensity, centre: Floats, factor: Floats, random: Any, each: int, worth: float, most: int
+) -> tuple[Floats, Floats, Proposal]:
+    """Draws (N, d), the logarithms of their weights (N,), and the last of the t distributions that they are of.
+
+    Each has the moments of the density, as far as enough of all draws before count, and a draw of any of them is weighed
+    against all (Cornuet, Marin, Mira, Robert 2012, Scand. J. Stat. 39, 798): ``each`` at once, until they are worth so many
+    independent ones or are ``most``.
+    """
+    proposals, latent, value = list[Proposal](), np.zeros((0, len(centre))), np.zeros(0)
+    while True:
+        proposals.append(Proposal.single(centre, factor))
+        more = proposals[-1].parameters(proposals[-1].draws(each, random))
+        latent, value = np.vstack([latent, more]), np.append(value, density(more))
+        of_all = np.logaddexp.reduce([one.log_probability(latent) for one in proposals], axis=0) - np.log(
+            len(proposals)
+        )
+        log = np.maximum(value - of_all, NEVER)
+        weight = weights(log)
+        if 1 / np.sum(weight**2) >= worth or len(latent) >= most:
+            return latent, log, proposals[-1]
+        power = highest_power(log, np.zeros(len(log)), 0.0, _COUNT * each)
+        centre, covariance = moments(latent, weights(power * log))
+        factor = np.linalg.cholesky(covariance + 1e-9 * np.trace(covariance) * np.eye(len(centre)))

@@ -13,7 +13,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
 from cmm_uq.maths.inference import families as room
-from cmm_uq.maths.inference.families import FieldErrors, FieldModel, sample_sizes, size_of
+from cmm_uq.maths.inference.families import FieldErrors, FieldModel, log_evidence, sample_sizes, size_of
 from cmm_uq.maths.inference.linear_model import Freedoms, LinearModel, Unknown, solve
 from cmm_uq.maths.inference.noise import Components, Sizes
 
@@ -161,3 +161,18 @@ def test_a_size_of_which_nothing_is_known_is_projected_out_and_refused_where_not
     hidden = replace(linear(y, last=np.inf), design=np.column_stack([DESIGN[:, 0], np.ones(M)]))
     with pytest.raises(CmmUqError, match="leaves a size of its artefact open"):
         FieldModel(hidden, whole.noise, whole.estimate, ()).log_likelihood(white(SIGMA), np.zeros((1, 0)))
+
+
+def test_the_evidence_is_the_density_of_the_observations_with_all_sizes_integrated_out() -> None:
+    """By quadrature over the half-normal sizes; as a ratio to that of a model with no families, whose constant it shares."""
+    y, known = observed((0.2, 1.0), 1), white(SIGMA)
+    both, none = families(y), model(y, normal(np.zeros((M, 6)), None))
+    at = (np.arange(120) + 0.5) / 30  # sizes up to 4
+    one, other = (each.ravel() for each in np.meshgrid(at, at))
+    logs = both.log_likelihood(white(SIGMA, len(one)), np.column_stack([one, other]))
+    weight = halfnorm.pdf(one) * halfnorm.pdf(other) / 30**2
+    expected = np.log(np.sum(weight * np.exp(logs - logs.max()))) + logs.max()
+    assert log_evidence(both, 1, known) == pytest.approx(expected, abs=0.1)
+    assert log_evidence(none, 1, known) == pytest.approx(
+        float(none.log_likelihood(known, np.zeros((1, 0)))[0]), abs=1e-9
+    )

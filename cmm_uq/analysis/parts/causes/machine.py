@@ -39,6 +39,7 @@ from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.model.field import GivenPeriod
+from cmm_uq.machine.physics.effects.drives import PeriodicScale
 from cmm_uq.machine.physics.superposition import About, Superposition
 
 MACHINE, NOISE, STYLUS = "machine", "noise", "stylus"
@@ -268,13 +269,21 @@ def not_modelled(state: MachineState, qualified: Qualified, pose: PartPose) -> t
 
 
 def _unmodelled(one: Unmodelled, qualified: Qualified, pose: PartPose) -> CommonCause:
-    trials = list(one.effect.trials())
-    columns = np.concatenate([About(qualified.both).columns(one.effect, shape) for shape in trials], axis=2)
-    k, count = len(one.sd), len(trials)
+    about, k = About(qualified.both), len(one.sd)
+    if isinstance(one.effect, PeriodicScale) and one.effect.errors:  # the sum of several, each of a size by its period
+        every = GivenPeriod(one.effect, np.zeros(0), np.zeros((0, 0)))
+        columns = about.columns(every)
+        sd = np.array([c.prior_sd for c in every.coefficients]) * one.sd[0] / one.effect.coefficients[0].prior_sd
+    else:
+        trials = list(one.effect.trials())
+        columns = np.concatenate([about.columns(one.effect, shape) for shape in trials], axis=2)
+        every = None
 
     def draw(random: np.random.Generator, n: int) -> Floats:
-        found = np.zeros((n, count, k))
-        found[np.arange(n), random.integers(count, size=n)] = random.standard_normal((n, k)) * one.sd
+        if every is not None:
+            return np.asarray(every.beforehand(random, n) * sd)
+        found = np.zeros((n, len(trials), k))
+        found[np.arange(n), random.integers(len(trials), size=n)] = random.standard_normal((n, k)) * one.sd
         return found.reshape(n, -1)
 
     as_shown = say("the calibration did not model it; as large as its recording would not have shown")
@@ -282,7 +291,7 @@ def _unmodelled(one: Unmodelled, qualified: Qualified, pose: PartPose) -> Common
     name, basis = one.effect.name, -_in_part(qualified.left(columns), pose)
     as_stated = say("the calibration did not show it; as large as the bound that is stated allows")
     why = {name: as_stated if one.effect.stated else as_shown if one.bounded else as_allowed}
-    return CommonCause(name=MACHINE, factors=(name,) * (k * count), draw=draw, named=why, basis=basis)
+    return CommonCause(name=MACHINE, factors=(name,) * columns.shape[2], draw=draw, named=why, basis=basis)
 
 
 def noise(state: MachineState, points: Points, pose: PartPose, repeats: int = 1, first: int = 0) -> list[PartCause]:

@@ -24,6 +24,7 @@ from cmm_uq.base.output import Owner, sha256_of, staged
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.sections.read_axes import readings_data, readings_warnings
 from cmm_uq.jobs.derived_job import IN_THE_RECORDING, PROGRAM, derived_toml, is_compensated, kept_inputs, recording_name
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.beside import log_of
@@ -144,6 +145,7 @@ def worth_of(found: FieldMap) -> list[str]:
         )
         if held.corrected > held.uncorrected:
             lines.append("The map makes them worse: correct nothing by it")
+    lines += [str(text) for text in readings_warnings(found.statements, {})]
     if found.omitted:
         lines.append(f"Neither in the map nor in its uncertainty: {', '.join(found.omitted)}")
     lines.append(f"{MAP_KEYS} holds the key by which [machine] of a job names it")
@@ -169,6 +171,7 @@ def _map_files(read: Job, found: FieldMap) -> dict[str, bytes]:
         "software": PROGRAM, "recording": read.origin, "inputs_sha256": sha256(read.inputs),
         "chain": read.facts.machine.chain,
         "sign": "true = indicated + e", "errors_not_in_it": list(found.omitted),
+        **({"axes": readings_data(read.points.machine, found.statements)} if found.statements else {}),
         "range_rms_um": dict(zip(both, map(_figure, found.range_um), strict=True)), "held_out_rms_um": tried,
     }  # fmt: skip
     return {

@@ -17,6 +17,7 @@ from cmm_uq import __version__
 from cmm_uq.analysis.diagnosis.held_out import thin_out
 from cmm_uq.analysis.machine.conditional import given_recording
 from cmm_uq.analysis.machine.state import MachineState, machine_stated, with_bounds, with_curves
+from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.app.commands.certificates.verification import Verification, examine_certificate, verify_given
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import with_noise
@@ -29,11 +30,13 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, day, say
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.certificate.clauses import draft
 from cmm_uq.certificate.part.measurement import CertificateStatus, Source, VerificationCheck
+from cmm_uq.certificate.sections.read_axes import readings_warnings
 from cmm_uq.certificate.verify.given import CHECKS, Given, given_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.source import sha256 as hashes
 from cmm_uq.jobs.tables.identification import COMPENSATED, MEASURED, SIMULATED
+from cmm_uq.jobs.tables.machine import stated_axes
 from cmm_uq.maths.inference.draws import Draws
 
 _ORIGINS = {SIMULATED: say("simulated"), COMPENSATED: say("compensated")}
@@ -148,6 +151,7 @@ def state_machine(
     state = machine_stated(stated.results, stated.draws, machine, corrected=job.facts.machine_state.corrected)
     stated_bounds = {name: one.largest_um for one in job.facts.machine_state.bound for name in one.errors}
     state = with_bounds(state, stated_bounds)
+    state = replace(state, unmodelled=with_readings(state.unmodelled, machine))
     # where the calibration modelled the scales' expansion, their errors are those of 20 °C
     expanding = any(column.startswith("temp_") for effect in state.effects for column in effect.columns)
     known_at = None if expanding else standing.temperature_c
@@ -158,7 +162,7 @@ def state_machine(
     stage("The machine's errors, given the recording of its calibration", 0.15)
     state, path, given = _given(state, stated.job, seed)
     standing = replace(standing, path=path, drift=since.told, given_recording=given, changes=since.changes)
-    told = machine_warnings(job, standing, stated.job)
+    told = [*machine_warnings(job, standing, stated.job), *readings_warnings(state.statements, state.scales)]
     if rerun and stated.not_again:
         told = [stated.not_again, *told]
     return StatedMachine(state, standing, stated.job, tuple(told), since.history)
@@ -341,8 +345,12 @@ def _machine(job: PartJob, calibrated: Job | None) -> Machine:
             raise CmmUqError(f"nothing says how far axis {axis} goes, by which errors of guideways are told", where=WHERE,
                              fix=f"Give travel_mm = {{ {axis} = [lowest, highest] }}, or the certificate as PDF")  # fmt: skip
         travel[i] = given
-    name = "" if own is None else own.name
-    return Machine(name, chain, travel, np.array(origin, dtype=np.float64))
+    name, read_by = "" if own is None else own.name, stated_axes([] if own is None else own.axes)
+    for axis, one in stated_axes(facts.axes).items():
+        if read_by.setdefault(axis, one).model_copy(update={"names": one.names}) != one:
+            raise CmmUqError(f"the machine's certificate says otherwise of how axis {axis} is read", where=f"{WHERE} axes",
+                             fix="Leave it out, or mend the job that is wrong")  # fmt: skip
+    return Machine(name, chain, travel, np.array(origin, dtype=np.float64), read_by=read_by)
 
 
 def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineState, Text, bool]:

@@ -52,6 +52,9 @@ class PeriodicScale(OfAxis, Harmonic):
     )  # fmt: skip
     amplitude = Parameter("amplitude_um", unit("µm"), 10.0, say("amplitude"))
     coefficients = (Parameter("cosine_um", unit("µm"), 10.0), Parameter("sine_um", unit("µm"), 10.0))
+    # errors that it is the sum of, where that is stated: each of any one period in its bands (from, to, mm; prior sd of sine
+    # and of cosine, µm)
+    errors: tuple[tuple[tuple[float, float, float], ...], ...] = ()
 
     def __init__(self, axis: str) -> None:
         super().__init__(axis)

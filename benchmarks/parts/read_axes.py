@@ -1,0 +1,125 @@
+"""Machines whose axes are stated to be read in some way: rightly, wrongly, or not at all.
+
+Each machine is calibrated and measures the part three times over, by the same random numbers: with nothing stated of its axes,
+with what it truly has, and with a statement that is wrong. Machines are those of :mod:`benchmarks.parts.curved`, with periodic
+errors and play of their kind of reading.
+
+Run: ``python -m benchmarks.parts.read_axes FOLDER [--machines N] [--only WORDS]``; a run can be stopped and taken up again;
+``--page`` writes the table of the page.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.coverage.measuring import kept
+from benchmarks.parts import curved, machines
+from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, WORDS
+from cmm_uq.base.points import AXES
+from cmm_uq.jobs.tables.machine import AxisFacts
+
+BEGIN, END = "<!-- written by benchmarks.parts.read_axes -->", "<!-- end of read_axes -->"
+GRATING = AxisFacts(
+    names=["x", "y", "z"],
+    reading="exposed optical grating",
+    source="study",
+    period_mm=0.02,
+    deviation=[[1000.0, 3.0], [10.0, 0.3]],
+)
+SCREW = AxisFacts(
+    names=["x", "y", "z"],
+    reading="ball screw and rotary encoder",
+    source="study",
+    period_mm=10.0,
+    grade=5,
+    play_um=15.0,
+)
+ROUGH = AxisFacts(names=["x", "y", "z"], reading="exposed optical grating", source="study")
+SHOWN = ("d2", "apart", "x1", "length", "position 1", "flat")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Machines of one class, calibrated alike, and what is stated of all of their axes."""
+
+    sort: curved.Sort
+    truly: str
+    stated: AxisFacts | None
+    words: str
+    artefact: str
+
+    @property
+    def name(self) -> str:
+        return f"{self.truly}, {self.artefact}, {self.words}"
+
+    @property
+    def key(self) -> tuple[int, ...]:
+        """Seeds of its machine, the same whatever is stated."""
+        return SORTS.index(self.truly), *machines.Cell(self.artefact, "white", 0.0).key
+
+
+SORTS = ("gratings", "screws", "play", "periodic")
+_GRATINGS = curved.Sort("ordinary", wave_um=0.2, periods_mm=(0.010, 0.020), gap_um=0.3)
+_SCREWS = curved.Sort("ordinary", wave_um=3.0, periods_mm=(9.999, 10.0), gap_um=6.0)
+_PLAY = curved.Sort("play", wave_um=0.2, periods_mm=(0.010, 0.020), gap_um=8.0)
+_PERIODIC = curved.Sort("periodic", wave_um=4.0, gap_um=0.3)
+_NOT, _RIGHT, _WRONG = "nothing stated", "stated rightly", "stated wrongly as gratings"
+_STATEMENTS: dict[str, tuple[curved.Sort, tuple[tuple[AxisFacts | None, str], ...]]] = {
+    "gratings": (_GRATINGS, ((None, _NOT), (ROUGH, "kind alone"), (GRATING, _RIGHT))),
+    "screws": (_SCREWS, ((None, _NOT), (SCREW, _RIGHT))),
+    "periodic": (_PERIODIC, ((None, _NOT), (GRATING, _WRONG))),
+    "play": (_PLAY, ((None, _NOT), (GRATING, _WRONG))),
+}
+CELLS = tuple(
+    Cell(sort, name, stated, words, artefact)
+    for artefact, some in (
+        ("bars", ("gratings", "screws", "periodic")), ("step gauge", ("gratings", "play")), ("dense gauge", ("periodic",)),
+    )
+    for name, (sort, each) in _STATEMENTS.items() if name in some
+    for stated, words in each
+    if words != "kind alone" or artefact == "bars"
+)  # fmt: skip
+
+
+def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
+    """One machine, as :func:`benchmarks.parts.machines.measured` has it."""
+    cell, seed, number = task
+    random = np.random.default_rng([seed, *cell.key, number])
+    start = time.process_time()
+    try:
+        hidden = curved.drawn(cell.sort, random)
+        calibration = machines.Cell(cell.artefact, "stated", 0.0)
+        machine = replace(MACHINE, read_by={} if cell.stated is None else dict.fromkeys(AXES, cell.stated))
+        found = machines.on_machine(calibration, hidden, random, machines.Made(), 0.7e-3, machine)
+    except Exception as fault:  # a study goes on, and counts it
+        found = {"fault": f"{type(fault).__name__}: {fault}"}
+    return {"cell": cell.name, "number": number, **found, "seconds": round(time.process_time() - start, 3)}
+
+
+def tables(folder: Path) -> str:
+    """As of :func:`benchmarks.parts.curved.tables`, and of how many machines an axis' statement was denied."""
+    records = kept(folder)
+    heads = " | ".join(WORDS[name] for name in SHOWN)
+    lines = [f"| axes truly, calibration, what is stated | machines | denied | all 15 hold | {heads} |"]
+    lines.append("| --- " * (len(SHOWN) + 4) + "|")
+    for cell in CELLS:
+        done = [r for r in records if r["cell"] == cell.name and "intervals" in r]
+        if not done:
+            continue
+        each = {one.name: np.array([r["intervals"][one.name] for r in done]).T for one in CHARACTERISTICS}
+        all_hold = 100 * np.mean([curved.holds(rows).mean() for rows in each.values()])
+        denied = "–" if cell.stated is None else f"{100 * np.mean([bool(r['denied']) for r in done]):.0f} %"
+        row = [cell.name, str(len(done)), denied, f"{all_hold:.1f} %", *(curved.figures(each[name]) for name in SHOWN)]
+        lines.append("| " + " | ".join(row) + " |")
+    faults = sum("fault" in r for r in records)
+    seconds = np.mean([r["seconds"] for r in records])
+    return "\n".join([*lines, "", f"{faults} faults; {seconds:.2f} s of CPU a machine"])
+
+
+if __name__ == "__main__":
+    curved.study(str(__doc__), CELLS, measured, tables, (BEGIN, END), 2044)

@@ -1,0 +1,100 @@
+"""How the axes are read, as it was stated by whom, what is taken of it, and what the recording says to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.analysis.machine.state import AxisStatement
+from cmm_uq.analysis.machine.statements import readings_of
+from cmm_uq.base.messages import DASH, Text, Verbatim, listed, number, say, semicolons
+from cmm_uq.base.points import Floats, Machine
+from cmm_uq.base.units import unit
+from cmm_uq.certificate.document import Column, Table, table
+from cmm_uq.machine.model.field import READ, STATED
+from cmm_uq.machine.model.readings import AxisReading
+
+
+def readings_table(machine: Machine, statements: Sequence[AxisStatement]) -> Table | None:
+    """Of the axes of which it is stated how they are read."""
+    readings, said = readings_of(machine), {one.axis: one for one in statements}
+    heads = (say("Axis"), say("Read by"), say("Periodic error, to either side"), Column(say("Play"), unit("µm")),
+             say("Stated by"), say("The recording"))  # fmt: skip
+    rows = (
+        (Verbatim(axis.upper()), one.published.name, _periodic(one), DASH if one.play_um is None else number(one.play_um, "g"),
+         Verbatim(one.facts.source), _recording(said.get(axis)))
+        for axis, one in readings.items()
+    )  # fmt: skip
+    notes: list[Text] = [
+        say(
+            "Taken for what is known of these errors before the recording; 95 of 100 do not exceed it. A scale on the "
+            "axis does not see the play of the drive. Play for which nothing is given is as large as physics allows."
+        )
+    ]
+    published = dict.fromkeys(one.source for one in readings.values() if one.source)
+    notes += [say("Figures that are not stated are published ones: {source}.", source=Verbatim(s)) for s in published]
+    if any(one.facts.play_um is None and one.play_um is not None for one in readings.values()):
+        notes.append(
+            say(
+                "Play that is not stated is the largest published hysteresis of a scale on its axis: RLS, LMA10, below 2 µm."
+            )
+        )
+    return table(say("How the axes are read"), heads, rows, *notes)
+
+
+def _periodic(one: AxisReading) -> Text:
+    sections = [say("{um} µm within {mm} mm", um=number(um, "g"), mm=number(mm, "g")) for mm, um in one.within]
+    if one.interpolation is not None:
+        period, most = one.interpolation
+        within = say("{um} µm within one period of {mm} mm", um=number(most, ".3g"), mm=number(period, ".3g"))
+        sections.insert(0, within)
+    return semicolons(sections) if sections else say("as physics allows")
+
+
+def _recording(one: AxisStatement | None) -> Text:
+    if one is None or np.isnan(one.ratio):
+        return say("shows nothing of it")
+    if one.denied:
+        return say("denies it: not used")
+    return say("supports it") if one.supported else say("shows little of it")
+
+
+def readings_warnings(statements: Iterable[AxisStatement], scales: Mapping[str, Floats]) -> list[Text]:
+    """What a recording says against what is stated of axes.
+
+    ``scales``: draws (N,) of each family's size; of stated ones over what is stated.
+    """
+    denied = [Verbatim(one.axis.upper()) for one in statements if one.denied]
+    texts: list[Text] = []
+    if denied:
+        texts.append(
+            say("The recording denies how these axes are stated to be read, so that nothing of it is used: {axes}.",
+                axes=listed(denied))
+        )  # fmt: skip
+    for name, sizes in scales.items():
+        low, middle, high = np.quantile(sizes, [0.025, 0.5, 0.975])
+        if name.endswith(STATED) and low > 1:
+            texts.append(
+                say("The recording shows more than is stated, and is followed: {errors} {size} ({low} to {high}).",
+                    errors=READ[name], size=number(middle, ".2g"), low=number(low, ".2g"), high=number(high, ".2g"))
+            )  # fmt: skip
+    return texts
+
+
+def readings_data(machine: Machine, statements: Iterable[AxisStatement]) -> list[dict[str, Any]]:
+    """For results.json."""
+    said = {one.axis: one for one in statements}
+    rows = []
+    for axis, one in readings_of(machine).items():
+        own = said.get(axis)
+        told = one.facts.model_dump(exclude={"names"}, exclude_none=True, exclude_defaults=True)
+        period, most = one.interpolation or (None, None)
+        taken = {"within": [list(each) for each in one.within], "period_mm": period, "interpolation_um": most}
+        ratio = None if own is None or np.isnan(own.ratio) else own.ratio
+        rows.append({
+            "axis": axis, "stated": told, "taken": {**taken, "play_um": one.play_um}, "published": one.source or None,
+            "recording_against": ratio, "used": own is None or not own.denied,
+        })  # fmt: skip
+    return rows
