@@ -161,9 +161,16 @@ import sys
 from cmm_uq.app.cli import lighten
 lighten()
 import emcee
-assert "scipy.stats" not in sys.modules
+import numpy as np
+import scipy.linalg.interpolative
+import scipy.optimize
+import scipy.special
+assert not {"scipy.stats", "numpy.f2py.crackfortran", "scipy.spatial"} & {*sys.modules}
 sampler = emcee.EnsembleSampler(4, 1, lambda x: -0.5 * x @ x)
 sampler.run_mcmc([[0.1], [0.2], [0.3], [0.4]], 5)
+found = scipy.optimize.shgo(lambda x: (x[0] - 1) ** 2, [(-3.0, 3.0)])
+assert abs(found.x[0] - 1) < 1e-6
+assert scipy.linalg.interpolative.interp_decomp(np.outer([1.0, 2.0, 3.0], [1.0, 2.0]), 1e-6)[0] == 1
 import scipy.stats
 assert round(scipy.stats.norm.cdf(1.96), 3) == 0.975
 """
