@@ -17,11 +17,12 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.base.errors import CmmUqError, NotInstalledError
 from cmm_uq.certificate.verify.given import Given, Inquiry
 from cmm_uq.certificate.verify.opened import read_html, reading
+from cmm_uq.jobs.dcc import read, written
+from cmm_uq.jobs.dcc.tree import Node, parsed
 from cmm_uq.laboratory.records.facts import ChainHead
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.sign import FileSignature, Trust
-    from cmm_uq.jobs.dcc.tree import Node
     from cmm_uq.jobs.job import Job
 
 Difference = tuple[str, str, str]  # path in a PDF or XPath, what stands there, what should
@@ -51,7 +52,8 @@ def differing_parts(stands: bytes, should: bytes, *, signed: bool = False) -> li
     ``signed``: what signatures add to a PDF is no difference.
     """
     with reading("the PDF"):
-        a, b = (dict(_parts(content)) for content in (stands, should))
+        a = dict(_parts(stands))  # read in any case: what cannot be read is refused
+        b = a if stands == should else dict(_parts(should))
     added = {path for path in a if path not in b and _OF_SIGNATURES.match(path)} if signed else set()
     paths = (path for path in {**a, **b} if a.get(path) != b.get(path) and path not in added)
     found = []
@@ -95,8 +97,6 @@ _ROOT = "/dcc:digitalCalibrationCertificate"
 
 def open_digital(inquiry: Inquiry, given: Given) -> None:
     """Take the certificate out of the PDF where it is not given by itself, and the page out of it; keep where these differ."""
-    from cmm_uq.jobs.dcc import read
-
     # an artefact's certificate is an input
     inputs = given.results[1]["job"]["inputs_sha256"] if given.results is not None else {}
     files = [] if given.pdf is None else given.pdf[1].attachments
@@ -128,7 +128,6 @@ def check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
     if given.xml is None or given.results is None:
         return
     from cmm_uq.certificate.digital_certificate.certificate import digital_certificate
-    from cmm_uq.jobs.dcc import written
 
     name, content = given.xml
     try:
@@ -157,14 +156,10 @@ def check_schema(inquiry: Inquiry, given: Given, folder: Path) -> None:
 
 def same_unsigned(one: bytes, other: bytes, where: str) -> bool:
     """Whether two certificates are the same but for their signatures."""
-    from cmm_uq.jobs.dcc.tree import parsed
-
     return next(differences(parsed(one, where), parsed(other, where)), None) is None
 
 
 def _compare(inquiry: Inquiry, name: str, content: bytes, should: bytes, source: str) -> None:
-    from cmm_uq.jobs.dcc.tree import parsed
-
     inquiry.looked("forms")
     if content == should:
         return

@@ -17,7 +17,8 @@ from typer.testing import CliRunner
 
 from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
 from cmm_uq.app.commands.certificates.verification import Verification
-from cmm_uq.app.commands.certificates.verify import to_rerun, verify
+from cmm_uq.app.commands.certificates.verify import verify
+from cmm_uq.app.commands.certificates.verify_part import to_rerun
 from cmm_uq.app.commands.parts.machine import state_machine
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part, write_part, written
 from cmm_uq.base.errors import CmmUqError
@@ -33,7 +34,7 @@ OTHER = ROOT / "examples" / "part-plate-simulated" / "machine" / "certificate-si
 @pytest.fixture
 def once(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests whose report was made by :func:`plate_found`, that computing again has no part in."""
-    monkeypatch.setattr("cmm_uq.app.commands.certificates.verify.evaluate_part", found_again_once)
+    monkeypatch.setattr("cmm_uq.app.commands.certificates.verify_part.evaluate_part", found_again_once)
 
 
 def found_in(folder: Path, files: Mapping[str, bytes], *names: str, rerun: bool = False) -> Verification:
