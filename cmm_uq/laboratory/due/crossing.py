@@ -2,19 +2,19 @@
 
 Paths are drawn from the state after the last certificate on a grid of days. Between two days a path without a step is a
 Brownian bridge, whose probability of touching a limit is known (Karatzas and Shreve 1991, section 4.3), so that nothing is
-lost between them; the probabilities are averaged. The random numbers are fixed: the same history gives the same days.
+lost between them; where the season has its crest between them, the bridge is one beside the limit less that crest. The
+probabilities are averaged. The random numbers are fixed: the same history gives the same days.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
@@ -136,14 +136,14 @@ def crossing(
 
 
 class _States(NamedTuple):
-    """Level and rate of N machines in each of C nodes and tales."""
+    """Level, rate and components of N machines in each of C nodes and tales; c are as many as move."""
 
-    mean: Floats  # (2, N, C)
-    variance: Floats  # (2, N, C)
-    covariance: Floats  # (N, C)
+    mean: Floats  # (c, N, C)
+    covariance: Floats  # (c, c, N, C)
     weight: Floats  # (N, C)
     node: Ints  # (C,)
     prior: drift.DriftPrior
+    machines: drift.Histories
 
 
 def crossings(
@@ -152,17 +152,19 @@ def crossings(
 ) -> Crossings:  # fmt: skip
     """When the errors of many machines will be; later than ``until`` days, probabilities are those of that day."""
     N, M = len(machines), state.log_weight.shape[2]
+    c = 2 + len(prior.components)
     flat = _States(
-        state.mean[:2].reshape(2, N, -1), state.covariance[[0, 1], [0, 1]].reshape(2, N, -1),
-        state.covariance[0, 1].reshape(N, -1), state.weights(prior).reshape(N, -1), np.repeat(np.arange(len(prior)), M), prior,
+        state.mean[:c].reshape(c, N, -1), state.covariance[:c, :c].reshape(c, c, N, -1),
+        state.weights(prior).reshape(N, -1), np.repeat(np.arange(len(prior)), M), prior, machines,
     )  # fmt: skip
     limits = np.broadcast_to(np.asarray(limit, dtype=np.float64), N)
     chunk = max(1, _AT_ONCE // (paths * 8))
     numbers, ahead = _numbers(paths, len(days) - 1), days[: 1 + int(np.searchsorted(days, until))]
     found = [_probabilities(flat, np.arange(i, min(i + chunk, N)), limits, one_sided, numbers, ahead)
              for i in range(0, N, chunk)]  # fmt: skip
-    mean = (flat.weight * flat.mean).sum(axis=-1)
-    u = np.sqrt((flat.weight * (flat.variance + (flat.mean - mean[..., None]) ** 2)).sum(axis=-1))
+    mean = (flat.weight * flat.mean[:2]).sum(axis=-1)
+    variance = flat.covariance[[0, 1], [0, 1]]
+    u = np.sqrt((flat.weight * (variance + (flat.mean[:2] - mean[..., None]) ** 2)).sum(axis=-1))
     probability = np.concatenate(found)
     probability = np.pad(probability, [(0, 0), (0, len(days) - probability.shape[1])], mode="edge")
     return Crossings(machines.last, days, probability, mean[0], u[0], mean[1], u[1])
@@ -172,17 +174,28 @@ def crossings(
 def _numbers(paths: int, gaps: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Of each path: where it stands in the weights, numbers for its state, and for each gap of the grid for walk and steps.
 
-    The first two are a lattice in three dimensions (Roberts 2018); a normal number of the walk has its mirror image in
-    another path; steps take a uniform number and a normal one.
+    The first two are a lattice in seven dimensions (Roberts 2018); a normal number of the walk has its mirror image in
+    another path; steps take an exponential number and a normal one.
     """
     n = np.arange(paths)
-    root = 1.324717957244746  # of x³ = x + 1, for two dimensions beside an even one
-    state = special.ndtri((0.5 + np.outer(n + 1, root ** -np.arange(1.0, 3.0))) % 1.0)
     random = np.random.default_rng(_SEED)
-    half = random.standard_normal((paths // 2 + 1, gaps))
-    walk = np.concatenate([half, -half])[:paths][random.permutation(paths)]
-    steps = np.stack([random.random((paths, gaps)), random.standard_normal((paths, gaps))])
-    return (n + 0.5) / paths, state, walk, steps
+    half = random.standard_normal((gaps, paths // 2 + 1))
+    walk = np.concatenate([half, -half], axis=1)[:, :paths][:, random.permutation(paths)]
+    steps = np.stack([random.standard_exponential((gaps, paths)), random.standard_normal((gaps, paths))])
+    return (n + 0.5) / paths, drift.normal_lattice(paths, 2 + len(drift.COMPONENTS)).T.copy(), walk, steps
+
+
+def _drawn(states: _States, which: Ints, chosen: Ints, normal: Floats) -> Floats:
+    """Of each path (c, n, paths): its mean and, by Cholesky's factor column by column, what is uncertain about it."""
+    at = which[:, None], chosen
+    drawn = states.mean[:, *at]
+    left = states.covariance[:, :, *at]
+    for i, number in enumerate(normal[: len(drawn)]):
+        root = np.sqrt(np.maximum(left[i, i], 0.0))
+        column = left[i, i:] / np.where(root > 0, root, 1.0)
+        drawn[i:] += column * number
+        left[i + 1 :, i + 1 :] -= column[1:, None] * column[1:]
+    return drawn
 
 
 def _probabilities(
@@ -192,11 +205,7 @@ def _probabilities(
     cumulated = np.cumsum(states.weight[which], axis=1)
     chosen = np.stack([np.searchsorted(row / row[-1], place) for row in cumulated])
     chosen = np.minimum(chosen, cumulated.shape[1] - 1)
-    mean, variance = states.mean[:, which[:, None], chosen], states.variance[:, which[:, None], chosen]
-    level = mean[0] + np.sqrt(variance[0]) * normal[:, 0]
-    slope = states.covariance[which[:, None], chosen] / variance[0]
-    left = np.maximum(variance[1] - slope**2 * variance[0], 0.0)
-    rate = mean[1] + slope * (level - mean[0]) + np.sqrt(left) * normal[:, 1]
+    level, *theta = _drawn(states, which, chosen, normal)
     node, prior = states.node[chosen], states.prior
     walking, often, size = prior.walk[node], prior.steps_per_year[node], prior.step_sd[node]
     high = limits[which][:, None]
@@ -204,19 +213,48 @@ def _probabilities(
     inside = ((low <= level) & (level <= high)).astype(np.float64)
     survival = np.empty((len(which), len(days)))
     survival[:, 0] = inside.mean(axis=1)
-    for g, years in enumerate(np.diff(days) / drift.YEAR):
-        spread = walking**2 * years
-        after = level + rate * years + walking * np.sqrt(years) * walk[:, g]
+    moves = _moves(states, which, node, theta, days)
+    for g, (years, (move, up, up_then, down, down_then)) in enumerate(
+        zip(np.diff(days) / drift.YEAR, moves, strict=True)
+    ):
+        per_variance = -2 / (walking**2 * years)
+        after = level + move + walking * (np.sqrt(years) * walk[g])
         # probability that a bridge from one level to the other stays within the limits, given that its ends do
-        stays = -np.expm1(-2 * np.maximum((high - level) * (high - after), 0.0) / spread)
+        stays = -np.expm1(np.maximum((high - level - up) * (high - after - up_then), 0.0) * per_variance)
+        inside *= (low + down <= level) & (level <= high - up)
         if not one_sided:
-            stays *= -np.expm1(-2 * np.maximum((high + level) * (high + after), 0.0) / spread)
+            stays *= -np.expm1(np.maximum((high + level - down) * (high + after - down_then), 0.0) * per_variance)
         inside *= stays
-        step = stepping[0, :, g] < -np.expm1(-often * years)
-        level = after + step * size * stepping[1, :, g]
+        level = after + np.where(stepping[0, g] < often * years, size * stepping[1, g], 0.0)
         inside *= (low <= level) & (level <= high)
         survival[:, g + 1] = inside.mean(axis=1)
     return 1.0 - survival
+
+
+def _moves(
+    states: _States, which: Ints, node: Ints, theta: Sequence[Floats], days: Floats
+) -> Iterator[tuple[Floats, Floats | float, Floats | float, Floats | float, Floats | float]]:
+    """Of each gap (n, paths) each: what the level moves by, how far the season rises above both its ends, and falls below."""
+    of, rows = states.machines, np.arange(len(which))[:, None]
+    since, first, settling = (each[which][:, None] for each in (of.last, of.first, of.settles))
+    until = since + days
+    rate, wear, settled, *_ = drift.moved(since, until, first, settling, states.prior.settle_years[:, None, None])
+    by_rate, by_wear, by_settling = (np.diff(each, axis=-1) for each in (rate, wear, settled))
+    if len(theta) == 1:
+        yield from ((each[:, None] * theta[0], 0.0, 0.0, 0.0, 0.0) for each in by_rate.T)
+        return
+    phase, cosine, sine = drift.phase(until), theta[3], theta[4]
+    most, crest = np.hypot(cosine, sine), np.arctan2(sine, cosine) / (2 * np.pi)
+    seasons: list[tuple[Floats, ...]] = []
+    for g, (c, s, turn) in enumerate(zip(np.cos(phase).T, np.sin(phase).T, phase.T / (2 * np.pi), strict=True)):
+        place = turn[:, None] - crest
+        seasons = [*seasons[-1:], (c[:, None] * cosine + s[:, None] * sine, np.floor(place), np.floor(place + 0.5))]
+        if g:
+            (now, crests, troughs), (then, crests_then, troughs_then) = seasons
+            move = by_rate[:, g - 1, None] * theta[0] + by_wear[:, g - 1, None] * theta[1] + then - now
+            move += by_settling[node, rows, g - 1] * theta[2]
+            up, down = crests_then > crests, troughs_then > troughs
+            yield move, up * (most - now), up * (most - then), down * (most + now), down * (most + then)
 
 
 def _log_survival(probability: Floats) -> Floats:

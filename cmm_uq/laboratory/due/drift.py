@@ -1,8 +1,9 @@
 """How one error of a machine drifts: its history as the model takes it, and what is known before its own certificates.
 
-The model, per error factor or figure of performance (docs/records/drift.md): between adjustments the error is a level that
-moves at a constant rate, wanders as a Wiener process and now and then makes a step; an adjustment puts it back near zero and
-leaves the rate. Certificates see it with their stated uncertainty, of which those made with one artefact share a part.
+The model, per error factor or figure of performance (docs/records/drift.md): between adjustments the error moves at a rate
+that may grow (wear), settles, follows the seasons, wanders as a Wiener process and now and then makes a step; an adjustment
+puts it back near zero and leaves the rate. Certificates see it with their stated uncertainty, of which those made with one
+artefact share a part.
 
 A prior is a set of nodes, each a full set of the model's parameters with a weight; the model is exact Gaussian algebra at
 every node (:mod:`cmm_uq.laboratory.due.drift_filter`), and the nodes are summed over. Defaults are in units of the limit,
@@ -103,13 +104,26 @@ class Histories:
     value: Floats  # and u: (n, N)
     u: Floats
     shared: Floats  # (n, q, N) what one standard uncertainty of each artefact of the machine adds to the certificate
-    years: Floats  # (n, N) since the certificate before, or since the adjustment where one came between
-    adjusted: NDArray[np.bool_]  # (n, N) whether one did
+    day: Floats  # and begun: (n, N) ordinal, and that of the certificate before, or of an adjustment between both
+    begun: Floats
+    adjusted: NDArray[np.bool_]  # (n, N) whether there is one
+    settling: Floats  # (n, N) ordinal from which on the machine settles: of an adjustment, or of its first certificate
     given: NDArray[np.bool_]  # (n, N) whether the machine has so many certificates
     artefacts: Ints  # (N, q) numbers into ``names``, −1 where a machine used fewer
     names: tuple[str, ...]
     last: Floats  # (N,) ordinal of the last certificate, or of an adjustment after it
+    settles: Floats  # (N,) ordinal from which on the machine settles then
     adjusted_after: NDArray[np.bool_]  # (N,) whether there is one
+
+    @property
+    def first(self) -> Floats:
+        """Ordinal of each machine's first certificate, (N,)."""
+        return self.day[0]
+
+    @property
+    def years(self) -> Floats:
+        """From where each certificate's time begins to the certificate, (n, N)."""
+        return (self.day - self.begun) / YEAR
 
     def __len__(self) -> int:
         return len(self.last)
@@ -117,9 +131,9 @@ class Histories:
     def some(self, which: Ints) -> Histories:
         most = int(self.given[:, which].sum(axis=0).max())
         return Histories(
-            self.value[:most, which], self.u[:most, which], self.shared[:most][:, :, which], self.years[:most, which],
-            self.adjusted[:most, which], self.given[:most, which], self.artefacts[which], self.names, self.last[which],
-            self.adjusted_after[which],
+            self.value[:most, which], self.u[:most, which], self.shared[:most][:, :, which], self.day[:most, which],
+            self.begun[:most, which], self.adjusted[:most, which], self.settling[:most, which], self.given[:most, which],
+            self.artefacts[which], self.names, self.last[which], self.settles[which], self.adjusted_after[which],
         )  # fmt: skip
 
 
@@ -128,40 +142,53 @@ def side_by_side(histories: Sequence[DriftHistory]) -> Histories:
     number = {name: i for i, name in enumerate(names)}
     own = [list(dict.fromkeys(each.artefact)) for each in histories]
     n, q, N = max(len(each.day) for each in histories), max(map(len, own)), len(histories)
-    value, u, years = np.zeros((n, N)), np.ones((n, N)), np.zeros((n, N))
+    value, u = np.zeros((n, N)), np.ones((n, N))
+    day, begun, settling = np.zeros((3, n, N))
     shared, artefacts = np.zeros((n, q, N)), np.full((N, q), -1)
     adjusted, given = np.zeros((n, N), dtype=bool), np.zeros((n, N), dtype=bool)
     for i, (each, mine) in enumerate(zip(histories, own, strict=True)):
         k = len(each.day)
         value[:k, i], u[:k, i], given[:k, i] = each.value, each.u, True
-        adjusted[:k, i], years[:k, i] = _since(each)
+        day[:k, i] = each.day
+        adjusted[:k, i], begun[:k, i], settling[:k, i] = _since(each)
         artefacts[i, : len(mine)] = [number[name] for name in mine]
         shared[np.arange(k), [mine.index(name) for name in each.artefact], i] = np.minimum(
             each.u_artefact, MOST_SHARED * each.u
         )
     after = np.array([each.adjusted_after for each in histories])
     last = np.where(np.isnan(after), [each.day[-1] for each in histories], after)
-    return Histories(value, u, shared, years, adjusted, given, artefacts, tuple(names), last, np.isfinite(after))
+    settles = np.where(np.isnan(after), settling[given.sum(axis=0) - 1, np.arange(N)], after)
+    return Histories(value, u, shared, day, begun, adjusted, settling, given, artefacts, tuple(names), last, settles,
+                     np.isfinite(after))  # fmt: skip
 
 
-def _since(of: DriftHistory) -> tuple[NDArray[np.bool_], Floats]:
-    """Whether an adjustment comes between each certificate and the one before, and the years since the later of both."""
+def _since(of: DriftHistory) -> tuple[NDArray[np.bool_], Floats, Floats]:
+    """Whether an adjustment comes between each certificate and the one before, the later of both, and what it settles from."""
     before = np.concatenate([[np.nan], of.adjusted_since[:-1]])
     adjusted = np.isfinite(of.adjusted_since) & ~(of.adjusted_since <= before)
     previous = np.concatenate([of.day[:1], of.day[:-1]])
     begun = np.where(adjusted, of.adjusted_since, previous)
     begun[1:] = np.maximum(begun[1:], previous[1:])
-    return adjusted, (of.day - begun) / YEAR
+    settling = np.maximum.accumulate(np.where(adjusted, begun, of.day[0] if not adjusted[0] else begun[0]))
+    return adjusted, begun, settling
 
 
 NAMES = ("rate_sd", "model_sd", "place_sd", "walk", "first_sd", "as_left_sd", "steps_per_year", "step_sd")
-"""Of the hyper-parameters, all positive; their logarithms are normal before any data."""
+"""Of the hyper-parameters that a fleet teaches, all positive; their logarithms are normal before any data."""
 
 MEDIANS = np.array([0.1, 0.05, 0.05, 0.07, 0.35, 0.15, 0.05, 0.4])
 """In units of the limit and of years, but for the steps a year."""
 
 SPREADS = np.array([0.8, 0.8, 0.8, 0.8, 0.5, 0.6, 0.8, 0.6])
 """Standard deviations of the logarithms: a factor of five either way is not surprising, of three for those of a level."""
+
+COMPONENTS = ("wear_sd", "settle_sd", "season_sd", "settle_years")
+"""Of what a machine does besides, all positive: wear that speeds up, settling, season; their logarithms are normal."""
+
+COMPONENT_MEDIANS = np.array([0.015, 0.2, 0.08, 0.7])
+"""In units of the limit and of years: a year's growth of the rate, ways settled, amplitudes of sine and cosine, decay time."""
+
+COMPONENT_SPREAD = 0.8  # standard deviation of their logarithms
 
 USUAL_RATE_SD = 0.15  # of the rate common to a whole fleet, in limits per year: it may drift either way
 
@@ -172,6 +199,8 @@ WITHOUT_LIMIT = 8.0
 """Standard uncertainties that stand for the limit where none is stated: test uncertainty ratios are from 4 to 10 or so."""
 
 NODES = 128
+FEW = 16  # draws of a fleet's posterior that components are summed over at, :data:`POINTS` of them at each size of walk
+POINTS = 4
 _WALK_NODES, _WALK_WEIGHTS = np.polynomial.hermite_e.hermegauss(3)
 
 WRONG, WRONG_TIMES = 0.01, 5.0
@@ -189,11 +218,21 @@ class DriftPrior:
     as_left_sd: Floats
     steps_per_year: Floats  # and step_sd: (K,) how often a step comes, and how large
     step_sd: Floats
+    wear_sd: Floats  # (K,) of a year's growth of the rate, and of the coefficients below; all zero: no components
+    settle_sd: Floats
+    season_sd: Floats
+    settle_years: Floats  # (K,) in which all but 1/e of a settling is over
     weight: Floats  # (K,) of the nodes before the machine's data; they sum to one in all groups together
     group: Ints
 
     def __len__(self) -> int:
         return len(self.rate)
+
+    @property
+    def components(self) -> Floats:
+        """Standard deviations (4, K) of wear's, settling's and the seasons' coefficients; (0, K) where there are none."""
+        each = np.stack([self.wear_sd, self.settle_sd, self.season_sd, self.season_sd])
+        return each if each.any() else each[:0]
 
     @cached_property
     def members(self) -> NDArray[np.bool_]:
@@ -206,40 +245,77 @@ def limit_for(limit: float | None, u: Floats) -> float:
     return float(limit) if limit else WITHOUT_LIMIT * float(np.median(u))
 
 
-def default_prior(unit: float, nodes: int = NODES) -> DriftPrior:
-    """Of a machine without a fleet, in units of the limit: nodes at the points of Roberts' sequence (2018)."""
+def default_prior(unit: float, nodes: int = NODES, *, plain: bool = False) -> DriftPrior:
+    """Of a machine without a fleet, in units of the limit; ``plain``: without wear that speeds up, settling and season."""
+    medians = np.concatenate([MEDIANS, COMPONENT_MEDIANS])
+    spreads = np.concatenate([SPREADS, np.full(len(COMPONENTS), COMPONENT_SPREAD)])
+    theta = np.log(medians) + spreads * normal_lattice(nodes, len(medians))
     d = len(NAMES)
+    values = _in_unit(NAMES, theta[:, :d], unit) | _components(theta[:, d:], unit, plain=plain)
+    rates = [values.pop(name) for name in ("rate_sd", "model_sd", "place_sd")]
+    spread = np.sqrt(sum(rate**2 for rate in rates) + (USUAL_RATE_SD * unit) ** 2)
+    return DriftPrior(rate=np.zeros(nodes), rate_sd=spread, **values, weight=np.full(nodes, 1.0 / nodes),
+                      group=np.zeros(nodes, dtype=np.int64))  # fmt: skip
+
+
+def normal_lattice(count: int, d: int) -> Floats:
+    """Normal numbers (count, d) at the points of Roberts' sequence (2018)."""
     root = 2.0
     for _ in range(60):
         root = (1.0 + root) ** (1.0 / (d + 1))
-    points = (0.5 + np.outer(np.arange(1, nodes + 1), root ** -np.arange(1.0, d + 1))) % 1.0
-    theta = np.log(MEDIANS) + SPREADS * special.ndtri(points)
-    values = _in_unit(np.exp(theta), unit)
-    spread = np.sqrt(values["rate_sd"] ** 2 + values["model_sd"] ** 2 + values["place_sd"] ** 2)
-    spread = np.hypot(spread, USUAL_RATE_SD * unit)
-    return DriftPrior(
-        np.zeros(nodes), spread, values["walk"], values["first_sd"], values["as_left_sd"], values["steps_per_year"],
-        values["step_sd"], np.full(nodes, 1.0 / nodes), np.zeros(nodes, dtype=np.int64),
-    )  # fmt: skip
+    points = (0.5 + np.outer(np.arange(1, count + 1), root ** -np.arange(1.0, d + 1))) % 1.0
+    return np.asarray(special.ndtri(points), dtype=np.float64)
 
 
-def learnt_prior(theta: Floats, rate: Floats, rate_sd: Floats, unit: float) -> DriftPrior:
-    """Of a machine of a fleet: at (g, 8) draws of its posterior of logarithms, in units of ``unit``, and rates (g,)."""
-    g, w = len(theta), len(_WALK_NODES)
-    values = {name: np.repeat(value, w) for name, value in _in_unit(np.exp(theta), unit).items()}
-    return DriftPrior(
-        np.repeat(rate, w), np.repeat(rate_sd, w), values["walk"] * np.tile(np.exp(WALKS_DIFFER * _WALK_NODES), g),
-        values["first_sd"], values["as_left_sd"], values["steps_per_year"], values["step_sd"],
-        np.tile(_WALK_WEIGHTS / _WALK_WEIGHTS.sum(), g) / g, np.repeat(np.arange(g), w),
-    )  # fmt: skip
+def learnt_prior(theta: Floats, rate: Floats, rate_sd: Floats, unit: float, *, plain: bool = False) -> DriftPrior:
+    """Of a machine of a fleet: at (g, 8) draws of its posterior of logarithms, in units of ``unit``, and rates (g,).
+
+    What a machine does besides is not learnt from a fleet: at each draw it is summed over as without one, or ``plain``.
+    """
+    g, w, c = len(theta), len(_WALK_NODES), 1 if plain else POINTS
+    values = _in_unit(NAMES, np.repeat(theta, w * c, axis=0), unit)
+    values["walk"] *= np.tile(np.repeat(np.exp(WALKS_DIFFER * _WALK_NODES), c), g)
+    log = np.log(COMPONENT_MEDIANS) + COMPONENT_SPREAD * normal_lattice(g * w * c, len(COMPONENTS))
+    values = {name: value for name, value in values.items() if name not in NAMES[:3]} | _components(
+        log, unit, plain=plain
+    )
+    return DriftPrior(rate=np.repeat(rate, w * c), rate_sd=np.repeat(rate_sd, w * c), **values,
+                      weight=np.tile(np.repeat(_WALK_WEIGHTS / _WALK_WEIGHTS.sum() / c, c), g) / g,
+                      group=np.repeat(np.arange(g), w * c))  # fmt: skip
 
 
-def _in_unit(values: Floats, unit: float) -> dict[str, Floats]:
-    """Columns by name; all but the steps a year are in limits."""
-    return {name: values[:, i] * (1.0 if name == "steps_per_year" else unit) for i, name in enumerate(NAMES)}
+def _components(theta: Floats, unit: float, *, plain: bool) -> dict[str, Floats]:
+    values = _in_unit(COMPONENTS, theta, unit)
+    return {name: value * (not plain or name == "settle_years") for name, value in values.items()}
+
+
+def _in_unit(names: Sequence[str], theta: Floats, unit: float) -> dict[str, Floats]:
+    """Columns of exp(theta) by name; all but the steps a year and the years are in limits."""
+    return {name: np.exp(theta[:, i]) * (1.0 if "year" in name else unit) for i, name in enumerate(names)}
 
 
 def log_density(theta: Floats) -> Floats:
     """Of the logarithms of the hyper-parameters before any data, up to a constant, (…, 8) → (…,)."""
     z = (theta - np.log(MEDIANS)) / SPREADS
     return np.asarray(-0.5 * (z * z).sum(axis=-1), dtype=np.float64)
+
+
+def phase(day: Floats) -> Floats:
+    """Of the year, in radians: nothing depends on where it begins."""
+    return np.asarray(2 * np.pi * day / YEAR)
+
+
+def moved(
+    since: Floats, until: Floats, first: Floats, settling: Floats, settle_years: Floats
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """What one unit of rate, of its growth, of settling, of the seasons' cosine and sine moves a level by between two days.
+
+    Parameters
+    ----------
+    since, until, first, settling : ordinals that fit together: from and to, and of :class:`Histories`.
+    settle_years : decay times that fit with the others; only the third depends on them.
+    """
+    begin, end = (since - first) / YEAR, (until - first) / YEAR
+    decay = np.exp((settling - since) / (YEAR * settle_years)) - np.exp((settling - until) / (YEAR * settle_years))
+    season = phase(until), phase(since)
+    return end - begin, 0.5 * (end**2 - begin**2), decay, *(f(season[0]) - f(season[1]) for f in (np.cos, np.sin))

@@ -1,6 +1,8 @@
 """Level and rate of many machines given their certificates: Kalman filters over every likely tale of steps.
 
-State of a machine: level, rate, and the errors of the artefacts that it was measured with, in their standard uncertainties.
+State of a machine: level, rate, the coefficients of wear that speeds up, of settling and of the seasons (four, or none), and
+the errors of the artefacts that it was measured with, in their standard uncertainties. All but the level stay as they are, but
+that an adjustment begins a new settling; they move the level by :func:`cmm_uq.laboratory.due.drift.moved`.
 Given when steps came and which certificates were wrong, all is Gaussian and the filter is exact (Kalman 1960; Durbin and
 Koopman 2012, section 4.3). Those tales are summed over: each certificate makes four of one, and the likeliest are kept (a
 Gaussian sum, Alspach and Sorenson 1972).
@@ -8,12 +10,13 @@ Gaussian sum, Alspach and Sorenson 1972).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.base.points import Floats
+from cmm_uq.base.points import Floats, Ints
 from cmm_uq.laboratory.due import drift
 
 KEPT = 12  # tales kept of a machine at a node
@@ -33,12 +36,14 @@ class DriftStart:
 class DriftState:
     """After the last certificate, or an adjustment after it, for N machines, K nodes and M tales."""
 
-    mean: Floats  # (2 + q, N, K, M) level, rate, errors of the artefacts
-    covariance: Floats  # (2 + q, 2 + q, N, K, M)
+    mean: Floats  # (d, N, K, M) level, rate, components, errors of the artefacts
+    covariance: Floats  # (d, d, N, K, M)
     log_weight: Floats  # (N, K, M) joint density of certificates and tale
+    steps: NDArray[np.bool_]  # (n, N, K, M) whether the tale has a step before a certificate; (0, …) where nobody asked
 
     def between(self, first: int, last: int | None) -> DriftState:
-        return DriftState(self.mean[:, first:last], self.covariance[:, :, first:last], self.log_weight[first:last])
+        mean, covariance, steps = self.mean[:, first:last], self.covariance[:, :, first:last], self.steps[:, first:last]
+        return DriftState(mean, covariance, self.log_weight[first:last], steps)
 
     @property
     def log_evidence(self) -> Floats:
@@ -72,20 +77,35 @@ def usual_start(machines: drift.Histories, prior: drift.DriftPrior) -> DriftStar
 
 
 def filtered(
-    machines: drift.Histories, prior: drift.DriftPrior, start: DriftStart | None = None, kept: int = KEPT
-) -> DriftState:
-    """Filter all certificates of all machines at all nodes, from :func:`usual_start` or another start."""
+    machines: drift.Histories, prior: drift.DriftPrior, start: DriftStart | None = None, kept: int = KEPT, *,
+    dated: bool = False, sized: Collection[int] = (),
+) -> DriftState:  # fmt: skip
+    """Filter all certificates of all machines at all nodes, from :func:`usual_start` or another start.
+
+    ``dated``: keep when tales have steps, of machines with as many certificates. ``sized``: certificates before which the sum
+    of steps is the state's last component.
+    """
     start = start or usual_start(machines, prior)
+    if sized:  # as of an artefact that no certificate was made with
+        machines = replace(machines, shared=np.pad(machines.shared, [(0, 0), (0, 1), (0, 0)]))
+        start = DriftStart(np.pad(start.mean, [(0, 1), (0, 0), (0, 0)]),
+                           np.pad(start.covariance, [(0, 1), (0, 1), (0, 0), (0, 0)]))  # fmt: skip
     order = np.argsort(-machines.given.sum(axis=0), kind="stable")  # whoever has no further certificate is done
     machines, start = machines.some(order), DriftStart(start.mean[:, order], start.covariance[:, :, order])
-    d, N, K = len(start.mean) + 1, len(machines), len(prior)
+    components, N, K = prior.components, len(machines), len(prior)
+    c = np.arange(2, 2 + len(components))
+    own = np.delete(np.arange(1 + len(start.mean) + len(c)), c)[1:]
+    d = 1 + len(own) + len(c)
     mean, covariance = np.zeros((d, N, K, 1)), np.zeros((d, d, N, K, 1))
-    mean[1:, ..., 0], covariance[1:, 1:, ..., 0] = start.mean, start.covariance
+    mean[own, ..., 0], covariance[own[:, None], own, ..., 0] = start.mean, start.covariance
     covariance[0, 0] = (prior.first_sd**2)[:, None]
-    state, done = DriftState(mean, covariance, np.zeros((N, K, 1))), []
+    covariance[c, c] = (components**2)[:, None, :, None]
+    no_steps = np.zeros((len(machines.given) * dated, N, K, 1), dtype=bool)
+    state, done = DriftState(mean, covariance, np.zeros((N, K, 1)), no_steps), []
     for k, left in enumerate(machines.given.sum(axis=1)):
         done.append(state.between(left, None))
-        state = _measured(_moved(state.between(0, left), machines, prior, k), machines, prior, k, kept)
+        state = _moved(state.between(0, left), machines, prior, k)
+        state = _measured(state, machines, prior, k, kept, counted=k in sized)
     back = np.argsort(order)
     state, after = _side_by_side([state, *reversed(done)], back), machines.adjusted_after[back][:, None, None]
     if after.any():
@@ -93,11 +113,18 @@ def filtered(
     return state
 
 
+_SETTLE = 3  # where the state has the coefficient of settling, if any
+
+
 def _set_back(state: DriftState, adjusted: NDArray[np.bool_], prior: drift.DriftPrior) -> None:
-    state.mean[0] *= ~adjusted
-    state.covariance[0] *= ~adjusted
-    state.covariance[:, 0] *= ~adjusted
-    state.covariance[0, 0] += adjusted * (prior.as_left_sd**2)[:, None]
+    """To what adjustments leave; what settles after one is as much less than after the installation as what it leaves is."""
+    left = prior.as_left_sd**2
+    again = [(0, left), (_SETTLE, prior.settle_sd**2 * left / prior.first_sd**2)][: 1 + (len(prior.components) > 0)]
+    for i, variance in again:
+        state.mean[i] *= ~adjusted
+        state.covariance[i] *= ~adjusted
+        state.covariance[:, i] *= ~adjusted
+        state.covariance[i, i] += adjusted * variance[:, None]
 
 
 def _side_by_side(parts: list[DriftState], order: NDArray[np.intp]) -> DriftState:
@@ -113,30 +140,39 @@ def _side_by_side(parts: list[DriftState], order: NDArray[np.intp]) -> DriftStat
 
     return DriftState(
         joined([part.mean for part in parts], 0.0), joined([part.covariance for part in parts], 0.0),
-        joined([part.log_weight for part in parts], -np.inf),
+        joined([part.log_weight for part in parts], -np.inf), joined([part.steps for part in parts], 0.0),
     )  # fmt: skip
 
 
 def _moved(state: DriftState, machines: drift.Histories, prior: drift.DriftPrior, k: int) -> DriftState:
-    """To the day of certificate k: set back by an adjustment, along the rate, wandering; in place."""
+    """To the day of certificate k: set back by an adjustment, moved by rate and components, wandering; in place."""
     mean, covariance, N = state.mean, state.covariance, len(state.log_weight)
-    adjusted, years = machines.adjusted[k, :N, None, None], machines.years[k, :N, None, None]
+    adjusted = machines.adjusted[k, :N, None, None]
     if adjusted.any():
         _set_back(state, adjusted, prior)
-    mean[0] += years * mean[1]
-    covariance[0] += years * covariance[1]
-    covariance[:, 0] += years * covariance[:, 1]
-    covariance[0, 0] += years * (prior.walk**2)[:, None]
+    days = (each[..., None, None] for each in (machines.begun[k, :N], machines.day[k, :N], machines.first[:N],
+                                               machines.settling[k, :N]))  # fmt: skip
+    moves = drift.moved(*days, prior.settle_years[:, None])[: 1 + len(prior.components)]
+    for i, move in enumerate(moves, 1):
+        mean[0] += move * mean[i]
+    along = sum(move * covariance[i] for i, move in enumerate(moves, 1))
+    along[0] += 0.5 * sum(move * along[i] for i, move in enumerate(moves, 1))
+    covariance[0] += along
+    covariance[:, 0] += along
+    covariance[0, 0] += machines.years[k, :N, None, None] * (prior.walk**2)[:, None]
     return state
 
 
-def _measured(state: DriftState, machines: drift.Histories, prior: drift.DriftPrior, k: int, kept: int) -> DriftState:
+def _measured(
+    state: DriftState, machines: drift.Histories, prior: drift.DriftPrior, k: int, kept: int, *, counted: bool
+) -> DriftState:
     """With certificate k: each tale becomes four (no step or one before it; right or wrong), the likeliest are kept."""
     N, K, M = state.log_weight.shape
     shared, variance = machines.shared[k, :, :N, None, None], machines.u[k, :N, None, None] ** 2
-    seen = state.covariance[:, 0] + (shared * state.covariance[:, 2:]).sum(axis=1)
-    expected = seen[0] + (shared * (seen[2:] - shared)).sum(axis=0) + variance
-    missed = machines.value[k, :N, None, None] - state.mean[0] - (shared * state.mean[2:]).sum(axis=0)
+    first = len(state.mean) - len(shared)  # of the artefacts
+    seen = state.covariance[:, 0] + (shared * state.covariance[:, first:]).sum(axis=1)
+    expected = seen[0] + (shared * (seen[first:] - shared)).sum(axis=0) + variance
+    missed = machines.value[k, :N, None, None] - state.mean[0] - (shared * state.mean[first:]).sum(axis=0)
     size = (prior.step_sd**2)[:, None]
     steps = _log_steps(machines.years[k, :N], prior)
     spread, log_weight = np.empty((N, K, 4, M)), np.empty((N, K, 4, M))
@@ -145,7 +181,8 @@ def _measured(state: DriftState, machines: drift.Histories, prior: drift.DriftPr
         spread[:, :, tale] = expected + stepped * size + wrong * _TIMES * variance
         log_weight[:, :, tale] = state.log_weight + (steps[stepped] + _ODDS[wrong])[..., None]
     log_weight -= 0.5 * (np.log(2 * np.pi * spread) + missed[:, :, None] ** 2 / spread)
-    return _kept(state, log_weight, seen, spread, missed, size, kept)
+    stepping = np.arange(len(state.mean))[[0, -1]] if counted else np.arange(1)
+    return _kept(state, log_weight, seen, spread, missed, size, kept, stepping, k)
 
 
 def _log_steps(years: Floats, prior: drift.DriftPrior) -> tuple[Floats, Floats]:
@@ -156,9 +193,13 @@ def _log_steps(years: Floats, prior: drift.DriftPrior) -> tuple[Floats, Floats]:
 
 
 def _kept(
-    state: DriftState, log_weight: Floats, seen: Floats, spread: Floats, missed: Floats, size: Floats, kept: int
-) -> DriftState:
-    """The likeliest tales, each with its Kalman update; ``log_weight`` and ``spread`` are (N, K, 4, M)."""
+    state: DriftState, log_weight: Floats, seen: Floats, spread: Floats, missed: Floats, size: Floats, kept: int,
+    stepping: Ints, k: int,
+) -> DriftState:  # fmt: skip
+    """The likeliest tales, each with its Kalman update; ``log_weight`` and ``spread`` are (N, K, 4, M).
+
+    ``stepping``: what of the state a step before certificate k changes.
+    """
     N, K, _, M = log_weight.shape
     few, rows = min(kept, 4 * M), np.arange(N * K)[:, None]
     flat = log_weight.reshape(N * K, 4 * M)
@@ -170,17 +211,19 @@ def _kept(
 
     def taken(values: Floats, which: NDArray[np.intp], own: int = 3) -> Floats:
         """Of the last ``own`` axes: machine, node, and what tales are made of."""
-        lead = values.shape[: values.ndim - own]
-        return values.reshape(*lead, -1).take(which, axis=-1).reshape(*lead, N, K, few)
+        lead, last = values.shape[: values.ndim - own], values.shape[values.ndim - own :]
+        return values.reshape(*lead, int(np.prod(last))).take(which, axis=-1).reshape(*lead, N, K, few)
 
-    mean, covariance, seen = taken(state.mean, of), taken(state.covariance, of), taken(seen, of)
-    stepped = (chosen // M >= 2).reshape(N, K, few) * size
-    seen[0] += stepped
-    covariance[0, 0] += stepped
+    mean, covariance, seen, steps = (taken(each, of) for each in (state.mean, state.covariance, seen, state.steps))
+    step = (chosen // M >= 2).reshape(N, K, few)
+    steps[k : k + 1] = step
+    stepped = step * size
+    seen[stepping] += stepped
+    covariance[stepping[:, None], stepping] += stepped
     gain = seen / taken(spread, tale, 4)
     mean += gain * taken(missed, of)
     covariance -= gain[:, None] * seen
-    return DriftState(mean, covariance, taken(log_weight, tale, 4))
+    return DriftState(mean, covariance, taken(log_weight, tale, 4), steps)
 
 
 FEWEST = 2  # certificates from which on a history says anything of a machine's own drift
@@ -191,15 +234,21 @@ def change_since(
 ) -> float | None:
     """Root mean square change of an error by so many days after its last certificate, in its unit; ``None`` if unknown.
 
-    A rate that is known less and less well the farther it is carried on, a wandering and now and then a step:
-    √((r² + u²(r))·t² + w²·t + n·s²·t), averaged over the model's parameters given the certificates.
+    A rate, its growth, a settling and a season that are known less and less well the farther they are carried on, a wandering
+    and now and then a step: √((m·θ)² + m·U·m + w²·t + n·s²·t) of coefficients θ with covariance U that move the level by m,
+    averaged over the model's parameters given the certificates.
     """
     if len(of.day) < FEWEST or np.isfinite(of.adjusted_after):
         return None
     known = drift.default_prior(drift.limit_for(limit, of.u)) if prior is None else prior
-    state, years = filtered(drift.side_by_side([of]), known), abs(days) / drift.YEAR
+    machines, years = drift.side_by_side([of]), abs(days) / drift.YEAR
+    state = filtered(machines, known)
     weight = state.weights(known)[0]
-    rate = state.mean[1, 0] ** 2 + state.covariance[1, 1, 0]
+    moves = drift.moved(machines.last, machines.last + abs(days), machines.first, machines.settles, known.settle_years)
+    m = np.stack([np.broadcast_to(move, len(known)) for move in moves])[: 1 + len(known.components)]
+    theta = slice(1, 1 + len(m))
+    moved = np.einsum("ik,ikm->km", m, state.mean[theta, 0]) ** 2
+    moved += np.einsum("ik,jk,ijkm->km", m, m, state.covariance[theta, theta, 0])
     wandering = (known.walk**2 + known.steps_per_year * known.step_sd**2)[:, None]
-    square = rate * years**2 + wandering * years
+    square = moved + wandering * years
     return float(np.sqrt(np.sum(weight * square) / np.sum(weight)))

@@ -34,24 +34,24 @@ def machine(
     )  # fmt: skip
 
 
+USUAL = {
+    "rate": 0.0, "rate_sd": 1.0, "walk": 0.7, "first_sd": 3.0, "as_left_sd": 1.0, "steps_per_year": 0.2, "step_sd": 2.5,
+    "wear_sd": 0.0, "settle_sd": 0.0, "season_sd": 0.0, "settle_years": 1.0,
+}  # fmt: skip
+ALL = {"wear_sd": 0.3, "settle_sd": 2.0, "season_sd": 1.5, "settle_years": 0.8}
+"""Of all components; none of them is of any in :data:`USUAL`."""
+
+
 def one_node(**of: float) -> DriftPrior:
-    usual = {
-        "rate": 0.0,
-        "rate_sd": 1.0,
-        "walk": 0.7,
-        "first_sd": 3.0,
-        "as_left_sd": 1.0,
-        "steps_per_year": 0.2,
-        "step_sd": 2.5,
-    }
-    return DriftPrior(**{name: np.array([value]) for name, value in (usual | of).items()}, weight=np.ones(1),
+    return DriftPrior(**{name: np.array([value]) for name, value in (USUAL | of).items()}, weight=np.ones(1),
                  group=np.zeros(1, dtype=np.int64))  # fmt: skip
 
 
 def dense(of: DriftHistory, prior: DriftPrior) -> tuple[float, Floats, Floats]:
-    n, p = len(of.day), {name: float(getattr(prior, name)[0]) for name in (
-        "rate", "rate_sd", "walk", "first_sd", "as_left_sd", "steps_per_year", "step_sd")}  # fmt: skip
+    """Evidence, and mean and covariance of level, rate, wear, settling, cosine and sine at the last certificate."""
+    n, p = len(of.day), {name: float(getattr(prior, name)[0]) for name in USUAL}
     t = (of.day - FIRST) / YEAR
+    season = 2 * np.pi * FIRST / YEAR
     names = sorted(set(of.artefact))
     log, means, covariances = [], [], []
     for tale in product(*[(0, 1)] * (2 * n)):
@@ -60,14 +60,30 @@ def dense(of: DriftHistory, prior: DriftPrior) -> tuple[float, Floats, Floats]:
         begun, before = t[0], np.nan
         rows: list[dict[str, float]] = []
         state: dict[str, float] = {"first": 1.0}
-        sd = {"first": p["first_sd"], "rate": p["rate_sd"]}
+        sd = {
+            "first": p["first_sd"],
+            "rate": p["rate_sd"],
+            "wear": p["wear_sd"],
+            "cos": p["season_sd"],
+            "sin": p["season_sd"],
+        }
+        settles, from_ = "settle", t[0]
+        sd[settles] = p["settle_sd"]
         for k in range(n):
             since = (of.adjusted_since[k] - FIRST) / YEAR
             if np.isfinite(since) and not since <= before:
                 begun, state = max(since, begun) if k else since, {f"left{k}": 1.0}
-                sd[f"left{k}"] = p["as_left_sd"]
+                settles, from_ = f"settle{k}", begun
+                sd[f"left{k}"], sd[settles] = p["as_left_sd"], p["settle_sd"] * p["as_left_sd"] / p["first_sd"]
             before, gap = since, t[k] - begun
-            state = {**state, "rate": state.get("rate", 0.0) + gap, f"walk{k}": 1.0}
+            for name, move in {
+                "rate": gap, "wear": (t[k] - t[0]) ** 2 / 2 - (begun - t[0]) ** 2 / 2,
+                settles: np.exp(-(begun - from_) / p["settle_years"]) - np.exp(-(t[k] - from_) / p["settle_years"]),
+                "cos": np.cos(season + 2 * np.pi * t[k]) - np.cos(season + 2 * np.pi * begun),
+                "sin": np.sin(season + 2 * np.pi * t[k]) - np.sin(season + 2 * np.pi * begun),
+            }.items():  # fmt: skip
+                state = {**state, name: state.get(name, 0.0) + move}
+            state = {**state, f"walk{k}": 1.0}
             sd[f"walk{k}"] = p["walk"] * np.sqrt(gap)
             none = np.exp(-p["steps_per_year"] * gap)
             chance += np.log(none) if not steps[k] else (np.log(1 - none) if none < 1 else -np.inf)
@@ -79,9 +95,10 @@ def dense(of: DriftHistory, prior: DriftPrior) -> tuple[float, Floats, Floats]:
         if chance == -np.inf:
             continue
         columns = list(sd)
-        A = np.array([[row.get(name, 0.0) for name in columns] for row in [*rows, rows[-1], {"rate": 1.0}]])
+        wanted = [rows[-1], *({name: 1.0} for name in ("rate", "wear", settles, "cos", "sin"))]
+        A = np.array([[row.get(name, 0.0) for name in columns] for row in [*rows, *wanted]])
         B = np.array([[u * (a == name) for name in names] for u, a in zip(of.u_artefact, of.artefact, strict=True)])
-        full = np.block([[A, np.vstack([B, np.zeros((2, len(names)))])]])
+        full = np.block([[A, np.vstack([B, np.zeros((len(wanted), len(names)))])]])
         S = full @ np.diag([*(sd[name] ** 2 for name in columns), *[1.0] * len(names)]) @ full.T
         own = of.u**2 - of.u_artefact**2 + np.array(wrong) * (WRONG_TIMES**2 - 1) * of.u**2
         S[:n, :n] += np.diag(own)

@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 from cmm_uq.base.points import Floats
 from cmm_uq.laboratory.due.drift import YEAR, DriftHistory, DriftPrior, default_prior, side_by_side
 from cmm_uq.laboratory.due.drift_filter import change_since, filtered
-from tests.laboratory.due.histories import dense, machine, one_node, over_tales
+from tests.laboratory.due.histories import ALL, USUAL, dense, machine, one_node, over_tales
 
 HISTORIES = {
     "one certificate": machine([0], [2.0]),
@@ -29,14 +29,23 @@ HISTORIES = {
 def found(of: DriftHistory, prior: DriftPrior) -> tuple[float, Floats, Floats]:
     state = filtered(side_by_side([of]), prior, kept=10**6)
     mean, covariance = over_tales(state)
-    return float(state.log_evidence[0, 0]), mean[:2, 0, 0], covariance[:2, :2, 0, 0]
+    moving = 2 + len(prior.components)
+    return float(state.log_evidence[0, 0]), mean[:moving, 0, 0], covariance[:moving, :moving, 0, 0]
 
 
 @pytest.mark.parametrize("name", HISTORIES)
-def test_evidence_level_and_rate_are_those_of_dense_matrices_over_every_tale(name: str) -> None:
-    prior = one_node(rate=0.6)
-    for mine, theirs in zip(found(HISTORIES[name], prior), dense(HISTORIES[name], prior), strict=True):
-        np.testing.assert_allclose(mine, theirs, rtol=1e-9, atol=1e-10)
+@pytest.mark.parametrize("components", [{}, ALL], ids=["plain", "all"])
+def test_evidence_and_state_are_those_of_dense_matrices_over_every_tale(
+    name: str, components: dict[str, float]
+) -> None:
+    prior = one_node(rate=0.6, **components)
+    evidence, mean, covariance = found(HISTORIES[name], prior)
+    moving = len(mean)
+    assert moving == (6 if components else 2)
+    dense_evidence, dense_mean, dense_covariance = dense(HISTORIES[name], prior)
+    assert evidence == pytest.approx(dense_evidence, rel=1e-9)
+    np.testing.assert_allclose(mean, dense_mean[:moving], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(covariance, dense_covariance[:moving, :moving], rtol=1e-9, atol=1e-9)
 
 
 def test_machines_side_by_side_are_what_they_are_alone() -> None:
@@ -103,7 +112,7 @@ def test_sign_and_unit_of_the_values_are_a_matter_of_words(
 
 def test_nodes_of_a_group_are_weighed_by_the_data_and_groups_are_not() -> None:
     prior = DriftPrior(*(np.repeat(getattr(one_node(), name), 4) for name in
-                    ("rate", "rate_sd", "walk", "first_sd", "as_left_sd", "steps_per_year", "step_sd")),
+                    USUAL),
                   weight=np.array([0.1, 0.4, 0.2, 0.3]), group=np.array([0, 0, 1, 1]))  # fmt: skip
     prior.walk[:] = [0.01, 1.0, 0.01, 3.0]
     state = filtered(side_by_side([machine([0, 1, 2, 3], [0, 3.0, -1.0, 2.0], 0.1)]), prior)
