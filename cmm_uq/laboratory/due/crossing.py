@@ -19,7 +19,8 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.laboratory.due import drift
-from cmm_uq.laboratory.due.drift_filter import DriftState, filtered
+from cmm_uq.laboratory.due.drift_filter import DriftState
+from cmm_uq.laboratory.due.steps import FollowedHistory, followed
 from cmm_uq.laboratory.records.facts import Series
 
 
@@ -129,9 +130,12 @@ def crossing(
     if not (np.isfinite(limit) and limit > 0):
         raise CmmUqError(f"a limit of {limit:g} cannot be crossed", fix="State a limit above zero")
     known = series if isinstance(series, drift.DriftHistory) else drift.history(series)
-    prior = prior or drift.default_prior(drift.limit_for(limit, known.u))
-    machines = drift.side_by_side([known])
-    many = crossings(machines, prior, filtered(machines, prior), limit, one_sided=one_sided, days=FINE)
+    return crossing_of(followed(known, limit, prior), limit, one_sided=one_sided)
+
+
+def crossing_of(known: FollowedHistory, limit: float, *, one_sided: bool = False) -> Crossing:
+    """The same of a history that was followed already."""
+    many = crossings(known.machines, known.prior, known.state, limit, one_sided=one_sided, days=FINE)
     return many.one(0)
 
 

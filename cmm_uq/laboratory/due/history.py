@@ -9,6 +9,7 @@ more uncertain (Birge ratio).
 from __future__ import annotations
 
 import datetime as dt
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -26,6 +27,7 @@ from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, Recor
 if TYPE_CHECKING:
     from cmm_uq.laboratory.due.crossing import Crossing
     from cmm_uq.laboratory.due.drift import DriftPrior as Prior
+    from cmm_uq.laboratory.due.steps import DatedStep
 
 YEAR = 365.2425  # days
 _LEAST = 1e-9  # standard uncertainty of a value that is stated without one, as a part of the largest value
@@ -94,17 +96,24 @@ class ValueHistory:
     outcome: str = ""  # of the newest certificate's statement on it; empty where it states none
 
     @cached_property
-    def crossing(self) -> Crossing | None:
-        """By the drift model, ``None`` without a limit or a history that it takes; worked out when first asked for."""
-        if not self.series.limit:
-            return None
-        from cmm_uq.laboratory.due.crossing import crossing
-        from cmm_uq.laboratory.due.drift import history
+    def _drift(self) -> tuple[Crossing | None, tuple[DatedStep, ...]]:
+        from cmm_uq.laboratory.due import crossing, drift, steps
 
         try:
-            return crossing(history(self.series, self.adjusted_after), self.series.limit, self.prior)
+            known = steps.followed(drift.history(self.series, self.adjusted_after), self.series.limit, self.prior)
         except CmmUqError:
-            return None
+            return None, ()
+        return crossing.crossing_of(known, self.series.limit) if self.series.limit else None, steps.dated_steps(known)
+
+    @cached_property
+    def crossing(self) -> Crossing | None:
+        """By the drift model, ``None`` without a limit or a history that it takes; worked out when first asked for."""
+        return self._drift[0]
+
+    @property
+    def steps(self) -> tuple[DatedStep, ...]:
+        """Those that the drift model finds more probable than not."""
+        return self._drift[1]
 
     @property
     def beyond(self) -> bool:
@@ -133,6 +142,14 @@ class MachineHistory:
         """Of the newest certificate that counts, the gravest of its statements of conformity; ``none`` without any."""
         standing = [one for one in self.certificates if one.state in STANDING and not one.interim]
         return standing[-1].decision if standing else NONE
+
+    def in_doubt(self, value: ValueHistory, step: DatedStep) -> tuple[RecordedCertificate, ...]:
+        """Certificates that were relied on when a step came: the last one before, if it still held then, and those since."""
+        issued = [one for one in self.certificates if one.state in STANDING and not one.interim]
+        day = [one.day.toordinal() for one in issued]
+        held = bool(np.isin(step.after, value.series.day))  # else it is the day of an adjustment
+        first = max(bisect_right(day, step.after) - held, 0)
+        return tuple(issued[first : bisect_left(day, step.by)])
 
     def significant(self, value: ValueHistory) -> bool:
         """Whether a value changed by more than chance among all that are compared."""
