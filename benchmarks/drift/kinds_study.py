@@ -19,7 +19,7 @@ from benchmarks.drift.generator import LIMIT, YEAR, Machine, crossed
 from benchmarks.drift.kinds import KINDS, machines
 from benchmarks.drift.study import COVERED, held, history, members, position
 from cmm_uq import __version__
-from cmm_uq.laboratory.due.crossing import FINE, Crossings, crossings
+from cmm_uq.laboratory.due.crossing import DAYS, FINE, PATHS, Crossings, crossings
 from cmm_uq.laboratory.due.drift import DriftPrior, default_prior, side_by_side
 from cmm_uq.laboratory.due.drift_filter import filtered
 from cmm_uq.laboratory.due.fleet import fit_fleet
@@ -28,7 +28,7 @@ from cmm_uq.laboratory.due.steps import DatedStep, dated_steps, followed
 HERE = Path(__file__).parent
 SEAL, RESULT = HERE / "kinds_seal.json", HERE / "kinds_result.json"
 SEALED = ("generator.py", "kinds.py", "kinds_study.py")
-MACHINES, DEVELOPMENT = 1200, 1
+MACHINES, OF_FLEET, DEVELOPMENT = 1200, 240, 1
 EPOCH = 730_000  # what the histories' days are shifted by
 
 
@@ -40,12 +40,12 @@ def seed_of(seal: dict[str, str]) -> int:
     return int(seal["kinds.py"][:8], 16)
 
 
-def alone(made: Sequence[Machine], prior: DriftPrior) -> Crossings:
-    """As ``history`` and ``due`` do without a fleet."""
+def alone(made: Sequence[Machine], prior: DriftPrior, days: np.ndarray, paths: int) -> Crossings:
+    """Without a fleet; on the grid and with the paths of ``history`` and ``due``, or fewer."""
     parts = []
     for i in range(0, len(made), 50):
         arrays = side_by_side([history(machine) for machine in made[i : i + 50]])
-        parts.append(crossings(arrays, prior, filtered(arrays, prior), LIMIT, days=FINE))
+        parts.append(crossings(arrays, prior, filtered(arrays, prior), LIMIT, days=days, paths=paths))
     return Crossings.joined(parts)
 
 
@@ -92,28 +92,41 @@ def _has(step: DatedStep, day: int) -> bool:
     return step.after - EPOCH < day <= step.by - EPOCH
 
 
-def run(seed: int, count: int) -> dict[str, object]:
-    kinds: dict[str, object] = {}
+def past_of(kind: str, seed: int, count: int) -> tuple[list[Machine], np.ndarray]:
+    """Machines without their futures, and the days on which they cross their limit."""
+    made, days = [], []
+    for machine in machines(kind, seed, count):
+        days.append(crossed(machine))
+        machine.raw = machine.raw[:0]
+        made.append(machine)
+    return made, np.array(days)
+
+
+def run(seed: int, count: int, of_fleet: int) -> dict[str, object]:
+    kinds: dict[str, dict[str, object]] = {}
     with_components, plain = default_prior(LIMIT), default_prior(LIMIT, plain=True)
+    some, their_days = [], []
     for kind in KINDS:
-        made, days = [], []
-        for machine in machines(kind, seed, count):
-            days.append(crossed(machine))
-            machine.raw = machine.raw[:0]  # the future stays behind
-            made.append(machine)
-        truth, begun = np.array(days), time.process_time()
-        of = {"alone": judged(alone(made, with_components), truth, made, seed)}
-        cpu = time.process_time() - begun
-        of["plain"] = judged(alone(made, plain), truth, made, seed)
-        fleet = fit_fleet(members(made)).estimates.crossing
-        assert fleet is not None
-        of["fleet"] = judged(fleet, truth, made, seed)
-        kinds[kind] = of | {
+        made, truth = past_of(kind, seed, count)
+        some.append(made[:of_fleet])
+        their_days.append(truth[:of_fleet])
+        begun = time.process_time()
+        found = judged(alone(made, with_components, FINE, PATHS), truth, made, seed)
+        kinds[kind] = {
+            "alone": found, "cpu_s": time.process_time() - begun,
+            "plain": judged(alone(made, plain, DAYS, 512), truth, made, seed),
             "steps": dated(made, with_components), "never": float(np.isinf(truth).mean()),
-            "already": float((truth == 0).mean()), "median_years": float(np.median(truth) / YEAR), "cpu_s": cpu,
+            "already": float((truth == 0).mean()), "median_years": float(np.median(truth) / YEAR),
         }  # fmt: skip
-        print(kind, {name: of[name]["groups"]["all"] for name in of}, kinds[kind]["steps"], flush=True)  # type: ignore[index]
-    return {"version": __version__, "seed": seed, "machines": count, "kinds": kinds}
+        print(kind, kinds[kind], flush=True)
+    learnt = fit_fleet(members([machine for made in some for machine in made])).estimates.crossing
+    assert learnt is not None
+    for i, kind in enumerate(KINDS):
+        own = slice(i * of_fleet, (i + 1) * of_fleet)
+        part = Crossings(learnt.last[own], learnt.days, *(getattr(learnt, name)[own] for name in (
+            "probability", "level", "u_level", "rate", "u_rate")))  # fmt: skip
+        kinds[kind]["fleet"] = judged(part, their_days[i], some[i], seed)
+    return {"version": __version__, "seed": seed, "machines": count, "of_fleet": of_fleet, "kinds": kinds}
 
 
 def main() -> None:
@@ -125,12 +138,12 @@ def main() -> None:
     if options.seal:
         SEAL.write_text(json.dumps(hashes(), indent=1) + "\n", encoding="utf-8")
     if options.development:
-        print(json.dumps(run(DEVELOPMENT, options.development), indent=1))
+        print(json.dumps(run(DEVELOPMENT, options.development, options.development // 5), indent=1))
     if options.run:
         seal = json.loads(SEAL.read_text(encoding="utf-8"))
         if seal != hashes():
             raise SystemExit("generator or judging changed after they were sealed")
-        found = run(seed_of(seal), MACHINES)
+        found = run(seed_of(seal), MACHINES, OF_FLEET)
         RESULT.write_text(json.dumps(found | {"seal": seal}, indent=1) + "\n", encoding="utf-8")
     if options.page:
         from benchmarks.drift.kinds_page import write

@@ -181,7 +181,7 @@ def history(
 ) -> None:
     """Say how every error factor and figure of a machine has gone, what changed last, and when a limit will be crossed."""
     from cmm_uq.app.commands.laboratory.due import history_of, write_history
-    from cmm_uq.certificate.pages.history import history_data, summary_row, terminal_note
+    from cmm_uq.certificate.pages.history import history_data, step_notes, summary_row, terminal_note
 
     found = history_of(machine, records, on=opt.day_of(on), fleet=fleet)
     files = {} if out is None else write_history(found, out, force=end.force)
@@ -193,7 +193,7 @@ def history(
         recordings = "one recording" if count == 1 else f"{count} recordings"
         head = ((f"{found.machine.name}{serial}", HEADING), (f": {recordings} up to {found.on.isoformat()}", ""))
         notes: list[Line] = [((terminal_note(found), ""),)] if found.values else []
-        notes += [((text, COLOURS["open"]),) for text in found.remarks]
+        notes += [((text, COLOURS["open"]),) for text in (*step_notes(found), *found.remarks)]
         _show_table(head, [summary_row(found, one) for one in found.values], notes, files, verbose=end.verbose)
 
 

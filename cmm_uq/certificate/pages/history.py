@@ -23,6 +23,8 @@ from cmm_uq.maths.uncertainty.quantity import limit_in_full, rounded
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from cmm_uq.laboratory.due.steps import DatedStep
+
 SCHEMA = "cmm-uq/history/1"
 COVERAGE = 2.0  # factor of every expanded uncertainty here: 95 %, as of a normal distribution
 
@@ -31,6 +33,11 @@ HEADINGS: tuple[Text, ...] = (
     say("U of the trend"), say("Limit"), say("Crosses its limit"),
 )  # fmt: skip
 WORDS = {say("Quantity"), say("Unit"), say("Crosses its limit")}  # headings of columns that hold no figures
+
+STEPS_NOTE = say(
+    "A step is one that the drift model finds more probable than not between two recordings, beside what the machine drifts, "
+    "settles, follows the seasons and wanders: a collision, a move, an adjustment that nobody recorded. Its ± has k = 2."
+)  # fmt: skip
 
 STATE_WORDS: Mapping[str, Text] = {
     "draft": say("draft"), "released": say("released"), "withdrawn": say("withdrawn"), "replaced": say("replaced"),
@@ -75,6 +82,32 @@ def meets(one: ValueHistory, on: dt.date) -> Text:
     if late is None:
         return say("{about}, {begins}, perhaps never", about=about, begins=begins)
     return say("{about}, {begins}, by {late}", about=about, begins=begins, late=day(late))
+
+
+def step_words(one: ValueHistory, step: DatedStep) -> Text:
+    size, expanded = rounded(step.size, COVERAGE * step.u)
+    return say(
+        "after a change of {size} ± {u} {unit} between {after} and {by} (probability {percent} %)", size=size, u=expanded,
+        unit=unit_as_written(one.series.unit), after=_date(step.after), by=_date(step.by),
+        percent=number(min(100 * step.probability, 99), ".0f"),
+    )  # fmt: skip
+
+
+def _date(ordinal: int) -> Text:
+    return day(dt.date.fromordinal(ordinal))
+
+
+def step_notes(history: MachineHistory) -> tuple[Text, ...]:
+    """Steps of all values, a sentence each, and which certificates they put in doubt."""
+    found = []
+    for one, step in [(value, step) for value in history.values for step in value.steps]:
+        name, doubtful = Verbatim(one.series.quantity), history.in_doubt(one, step)
+        found.append(say("{name}: {change}.", name=name, change=step_words(one, step)))
+        if doubtful:
+            names = commas(Verbatim(certificate.number or certificate.job) for certificate in doubtful)
+            found[-1] = say("{sentence} In doubt for what was measured after {day}: {certificates}.", sentence=found[-1],
+                            day=_date(step.after), certificates=names)  # fmt: skip
+    return tuple(found)
 
 
 def model_note(history: MachineHistory) -> Text:
@@ -160,6 +193,12 @@ def _value_data(history: MachineHistory, one: ValueHistory) -> dict[str, Any]:
             "date": dt.date.fromordinal(line.day).isoformat(), "value": line.value, "per_year": line.slope,
             "u_per_year": line.u_slope, "count": line.count, "birge_ratio": line.excess,
         },
+        "steps": [
+            {"after": dt.date.fromordinal(step.after).isoformat(), "by": dt.date.fromordinal(step.by).isoformat(),
+             "probability": step.probability, "size": step.size, "u": step.u,
+             "in_doubt": [certificate.entry for certificate in history.in_doubt(one, step)]}
+            for step in one.steps
+        ],
         "crosses_limit": crossing and {"model": "drift", "fleet": one.prior is not None, **crossing.data()},
     }  # fmt: skip
 
@@ -235,10 +274,10 @@ def _told(history: MachineHistory, one: ValueHistory) -> Text:
         "{name}: {count} recordings, from {first} to {last} {unit}", name=Verbatim(series.quantity), count=len(series.day),
         first=first, last=last, unit=Verbatim(series.unit),
     )  # fmt: skip
-    if series.limit is None:
-        return say("{what}.", what=what)
-    limit = limit_in_full(series.limit)
-    return say("{what}; limit {limit}: {meets}.", what=what, limit=limit, meets=meets(one, history.on))
+    if series.limit is not None:
+        limit = limit_in_full(series.limit)
+        what = say("{what}; limit {limit}: {meets}", what=what, limit=limit, meets=meets(one, history.on))
+    return say("{what}.", what=commas([what, *(step_words(one, step) for step in one.steps)]))
 
 
 def history_document(history: MachineHistory) -> doc.Document:
@@ -258,10 +297,11 @@ def history_document(history: MachineHistory) -> doc.Document:
     if machine.adjusted:
         particulars.append((say("Adjusted"), commas([day(when) for when in machine.adjusted])))
     heads = tuple(doc.Column(heading, numeric=heading not in WORDS) for heading in HEADINGS)
-    rows = [value_row(history, one) for one in history.values]
+    rows, steps = [value_row(history, one) for one in history.values], step_notes(history)
     values = doc.table(say("Error factors and figures of performance"), heads, rows, *notes(history))
     sections = (
         doc.section(say("Values and trends"), values or doc.Paragraph(say("No value of this machine is recorded."))),
+        doc.section(say("Steps"), *map(doc.Paragraph, steps), *([doc.Paragraph(STEPS_NOTE)] if steps else ())),
         doc.section(say("Over time"), *(trend_plot(history, one) for one in history.values)),
         doc.section(say("Certificates and interim checks"), _certificates(history)),
     )

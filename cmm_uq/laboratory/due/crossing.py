@@ -178,7 +178,7 @@ def crossings(
 def _numbers(paths: int, gaps: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Of each path: where it stands in the weights, numbers for its state, and for each gap of the grid for walk and steps.
 
-    The first two are a lattice in seven dimensions (Roberts 2018); a normal number of the walk has its mirror image in
+    The first two are a lattice in six dimensions (Roberts 2018); a normal number of the walk has its mirror image in
     another path; steps take an exponential number and a normal one.
     """
     n = np.arange(paths)
@@ -186,7 +186,7 @@ def _numbers(paths: int, gaps: int) -> tuple[Floats, Floats, Floats, Floats]:
     half = random.standard_normal((gaps, paths // 2 + 1))
     walk = np.concatenate([half, -half], axis=1)[:, :paths][:, random.permutation(paths)]
     steps = np.stack([random.standard_exponential((gaps, paths)), random.standard_normal((gaps, paths))])
-    return (n + 0.5) / paths, drift.normal_lattice(paths, 2 + len(drift.COMPONENTS)).T.copy(), walk, steps
+    return (n + 0.5) / paths, drift.normal_lattice(paths, 5).T.copy(), walk, steps
 
 
 def _drawn(states: _States, which: Ints, chosen: Ints, normal: Floats) -> Floats:
@@ -242,12 +242,14 @@ def _moves(
     of, rows = states.machines, np.arange(len(which))[:, None]
     since, first, settling = (each[which][:, None] for each in (of.last, of.first, of.settles))
     until = since + days
-    rate, wear, settled, *_ = drift.moved(since, until, first, settling, states.prior.settle_years[:, None, None])
-    by_rate, by_wear, by_settling = (np.diff(each, axis=-1) for each in (rate, wear, settled))
+    of_nodes = (each[:, None, None] for each in (states.prior.growth, states.prior.settle_years))
+    by_rate, by_settling = (
+        np.diff(each, axis=-1) for each in drift.moved(since, until, first, settling, *of_nodes)[:2]
+    )
     if len(theta) == 1:
-        yield from ((each[:, None] * theta[0], 0.0, 0.0, 0.0, 0.0) for each in by_rate.T)
+        yield from ((by_rate[node, rows, g] * theta[0], 0.0, 0.0, 0.0, 0.0) for g in range(len(days) - 1))
         return
-    phase, cosine, sine = drift.phase(until), theta[3], theta[4]
+    phase, cosine, sine = drift.phase(until), theta[2], theta[3]
     most, crest = np.hypot(cosine, sine), np.arctan2(sine, cosine) / (2 * np.pi)
     seasons: list[tuple[Floats, ...]] = []
     for g, (c, s, turn) in enumerate(zip(np.cos(phase).T, np.sin(phase).T, phase.T / (2 * np.pi), strict=True)):
@@ -255,8 +257,7 @@ def _moves(
         seasons = [*seasons[-1:], (c[:, None] * cosine + s[:, None] * sine, np.floor(place), np.floor(place + 0.5))]
         if g:
             (now, crests, troughs), (then, crests_then, troughs_then) = seasons
-            move = by_rate[:, g - 1, None] * theta[0] + by_wear[:, g - 1, None] * theta[1] + then - now
-            move += by_settling[node, rows, g - 1] * theta[2]
+            move = by_rate[node, rows, g - 1] * theta[0] + by_settling[node, rows, g - 1] * theta[1] + then - now
             up, down = crests_then > crests, troughs_then > troughs
             yield move, up * (most - now), up * (most - then), down * (most + now), down * (most + then)
 

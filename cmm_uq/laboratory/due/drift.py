@@ -182,13 +182,12 @@ MEDIANS = np.array([0.1, 0.05, 0.05, 0.07, 0.35, 0.15, 0.05, 0.4])
 SPREADS = np.array([0.8, 0.8, 0.8, 0.8, 0.5, 0.6, 0.8, 0.6])
 """Standard deviations of the logarithms: a factor of five either way is not surprising, of three for those of a level."""
 
-COMPONENTS = ("wear_sd", "settle_sd", "season_sd", "settle_years")
-"""Of what a machine does besides, all positive: wear that speeds up, settling, season; their logarithms are normal."""
+ALONE = ("rate_sd", "growth", "settle_sd", "settle_years", "season_sd")
+"""Of a machine that no fleet tells of: its rate, and, with a fleet too, wear that speeds up, settling and season."""
 
-COMPONENT_MEDIANS = np.array([0.015, 0.2, 0.08, 0.7])
-"""In units of the limit and of years: a year's growth of the rate, ways settled, amplitudes of sine and cosine, decay time."""
-
-COMPONENT_SPREAD = 0.8  # standard deviation of their logarithms
+ALONE_MEDIANS = np.array([0.05, 0.03, 0.2, 0.7, 0.08])
+ALONE_SPREADS = np.array([1.0, 1.0, 0.8, 0.8, 0.8])
+"""As above; for the rate of one machine, and for what it grows by, factors of five either way are usual."""
 
 USUAL_RATE_SD = 0.15  # of the rate common to a whole fleet, in limits per year: it may drift either way
 
@@ -218,10 +217,10 @@ class DriftPrior:
     as_left_sd: Floats
     steps_per_year: Floats  # and step_sd: (K,) how often a step comes, and how large
     step_sd: Floats
-    wear_sd: Floats  # (K,) of a year's growth of the rate, and of the coefficients below; all zero: no components
-    settle_sd: Floats
-    season_sd: Floats
-    settle_years: Floats  # (K,) in which all but 1/e of a settling is over
+    growth: Floats  # (K,) of the rate, per year, as a part of what it is at the first certificate
+    settle_sd: Floats  # (K,) of how far the machine settles, and years in which all but 1/e of that is over
+    settle_years: Floats
+    season_sd: Floats  # (K,) of the amplitudes of sine and cosine
     weight: Floats  # (K,) of the nodes before the machine's data; they sum to one in all groups together
     group: Ints
 
@@ -230,8 +229,8 @@ class DriftPrior:
 
     @property
     def components(self) -> Floats:
-        """Standard deviations (4, K) of wear's, settling's and the seasons' coefficients; (0, K) where there are none."""
-        each = np.stack([self.wear_sd, self.settle_sd, self.season_sd, self.season_sd])
+        """Standard deviations (3, K) of the coefficients of settling, cosine and sine; (0, K) where there are none."""
+        each = np.stack([self.settle_sd, self.season_sd, self.season_sd])
         return each if each.any() else each[:0]
 
     @cached_property
@@ -247,14 +246,10 @@ def limit_for(limit: float | None, u: Floats) -> float:
 
 def default_prior(unit: float, nodes: int = NODES, *, plain: bool = False) -> DriftPrior:
     """Of a machine without a fleet, in units of the limit; ``plain``: without wear that speeds up, settling and season."""
-    medians = np.concatenate([MEDIANS, COMPONENT_MEDIANS])
-    spreads = np.concatenate([SPREADS, np.full(len(COMPONENTS), COMPONENT_SPREAD)])
-    theta = np.log(medians) + spreads * normal_lattice(nodes, len(medians))
-    d = len(NAMES)
-    values = _in_unit(NAMES, theta[:, :d], unit) | _components(theta[:, d:], unit, plain=plain)
-    rates = [values.pop(name) for name in ("rate_sd", "model_sd", "place_sd")]
-    spread = np.sqrt(sum(rate**2 for rate in rates) + (USUAL_RATE_SD * unit) ** 2)
-    return DriftPrior(rate=np.zeros(nodes), rate_sd=spread, **values, weight=np.full(nodes, 1.0 / nodes),
+    number = normal_lattice(nodes, len(NAMES) - 3 + len(ALONE))
+    values = _in_unit(NAMES[3:], np.log(MEDIANS[3:]) + SPREADS[3:] * number[:, len(ALONE) :], unit)
+    values |= _alone(ALONE, number, unit, plain=plain)
+    return DriftPrior(rate=np.zeros(nodes), **values, weight=np.full(nodes, 1.0 / nodes),
                       group=np.zeros(nodes, dtype=np.int64))  # fmt: skip
 
 
@@ -273,25 +268,25 @@ def learnt_prior(theta: Floats, rate: Floats, rate_sd: Floats, unit: float, *, p
     What a machine does besides is not learnt from a fleet: at each draw it is summed over as without one, or ``plain``.
     """
     g, w, c = len(theta), len(_WALK_NODES), 1 if plain else POINTS
-    values = _in_unit(NAMES, np.repeat(theta, w * c, axis=0), unit)
+    values = _in_unit(NAMES[3:], np.repeat(theta[:, 3:], w * c, axis=0), unit)
     values["walk"] *= np.tile(np.repeat(np.exp(WALKS_DIFFER * _WALK_NODES), c), g)
-    log = np.log(COMPONENT_MEDIANS) + COMPONENT_SPREAD * normal_lattice(g * w * c, len(COMPONENTS))
-    values = {name: value for name, value in values.items() if name not in NAMES[:3]} | _components(
-        log, unit, plain=plain
-    )
+    values |= _alone(ALONE[1:], normal_lattice(g * w * c, len(ALONE) - 1), unit, plain=plain)
     return DriftPrior(rate=np.repeat(rate, w * c), rate_sd=np.repeat(rate_sd, w * c), **values,
                       weight=np.tile(np.repeat(_WALK_WEIGHTS / _WALK_WEIGHTS.sum() / c, c), g) / g,
                       group=np.repeat(np.arange(g), w * c))  # fmt: skip
 
 
-def _components(theta: Floats, unit: float, *, plain: bool) -> dict[str, Floats]:
-    values = _in_unit(COMPONENTS, theta, unit)
-    return {name: value * (not plain or name == "settle_years") for name, value in values.items()}
+def _alone(names: Sequence[str], number: Floats, unit: float, *, plain: bool) -> dict[str, Floats]:
+    """Columns of :data:`ALONE`, its last ones, at normal numbers (K, d); ``plain``: nothing of components."""
+    first = len(ALONE) - len(names)
+    values = _in_unit(names, np.log(ALONE_MEDIANS[first:]) + ALONE_SPREADS[first:] * number[:, : len(names)], unit)
+    return values | {name: 0.0 * values[name] for name in ("growth", "settle_sd", "season_sd") if plain}
 
 
 def _in_unit(names: Sequence[str], theta: Floats, unit: float) -> dict[str, Floats]:
-    """Columns of exp(theta) by name; all but the steps a year and the years are in limits."""
-    return {name: np.exp(theta[:, i]) * (1.0 if "year" in name else unit) for i, name in enumerate(names)}
+    """Columns of exp(theta) by name; those of levels, rates and walks are in limits."""
+    plain = ("steps_per_year", "growth", "settle_years")
+    return {name: np.exp(theta[:, i]) * (1.0 if name in plain else unit) for i, name in enumerate(names)}
 
 
 def log_density(theta: Floats) -> Floats:
@@ -306,16 +301,17 @@ def phase(day: Floats) -> Floats:
 
 
 def moved(
-    since: Floats, until: Floats, first: Floats, settling: Floats, settle_years: Floats
-) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """What one unit of rate, of its growth, of settling, of the seasons' cosine and sine moves a level by between two days.
+    since: Floats, until: Floats, first: Floats, settling: Floats, growth: Floats, settle_years: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """What one unit of rate, of settling, of the seasons' cosine and of their sine moves a level by between two days.
 
     Parameters
     ----------
     since, until, first, settling : ordinals that fit together: from and to, and of :class:`Histories`.
-    settle_years : decay times that fit with the others; only the third depends on them.
+    growth, settle_years : of a prior's nodes, so that they fit with the others.
     """
     begin, end = (since - first) / YEAR, (until - first) / YEAR
+    by_rate = (end - begin) * (1.0 + 0.5 * growth * (begin + end))
     decay = np.exp((settling - since) / (YEAR * settle_years)) - np.exp((settling - until) / (YEAR * settle_years))
     season = phase(until), phase(since)
-    return end - begin, 0.5 * (end**2 - begin**2), decay, *(f(season[0]) - f(season[1]) for f in (np.cos, np.sin))
+    return by_rate, decay, *(f(season[0]) - f(season[1]) for f in (np.cos, np.sin))

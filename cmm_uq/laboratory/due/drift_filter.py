@@ -1,8 +1,8 @@
 """Level and rate of many machines given their certificates: Kalman filters over every likely tale of steps.
 
-State of a machine: level, rate, the coefficients of wear that speeds up, of settling and of the seasons (four, or none), and
-the errors of the artefacts that it was measured with, in their standard uncertainties. All but the level stay as they are, but
-that an adjustment begins a new settling; they move the level by :func:`cmm_uq.laboratory.due.drift.moved`.
+State of a machine: level, rate at its first certificate, coefficients of settling and of the seasons (three, or none), and
+the errors of the artefacts that it was measured with, in their standard uncertainties. All but the level stay as they are (an
+adjustment begins a new settling) and move the level by :func:`cmm_uq.laboratory.due.drift.moved`.
 Given when steps came and which certificates were wrong, all is Gaussian and the filter is exact (Kalman 1960; Durbin and
 Koopman 2012, section 4.3). Those tales are summed over: each certificate makes four of one, and the likeliest are kept (a
 Gaussian sum, Alspach and Sorenson 1972).
@@ -113,7 +113,7 @@ def filtered(
     return state
 
 
-_SETTLE = 3  # where the state has the coefficient of settling, if any
+_SETTLE = 2  # where the state has the coefficient of settling, if any
 
 
 def _set_back(state: DriftState, adjusted: NDArray[np.bool_], prior: drift.DriftPrior) -> None:
@@ -152,7 +152,7 @@ def _moved(state: DriftState, machines: drift.Histories, prior: drift.DriftPrior
         _set_back(state, adjusted, prior)
     days = (each[..., None, None] for each in (machines.begun[k, :N], machines.day[k, :N], machines.first[:N],
                                                machines.settling[k, :N]))  # fmt: skip
-    moves = drift.moved(*days, prior.settle_years[:, None])[: 1 + len(prior.components)]
+    moves = drift.moved(*days, prior.growth[:, None], prior.settle_years[:, None])[: 1 + len(prior.components)]
     for i, move in enumerate(moves, 1):
         mean[0] += move * mean[i]
     along = sum(move * covariance[i] for i, move in enumerate(moves, 1))
@@ -234,8 +234,8 @@ def change_since(
 ) -> float | None:
     """Root mean square change of an error by so many days after its last certificate, in its unit; ``None`` if unknown.
 
-    A rate, its growth, a settling and a season that are known less and less well the farther they are carried on, a wandering
-    and now and then a step: √((m·θ)² + m·U·m + w²·t + n·s²·t) of coefficients θ with covariance U that move the level by m,
+    A rate that may grow, a settling and a season, known less and less well the farther they are carried on, a wandering and
+    now and then a step: √((m·θ)² + m·U·m + w²·t + n·s²·t) of coefficients θ with covariance U that move the level by m,
     averaged over the model's parameters given the certificates.
     """
     if len(of.day) < FEWEST or np.isfinite(of.adjusted_after):
@@ -244,7 +244,8 @@ def change_since(
     machines, years = drift.side_by_side([of]), abs(days) / drift.YEAR
     state = filtered(machines, known)
     weight = state.weights(known)[0]
-    moves = drift.moved(machines.last, machines.last + abs(days), machines.first, machines.settles, known.settle_years)
+    ends = machines.last, machines.last + abs(days)
+    moves = drift.moved(*ends, machines.first, machines.settles, known.growth, known.settle_years)
     m = np.stack([np.broadcast_to(move, len(known)) for move in moves])[: 1 + len(known.components)]
     theta = slice(1, 1 + len(m))
     moved = np.einsum("ik,ikm->km", m, state.mean[theta, 0]) ** 2

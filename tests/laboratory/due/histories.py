@@ -36,9 +36,9 @@ def machine(
 
 USUAL = {
     "rate": 0.0, "rate_sd": 1.0, "walk": 0.7, "first_sd": 3.0, "as_left_sd": 1.0, "steps_per_year": 0.2, "step_sd": 2.5,
-    "wear_sd": 0.0, "settle_sd": 0.0, "season_sd": 0.0, "settle_years": 1.0,
+    "growth": 0.0, "settle_sd": 0.0, "settle_years": 1.0, "season_sd": 0.0,
 }  # fmt: skip
-ALL = {"wear_sd": 0.3, "settle_sd": 2.0, "season_sd": 1.5, "settle_years": 0.8}
+ALL = {"growth": 0.3, "settle_sd": 2.0, "settle_years": 0.8, "season_sd": 1.5}
 """Of all components; none of them is of any in :data:`USUAL`."""
 
 
@@ -48,7 +48,7 @@ def one_node(**of: float) -> DriftPrior:
 
 
 def dense(of: DriftHistory, prior: DriftPrior) -> tuple[float, Floats, Floats]:
-    """Evidence, and mean and covariance of level, rate, wear, settling, cosine and sine at the last certificate."""
+    """Evidence, and mean and covariance of level, rate, settling, cosine and sine at the last certificate."""
     n, p = len(of.day), {name: float(getattr(prior, name)[0]) for name in USUAL}
     t = (of.day - FIRST) / YEAR
     season = 2 * np.pi * FIRST / YEAR
@@ -60,13 +60,7 @@ def dense(of: DriftHistory, prior: DriftPrior) -> tuple[float, Floats, Floats]:
         begun, before = t[0], np.nan
         rows: list[dict[str, float]] = []
         state: dict[str, float] = {"first": 1.0}
-        sd = {
-            "first": p["first_sd"],
-            "rate": p["rate_sd"],
-            "wear": p["wear_sd"],
-            "cos": p["season_sd"],
-            "sin": p["season_sd"],
-        }
+        sd = {"first": p["first_sd"], "rate": p["rate_sd"], "cos": p["season_sd"], "sin": p["season_sd"]}
         settles, from_ = "settle", t[0]
         sd[settles] = p["settle_sd"]
         for k in range(n):
@@ -77,7 +71,7 @@ def dense(of: DriftHistory, prior: DriftPrior) -> tuple[float, Floats, Floats]:
                 sd[f"left{k}"], sd[settles] = p["as_left_sd"], p["settle_sd"] * p["as_left_sd"] / p["first_sd"]
             before, gap = since, t[k] - begun
             for name, move in {
-                "rate": gap, "wear": (t[k] - t[0]) ** 2 / 2 - (begun - t[0]) ** 2 / 2,
+                "rate": gap + p["growth"] * ((t[k] - t[0]) ** 2 / 2 - (begun - t[0]) ** 2 / 2),
                 settles: np.exp(-(begun - from_) / p["settle_years"]) - np.exp(-(t[k] - from_) / p["settle_years"]),
                 "cos": np.cos(season + 2 * np.pi * t[k]) - np.cos(season + 2 * np.pi * begun),
                 "sin": np.sin(season + 2 * np.pi * t[k]) - np.sin(season + 2 * np.pi * begun),
@@ -95,7 +89,7 @@ def dense(of: DriftHistory, prior: DriftPrior) -> tuple[float, Floats, Floats]:
         if chance == -np.inf:
             continue
         columns = list(sd)
-        wanted = [rows[-1], *({name: 1.0} for name in ("rate", "wear", settles, "cos", "sin"))]
+        wanted = [rows[-1], *({name: 1.0} for name in ("rate", settles, "cos", "sin"))]
         A = np.array([[row.get(name, 0.0) for name in columns] for row in [*rows, *wanted]])
         B = np.array([[u * (a == name) for name in names] for u, a in zip(of.u_artefact, of.artefact, strict=True)])
         full = np.block([[A, np.vstack([B, np.zeros((len(wanted), len(names)))])]])

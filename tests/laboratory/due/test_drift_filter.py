@@ -41,7 +41,7 @@ def test_evidence_and_state_are_those_of_dense_matrices_over_every_tale(
     prior = one_node(rate=0.6, **components)
     evidence, mean, covariance = found(HISTORIES[name], prior)
     moving = len(mean)
-    assert moving == (6 if components else 2)
+    assert moving == (5 if components else 2)
     dense_evidence, dense_mean, dense_covariance = dense(HISTORIES[name], prior)
     assert evidence == pytest.approx(dense_evidence, rel=1e-9)
     np.testing.assert_allclose(mean, dense_mean[:moving], rtol=1e-9, atol=1e-9)
