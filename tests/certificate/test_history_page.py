@@ -78,7 +78,7 @@ def test_when_a_limit_is_crossed_in_words() -> None:
     """From 2024-03-01 on: 300 days apart, to 2025-10-22; asked on 2026-06-01."""
     assert meets(history(1.0, 2.0, 9.5).values[0], ON) == "is beyond it"
     assert meets(history(1.0, 2.0, 3.0, limit=None).values[0], ON) == "–"
-    assert meets(history(2.0, 4.5, 7.0).values[0], ON) == "probably already"
+    assert meets(history(2.0, 4.8, 7.6).values[0], ON) == "probably already"
     alone = meets(history(1.0).values[0], ON)  # one certificate has no line, and the model a wide guess
     assert alone.startswith("about 20")
     assert alone.endswith("perhaps never")

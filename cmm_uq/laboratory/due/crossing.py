@@ -209,29 +209,30 @@ def _probabilities(
     cumulated = np.cumsum(states.weight[which], axis=1)
     chosen = np.stack([np.searchsorted(row / row[-1], place) for row in cumulated])
     chosen = np.minimum(chosen, cumulated.shape[1] - 1)
-    level, *theta = _drawn(states, which, chosen, normal)
-    node, prior = states.node[chosen], states.prior
-    walking, often, size = prior.walk[node], prior.steps_per_year[node], prior.step_sd[node]
-    high = limits[which][:, None]
-    low = np.full_like(high, -np.inf) if one_sided else -high
-    inside = ((low <= level) & (level <= high)).astype(np.float64)
+    node, prior, years = states.node[chosen], states.prior, np.diff(days) / drift.YEAR
+    walking, often = prior.walk[node], prior.steps_per_year[node]
+    level, *theta = _drawn(states, which, chosen, normal) / walking  # all in units of what a year's wandering adds
+    size, high = prior.step_sd[node] / walking, limits[which][:, None] / walking
+    inside = ((level <= high) & (one_sided | (-high <= level))).astype(np.float64)
+    part = np.full(len(place), 1 / len(place))
     survival = np.empty((len(which), len(days)))
-    survival[:, 0] = inside.mean(axis=1)
+    survival[:, 0] = inside @ part
     moves = _moves(states, which, node, theta, days)
-    for g, (years, (move, up, up_then, down, down_then)) in enumerate(
-        zip(np.diff(days) / drift.YEAR, moves, strict=True)
-    ):
-        per_variance = -2 / (walking**2 * years)
-        after = level + move + walking * (np.sqrt(years) * walk[g])
+    wandering = walk[: len(years)] * np.sqrt(years)[:, None]
+    for g, (gap, (move, up, up_then, down, down_then)) in enumerate(zip(years, moves, strict=True)):
+        after = level + move
+        after += wandering[g]
         # probability that a bridge from one level to the other stays within the limits, given that its ends do
-        stays = -np.expm1(np.maximum((high - level - up) * (high - after - up_then), 0.0) * per_variance)
-        inside *= (low + down <= level) & (level <= high - up)
+        crosses = np.expm1(-2 / gap * np.maximum(high - level - up, 0.0) * np.maximum(high - after - up_then, 0.0))
         if not one_sided:
-            stays *= -np.expm1(np.maximum((high + level - down) * (high + after - down_then), 0.0) * per_variance)
-        inside *= stays
-        level = after + np.where(stepping[0, g] < often * years, size * stepping[1, g], 0.0)
-        inside *= (low <= level) & (level <= high)
-        survival[:, g + 1] = inside.mean(axis=1)
+            crosses *= -np.expm1(
+                -2 / gap * np.maximum(high + level - down, 0.0) * np.maximum(high + after - down_then, 0.0)
+            )
+        inside *= -crosses
+        level, stepped = after, np.nonzero(stepping[0, g] < often * gap)
+        level[stepped] += size[stepped] * stepping[1, g, stepped[1]]
+        inside[stepped] *= (level[stepped] <= high[stepped]) & (one_sided | (-high[stepped] <= level[stepped]))
+        survival[:, g + 1] = inside @ part
     return 1.0 - survival
 
 
@@ -239,27 +240,33 @@ def _moves(
     states: _States, which: Ints, node: Ints, theta: Sequence[Floats], days: Floats
 ) -> Iterator[tuple[Floats, Floats | float, Floats | float, Floats | float, Floats | float]]:
     """Of each gap (n, paths) each: what the level moves by, how far the season rises above both its ends, and falls below."""
-    of, rows = states.machines, np.arange(len(which))[:, None]
+    of, prior = states.machines, states.prior
     since, first, settling = (each[which][:, None] for each in (of.last, of.first, of.settles))
     until = since + days
-    of_nodes = (each[:, None, None] for each in (states.prior.growth, states.prior.settle_years))
-    by_rate, by_settling = (
-        np.diff(each, axis=-1) for each in drift.moved(since, until, first, settling, *of_nodes)[:2]
-    )
+
+    def along(growth: Floats | float, settle_years: Floats) -> tuple[Floats, Floats]:
+        return drift.moved(since, until, first, settling, growth, settle_years)[:2]
+
+    by_rate, settled = along(0.0, prior.settle_years[:, None, None])
+    by_growth = along(1.0, prior.settle_years[:1])[0] - by_rate
+    by_settling = np.ascontiguousarray(np.diff(settled, axis=-1).transpose(2, 0, 1)).reshape(len(days) - 1, -1)
+    place, growing = node * len(which) + np.arange(len(which))[:, None], theta[0] * prior.growth[node]
+    rate, growth = (np.diff(each, axis=-1).T[..., None] for each in (by_rate, by_growth))
     if len(theta) == 1:
-        yield from ((by_rate[node, rows, g] * theta[0], 0.0, 0.0, 0.0, 0.0) for g in range(len(days) - 1))
+        yield from ((a * theta[0] + b * growing, 0.0, 0.0, 0.0, 0.0) for a, b in zip(rate, growth, strict=True))
         return
-    phase, cosine, sine = drift.phase(until), theta[2], theta[3]
+    phase, cosine, sine = drift.phase(until).T[..., None], theta[2], theta[3]
     most, crest = np.hypot(cosine, sine), np.arctan2(sine, cosine) / (2 * np.pi)
-    seasons: list[tuple[Floats, ...]] = []
-    for g, (c, s, turn) in enumerate(zip(np.cos(phase).T, np.sin(phase).T, phase.T / (2 * np.pi), strict=True)):
-        place = turn[:, None] - crest
-        seasons = [*seasons[-1:], (c[:, None] * cosine + s[:, None] * sine, np.floor(place), np.floor(place + 0.5))]
+    ends: list[tuple[Floats, ...]] = []
+    for g, (c, s, turn) in enumerate(zip(np.cos(phase), np.sin(phase), phase / (2 * np.pi), strict=True)):
+        then, turned = c * cosine + s * sine, turn - crest
+        ends = [*ends[-1:], (then, most - then, most + then, np.floor(turned), np.floor(turned + 0.5))]
         if g:
-            (now, crests, troughs), (then, crests_then, troughs_then) = seasons
-            move = by_rate[node, rows, g - 1] * theta[0] + by_settling[node, rows, g - 1] * theta[1] + then - now
-            up, down = crests_then > crests, troughs_then > troughs
-            yield move, up * (most - now), up * (most - then), down * (most + now), down * (most + then)
+            (now, rise, fall, *before), (then, rise_then, fall_then, *after) = ends
+            move = rate[g - 1] * theta[0] + growth[g - 1] * growing + then - now
+            move += by_settling[g - 1].take(place) * theta[1]
+            up, down = (b > a for a, b in zip(before, after, strict=True))
+            yield move, up * rise, up * rise_then, down * fall, down * fall_then
 
 
 def _log_survival(probability: Floats) -> Floats:
