@@ -12,6 +12,7 @@ import json
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from benchmarks.drift.generator import LIMIT, YEAR, Machine, crossed
 from benchmarks.drift.kinds import KINDS, machines
 from benchmarks.drift.study import COVERED, held, history, members, position
 from cmm_uq import __version__
-from cmm_uq.laboratory.due.crossing import DAYS, FINE, PATHS, Crossings, crossings
+from cmm_uq.laboratory.due.crossing import DAYS, Crossings, crossings
 from cmm_uq.laboratory.due.drift import DriftPrior, default_prior, side_by_side
 from cmm_uq.laboratory.due.drift_filter import filtered
 from cmm_uq.laboratory.due.fleet import fit_fleet
@@ -28,7 +29,7 @@ from cmm_uq.laboratory.due.steps import DatedStep, dated_steps, followed
 HERE = Path(__file__).parent
 SEAL, RESULT = HERE / "kinds_seal.json", HERE / "kinds_result.json"
 SEALED = ("generator.py", "kinds.py", "kinds_study.py")
-MACHINES, OF_FLEET, DEVELOPMENT = 1200, 240, 1
+MACHINES, DATED, OF_FLEET, DEVELOPMENT = 1000, 400, 100, 1
 EPOCH = 730_000  # what the histories' days are shifted by
 
 
@@ -40,12 +41,12 @@ def seed_of(seal: dict[str, str]) -> int:
     return int(seal["kinds.py"][:8], 16)
 
 
-def alone(made: Sequence[Machine], prior: DriftPrior, days: np.ndarray, paths: int) -> Crossings:
-    """Without a fleet; on the grid and with the paths of ``history`` and ``due``, or fewer."""
+def alone(made: Sequence[Machine], prior: DriftPrior) -> Crossings:
+    """Without a fleet, with the prior of ``history`` and ``due``; fewer days and paths than of one machine."""
     parts = []
     for i in range(0, len(made), 50):
         arrays = side_by_side([history(machine) for machine in made[i : i + 50]])
-        parts.append(crossings(arrays, prior, filtered(arrays, prior), LIMIT, days=days, paths=paths))
+        parts.append(crossings(arrays, prior, filtered(arrays, prior), LIMIT, paths=512))
     return Crossings.joined(parts)
 
 
@@ -59,11 +60,11 @@ def judged(found: Crossings, truth: np.ndarray, made: Sequence[Machine], seed: i
         "4 to 6": (count > 3) & (count < 7),
     }
     parts |= {"7 and more": count > 6, "both ends are dates": dates}
-    middle = np.minimum(found.quantile(0.5), FINE[-1])
-    wide = np.minimum(found.quantile(COVERED[1]), FINE[-1]) - found.quantile(COVERED[0])
+    middle = np.minimum(found.quantile(0.5), DAYS[-1])
+    wide = np.minimum(found.quantile(COVERED[1]), DAYS[-1]) - found.quantile(COVERED[0])
     return {
         "groups": {name: held(place[which]) for name, which in parts.items() if which.sum() > 20},
-        "median_error_years": float(np.median(np.abs(middle - np.minimum(truth, FINE[-1])))) / YEAR,
+        "median_error_years": float(np.median(np.abs(middle - np.minimum(truth, DAYS[-1])))) / YEAR,
         "width_years": float(np.median(wide)) / YEAR, "histogram": np.histogram(place, 10, (0, 1))[0].tolist(),
     }  # fmt: skip
 
@@ -102,31 +103,35 @@ def past_of(kind: str, seed: int, count: int) -> tuple[list[Machine], np.ndarray
     return made, np.array(days)
 
 
-def run(seed: int, count: int, of_fleet: int) -> dict[str, object]:
-    kinds: dict[str, dict[str, object]] = {}
+def run(seed: int, count: int, dated_count: int) -> dict[str, Any]:
+    kinds: dict[str, dict[str, Any]] = {}
     with_components, plain = default_prior(LIMIT), default_prior(LIMIT, plain=True)
-    some, their_days = [], []
     for kind in KINDS:
         made, truth = past_of(kind, seed, count)
-        some.append(made[:of_fleet])
-        their_days.append(truth[:of_fleet])
         begun = time.process_time()
-        found = judged(alone(made, with_components, FINE, PATHS), truth, made, seed)
+        found = judged(alone(made, with_components), truth, made, seed)
         kinds[kind] = {
             "alone": found, "cpu_s": time.process_time() - begun,
-            "plain": judged(alone(made, plain, DAYS, 512), truth, made, seed),
-            "steps": dated(made, with_components), "never": float(np.isinf(truth).mean()),
+            "plain": judged(alone(made, plain), truth, made, seed),
+            "steps": dated(made[:dated_count], with_components), "never": float(np.isinf(truth).mean()),
             "already": float((truth == 0).mean()), "median_years": float(np.median(truth) / YEAR),
         }  # fmt: skip
         print(kind, kinds[kind], flush=True)
-    learnt = fit_fleet(members([machine for made in some for machine in made])).estimates.crossing
+    return {"version": __version__, "seed": seed, "machines": count, "dated": dated_count, "kinds": kinds}
+
+
+def with_fleet(seed: int, count: int) -> dict[str, Any]:
+    """The first machines of all kinds as one fleet."""
+    each = [past_of(kind, seed, count) for kind in KINDS]
+    learnt = fit_fleet(members([machine for made, _ in each for machine in made])).estimates.crossing
     assert learnt is not None
-    for i, kind in enumerate(KINDS):
-        own = slice(i * of_fleet, (i + 1) * of_fleet)
+    found = {}
+    for i, (kind, (made, truth)) in enumerate(zip(KINDS, each, strict=True)):
+        own = slice(i * count, (i + 1) * count)
         part = Crossings(learnt.last[own], learnt.days, *(getattr(learnt, name)[own] for name in (
             "probability", "level", "u_level", "rate", "u_rate")))  # fmt: skip
-        kinds[kind]["fleet"] = judged(part, their_days[i], some[i], seed)
-    return {"version": __version__, "seed": seed, "machines": count, "of_fleet": of_fleet, "kinds": kinds}
+        found[kind] = judged(part, truth, made, seed)
+    return found
 
 
 def main() -> None:
@@ -138,13 +143,15 @@ def main() -> None:
     if options.seal:
         SEAL.write_text(json.dumps(hashes(), indent=1) + "\n", encoding="utf-8")
     if options.development:
-        print(json.dumps(run(DEVELOPMENT, options.development, options.development // 5), indent=1))
+        print(json.dumps(run(DEVELOPMENT, options.development, options.development), indent=1))
     if options.run:
         seal = json.loads(SEAL.read_text(encoding="utf-8"))
         if seal != hashes():
             raise SystemExit("generator or judging changed after they were sealed")
-        found = run(seed_of(seal), MACHINES, OF_FLEET)
-        RESULT.write_text(json.dumps(found | {"seal": seal}, indent=1) + "\n", encoding="utf-8")
+        found = run(seed_of(seal), MACHINES, DATED) | {"seal": seal}
+        RESULT.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        found |= {"of_fleet": OF_FLEET, "fleet": with_fleet(seed_of(seal), OF_FLEET)}
+        RESULT.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     if options.page:
         from benchmarks.drift.kinds_page import write
 
