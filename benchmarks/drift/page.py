@@ -48,7 +48,9 @@ BEST = """
     less than that fixed interval.
 """
 LIMITS = """
-    Machines here drift as their maker thought machines drift; no real fleet with a known future was at hand. Rates do not
+    The run is of version {version}, whose model had neither settling nor season nor wear that speeds up, and a prior without
+    a fleet that knew of no machine that hardly drifts; with them: [five kinds of machines](drift-kinds-study.md). Machines
+    here drift as their maker thought machines drift; no real fleet with a known future was at hand. Rates do not
     change, errors are taken one by one, every adjustment is recorded, and models and places are spelled alike. The cost
     function is one of many, and targets of the drift model are not its reliability: it crosses a limit and may come back.
     The staircase sees whether values conform, not values, places or models: what the drift model gains is partly that; at
@@ -71,7 +73,7 @@ def parts(result: dict[str, Any]) -> list[str]:
              median=result["median_years"], never=100 * result["never"]),
         _asked(result), "## The day of crossing", told(COVERAGE), _coverage(result), _after_coverage(result),
         "## What too early and too late cost", _cost(result["cost"]), _costs(result["cost"]), _best(result["cost"]),
-        "## What this does not show", told(LIMITS),
+        "## What this does not show", told(LIMITS, version=result["version"]),
     ]  # fmt: skip
 
 

@@ -11,12 +11,21 @@ import pytest
 
 from cmm_uq.certificate.document import Document
 from cmm_uq.certificate.pages.fleet import due_document
-from cmm_uq.certificate.pages.history import history_data, history_document, meets, notes, overview_of, terminal_note
+from cmm_uq.certificate.pages.history import (
+    history_data,
+    history_document,
+    meets,
+    notes,
+    overview_of,
+    step_notes,
+    terminal_note,
+)
 from cmm_uq.certificate.render import render_html
 from cmm_uq.laboratory.due.crossing import Crossing, crossing
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, machine_due
 from cmm_uq.laboratory.due.history import MachineHistory, machine_history
 from cmm_uq.laboratory.due.rule import Rule
+from cmm_uq.laboratory.due.steps import DatedStep
 from cmm_uq.laboratory.records.facts import ArtefactRow
 from tests.certificate.saying import strangers
 from tests.laboratory.due.histories import MACHINE, FIRST_of_made, certificate, series, value
@@ -114,6 +123,41 @@ def test_which_model_the_day_of_a_crossing_is_of_is_said_and_the_data_have_it() 
     again = crossing(made.values[0].series, 8.0)
     assert data["model"] == "drift"
     assert [data["day_5"], data["day_50"]] == [str(again.quantile(0.05)), str(again.quantile(0.5))]
+
+
+def stepped(**further: object) -> MachineHistory:
+    """Seven recordings, 200 days apart, with a step of 6 before the fifth, 2026-05-10."""
+    numbers, days = (0.1, 0.4, 0.2, 0.5, 6.2, 6.6, 6.1), [200 * i for i in range(7)]
+    made = [certificate(FIRST_of_made + dt.timedelta(days=day), value(number), interim=i == 1, entry=i + 1)
+            for i, (day, number) in enumerate(zip(days, numbers, strict=True))]  # fmt: skip
+    made.insert(4, certificate(dt.date(2026, 1, 7), value(1.0, name="other"), entry=8))
+    of = series(days, numbers, 0.4, **further)  # type: ignore[arg-type]
+    return machine_history(MACHINE, made, {"scale_x.ppm": of}, dt.date(2028, 1, 1))
+
+
+def test_a_step_is_dated_in_words_with_the_certificates_that_it_puts_in_doubt() -> None:
+    """Those relied on when it came: the last that does not have it, and one of other values between both."""
+    made = stepped()
+    (words,) = step_notes(made)
+    change = "after a change of 5.8 ± 1.4 ppm between 2025-10-22 and 2026-05-10 (probability 99 %)"
+    assert words == (
+        f"Scale error of x: {change}. In doubt for what was measured after 2025-10-22: K-2025-10-22, K-2026-01-07."
+    )
+    (data,) = history_data(made)["values"]["scale_x.ppm"]["steps"]
+    assert (data["after"], data["by"], data["in_doubt"]) == ("2025-10-22", "2026-05-10", [4, 8])
+    assert (data["size"], data["u"], data["probability"]) == pytest.approx((5.8, 0.7, 0.99), abs=0.05)
+    html = render_html(history_document(made))
+    assert change in html
+    assert strangers(history_document(made), OWN) == []
+    assert step_notes(history(1.0, 1.1, 1.0)) == ()
+
+
+def test_a_step_after_an_adjustment_puts_no_certificate_of_before_it_in_doubt() -> None:
+    made = stepped(adjusted_since=[0, 0, 0, 0, 700, 700, 700])  # a hundred days after the fourth recording
+    first = FIRST_of_made.toordinal()
+    for after, doubtful in ((600, [4, 8]), (700, [])):
+        step = DatedStep(first + after, first + 800, 0.9, 6.0, 0.5)
+        assert [one.entry for one in made.in_doubt(made.values[0], step)] == doubtful
 
 
 def test_a_history_fits_a_telephone(browser: Browser, tmp_path: Path) -> None:

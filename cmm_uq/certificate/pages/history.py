@@ -225,6 +225,8 @@ def trend_plot(history: MachineHistory, one: ValueHistory) -> doc.Plot:
         adjusted = [when for when in _years(np.unique(since[since > 0])) if when > left]
         for when in adjusted:
             ax.axvline(when, color=MUTED, lw=0.9, ls=(0, (1, 2)), zorder=1)
+        for step in one.steps:
+            ax.axvspan(*_years(np.array([step.after, step.by])), color=BAND, lw=0, zorder=0)
         if series.limit is None:
             ax.margins(y=0.1)
         else:
@@ -239,7 +241,7 @@ def trend_plot(history: MachineHistory, one: ValueHistory) -> doc.Plot:
         parts = (
             (True, say("bars: U (k = 2)")), (series.limit is not None, say("dashed: limits")),
             (one.line is not None, say("line: straight trend with its U")), (adjusted, say("dotted: adjusted")),
-            (check.any(), say("hollow: interim checks")),
+            (check.any(), say("hollow: interim checks")), (bool(one.steps), say("shaded: a step")),
         )  # fmt: skip
         note(figure, semicolons([text for is_drawn, text in parts if is_drawn]))
         return drawn(figure, say("{name} over time.", name=Verbatim(series.quantity)), _told(history, one))

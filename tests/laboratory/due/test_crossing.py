@@ -12,7 +12,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.due.crossing import DAYS, Crossing, crossing, crossings
 from cmm_uq.laboratory.due.drift import HORIZON, YEAR, history, side_by_side
 from cmm_uq.laboratory.due.drift_filter import filtered
-from tests.laboratory.due.histories import machine, one_node, over_tales
+from tests.laboratory.due.histories import ALL, FIRST, machine, one_node, over_tales
 
 EXACT = 1e-4
 """u of a certificate, sd of a rate: as good as nothing beside the walk."""
@@ -47,6 +47,38 @@ def test_between_two_limits_with_steps_and_an_uncertain_state_it_is_that_of_path
     for d in (100, 400, 900, 1500, 2100):
         by = found.by(replace_day(found, d))
         assert by == pytest.approx(parts[d], abs=0.025)  # the walk's own 0.004, and limits watched by the day
+
+
+def test_with_a_season_and_settling_too_and_where_the_season_is_above_the_limit_between_two_days_of_the_grid() -> None:
+    """One node, and a coarse grid whose gaps are of half a year and more from the third year on."""
+    of = machine([0, 0.4, 1, 1.6, 2], [0.0, 1.8, 1.2, 2.2, 2.3], 0.4, 0.2)
+    prior = one_node(rate=0.5, rate_sd=0.3, walk=0.4, steps_per_year=0.05, **ALL)
+    arrays = side_by_side([of])
+    state = filtered(arrays, prior, kept=500)
+    found = crossings(arrays, prior, state, 5.0).one(0)
+    mean, covariance = over_tales(state)
+    random, n = np.random.default_rng(7), 20_000
+    level, rate, settle, cosine, sine = random.multivariate_normal(mean[:5, 0, 0], covariance[:5, :5, 0, 0], n).T
+    inside, parts = np.abs(level) <= 5.0, {}
+    for d in range(1, int(6 * YEAR)):
+        t, before = 2 + d / YEAR, 2 + (d - 1) / YEAR
+        level = level + rate * (1 + 0.3 * (t + before) / 2) / YEAR + 0.4 / np.sqrt(YEAR) * random.standard_normal(n)
+        level += settle * (np.exp(-before / 0.8) - np.exp(-t / 0.8))
+        year, year_before = (2 * np.pi * (FIRST / YEAR + when) for when in (t, before))
+        level += cosine * (np.cos(year) - np.cos(year_before)) + sine * (np.sin(year) - np.sin(year_before))
+        steps = random.random(n) < 0.05 / YEAR
+        level[steps] += 2.5 * random.standard_normal(int(steps.sum()))
+        inside &= np.abs(level) <= 5.0
+        parts[d] = 1 - inside.mean()
+    for d in (60, 200, 400, 900, 1500, 2100):
+        assert found.by(replace_day(found, d)) == pytest.approx(parts[d], abs=0.025), d
+
+
+def test_a_calibration_always_in_the_same_month_leaves_the_season_to_the_prior() -> None:
+    state = filtered(side_by_side([machine([0, 1, 2, 3], [0.0, 0.3, 0.2, 0.6], 0.1)]), one_node(**ALL))
+    mean, covariance = over_tales(state)
+    assert mean[3:5, 0, 0] == pytest.approx(0.0, abs=1e-9)
+    assert covariance[[3, 4], [3, 4], 0, 0] == pytest.approx(ALL["season_sd"] ** 2)
 
 
 def replace_day(found: Crossing, days: int):  # type: ignore[no-untyped-def]

@@ -9,7 +9,7 @@ from hashlib import sha256
 
 import pytest
 
-from benchmarks.drift import page
+from benchmarks.drift import kinds_page, kinds_study, page
 from benchmarks.drift.study import HERE, RESULT, SEAL, hashes, seed_of
 from tests.conftest import ROOT
 
@@ -31,7 +31,16 @@ def test_generator_and_judging_are_those_that_were_sealed_and_run() -> None:
     assert result["seed"] == seed_of(seal)
 
 
-@pytest.mark.parametrize("name", ["generator.py", "policies.py"])
+def test_the_study_of_kinds_is_the_one_that_was_sealed_and_its_page_what_its_tool_writes() -> None:
+    seal, result = (json.loads(path.read_text(encoding="utf-8")) for path in (kinds_study.SEAL, kinds_study.RESULT))
+    assert seal == kinds_study.hashes() == result["seal"]
+    assert result["seed"] == kinds_study.seed_of(seal)
+    assert kinds_page.PAGE.read_text(encoding="utf-8") == kinds_page.page(result)
+    for kind, of in result["kinds"].items():
+        assert of["alone"]["groups"]["all"]["machines"] >= 1000, kind
+
+
+@pytest.mark.parametrize("name", ["generator.py", "kinds.py", "policies.py"])
 def test_the_generator_and_the_rules_beside_it_share_no_code_with_the_package(name: str) -> None:
     tree = ast.parse((HERE / name).read_text(encoding="utf-8"))
     modules = [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
