@@ -118,12 +118,12 @@ class Histories:
     @property
     def first(self) -> Floats:
         """Ordinal of each machine's first certificate, (N,)."""
-        return self.day[0]
+        return np.asarray(self.day[0], dtype=np.float64)
 
     @property
     def years(self) -> Floats:
         """From where each certificate's time begins to the certificate, (n, N)."""
-        return (self.day - self.begun) / YEAR
+        return np.asarray((self.day - self.begun) / YEAR, dtype=np.float64)
 
     def __len__(self) -> int:
         return len(self.last)
@@ -301,7 +301,7 @@ def phase(day: Floats) -> Floats:
 
 
 def moved(
-    since: Floats, until: Floats, first: Floats, settling: Floats, growth: Floats, settle_years: Floats
+    since: Floats, until: Floats, first: Floats, settling: Floats, growth: Floats | float, settle_years: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """What one unit of rate, of settling, of the seasons' cosine and of their sine moves a level by between two days.
 
@@ -313,5 +313,5 @@ def moved(
     begin, end = (since - first) / YEAR, (until - first) / YEAR
     by_rate = (end - begin) * (1.0 + 0.5 * growth * (begin + end))
     decay = np.exp((settling - since) / (YEAR * settle_years)) - np.exp((settling - until) / (YEAR * settle_years))
-    season = phase(until), phase(since)
-    return by_rate, decay, *(f(season[0]) - f(season[1]) for f in (np.cos, np.sin))
+    year, year_before = phase(until), phase(since)
+    return by_rate, decay, np.cos(year) - np.cos(year_before), np.sin(year) - np.sin(year_before)

@@ -39,7 +39,7 @@ class DriftState:
     mean: Floats  # (d, N, K, M) level, rate, components, errors of the artefacts
     covariance: Floats  # (d, d, N, K, M)
     log_weight: Floats  # (N, K, M) joint density of certificates and tale
-    steps: NDArray[np.bool_]  # (n, N, K, M) whether the tale has a step before a certificate; (0, …) where nobody asked
+    steps: Floats  # (n, N, K, M) 1 where the tale has a step before a certificate, else 0; (0, …) where nobody asked
 
     def between(self, first: int, last: int | None) -> DriftState:
         mean, covariance, steps = self.mean[:, first:last], self.covariance[:, :, first:last], self.steps[:, first:last]
@@ -100,7 +100,7 @@ def filtered(
     mean[own, ..., 0], covariance[own[:, None], own, ..., 0] = start.mean, start.covariance
     covariance[0, 0] = (prior.first_sd**2)[:, None]
     covariance[c, c] = (components**2)[:, None, :, None]
-    no_steps = np.zeros((len(machines.given) * dated, N, K, 1), dtype=bool)
+    no_steps = np.zeros((len(machines.given) * dated, N, K, 1))
     state, done = DriftState(mean, covariance, np.zeros((N, K, 1)), no_steps), []
     for k, left in enumerate(machines.given.sum(axis=1)):
         done.append(state.between(left, None))
@@ -150,9 +150,9 @@ def _moved(state: DriftState, machines: drift.Histories, prior: drift.DriftPrior
     adjusted = machines.adjusted[k, :N, None, None]
     if adjusted.any():
         _set_back(state, adjusted, prior)
-    days = (each[..., None, None] for each in (machines.begun[k, :N], machines.day[k, :N], machines.first[:N],
-                                               machines.settling[k, :N]))  # fmt: skip
-    moves = drift.moved(*days, prior.growth[:, None], prior.settle_years[:, None])[: 1 + len(prior.components)]
+    begun, day, settling = (each[k, :N, None, None] for each in (machines.begun, machines.day, machines.settling))
+    first, nodes = machines.first[:N, None, None], (prior.growth[:, None], prior.settle_years[:, None])
+    moves = drift.moved(begun, day, first, settling, *nodes)[: 1 + len(prior.components)]
     for i, move in enumerate(moves, 1):
         mean[0] += move * mean[i]
     along = sum(move * covariance[i] for i, move in enumerate(moves, 1))

@@ -51,8 +51,20 @@ def test_a_steady_drift_goes_on_by_its_rate_and_more(records: Path) -> None:
     assert 1.0 < found.state.drift[0] < 3.0
     assert found.state.drift[1] == 0
     assert "They say nothing of Scale error of Y" in found.told
-    sooner = with_drift(STATE, "1102", CALIBRATED + dt.timedelta(days=90), records, "job.toml")
-    assert sooner.state.drift[0] < 0.6 * found.state.drift[0]
+    later = with_drift(STATE, "1102", dt.date(2029, 3, 2), records, "job.toml")
+    assert found.state.drift[0] < 0.6 * later.state.drift[0]
+
+
+def test_calibrations_of_one_month_say_nothing_of_the_season_in_another(tmp_path: Path) -> None:
+    """All of March: in June more may have changed than in a year; with those of June, September and December too, less."""
+    days = [dt.date(2021 + i, month, 2) for i in range(6) for month in (3, 6, 9, 12)][:21]
+    rows = [certificate("1102", day, scale((day - days[0]).days / 365.25)) for day in days]
+    march, june = rows[::4], CALIBRATED + dt.timedelta(days=92)
+    for name, some, more in (("one", march, True), ("four", rows, False)):
+        (tmp_path / name).mkdir()
+        place = recorded(tmp_path / name, *some)
+        there, again = (with_drift(STATE, "1102", on, place, "job.toml").state.drift[0] for on in (june, ON))
+        assert bool(there > again) is more
 
 
 def test_a_history_that_was_kept_gives_the_same_drift_once_more(records: Path) -> None:
