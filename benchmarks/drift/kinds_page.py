@@ -104,7 +104,7 @@ def _steps(kinds: dict[str, Any]) -> str:
 
 def _fleet(result: dict[str, Any]) -> list[str]:
     if "fleet" not in result:
-        return ["Not run."]
+        return ["Not run yet: only the study of one fleet, by the earlier model."]
     rows = []
     for kind, of in result["fleet"].items():
         found = of["groups"]["all"]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, plural, say, semicolons
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, plural, say, semicolons, sentences
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import unit_as_written
 from cmm_uq.certificate import document as doc
@@ -105,8 +105,10 @@ def step_notes(history: MachineHistory) -> tuple[Text, ...]:
         found.append(say("{name}: {change}.", name=name, change=step_words(one, step)))
         if doubtful:
             names = commas(Verbatim(certificate.number or certificate.job) for certificate in doubtful)
-            found[-1] = say("{sentence} In doubt for what was measured after {day}: {certificates}.", sentence=found[-1],
-                            day=_date(step.after), certificates=names)  # fmt: skip
+            words = say(
+                "In doubt for what was measured after {day}: {certificates}.", day=_date(step.after), certificates=names
+            )
+            found[-1] = sentences([found[-1], words])
     return tuple(found)
 
 

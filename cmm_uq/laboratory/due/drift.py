@@ -158,8 +158,8 @@ def side_by_side(histories: Sequence[DriftHistory]) -> Histories:
     after = np.array([each.adjusted_after for each in histories])
     last = np.where(np.isnan(after), [each.day[-1] for each in histories], after)
     settles = np.where(np.isnan(after), settling[given.sum(axis=0) - 1, np.arange(N)], after)
-    return Histories(value, u, shared, day, begun, adjusted, settling, given, artefacts, tuple(names), last, settles,
-                     np.isfinite(after))  # fmt: skip
+    columns = value, u, shared, day, begun, adjusted, settling, given, artefacts
+    return Histories(*columns, tuple(names), last, settles, np.isfinite(after))
 
 
 def _since(of: DriftHistory) -> tuple[NDArray[np.bool_], Floats, Floats]:
@@ -249,8 +249,8 @@ def default_prior(unit: float, nodes: int = NODES, *, plain: bool = False) -> Dr
     number = normal_lattice(nodes, len(NAMES) - 3 + len(ALONE))
     values = _in_unit(NAMES[3:], np.log(MEDIANS[3:]) + SPREADS[3:] * number[:, len(ALONE) :], unit)
     values |= _alone(ALONE, number, unit, plain=plain)
-    return DriftPrior(rate=np.zeros(nodes), **values, weight=np.full(nodes, 1.0 / nodes),
-                      group=np.zeros(nodes, dtype=np.int64))  # fmt: skip
+    weight, group = np.full(nodes, 1.0 / nodes), np.zeros(nodes, dtype=np.int64)
+    return DriftPrior(rate=np.zeros(nodes), **values, weight=weight, group=group)
 
 
 def normal_lattice(count: int, d: int) -> Floats:
@@ -271,9 +271,9 @@ def learnt_prior(theta: Floats, rate: Floats, rate_sd: Floats, unit: float, *, p
     values = _in_unit(NAMES[3:], np.repeat(theta[:, 3:], w * c, axis=0), unit)
     values["walk"] *= np.tile(np.repeat(np.exp(WALKS_DIFFER * _WALK_NODES), c), g)
     values |= _alone(ALONE[1:], normal_lattice(g * w * c, len(ALONE) - 1), unit, plain=plain)
-    return DriftPrior(rate=np.repeat(rate, w * c), rate_sd=np.repeat(rate_sd, w * c), **values,
-                      weight=np.tile(np.repeat(_WALK_WEIGHTS / _WALK_WEIGHTS.sum() / c, c), g) / g,
-                      group=np.repeat(np.arange(g), w * c))  # fmt: skip
+    rates = {"rate": np.repeat(rate, w * c), "rate_sd": np.repeat(rate_sd, w * c)}
+    weight = np.tile(np.repeat(_WALK_WEIGHTS / _WALK_WEIGHTS.sum() / c, c), g) / g
+    return DriftPrior(**rates, **values, weight=weight, group=np.repeat(np.arange(g), w * c))
 
 
 def _alone(names: Sequence[str], number: Floats, unit: float, *, plain: bool) -> dict[str, Floats]:

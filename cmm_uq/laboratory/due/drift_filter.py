@@ -88,8 +88,8 @@ def filtered(
     start = start or usual_start(machines, prior)
     if sized:  # as of an artefact that no certificate was made with
         machines = replace(machines, shared=np.pad(machines.shared, [(0, 0), (0, 1), (0, 0)]))
-        start = DriftStart(np.pad(start.mean, [(0, 1), (0, 0), (0, 0)]),
-                           np.pad(start.covariance, [(0, 1), (0, 1), (0, 0), (0, 0)]))  # fmt: skip
+        more = [(0, 1), (0, 0), (0, 0)]
+        start = DriftStart(np.pad(start.mean, more), np.pad(start.covariance, [(0, 1), *more]))
     order = np.argsort(-machines.given.sum(axis=0), kind="stable")  # whoever has no further certificate is done
     machines, start = machines.some(order), DriftStart(start.mean[:, order], start.covariance[:, :, order])
     components, N, K = prior.components, len(machines), len(prior)

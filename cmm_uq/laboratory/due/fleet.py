@@ -190,8 +190,8 @@ def _estimated(
     for i in range(0, len(machines), chunk):
         which = np.arange(i, min(i + chunk, len(machines)))
         some = machines.some(which)
-        at, at_few = (DriftStart(start.mean[:, which][..., draws], start.covariance[:, :, which][..., draws])
-                      for draws in (plain.group, few[prior.group]))  # fmt: skip
+        mean, covariance = start.mean[:, which], start.covariance[:, :, which]
+        at, at_few = (DriftStart(mean[..., i], covariance[..., i]) for i in (plain.group, few[prior.group]))
         crossed = crossings(some, prior, filtered(some, prior, at_few), limit[which], paths=PATHS)
         parts.append((_rates(filtered(some, plain, at), plain, at), crossed))
     rate, u, expected, u_expected, p = np.concatenate([part for part, _ in parts], axis=1)
