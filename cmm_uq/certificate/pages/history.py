@@ -99,7 +99,7 @@ def _date(ordinal: int) -> Text:
 
 def step_notes(history: MachineHistory) -> tuple[Text, ...]:
     """Steps of all values, a sentence each, and which certificates they put in doubt."""
-    found = []
+    found: list[Text] = []
     for one, step in [(value, step) for value in history.values for step in value.steps]:
         name, doubtful = Verbatim(one.series.quantity), history.in_doubt(one, step)
         found.append(say("{name}: {change}.", name=name, change=step_words(one, step)))
