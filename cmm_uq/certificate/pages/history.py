@@ -37,7 +37,7 @@ WORDS = {say("Quantity"), say("Unit"), say("Crosses its limit")}  # headings of 
 STEPS_NOTE = say(
     "A step is one that the drift model finds more probable than not between two recordings, beside what the machine drifts, "
     "settles, follows the seasons and wanders: a collision, a move, an adjustment that nobody recorded. Its ± has k = 2."
-)  # fmt: skip
+)
 
 STATE_WORDS: Mapping[str, Text] = {
     "draft": say("draft"), "released": say("released"), "withdrawn": say("withdrawn"), "replaced": say("replaced"),

@@ -193,9 +193,16 @@ def _log_steps(years: Floats, prior: drift.DriftPrior) -> tuple[Floats, Floats]:
 
 
 def _kept(
-    state: DriftState, log_weight: Floats, seen: Floats, spread: Floats, missed: Floats, size: Floats, kept: int,
-    stepping: Ints, k: int,
-) -> DriftState:  # fmt: skip
+    state: DriftState,
+    log_weight: Floats,
+    seen: Floats,
+    spread: Floats,
+    missed: Floats,
+    size: Floats,
+    kept: int,
+    stepping: Ints,
+    k: int,
+) -> DriftState:
     """The likeliest tales, each with its Kalman update; ``log_weight`` and ``spread`` are (N, K, 4, M).
 
     ``stepping``: what of the state a step before certificate k changes.
