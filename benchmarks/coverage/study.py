@@ -21,6 +21,8 @@ from benchmarks.coverage.page import page
 from benchmarks.coverage.tally import POOLED, Tally, tallies
 
 PAGE = Path(__file__).parents[2] / "docs" / "coverage-study.md"
+FURTHER = "## Figures of performance without noise"
+"""Heading of what another study writes below this one's."""
 
 
 class Named(Protocol):
@@ -91,7 +93,10 @@ def main() -> None:
     found = tallies(kept(chosen.folder))
     if chosen.page:
         beside = tallies(kept(chosen.beside)) if chosen.beside else {}
-        chosen.page.write_text(page(found, beside, chosen.folder / "power.json"), encoding="utf-8")
+        whole = chosen.page.read_text(encoding="utf-8") if chosen.page.exists() else ""
+        further = whole[whole.index(FURTHER) :] if FURTHER in whole else ""  # of benchmarks.coverage.performance
+        written = page(found, beside, chosen.folder / "power.json")
+        chosen.page.write_text(f"{written}\n{further}" if further else written, encoding="utf-8")
     for cell in some:
         if cell.name in found:
             print(f"{cell.name}: {_line(found[cell.name])}")

@@ -18,6 +18,7 @@ from cmm_uq.certificate.results.provenance import COMPARED, NOT_COMPARED, REBUIL
 from cmm_uq.certificate.sections import results as of_result
 from cmm_uq.certificate.sections.conformity import conformity_section
 from cmm_uq.certificate.sections.method import method, posterior_section, warnings
+from cmm_uq.certificate.sections.performance import machine_alone, own_figures, performance, with_performance
 from cmm_uq.certificate.sections.regions import regions_section, with_regions
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.logo import logo_of
@@ -169,6 +170,7 @@ def with_capability(result: Result) -> tuple[Result, StatedUncertainty]:
         accuracy=stating.all("accuracy", result.accuracy),
         stating=stating,
     )
+    own_figures(stated)  # what is raised of them is in the warning
     return stated, stating
 
 
@@ -182,7 +184,8 @@ def certified(result: Result, page: Page) -> Outcome:
     if draws is not None:
         data["posterior"] = draws.entry
     return Outcome(
-        result, lambda: _certificate(result, page, own), with_regions(page.with_further(result, data), result),
+        result, lambda: _certificate(result, page, own),
+        with_performance(with_regions(page.with_further(result, data), result), result),
         of_result.summary(result, warned), warned, {draws.name: draws.content} if draws else {}, draws=result.draws,
         verdicts=result.verdicts,
         in_order=result.diagnosed.diagnosis.verdict == "consistent",
@@ -205,8 +208,8 @@ def _certificate(result: Result, page: Page, warned: tuple[Text, ...]) -> Docume
 
 def _ordered(result: Result, own: list[Section]) -> list[Section]:
     """Results first (figures of lengths, else error factors, else the first of ``own``), then decisions and their basis."""
-    figures, factors = of_result.performance(result), of_result.error_factors(result)
-    decided, rests_on = conformity_section(result.statements), traceability(result)
+    figures, factors = performance(result), of_result.error_factors(result)
+    decided, rests_on = conformity_section(result.statements, machine_alone(result)), traceability(result)
     before = of_result.as_found_section(result.job, of_result.quantities_left(result), result.verdicts)
     if figures.blocks:
         return [figures, decided, before, factors, regions_section(result), rests_on, *own]

@@ -42,6 +42,12 @@ def expanded(quantity: Quantity) -> tuple[Text, Text, Text]:
     return (value, uncertainty, (NO_FACTOR if k is None or k < _ONE_HILL else number(k, ".2f")))
 
 
+def stated(quantity: Quantity) -> tuple[Text, Text, Text]:
+    """The same as a table states it: of what is skewed the interval stands in place of U, and there is no k."""
+    value, U, k = expanded(quantity)
+    return (value, interval_of(quantity), NO_FACTOR) if quantity.skewed and not quantity.one_sided else (value, U, k)
+
+
 def interval_of(quantity: Quantity) -> Text:
     """Its 95 % interval, to the digits of U."""
     low, high = (rounded(end, quantity.expanded)[0] for end in quantity.interval95)
@@ -52,6 +58,15 @@ def with_uncertainty(quantity: Quantity) -> Text:
     """Value ± U, or the interval of what has one side; its unit follows."""
     value, U, _ = expanded(quantity)
     return value if quantity.one_sided else say("{value} ± {U}", value=value, U=U)
+
+
+def skewed_note(quantities: Iterable[Quantity]) -> tuple[Text, ...]:
+    """What an interval in the column of U is; nothing where none is there."""
+    note = say(
+        "Two figures in place of U: the ends of the 95 % interval of a skewed distribution. Its sides differ by more than a "
+        "tenth, so that value ± U does not say it (JCGM 101:2008, 5.3.4)."
+    )
+    return (note,) if any(one.skewed and not one.one_sided for one in quantities) else ()
 
 
 CERTAIN = 1e-4  # A probability nearer to 0 or 1 than this is printed as less or more than it
@@ -175,9 +190,11 @@ def figure_row(name: Text, quantity: Quantity, *, known: bool = True) -> Figure:
     """A quantity with its expanded uncertainty; ``known`` is false where a recording says nothing of it."""
     if not known:
         return name, say("not determined"), NOTHING
-    figure, k = say("{figure} {unit}", figure=with_uncertainty(quantity), unit=quantity.unit), expanded(quantity)[2]
+    figure, k = say("{figure} {unit}", figure=with_uncertainty(quantity), unit=quantity.unit), stated(quantity)[2]
     if quantity.one_sided:
         return name, figure, say("95 % interval")
+    if quantity.skewed:
+        return name, figure, say("95 % interval {interval}", interval=interval_of(quantity))
     return name, figure, NOTHING if k == NO_FACTOR else say("k = {k}", k=k)
 
 
@@ -232,7 +249,7 @@ def _what(effect: Effect | None, name: str) -> Text:
 def _figures(quantity: Quantity, factors: bool) -> Text:
     if not quantity.u > 0:
         return say("{value}\u00a0{unit}", value=figure(quantity.value), unit=quantity.unit)
-    stated, k = with_uncertainty(quantity), expanded(quantity)[2]
+    shown, k = with_uncertainty(quantity), stated(quantity)[2]
     if not factors or k == NO_FACTOR:
-        return say("{stated}\u00a0{unit}", stated=stated, unit=quantity.unit)
-    return say("{stated}\u00a0{unit} (k\u00a0=\u00a0{k})", stated=stated, unit=quantity.unit, k=k)
+        return say("{stated}\u00a0{unit}", stated=shown, unit=quantity.unit)
+    return say("{stated}\u00a0{unit} (k\u00a0=\u00a0{k})", stated=shown, unit=quantity.unit, k=k)

@@ -127,7 +127,10 @@ STATED = (
 )
 
 RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
-    "Figures of performance": lambda r: [[quantity] for quantity in r["accuracy_uncertainty"].values()],
+    "Figures of performance": lambda r: [
+        [quantity, *([own[name]["interval95"]] if name in (own := r.get("performance_of_machine", {})) else [])]
+        for name, quantity in r["accuracy_uncertainty"].items()
+    ],
     "Error factors of the machine": parameters,
     "Where the error factors hold": by_region,
     "Sizes of errors, root mean square": lambda r: [[family] for family in r["regions"]["families"]],
@@ -183,7 +186,7 @@ def printed(table: Table, row: tuple[str, ...]) -> Iterator[tuple[Decimal, Decim
     for column, cell in zip(table.columns, row, strict=True):
         if cell in WORDS:
             continue
-        if not FIGURE.fullmatch(cell):
+        if not all(FIGURE.fullmatch(end) for end in cell.split(" to ", 1)):  # both ends of an interval, or one figure
             assert not column.numeric, f"{table.caption}: {cell!r} is no figure"
             continue
         for text in NUMBER.findall(cell):

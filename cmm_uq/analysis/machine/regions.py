@@ -15,7 +15,7 @@ recording itself. Where the recording leaves the difference open, the draws diff
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 
@@ -24,6 +24,7 @@ from scipy.special import ndtri
 
 from cmm_uq.analysis.diagnosis.held_out import thin_out
 from cmm_uq.analysis.machine.conditional import PriorInfluence, RecordedField, as_recorded_allows, influence_of
+from cmm_uq.analysis.machine.performance import MachinePerformance, performance_of, rows_of
 from cmm_uq.analysis.machine.state import AxisStatement, Unmodelled, of_machine, unmodelled_errors
 from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.base.errors import CmmUqError
@@ -38,6 +39,8 @@ from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior, gain
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 DRAWS = 2000
+_ABSENT = 1e-4  # size of a family of errors that are not there
+_ERRORS, _LEAST = 4_000_000, 200  # errors of lengths that are drawn, and how often each at least
 _MOST = 100  # quantities of a recording, with their repeats: time grows with the cube of what they show
 _EACH = 4  # points along each axis of a region
 _ANYWHERE = ("ppm", "″", "″/m")  # units of what means the same on a part of a travel; a bow is one of the whole travel
@@ -63,6 +66,7 @@ class FactorRegions:
     influence: tuple[PriorInfluence, ...]  # of other priors on the factors over the measuring range, in their order
     observations: tuple[int, int]  # reckoned with, and of how many
     statements: tuple[AxisStatement, ...] = ()  # what the recording says of what is stated of axes
+    performance: MachinePerformance | None = None  # without noise; of an artefact that has lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +96,52 @@ class DrawnErrors:
     def recorded(self, model: RecordingModel, posterior: NoisyPosterior) -> Floats:
         """Draws (N, k) of the named effects as means over the recorded set-ups, as an estimate of them alone has them."""
         return np.asarray(self.own + self.further @ as_recorded(model, self.field, posterior).T)
+
+    def performance(self, model: RecordingModel, doubt: Doubt, seed: int) -> MachinePerformance | None:
+        """Figures of the recorded lengths without noise; ``None`` of an artefact that has no lengths.
+
+        Whether what the named errors leave is noise, or errors of the field, a recording says by how smooth it is, and hardly
+        at all where nothing was measured twice. Half of the draws are of a machine with no errors beside the named ones.
+        """
+        rows = rows_of(model.artefact)
+        if rows is None:
+            return None
+        each = np.linspace(0, len(self.own) - 1, min(len(self.own), max(_LEAST, _ERRORS // len(rows)))).astype(np.int64)
+        try:
+            none = tuple(one for one in self.field.field.errors if one.family is None)
+            noise = sample_sizes(replace(self.field.field, errors=none), len(each), seed, effort=BRIEF).noise
+        except CmmUqError:  # where the factors hold is stated all the same
+            return None
+        random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(41,)))
+        absent = np.full((len(each), len(self.field.field.families)), _ABSENT)
+        drawn, k = self.field.coefficients(noise, absent, random), self.field.modelled
+        whole = np.where(np.arange(len(each))[:, None] % 2, drawn, np.hstack([self.own, self.further])[each])
+        own = doubted_draws(doubt, len(model.unknowns), np.arange(k), seed, whole[:, :k])
+        return performance_of(model, self.of_lengths(model, rows, own, whole[:, k:]))
+
+    def of_lengths(self, model: RecordingModel, rows: Ints, own: Floats, further: Floats) -> Floats:
+        """Draws (N, m), mm, of how much longer than true the machine shows lengths between points ``rows`` (m, 2).
+
+        Without noise, where the recording found the points; ``own`` (N, k), ``further`` (N, f) draws of all effects.
+        """
+        artefact, about = model.artefact, model.estimate().about
+        steps = np.diff(artefact.points.xyz[rows], axis=1)[:, 0]
+        along = artefact.lines_of(rows)[1]
+        along = along * (np.sign(np.sum(along * steps, axis=1)) / np.linalg.norm(along, axis=1))[:, None]
+
+        def seen(errors: Floats) -> Floats:
+            return np.asarray(np.einsum("mi,mik->mk", along, errors[rows[:, 0]] - errors[rows[:, 1]]))
+
+        def of_effects(effects: Sequence[Effect]) -> Floats:
+            none = np.zeros((len(rows), 0))
+            return np.hstack([none, *(seen(model.columns(one, (), about)) for one in effects)])
+
+        shown, true = (
+            np.linalg.norm(np.diff(xyz[rows], axis=1)[:, 0], axis=1)
+            for xyz in (model.predicted(about), model.placed(about))
+        )
+        named, others = of_effects(model.effects), of_effects(self.field.effects)
+        return np.asarray(shown - true + (own - about[: own.shape[1]]) @ named.T + further @ others.T)
 
 
 def other_errors(model: RecordingModel) -> list[Unmodelled]:
@@ -148,6 +198,7 @@ def factor_regions(
         influence,
         (int(drawn.model.used.sum()), int(model.used.sum())),
         drawn.statements,
+        drawn.performance(model, doubt, seed),
     )
 
 

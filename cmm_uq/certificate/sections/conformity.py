@@ -6,15 +6,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from cmm_uq.analysis.conformity.statement import Decided, Statement, least_favourable
+from cmm_uq.analysis.machine.performance import MachinePerformance
 from cmm_uq.base import messages
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, number, plural, say
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, DecisionBlock, Plot, Section, Table, columns
 from cmm_uq.certificate.plots.residuals import trumpet
-from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, stated_value
+from cmm_uq.certificate.wording import OUTCOME_WORDS, interval_of, probability, stated_value
 from cmm_uq.jobs.tables.conformity import ConformityFacts
 from cmm_uq.maths.uncertainty.budget import Budget, BudgetLine
-from cmm_uq.maths.uncertainty.quantity import figure, limit_in_full, nominal, significant
+from cmm_uq.maths.uncertainty.quantity import figure, limit_in_full, nominal, rounded, significant
 
 
 def budget_table(measurand: Text, budget: Budget) -> Table:
@@ -54,9 +55,9 @@ def _turned(line: BudgetLine, scale: float) -> tuple[Text, Text]:
 _LISTED = 250  # rows of a table of errors; of more only those nearest to their limits are listed, results.json has all.
 
 
-def conformity_section(statements: Sequence[Statement]) -> Section:
-    """Decisions first, what they rest on behind them."""
-    blocks: list[Block] = [decision_block(statement) for statement in statements]
+def conformity_section(statements: Sequence[Statement], machine: MachinePerformance | None = None) -> Section:
+    """Decisions first, what they rest on behind them; ``machine``: its figures without noise, beside the decided ones."""
+    blocks: list[Block] = [decision_block(statement, machine) for statement in statements]
     for statement in statements:
         if len(statement.errors) > 1:
             blocks += [*([picture(statement)] if has_picture(statement) else []), _table(statement)]
@@ -66,13 +67,29 @@ def conformity_section(statements: Sequence[Statement]) -> Section:
     return Section(say("Statements of conformity"), tuple(blocks))
 
 
-def decision_block(statement: Statement) -> DecisionBlock:
+def decision_block(statement: Statement, machine: MachinePerformance | None = None) -> DecisionBlock:
     """One statement: what was compared with what, by which rule, and what follows."""
     value = stated_value(statement.value_um, 2 * statement.u_um, signed=statement.signed)
     measured = say("{value} µm (k = 2)", value=value) if statement.u_um > 0 else say("{value} µm", value=value)
-    told = messages.sentences((*_what_follows(statement), *statement.remarks))
+    told = messages.sentences((*_what_follows(statement), *statement.remarks, *without_noise(statement, machine)))
     return DecisionBlock(named(statement), statement.quantity, measured, _limit(statement), statement.decision.rule,
                          statement.outcome, told, statement.missing)  # fmt: skip
+
+
+def without_noise(statement: Statement, machine: MachinePerformance | None) -> tuple[Text, ...]:
+    """How large of the machine alone is what was decided, with noise, as recorded."""
+    found = None if machine is None else machine.of_statement(statement)
+    if found is None:
+        return ()
+    recorded, own = found
+    return (
+        say(
+            "Decided is what was recorded, noise included, {recorded} µm at most; of the machine without noise this is "
+            "{interval} µm (95 % interval).",
+            recorded=rounded(recorded, own.expanded)[0],
+            interval=interval_of(own),
+        ),
+    )
 
 
 def named(statement: Statement) -> Text:

@@ -72,7 +72,7 @@ def _table(result: Result, regions: FactorRegions, ranged: dict[Key, Quantity]) 
     rows = []
     for key, quantity in ranged.items():
         # an average over explanations is of each beside other errors, and no mean over the set-ups
-        mean, U, _ = wording.expanded(regions.recorded[key] if result.averaged else result.parameters[key[0]][key[1]])
+        mean, U, _ = wording.stated(regions.recorded[key] if result.averaged else result.parameters[key[0]][key[1]])
         value, wider = rounded(quantity.value, quantity.expanded)
         ends: Sequence[Text] = [rounded(end, quantity.expanded)[0] for end in regions.eighths.get(key, ())]
         title, ends = wording.title_of(key, result), ends or (NOTHING, NOTHING)

@@ -33,19 +33,9 @@ def stated_table(
     value: Text = say("Value"),
 ) -> Table:  # fmt: skip
     heads = (what, doc.Column(value), doc.Column(say("U")), doc.Column(say("k")), say("Unit"))
-    rows = tuple((name, *wording.expanded(one), one.unit) for name, one in named)
-    return Table(caption, doc.columns(heads), rows, notes)
-
-
-def performance(result: Result) -> Section:
-    """Figures of the lengths; without blocks for an artefact that has none."""
-    title, named = say("Figures of performance"), [(TITLES[name], one) for name, one in result.accuracy.items()]
-    measurand = say(
-        "Each figure estimates what the machine would show on average if the recording were "
-        "repeated; all recorded lengths count. The test value of a statement of conformity is another quantity, that of "
-        "this recording alone, and its U is the test uncertainty."
-    )
-    return section(title, stated_table(title, named, (UNCERTAINTY, measurand)) if named else None)
+    each = tuple(named)
+    rows = tuple((name, *wording.stated(one), one.unit) for name, one in each)
+    return Table(caption, doc.columns(heads), rows, (*notes, *wording.skewed_note(one for _, one in each)))
 
 
 def error_factors(result: Result) -> Section:
@@ -60,11 +50,12 @@ def error_factors(result: Result) -> Section:
             rows.append((wording.title_of(key, result), why, NOTHING, NOTHING, NOTHING, quantity.unit))
             continue
         least = rounded(float(fitted[key]), quantity.expanded)[0] if key in fitted else NOTHING
-        rows.append((wording.title_of(key, result), *wording.expanded(quantity), least, quantity.unit))
+        rows.append((wording.title_of(key, result), *wording.stated(quantity), least, quantity.unit))
     least_squares = say("Least squares, named model") if result.averaged else say("Least squares")
     figures = (doc.Column(head) for head in (say("Estimate"), say("U"), say("k"), least_squares))
     heads: tuple[Text | doc.Column, ...] = (say("Error factor"), *figures, say("Unit"))
-    factors = doc.table(say("Error factors of the machine"), heads, rows, SIGN, UNCERTAINTY)
+    skewed = wording.skewed_note(one for key, one in reported(result) if key not in result.not_given)
+    factors = doc.table(say("Error factors of the machine"), heads, rows, SIGN, UNCERTAINTY, *skewed)
     free = (block for combination in result.undetermined for block in _free_combination(result, combination))
     return section(say("Error factors"), factors, *free)
 
@@ -107,7 +98,7 @@ def as_found_section(job: Job, left: Iterable[Left], verdicts: Iterable[Verdict]
         if (before := found.figure(group, name)) is not None:
             low, high = before.interval95
             then = Quantity(before.value, before.u, (low, high), now.unit)
-            rows.append((quantity, *wording.expanded(then)[:2], *wording.expanded(now)[:2], now.unit))
+            rows.append((quantity, *wording.stated(then)[:2], *wording.stated(now)[:2], now.unit))
     figures = (doc.Column(head) for head in (say("As found"), say("U"), say("As left"), say("U")))
     note = say("U is the expanded uncertainty for a coverage probability of 95 %.")
     heads = (say("Statement"), say("As found"), say("As left"))
@@ -156,7 +147,7 @@ def tolerance_sections(result: Result) -> list[Section]:
     for one in judged:
         effect, _, parameter = one.name.partition(".")
         quantity, tolerance = result.parameters[effect][parameter], result.job.facts.model.tolerances[effect]
-        value, U, _ = wording.expanded(quantity)
+        value, U, _ = wording.stated(quantity)
         rows.append((one.title, value, U, number(tolerance, "g"), one.unit, _INSIDE[one.outcome]))
         part = quantity.times(1 / tolerance, unit("1"))
         ratios.append((part.value, *part.interval95))

@@ -24,6 +24,14 @@ from cmm_uq.base.messages import Number
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import Unit
 
+_ALIKE = 0.1  # of the longer side of an interval, by which the other may be shorter: what U says of two digits, 10 ± 1
+
+
+def uneven(value: float, low: float, high: float) -> bool:
+    """Whether the sides of an interval about a value differ by more than a tenth of the longer one."""
+    sides = high - value, value - low
+    return min(sides) < (1 - _ALIKE) * max(sides)
+
 
 def expanded_of(draws: Floats, value: Floats) -> Floats:
     """U (...) of draws (N, ...) about a value: the larger distance to an end of the 95 % interval."""
@@ -61,6 +69,11 @@ class Quantity:
         """Whether ± U would reach beyond zero where the interval does not: such a quantity is stated by its interval."""
         low, high = self.interval95
         return (low >= 0 > self.value - self.expanded) or (high <= 0 < self.value + self.expanded)
+
+    @property
+    def skewed(self) -> bool:
+        """Whether no value ± U says the interval, which is then stated itself (JCGM 101:2008, 5.3.4)."""
+        return self.u > 0 and uneven(self.value, *self.interval95)
 
     @property
     def degrees_of_freedom(self) -> float:

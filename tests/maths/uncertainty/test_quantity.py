@@ -240,3 +240,30 @@ def test_where_models_disagree_on_two_quantities_the_mixture_has_them_vary_toget
 def test_what_nothing_makes_uncertain_stays_so() -> None:
     exact = Quantity(3.0, 0.0, (3.0, 3.0), unit("mm"))
     assert averaged([exact, exact], [1, 2]) == exact
+
+
+SIDES = {"as long": (1.0, 1.0, False), "a tenth shorter": (1.0, 0.9, False), "more": (1.0, 0.8999, True),
+         "below": (0.5, 1.0, True)}  # fmt: skip
+
+
+@pytest.mark.parametrize(("above", "below", "skewed"), SIDES.values(), ids=SIDES)
+def test_a_quantity_is_skewed_whose_sides_differ_by_more_than_a_tenth(
+    above: float, below: float, *, skewed: bool
+) -> None:
+    """Of the longer: two digits of U are worth a tenth of it at most (10 to within 1)."""
+    assert Quantity(5.0, 0.5, (5.0 - below, 5.0 + above), unit("µm")).skewed is skewed
+    assert Quantity(-5.0, 0.5, (-5.0 - above, -5.0 + below), unit("µm")).skewed is skewed
+
+
+def test_an_exponential_distribution_is_skewed_and_draws_of_a_normal_one_are_not() -> None:
+    """By its quantiles about the mean one: 2.5 % at 0.0253, 97.5 % at 3.689. Of 10 000 normal draws they differ by 2 %."""
+    exponential = Quantity(1.0, 1.0, (0.0253, 3.689), unit("µm"))
+    assert exponential.skewed
+    assert exponential.times(-2.0, unit("µm")).skewed
+    random = np.random.default_rng(0)
+    assert not any(Quantity.of_draws(random.standard_normal(10_000), unit("µm")).skewed for _ in range(200))
+
+
+def test_what_is_not_uncertain_is_not_skewed() -> None:
+    assert not Quantity(2.5, 0.0, (2.5, 2.5), unit("µm")).skewed
+    assert not Quantity(2.5, 0.1, (2.2, 2.6), unit("µm")).at_least(1.0).skewed

@@ -1,0 +1,80 @@
+"""Figures of performance: as recorded, and of the machine alone, without noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cmm_uq.analysis.conformity.accuracy import TITLES
+from cmm_uq.analysis.machine.performance import MachinePerformance
+from cmm_uq.analysis.machine.regions import FactorRegions
+from cmm_uq.base.messages import NOTHING, Text, say
+from cmm_uq.certificate import wording
+from cmm_uq.certificate.document import Column, Section, Table, columns, section
+from cmm_uq.certificate.origin import quantity_data
+from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.sections.results import UNCERTAINTY
+from cmm_uq.maths.uncertainty.quantity import Quantity, rounded
+
+
+def machine_alone(result: Result) -> MachinePerformance | None:
+    """``None`` where nothing is stated of the machine without noise."""
+    regions = result.regions
+    return regions.performance if isinstance(regions, FactorRegions) else None
+
+
+def own_figures(result: Result) -> Mapping[str, Quantity]:
+    """Of the machine, without noise; U not below the laboratory's capability."""
+    machine = machine_alone(result)
+    found: Mapping[str, Quantity] = {} if machine is None else machine.figures
+    return found if result.stating is None else result.stating.all("performance_of_machine", found)
+
+
+def performance(result: Result) -> Section:
+    """Figures of the lengths; without blocks for an artefact that has none."""
+    title, own, regions = say("Figures of performance"), own_figures(result), result.regions
+    if not result.accuracy:
+        return section(title)
+    machine = (say("Without noise from"), say("to")) if own else ()
+    heads: tuple[Text | Column, ...] = (
+        say("Quantity"),
+        *map(Column, (say("Value"), say("U"), say("k"), *machine)),
+        say("Unit"),
+    )
+    rows = []
+    for name, one in result.accuracy.items():
+        ends: tuple[Text, ...] = (NOTHING, NOTHING) if own else ()
+        if name in own:
+            ends = tuple(rounded(end, own[name].expanded)[0] for end in own[name].interval95)
+        rows.append((TITLES[name], *wording.stated(one), *ends, one.unit))
+    measurand = say(
+        "Each figure estimates what the machine would show on average if the recording were "
+        "repeated; all recorded lengths count. The test value of a statement of conformity is another quantity, that of "
+        "this recording alone, and its U is the test uncertainty."
+    )
+    without = say(
+        "Without noise: the 95 % interval of the same figure of the machine alone, in the recorded set-ups, by all of its "
+        "errors together, what the named ones leave being noise or the machine's with even odds. Noise makes ranges and "
+        "largest deviations larger; nothing is decided by this interval."
+    )
+    notes: list[Text] = [UNCERTAINTY, measurand]
+    if own:
+        notes.append(without)
+    elif not isinstance(regions, FactorRegions) and regions:
+        notes.append(say("What of them is the machine's alone, without noise, is not stated: {why}.", why=regions))
+    notes += wording.skewed_note(result.accuracy.values())
+    return section(title, Table(title, columns(heads), tuple(rows), tuple(notes)))
+
+
+def with_performance(data: Mapping[str, Any], result: Result) -> dict[str, Any]:
+    """Contents of results.json with the machine's own figures, and those of each statement."""
+    own, machine = {name: quantity_data(one) for name, one in own_figures(result).items()}, machine_alone(result)
+    found = dict(data) | ({"performance_of_machine": own} if own else {})
+    if machine is None:
+        return found
+    each = [machine.of_statement(statement) for statement in result.statements]
+    found["conformity"] = [
+        stated if one is None else {**stated, "largest_um": one[0], "largest_without_noise_um": quantity_data(one[1])}
+        for stated, one in zip(found["conformity"], each, strict=True)
+    ]
+    return found
