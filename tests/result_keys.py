@@ -377,6 +377,8 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = {
         "unseen[].title": ("", "The same in words."),
         "unseen[].share": ("", "Its share of the variance."),
         "unseen[].why": ("", "Why it was not seen, in words."),
+        "unseen[].u_smaller_by": ("", "Part of u that knowing it exactly would take off: 1 − √(1 − share)."),
+        "unseen[].shown_or_bounded_by": ("", "What would show or bound it; null of what is no error of the machine."),
         "priors[].family": ("", "A family of errors, an error that no recording shows, or `all` of them."),
         "priors[].times": ("", "By which its prior is narrower or wider."),
         "priors[].u_ratio": ("", "u that would follow over u as stated, by characteristic."),

@@ -7,7 +7,13 @@ import pytest
 
 from cmm_uq.analysis.machine.state import AxisStatement
 from cmm_uq.base.points import Machine
-from cmm_uq.certificate.sections.read_axes import readings_data, readings_table, readings_warnings
+from cmm_uq.certificate.sections.read_axes import (
+    readings_data,
+    readings_table,
+    readings_warnings,
+    shrinking,
+    smaller_by,
+)
 from cmm_uq.jobs.tables.machine import AxisFacts
 
 GRATING = AxisFacts(names=["x"], reading="exposed optical grating", source="Data sheet S-1, 2024", period_mm=0.02,
@@ -65,3 +71,22 @@ def test_results_have_what_was_stated_what_is_taken_and_what_the_recording_says(
     }
     assert (x["recording_against"], x["used"]) == (0.01, True)
     assert (z["recording_against"], z["used"]) == (1e6, False)
+
+
+def test_an_error_that_was_not_seen_has_what_would_show_or_bound_it() -> None:
+    free, stated = Machine("A"), MACHINE
+    assert str(shrinking("hysteresis_x", free)) == (
+        "faces of a gauge that are met from both sides, or a statement of how X is read"
+    )
+    assert str(shrinking("hysteresis_x", stated)) == "faces of a gauge that are met from both sides"
+    assert str(shrinking("periodic_scale_y", stated)).startswith("positions along the axis that lie closer than half")
+    assert "how Y is read" in str(shrinking("periodic_scale_y", stated))
+    for name in ("rotation_x_y", "straightness_y_z", "scale_curvature_x"):
+        assert str(shrinking(name, free)) == "a calibrated ring, ball or gauge at the place of the part"
+    assert not shrinking("tip size A", free)
+
+
+@pytest.mark.parametrize(("share", "part"), [(0.0, 0.0), (0.36, 0.2), (0.75, 0.5), (1.0, 1.0), (1.02, 1.0)])
+def test_what_is_known_takes_its_share_of_the_variance_off_u(share: float, part: float) -> None:
+    """Of u = 5 with parts 3 and 4, knowing the 3 leaves 4: a share of 0.36, a fifth."""
+    assert smaller_by(share) == pytest.approx(part)

@@ -15,7 +15,7 @@ from cmm_uq.certificate.document import Column, Paragraph, Section, Table, secti
 from cmm_uq.certificate.part.figures import CharacteristicFigures, by_margin, critical, figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement, UnseenError
 from cmm_uq.certificate.part.plots import shares_plots
-from cmm_uq.certificate.sections.read_axes import readings_table
+from cmm_uq.certificate.sections.read_axes import readings_table, shrinking, smaller_by
 from cmm_uq.certificate.sections.regions import changes_table, resting, sizes_table
 from cmm_uq.certificate.wording import effect_title
 
@@ -139,16 +139,22 @@ def unseen_section(found: PartMeasurement) -> Section:
     title, further = say("What the calibration did not see"), found.further
     if not found.unseen:
         return section(title)
-    heads = (say("Error"), Column(say("Largest share"), unit("%")), say("Of"), say("Why"))
+    heads = (say("Error"), Column(say("Largest share"), unit("%")), say("Of"), say("Why"),
+             Column(say("u smaller by"), unit("%")), say("What would show or bound it"))  # fmt: skip
+    machine = found.given.machine.machine
     rows = (
-        (own[0].title, _percent(max(one.share for one in own)), _whose(own), say("{why:capital}", why=own[0].why))
+        (own[0].title, _percent(own[0].share), _whose(own), say("{why:capital}", why=own[0].why),
+         _percent(smaller_by(own[0].share)), shrinking(own[0].effect, machine) or DASH)
         for own in _by_effect(found.unseen)
+    )  # fmt: skip
+    known = say(
+        "u smaller by: what knowing this error exactly would take off u of that characteristic, 1 − √(1 − share)."
     )
     planned = (further.text, *((say("The set-ups are planned by: {command}", command=Verbatim(further.command)),)
                                if further.command else ())) if further else ()  # fmt: skip
     return section(
         title, Paragraph(unseen_words(found), "warning"),
-        table(say("Errors that are drawn as large as they may be"), heads, rows), *map(Paragraph, planned),
+        table(say("Errors that are drawn as large as they may be"), heads, rows, known), *map(Paragraph, planned),
     )  # fmt: skip
 
 

@@ -26,7 +26,7 @@ from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.origin import NAME
-from cmm_uq.certificate.sections.read_axes import readings_data
+from cmm_uq.certificate.sections.read_axes import readings_data, shrinking, smaller_by
 from cmm_uq.certificate.sections.regions import families_data, priors_data
 from cmm_uq.jobs.part.feature import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
@@ -239,7 +239,8 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
         },
         "unseen": [
             {"characteristic": one.characteristic, "effect": one.effect or None, "line": one.line, "title": _plain(one.title),
-             "share": one.share, "why": _plain(one.why)}
+             "share": one.share, "why": _plain(one.why), "u_smaller_by": smaller_by(one.share),
+             "shown_or_bounded_by": _plain(shrinking(one.effect, found.given.machine.machine)) or None}
             for one in found.unseen
         ],
         "priors": priors_data(found.influence),

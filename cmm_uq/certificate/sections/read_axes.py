@@ -1,4 +1,7 @@
-"""How the axes are read, as it was stated by whom, what is taken of it, and what the recording says to it."""
+"""How the axes are read, as it was stated by whom, what is taken of it, and what the recording says to it.
+
+And what would show, or bound, an error that a calibration did not see.
+"""
 
 from __future__ import annotations
 
@@ -9,24 +12,37 @@ import numpy as np
 
 from cmm_uq.analysis.machine.state import AxisStatement
 from cmm_uq.analysis.machine.statements import readings_of
-from cmm_uq.base.messages import DASH, Text, Verbatim, listed, number, say, semicolons
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, listed, number, say, semicolons
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Column, Table, table
-from cmm_uq.machine.model.field import READ, STATED
+from cmm_uq.machine.model.field import PERIODIC, PLAY, READ, STATED, family_of
 from cmm_uq.machine.model.readings import AxisReading
+from cmm_uq.machine.physics.catalogue import every
 
 
 def readings_table(machine: Machine, statements: Sequence[AxisStatement]) -> Table | None:
     """Of the axes of which it is stated how they are read."""
     readings, said = readings_of(machine), {one.axis: one for one in statements}
-    heads = (say("Axis"), say("Read by"), say("Periodic error, to either side"), Column(say("Play"), unit("µm")),
-             say("Stated by"), say("The recording"))  # fmt: skip
+    heads = (
+        say("Axis"),
+        say("Read by"),
+        say("Periodic error, to either side"),
+        Column(say("Play"), unit("µm")),
+        say("Stated by"),
+        say("The recording"),
+    )
     rows = (
-        (Verbatim(axis.upper()), one.published.name, _periodic(one), DASH if one.play_um is None else number(one.play_um, "g"),
-         Verbatim(one.facts.source), _recording(said.get(axis)))
+        (
+            Verbatim(axis.upper()),
+            one.published.name,
+            _periodic(one),
+            DASH if one.play_um is None else number(one.play_um, "g"),
+            Verbatim(one.facts.source),
+            _recording(said.get(axis)),
+        )
         for axis, one in readings.items()
-    )  # fmt: skip
+    )
     notes: list[Text] = [
         say(
             "Taken for what is known of these errors before the recording; 95 of 100 do not exceed it. A scale on the "
@@ -70,16 +86,23 @@ def readings_warnings(statements: Iterable[AxisStatement], scales: Mapping[str, 
     texts: list[Text] = []
     if denied:
         texts.append(
-            say("The recording denies how these axes are stated to be read, so that nothing of it is used: {axes}.",
-                axes=listed(denied))
-        )  # fmt: skip
+            say(
+                "The recording denies how these axes are stated to be read, so that nothing of it is used: {axes}.",
+                axes=listed(denied),
+            )
+        )
     for name, sizes in scales.items():
         low, middle, high = np.quantile(sizes, [0.025, 0.5, 0.975])
         if name.endswith(STATED) and low > 1:
             texts.append(
-                say("The recording shows more than is stated, and is followed: {errors} {size} ({low} to {high}).",
-                    errors=READ[name], size=number(middle, ".2g"), low=number(low, ".2g"), high=number(high, ".2g"))
-            )  # fmt: skip
+                say(
+                    "The recording shows more than is stated, and is followed: {errors} {size} ({low} to {high}).",
+                    errors=READ[name],
+                    size=number(middle, ".2g"),
+                    low=number(low, ".2g"),
+                    high=number(high, ".2g"),
+                )
+            )
     return texts
 
 
@@ -93,8 +116,38 @@ def readings_data(machine: Machine, statements: Iterable[AxisStatement]) -> list
         period, most = one.interpolation or (None, None)
         taken = {"within": [list(each) for each in one.within], "period_mm": period, "interpolation_um": most}
         ratio = None if own is None or np.isnan(own.ratio) else own.ratio
-        rows.append({
-            "axis": axis, "stated": told, "taken": {**taken, "play_um": one.play_um}, "published": one.source or None,
-            "recording_against": ratio, "used": own is None or not own.denied,
-        })  # fmt: skip
+        rows.append(
+            {
+                "axis": axis,
+                "stated": told,
+                "taken": {**taken, "play_um": one.play_um},
+                "published": one.source or None,
+                "recording_against": ratio,
+                "used": own is None or not own.denied,
+            }
+        )
     return rows
+
+
+_SHRINKS: Mapping[str, Text] = {
+    PERIODIC: say("positions along the axis that lie closer than half of the period"),
+    PLAY: say("faces of a gauge that are met from both sides"),
+}
+_AT_THE_PLACE = say("a calibrated ring, ball or gauge at the place of the part")
+
+
+def shrinking(name: str, machine: Machine) -> Text:
+    """What would make an error of the machine smaller than it may be; nothing of what is none of its families."""
+    effect = every().get(name)
+    family = None if effect is None else family_of(effect)
+    if effect is None or family is None:
+        return NOTHING
+    axis, measured = str(getattr(effect, "axis", "")), _SHRINKS.get(family, _AT_THE_PLACE)
+    if family not in _SHRINKS or axis in machine.read_by:
+        return measured
+    return say("{measured}, or a statement of how {axis} is read", measured=measured, axis=Verbatim(axis.upper()))
+
+
+def smaller_by(share: float) -> float:
+    """Part of u that knowing exactly what makes a share of its square would take off: 1 − √(1 − share)."""
+    return float(1 - np.sqrt(1 - min(max(share, 0.0), 1.0)))
