@@ -48,7 +48,7 @@ def facts(document: Document) -> dict[str, str]:
 
 def test_figures_are_stated_with_expanded_uncertainty_to_two_digits(document: Document) -> None:
     rows = {row[0]: row[1:] for row in table(document, "Figures of performance").rows}
-    for value, U, k, _ in rows.values():
+    for value, U, k, *_ in rows.values():
         assert len(U.replace(".", "").lstrip("0")) == 2
         assert len(value.partition(".")[2]) == len(U.partition(".")[2])
         assert 1.8 < float(k) < 2.6

@@ -127,8 +127,8 @@ def _figures(path: tuple[str, ...], entry: Mapping[str, Any], figures: plain.Dig
             letter = Verbatim(key.partition("_")[0].upper())
             name = say("{letter} of the maximum permissible error A + L/K, at most B", letter=letter)
             yield quantity(f"mpe.{key}", name, plain.decimal(value), "cmm_toleranceLimit", units[key])
-    for key in ("prior", "global_risks"):
-        yield from figures.parts((*path, key), entry[key])
+    for key in ("prior", "global_risks", "largest_um", "largest_without_noise_um"):
+        yield from figures.parts((*path, key), entry.get(key))
 
 
 def evidence(

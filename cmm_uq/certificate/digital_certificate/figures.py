@@ -23,7 +23,6 @@ from cmm_uq.certificate.digital_certificate.administration import P_STANDARD, La
 from cmm_uq.certificate.wording import effect_of, effect_title, parameter_title
 from cmm_uq.jobs.dcc import certificate as dcc
 from cmm_uq.jobs.dcc.certificate import Element
-from cmm_uq.maths.uncertainty.quantity import uneven
 
 ONE = UNITS["1"]
 _ENDINGS: Mapping[str, Unit] = MappingProxyType({**PRINTED, "deg": UNITS["°"], "mm2": UNITS["mm²"]})
@@ -261,7 +260,7 @@ class DigitalFigures:
             yield self._quantity(path, self.texts.rich(NOT_DETERMINED))
             return
         value, interval = decimal(data["value"]), interval_of(data) if data["u"] else None
-        stated = interval if interval and uneven(data["value"], *data["interval95"]) else expanded_of(data) or interval
+        stated = expanded_of(data) or interval
         yield self._quantity(path, dcc.Real(value=value, unit=unit.dsi, uncertainty=stated))
         if interval is not None and interval is not stated and not symmetric(data):
             yield self._interval(path, dcc.Real(value=value, unit=unit.dsi, uncertainty=interval))

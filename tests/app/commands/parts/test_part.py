@@ -196,7 +196,7 @@ def test_results_say_what_was_found_with_hashes_of_all_inputs() -> None:
 
 def test_every_key_of_results_is_told_in_the_reference_and_no_other() -> None:
     told, there = set(PART_RESULTS), set(results_keys(json.loads(as_json(part_results(shifted())))))
-    empty = {"further", "simulation.not_drawn", "machine.changes", "machine.families", "machine.bounds"}  # here
+    empty = {"further", "simulation.not_drawn", "machine.changes", "machine.families", "machine.bounds", "machine.axes"}
     assert there - told - empty == set()
     sometimes = (
         "job.number",
@@ -206,6 +206,7 @@ def test_every_key_of_results_is_told_in_the_reference_and_no_other() -> None:
         "machine.changes[]",
         "machine.families[]",
         "machine.bounds[]",
+        "machine.axes[]",
         "other_methods.",
     )
     assert {key for key in told - there if not key.startswith(sometimes)} == set()
