@@ -274,6 +274,7 @@ def two_uncertainties(document: Document) -> list[str]:
     return [name for name, found in seen.items() if len({U for U, _ in found}) > 1 and not any(r for _, r in found)]
 
 
+@pytest.mark.long(but="step-gauge")
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_no_quantity_has_two_uncertainties_without_a_reason(example: str) -> None:
     results = {"conditional": {}, **read_back(example)}

@@ -241,6 +241,7 @@ def test_the_annex_is_marked_as_such_and_comes_after_the_statements(document: Do
     assert places == sorted(places)
 
 
+@pytest.mark.long(but="a")
 @pytest.mark.parametrize(
     "kind", ["sphere-simulated", "digitizer-simulated", "gauge-blocks-simulated", "shift-simulated"]
 )

@@ -164,6 +164,7 @@ def test_on_a_wide_screen_nothing_is_cut_and_axe_finds_nothing(
     assert min(page.evaluate(CONTRASTS)) >= 4.5
 
 
+@pytest.mark.long(but="triangle")
 @pytest.mark.parametrize("name", NAMES)
 def test_every_picture_has_words_in_its_place(name: str, folder: str) -> None:
     plots = [block for block in blocks(made(name, folder).sections) if isinstance(block, Plot)]

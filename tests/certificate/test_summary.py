@@ -153,6 +153,7 @@ def test_without_a_capability_nothing_changes(result: Result) -> None:
     assert plain.document == empty.document
 
 
+@pytest.mark.long(but="shift-simulated")
 @pytest.mark.parametrize(("job", "caption", "quantity"), [
     ("shift-simulated", "Axis figures", "Mean sensitivity error of axis x"),
     ("shift-plate-simulated", "Plane figures", "Scale of X"),

@@ -84,6 +84,7 @@ def test_every_text_of_every_document_is_a_message_or_the_user_s(name: str) -> N
     assert all(sum(isinstance(text, Message) for text in leaves(document)) > 5 for document in made)
 
 
+@pytest.mark.long(but="triangle")
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_every_document_is_translated_whole_with_the_same_figures(name: str) -> None:
     """Where English counts in words, Japanese may write a digit, and no language leaves a figure out."""

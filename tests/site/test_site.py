@@ -12,6 +12,8 @@ from urllib.parse import unquote, urlsplit
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
+pytestmark = pytest.mark.long  # all need what takes long to make
+
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
@@ -123,7 +125,6 @@ def looks(read: dict[Path, Read], browser: Browser) -> dict[str, Look]:
     return found
 
 
-@pytest.mark.long
 def test_every_link_leads_to_a_page_and_a_place_in_it(read: dict[Path, Read]) -> None:
     broken = []
     for path, page in read.items():
@@ -156,7 +157,6 @@ def tab(browser: Browser) -> Iterator[Page]:
     context.close()
 
 
-@pytest.mark.long
 def test_axe_finds_nothing_on_any_page(looks: dict[str, Look]) -> None:
     """By WCAG 2.2 A and AA; what stands around the text and the theme's colours are alike, and are read on some pages."""
     assert {page: look.wrong for page, look in looks.items() if look.wrong} == {}
@@ -178,7 +178,6 @@ def test_the_search_works_without_a_network(site: Path, tab: Page) -> None:
     assert "effects.html" in " ".join(tab.eval_on_selector_all("#search-results li a", "all => all.map(a => a.href)"))
 
 
-@pytest.mark.long
 def test_the_first_address_leads_to_the_documentation(site: Path, tab: Page) -> None:
     tab.goto((site / "index.html").as_uri())
     tab.wait_for_url("**/docs/index.html*")

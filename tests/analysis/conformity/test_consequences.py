@@ -59,6 +59,7 @@ def test_corrected_figures_are_those_of_the_recording_before_the_squareness_was_
             assert as_recorded.value > corrected.value + 2 * corrected.u
 
 
+@pytest.mark.long
 def test_a_decision_that_the_squareness_spoilt_is_mended_by_its_correction(found: JobDiagnosis) -> None:
     """As far as measured: position 18 is a copy of 14 and stays one."""
     assert found.consequences is not None

@@ -65,6 +65,7 @@ def test_every_characteristic_of_every_standard_is_in_the_grid() -> None:
     assert set(TESTS) == {(name, one.name) for name, standard in BUILT_IN.items() for one in standard.characteristics}
 
 
+@pytest.mark.long(but="ISO 14253-1")
 @pytest.mark.parametrize(("standard", "characteristic", "rule"), CASES)
 def test_a_complete_test_turns_where_its_rule_does(standard: str, characteristic: str, rule: str) -> None:
     hand = by_hand(standard, characteristic, "complete")
@@ -75,6 +76,7 @@ def test_a_complete_test_turns_where_its_rule_does(standard: str, characteristic
         assert (found.value_um, found.u_um) == (pytest.approx(abs(hand.value), abs=2e-5), pytest.approx(hand.u))
 
 
+@pytest.mark.long(but="ISO 14253-1")
 @pytest.mark.parametrize("how", ["incomplete", "copied"])
 @pytest.mark.parametrize(("standard", "characteristic", "rule"), CASES)
 def test_what_is_missing_or_copied_makes_no_pass(standard: str, characteristic: str, rule: str, how: str) -> None:
@@ -103,6 +105,7 @@ def test_without_an_uncertainty_only_simple_acceptance_decides(standard: str, ch
         assert (found.decision.probability_conforming, found.joint) == (None, None)
 
 
+@pytest.mark.long(but="ISO 14253-1")
 @pytest.mark.parametrize(("standard", "characteristic", "rule"), [
     case for case in CASES if case[1] in {*AGAIN, "U1", "U2", "U3", "linear displacement accuracy", "bidirectional length"}
 ])  # fmt: skip

@@ -138,6 +138,7 @@ def test_what_lies_just_beyond_the_limit_is_measured_again_where_it_is_outside(
     assert graded(OVER, OVER, 0, rule) == both_over
 
 
+@pytest.mark.long(but="ISO 14253-1")
 @pytest.mark.parametrize("rule", ["ISO 14253-1", "ILAC-G8 non-binary", "ILAC-G8 binary", "simple"])
 @pytest.mark.parametrize("further", [0, 9, 10])
 def test_a_larger_error_never_improves_the_finding(rule: str, further: int) -> None:

@@ -102,6 +102,7 @@ def test_several_explanations_remain_and_the_true_one_is_among_them(found: JobDi
     assert remaining.weights[0] < SETTLED
 
 
+@pytest.mark.long
 def test_under_the_explanation_that_is_asserted_it_is_the_joint_posterior(found: JobDiagnosis) -> None:
     """Sampled by emcee under the same noise: means within a third of u, u within a third."""
     asserted = {item.effect: item for item in found.diagnosis.effects}

@@ -46,6 +46,7 @@ def test_power_grows_with_the_effect_and_naming_needs_more_than_detection() -> N
     assert np.all(power.named_at >= power.detected_at)
 
 
+@pytest.mark.long
 def test_an_effect_that_moves_no_face_is_never_found() -> None:
     """The ram turning about its own axis leaves the tip at its end where it is."""
     power = predicted()["rotation_z_z"]

@@ -158,6 +158,7 @@ def test_of_a_machine_with_further_axes_nothing_is_told_yet() -> None:
         factor_regions(replace(found.model, artefact=artefact), found.posterior, Doubt(()), partial(observe, found), 0)
 
 
+@pytest.mark.long
 def test_priors_that_a_recording_outweighs_change_little() -> None:
     """A step gauge on seven lines, some hundred readings, against twenty bars."""
 

@@ -112,6 +112,7 @@ def accepted(mean: float, x: Floats, coverage: float) -> Floats:
     return np.asarray(x[order[inside]])
 
 
+@pytest.mark.long(but="0.95")
 @pytest.mark.parametrize("coverage", [0.9, 0.95, 0.99])
 @pytest.mark.parametrize("at", [0.3, 1.2, 1.9, 2.4, 3.1, 4.0, 6.0])
 def test_limits_are_those_of_the_belt(at: float, coverage: float) -> None:

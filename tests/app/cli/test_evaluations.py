@@ -234,6 +234,7 @@ def test_the_documents_are_in_the_language(german: Path) -> None:
     assert "404.2051" not in page
 
 
+@pytest.mark.long
 def test_the_results_are_the_english_ones_but_for_the_name_of_the_language(german: Path) -> None:
     data, english = (json.loads((folder / "results.json").read_bytes()) for folder in (german, german.parent / "en"))
     assert data["job"].pop("language") == "de"

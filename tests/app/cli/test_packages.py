@@ -175,6 +175,7 @@ def test_a_plan_determines_it(work: Path) -> None:
     assert "Twist of the beam" in (work / "plan" / "plan.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_the_simulated_recording_says_whose_effect_acted(work: Path) -> None:
     first, *_ = (work / "simulated" / "recording.csv").read_text(encoding="utf-8").splitlines()
     assert "with outside-effects 0.1.0, seed 5" in first

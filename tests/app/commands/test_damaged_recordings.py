@@ -275,6 +275,7 @@ def test_it_is_not_given_on_any_page_nor_to_programs_while_that_of_z_is(result: 
     assert "±" in figures["Scale error of Z"]
 
 
+@pytest.mark.long
 def test_a_tolerance_of_it_is_not_decided(result: Result) -> None:
     outcomes = {verdict.name: verdict.outcome for verdict in result.verdicts}
     assert outcomes["scale_x.ppm"] == "undecided"

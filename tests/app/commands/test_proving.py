@@ -98,6 +98,7 @@ def test_the_command_goes_on_with_what_was_kept_and_writes_one_set(ran: Ran, tmp
     assert json.loads((tmp_path / "results.json").read_bytes())["truth_sha256"] == ran.proof.sha256
 
 
+@pytest.mark.long
 def test_another_seed_is_refused_where_a_run_is_unfinished(ran: Ran, tmp_path: Path) -> None:
     shutil.copytree(ran.kept, tmp_path / UNFINISHED)
     done = run("prove", JOB, "--cases", CASES, "--seed", 1, "--out", tmp_path)

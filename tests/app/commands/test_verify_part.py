@@ -27,6 +27,8 @@ from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_results, plate_files, plate_of
 from tests.part_reports import TRIALS, found_again_once, plate_found, plate_report, put, unchanged, with_inputs
 
+pytestmark = pytest.mark.long  # all need what takes long to make
+
 PDF, PAGE = "part-simulated.pdf", "part-simulated.html"
 OTHER = ROOT / "examples" / "part-plate-simulated" / "machine" / "certificate-simulated.pdf"
 
@@ -50,7 +52,6 @@ def told(found: Verification) -> str:
     return "\n".join(map(str, (*found.inquiry.findings, *found.inquiry.unchecked)))
 
 
-@pytest.mark.long
 @pytest.mark.usefixtures("once")
 def test_a_report_is_verified_from_its_pdf_alone_and_computed_again_to_the_byte(tmp_path: Path) -> None:
     found = found_in(tmp_path, plate_report(), PDF, rerun=True)
@@ -59,7 +60,6 @@ def test_a_report_is_verified_from_its_pdf_alone_and_computed_again_to_the_byte(
     assert {name for name, count in found.inquiry.done.items() if count} >= {"figures", "decisions", "inputs", "dates"}
 
 
-@pytest.mark.long
 def test_its_folder_is_held_to_its_manifest_with_the_folders_inside(tmp_path: Path) -> None:
     out = tmp_path / "out"
     written(plate_found().job, plate_found, out)
@@ -77,7 +77,6 @@ def test_its_folder_is_held_to_its_manifest_with_the_folders_inside(tmp_path: Pa
     assert "is not the file whose hash manifest.json has" in told(verify([out], rerun=False))
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("name", "old", "new"), [
     ("points.csv", b"bore,1,", b"bore,01,"), ("results.json", b'"U": 0', b'"U": 1'), ("job.toml", b"[part]", b"[part]\n"),
 ])  # fmt: skip
@@ -94,7 +93,6 @@ def test_a_file_inside_that_was_exchanged_is_named(tmp_path: Path, name: str, ol
     assert any(name in one.file + one.place + one.problem for one in found.inquiry.findings), told(found)
 
 
-@pytest.mark.long
 @pytest.mark.usefixtures("once")
 def test_another_expanded_uncertainty_in_all_documents_is_found_by_computing_again(tmp_path: Path) -> None:
     """Value, u, interval, U, k, page and PDF agree: nothing but the draws tells."""
@@ -108,7 +106,6 @@ def test_another_expanded_uncertainty_in_all_documents_is_found_by_computing_aga
     assert "characteristics[0].U" in places(again), told(again)
 
 
-@pytest.mark.long
 @pytest.mark.usefixtures("once")
 @pytest.mark.parametrize(("name", "old", "new", "place"), [
     (PAGE, b"</td>", b"1</td>", "line "), (PAGE, b"</h1>", b" pass</h1>", "line "), (PDF, b"", b"", "page 1: /Contents"),
@@ -149,14 +146,12 @@ def moved(found: PartMeasurement) -> bytes:
     return "\n".join([*rest, ",".join([*cells[:2], f"{x:.6f}", cells[3], z])]).encode() + b"\n"
 
 
-@pytest.mark.long
 def test_another_point_under_its_own_hash_is_found_by_the_values(tmp_path: Path) -> None:
     found = found_in(tmp_path, with_inputs(points=moved(plate_found())))
     assert "characteristics[0].measured" in places(found), told(found)
     assert all(one.problem == "is not the value of the measured points" for one in found.inquiry.findings)
 
 
-@pytest.mark.long
 def test_another_limit_under_its_own_hash_is_found_by_the_job(tmp_path: Path) -> None:
     job = plate_found().job.inputs["job.toml"]
     limit = plate_found().characteristics[0].upper_mm
@@ -167,13 +162,11 @@ def test_another_limit_under_its_own_hash_is_found_by_the_job(tmp_path: Path) ->
     assert places(found) == ["characteristics[0].limits.upper"], told(found)
 
 
-@pytest.mark.long
 def test_another_certificate_of_the_machine_under_its_own_hash_is_found_by_what_it_states(tmp_path: Path) -> None:
     found = found_in(tmp_path, with_inputs(certificate=OTHER.read_bytes()))
     assert {"machine.number", "machine.inputs_sha256"} <= set(places(found)), told(found)
 
 
-@pytest.mark.long
 def test_the_certificate_inside_is_verified_as_by_itself(tmp_path: Path) -> None:
     name = next(name for name in plate_found().job.inputs if name.endswith(".pdf"))
     certificate = plate_found().job.inputs[name]
@@ -187,7 +180,6 @@ def test_the_certificate_inside_is_verified_as_by_itself(tmp_path: Path) -> None
     assert any(one.file.startswith(name) for one in found.inquiry.findings), told(found)
 
 
-@pytest.mark.long
 def test_the_machines_own_job_goes_with_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where no certificate states the machine, its job is inside, and all is computed again from the file."""
     monkeypatch.setattr("cmm_uq.app.commands.parts.part.ways", unchanged)
@@ -200,14 +192,12 @@ def test_the_machines_own_job_goes_with_the_report(tmp_path: Path, monkeypatch: 
     assert any("was analysed, and is inside" in note for note in found.inquiry.notes)
 
 
-@pytest.mark.long
 def test_nothing_measured_is_verified_too(tmp_path: Path) -> None:
     files = contents_of(evaluate_part(plate_of(by_results(), **THERE), PartOptions(trials=1000)))
     found = found_in(tmp_path, files)
     assert not found.inquiry.findings, told(found)
 
 
-@pytest.mark.long
 def test_exit_codes_are_those_of_a_machines_certificate(tmp_path: Path) -> None:
     from cmm_uq.app.cli.commands import app
 

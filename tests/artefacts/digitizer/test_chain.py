@@ -189,6 +189,7 @@ def test_a_simulated_calibration_serves_no_measured_cloud(tmp_path: Path) -> Non
         write_compensated_cloud(use(tmp_path, content), cloud(tmp_path)[0], tmp_path / "out")
 
 
+@pytest.mark.long
 def test_poses_beside_a_calibration_replace_its_own(tmp_path: Path, calibrated: Path) -> None:
     content = (calibrated / "results.json").read_text(encoding="utf-8")
     poses = ", poses = [ { pose = 7, alpha_deg = 90.0, beta_deg = 90.0, gamma_deg = 15.0 } ]"

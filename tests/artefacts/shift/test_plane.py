@@ -47,6 +47,7 @@ def test_the_chains_converge(estimate: PlaneEstimate) -> None:
     assert estimate.chains.converged
 
 
+@pytest.mark.long
 def test_linearity_with_its_scale_is_the_machines_error_along_the_middle(estimate: PlaneEstimate) -> None:
     for which, curve in enumerate(estimate.linearity):
         true = true_along(estimate, which)[:, which]

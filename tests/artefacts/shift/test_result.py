@@ -42,6 +42,7 @@ def test_the_covariance_has_the_variances_of_all_estimates_first(found: Any) -> 
     assert u == pytest.approx(found.estimates["u"].to_numpy(), rel=1e-9)
 
 
+@pytest.mark.long(but="shift-simulated")
 def test_it_agrees_with_the_covariance_of_results_json(found: Any) -> None:
     said = found.results["covariance"]
     ours = found.covariance.loc[said["parameters"], said["parameters"]].to_numpy()

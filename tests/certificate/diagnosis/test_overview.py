@@ -100,6 +100,7 @@ def test_a_consistent_one_that_could_not_have_shown_much_says_so_and_what_to_mea
     assert titles.index("What to measure next") < titles.index("What would not have been seen")
 
 
+@pytest.mark.long
 def test_an_explained_one_has_the_field_the_profile_and_each_observation(explained: JobDiagnosis) -> None:
     document = diagnosis_document(replace(explained, next_plan=None))
     assert len(plots(document)) == 3

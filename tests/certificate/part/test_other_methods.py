@@ -27,6 +27,8 @@ from tests.certificate.parts_found import found_of, measured_points
 from tests.certificate.saying import leaves, said
 from tests.jobs.part.other_methods import SIZE, with_methods
 
+pytestmark = pytest.mark.long  # all need what takes long to make
+
 
 @pytest.fixture(scope="module")
 def comparison() -> MethodComparison:
@@ -51,7 +53,6 @@ def test_a_job_without_other_methods_has_no_such_section() -> None:
     assert methods_data(None) is None
 
 
-@pytest.mark.long
 def test_each_method_has_a_row_with_value_u_and_U(comparison: MethodComparison, section: Section) -> None:  # noqa: N802
     rows = [row for row in table(section, "Lengths by each method").rows if row[0] == SIZE]
     assert [row[1] for row in rows] == ["The virtual measurements", "The calibrated part", "Several orientations"]
@@ -93,7 +94,6 @@ def test_it_says_which_descriptions_it_follows(section: Section) -> None:
     assert "public summary of ISO/DTS 15530-2" in told
 
 
-@pytest.mark.long
 def test_it_stands_on_the_part_s_page(comparison: MethodComparison) -> None:
     job = with_methods()
     found = replace(found_of(job, points=measured_points(job), draws=500), methods=comparison)

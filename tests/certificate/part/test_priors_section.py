@@ -17,6 +17,8 @@ from cmm_uq.jobs.part.tables import BoundFacts
 from tests.certificate.parts_found import found_of, machine, measured_points
 from tests.jobs.part.parts import plate
 
+pytestmark = pytest.mark.long  # all need what takes long to make
+
 DATASHEET = BoundFacts(errors=["periodic_scale_x", "hysteresis_y"], largest_um=0.5, source="Datasheet S-1, 2024")
 
 
@@ -54,7 +56,6 @@ def with_sizes(found: PartMeasurement) -> PartMeasurement:
     return replace(found, given=replace(found.given, machine=replace(machine(), scales=scales)))
 
 
-@pytest.mark.long
 def test_sizes_are_those_of_the_draws_times_what_physics_allows(found: PartMeasurement) -> None:
     """30 µm of play; of eight waves of 30″ with weights 1/k the first two have 30″·√((1 + 1/4)/Σ 1/k²) = 27.14″."""
     sized = with_sizes(found)

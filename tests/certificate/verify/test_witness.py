@@ -27,6 +27,8 @@ from cmm_uq.laboratory.records.facts import BEGINNING, ChainHead, Entry
 from tests.app.cli.laboratory import PLACE, reported
 from tests.app.cli.process import run
 
+pytestmark = pytest.mark.long  # all need what takes long to make
+
 NEW = Callable[[Entry], dict[str, Any] | None]
 """What an entry is to say when the records are written anew; ``None`` for nothing: it is left out."""
 
@@ -95,7 +97,6 @@ def told(inquiry: Inquiry, check: str = "records") -> list[str]:
     return [one.problem for one in inquiry.findings if one.check == check]
 
 
-@pytest.mark.long
 def test_every_form_states_the_newest_entry_before_its_own(made: Path) -> None:
     folder, (_, released, own) = made / "reports" / "second", entries(made / PLACE)
     assert results(folder)["records"] == {"entries": 2, "head": released.hash, "at": released.at}
@@ -110,7 +111,6 @@ def test_every_form_states_the_newest_entry_before_its_own(made: Path) -> None:
     assert line in str(stated.declaration)
 
 
-@pytest.mark.long
 def test_empty_records_and_none_are_said_in_words(made: Path, tmp_path: Path) -> None:
     first = made / "reports" / "mount"
     assert results(first)["records"] == {"entries": 0, "head": BEGINNING, "at": None}
@@ -129,7 +129,6 @@ def bytes_of(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.mark.long
 def test_the_same_inputs_at_the_same_head_give_the_same_bytes_and_at_another_one_line_more(
     laboratory: Path, tmp_path: Path
 ) -> None:
@@ -144,7 +143,6 @@ def test_the_same_inputs_at_the_same_head_give_the_same_bytes_and_at_another_one
     assert lines[0] == lines[1]
 
 
-@pytest.mark.long
 def test_a_report_that_is_made_again_keeps_its_head_and_is_recorded_once(laboratory: Path) -> None:
     folder, before = laboratory / "reports" / "mount", entries(laboratory / PLACE)
     there = bytes_of(folder)
@@ -153,7 +151,6 @@ def test_a_report_that_is_made_again_keeps_its_head_and_is_recorded_once(laborat
     assert entries(laboratory / PLACE) == before
 
 
-@pytest.mark.long
 def test_computed_again_from_the_head_that_it_states_it_is_the_same_to_the_byte(made: Path) -> None:
     found = verify([made / "reports" / "second"], records=made / PLACE).inquiry
     assert (found.word, found.findings) == ("VERIFIED", [])
@@ -162,7 +159,6 @@ def test_computed_again_from_the_head_that_it_states_it_is_the_same_to_the_byte(
     assert any(note.startswith(stated) for note in found.notes)
 
 
-@pytest.mark.long
 def test_records_that_were_rewritten_are_found_by_number_and_both_hashes(laboratory: Path) -> None:
     before = entries(laboratory / PLACE)[1]
     rewritten(laboratory / PLACE, by_another)
@@ -174,7 +170,6 @@ def test_records_that_were_rewritten_are_found_by_number_and_both_hashes(laborat
         assert f"that entry has the hash {now.hash}: they were rewritten, though they have the certificate" in problem
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("witness", ["certificate.pdf", "certificate.xml", "results.json", "."])
 def test_every_certificate_in_other_hands_is_a_witness(witness: str, laboratory: Path, tmp_path: Path) -> None:
     customer = shutil.copytree(laboratory / "reports" / "second", tmp_path / "customer") / witness
@@ -190,7 +185,6 @@ def test_every_certificate_in_other_hands_is_a_witness(witness: str, laboratory:
     assert data["witnesses"] == {"certificates": 1, "entries": 2, "passed_over": []}
 
 
-@pytest.mark.long
 def test_records_that_are_shorter_or_others_are_told_apart(laboratory: Path, tmp_path: Path) -> None:
     rewritten(laboratory / PLACE, lambda entry: entry.data if entry.number == 1 else None)
     end = entries(laboratory / PLACE)[-1].hash
@@ -253,7 +247,6 @@ def spoilt_digital(folder: Path) -> None:
     )
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("spoil", "check"), [(spoilt_page, "again"), (spoilt_results, "again"), (spoilt_digital, "forms")]
 )
@@ -269,7 +262,6 @@ def test_a_head_that_was_altered_in_one_form_is_found_without_the_records(
     assert told(found, check)
 
 
-@pytest.mark.long
 def test_a_certificate_from_which_its_head_was_taken_is_found(laboratory: Path) -> None:
     folder = laboratory / "reports" / "second"
     data = {key: value for key, value in results(folder).items() if key != "records"}
@@ -296,7 +288,6 @@ def test_a_folder_in_which_nothing_states_a_head_is_no_witness(tmp_path: Path, m
     assert "no certificate states a head of records" in done.stderr
 
 
-@pytest.mark.long
 def test_reports_of_a_batch_state_heads_of_one_chain_though_others_write_between(laboratory: Path) -> None:
     jobs = [f"b{number}" for number in range(3)]
     for job in jobs:
@@ -337,7 +328,6 @@ def now() -> dt.datetime:
     return dt.datetime.now(dt.UTC).replace(microsecond=0)
 
 
-@pytest.mark.long
 def test_a_signature_lies_between_the_entry_that_it_names_and_the_one_that_has_it(laboratory: Path) -> None:
     with open_records(laboratory / PLACE) as records:
         records.append("sent", {"key": "another's"})
@@ -355,7 +345,6 @@ def test_a_signature_lies_between_the_entry_that_it_names_and_the_one_that_has_i
     assert run("records", "verify", "--records", laboratory / PLACE).returncode == 0
 
 
-@pytest.mark.long
 def test_a_signature_that_names_an_entry_of_other_records_is_found(laboratory: Path) -> None:
     assert signed(laboratory, now()).findings == []
     old = entries(laboratory / PLACE)
@@ -370,7 +359,6 @@ def test_a_signature_that_names_an_entry_of_other_records_is_found(laboratory: P
     assert problem.endswith(f"and certificate.pdf was signed after it with the hash {old[2].hash}")
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("at", "why"), [
     (dt.datetime(2025, 12, 31, tzinfo=dt.UTC), "the certificate is of 2026-01-02"),
     (dt.datetime(2026, 1, 5, tzinfo=dt.UTC), "it states entry 2 of the records, of "),
@@ -390,7 +378,6 @@ def test_a_signature_that_says_a_time_after_it_was_recorded_is_found(laboratory:
     assert "not between these entries" in "\n".join(told(signed(laboratory, late), "signatures"))
 
 
-@pytest.mark.long
 def test_a_report_that_is_signed_as_it_is_made_lies_between_its_head_and_its_own_entry(laboratory: Path) -> None:
     second(laboratory, "third", "K-3")
     out, at = laboratory / "reports" / "third", now()

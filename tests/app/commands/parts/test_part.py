@@ -80,6 +80,7 @@ def test_figures_and_draws_alone_are_taken_too_and_said_to_be_less() -> None:
     assert {one.effect.name for one in shifted().given.machine.unmodelled} >= {"rotation_x_x", "hysteresis_x"}
 
 
+@pytest.mark.long
 def test_chain_travel_and_place_are_the_certificates_where_the_job_leaves_them_out() -> None:
     machine = plain().given.machine.machine
     np.testing.assert_array_equal(machine.travel_mm, [[0, 900], [0, 1200], [-600, 0]])
@@ -108,6 +109,7 @@ def test_a_machines_job_states_the_same_as_its_certificate(tmp_path: Path, monke
     np.testing.assert_allclose(state.noise.usual_mm, stated.noise.usual_mm, rtol=0.05)
 
 
+@pytest.mark.long
 def test_a_value_is_what_was_measured_less_the_mean_error_and_of_a_zone_zero_at_least() -> None:
     found = shifted()
     assert found.measured is not None
