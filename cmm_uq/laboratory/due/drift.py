@@ -198,6 +198,9 @@ WITHOUT_LIMIT = 8.0
 """Standard uncertainties that stand for the limit where none is stated: test uncertainty ratios are from 4 to 10 or so."""
 
 NODES = 128
+FAST, _FASTER = np.geomspace(0.5, 50.0, 12), 0.01
+"""Rates of one machine in a hundred, beyond what is usual, in limits a year: a steady line, however steep, is a drift."""
+
 FEW = 16  # draws of a fleet's posterior that components are summed over at, :data:`POINTS` of them at each size of walk
 POINTS = 4
 _WALK_NODES, _WALK_WEIGHTS = np.polynomial.hermite_e.hermegauss(3)
@@ -246,11 +249,12 @@ def limit_for(limit: float | None, u: Floats) -> float:
 
 def default_prior(unit: float, nodes: int = NODES, *, plain: bool = False) -> DriftPrior:
     """Of a machine without a fleet, in units of the limit; ``plain``: without wear that speeds up, settling and season."""
-    number = normal_lattice(nodes, len(NAMES) - 3 + len(ALONE))
+    number = normal_lattice(nodes + len(FAST), len(NAMES) - 3 + len(ALONE))
     values = _in_unit(NAMES[3:], np.log(MEDIANS[3:]) + SPREADS[3:] * number[:, len(ALONE) :], unit)
     values |= _alone(ALONE, number, unit, plain=plain)
-    weight, group = np.full(nodes, 1.0 / nodes), np.zeros(nodes, dtype=np.int64)
-    return DriftPrior(rate=np.zeros(nodes), **values, weight=weight, group=group)
+    values["rate_sd"][nodes:] = FAST * unit
+    weight = np.repeat([(1 - _FASTER) / nodes, _FASTER / len(FAST)], [nodes, len(FAST)])
+    return DriftPrior(rate=np.zeros(len(weight)), **values, weight=weight, group=np.zeros(len(weight), dtype=np.int64))
 
 
 def normal_lattice(count: int, d: int) -> Floats:

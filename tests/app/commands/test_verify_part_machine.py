@@ -32,11 +32,11 @@ def once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def records(folder: Path) -> Path:
-    """Scale of x by one ppm a year more, up to the day of the calibration; later ones say nothing of it."""
+    """Scale of x by four ppm a year more, seen in all seasons up to the day of the calibration."""
     from tests.laboratory.records.histories import certificate
 
-    days = [dt.date(2021 + i, 1, 1) for i in range(6)]
-    return recorded(folder, *(certificate("", day, scale(float(i)), machine=BRIDGE) for i, day in enumerate(days)))
+    days = [dt.date(2026, 1, 1) - dt.timedelta(430 * (5 - i)) for i in range(6)]
+    return recorded(folder, *(certificate("", day, scale(5.0 * i), machine=BRIDGE) for i, day in enumerate(days)))
 
 
 @cache

@@ -143,6 +143,18 @@ def test_a_rate_that_certificates_show_is_carried_on() -> None:
     assert found == pytest.approx(1.0, rel=0.01)
 
 
+@pytest.mark.parametrize("limit", [None, 8.0])
+@pytest.mark.parametrize("rate", [0.5, 2.0, 8.0, 20.0, 60.0, -20.0])
+def test_a_steady_line_is_carried_on_however_steep_it_is(rate: float, limit: float | None) -> None:
+    """Six certificates in all seasons, each known to 0.4; in a year it moves by the rate, and is known to what is usual."""
+    years = [1.18 * i for i in range(6)]
+    usual = change_since(machine(years, [0.0] * 6, 0.4), YEAR, limit=limit)
+    found = change_since(machine(years, [rate * year for year in years], 0.4), YEAR, limit=limit)
+    assert usual is not None
+    assert found is not None
+    assert 0.8 * abs(rate) < found < 1.2 * np.hypot(rate, usual)
+
+
 def test_what_nobody_can_know() -> None:
     two = machine([0, 1], [0.2, 0.3])
     assert change_since(machine([0], [0.2]), 100.0) is None
