@@ -35,10 +35,9 @@ STEPS = """
     last certificate only is one that no second one confirms; one across an adjustment is not seen.
 """
 FLEET = """
-    The first {of_fleet} machines of all five kinds, as one fleet, each with what all others taught as prior. 87–93 % is not
-    reached for most: days are foreseen too early. The likely reason, not tested: rates, walk and steps of a fleet are learnt
-    without settling, season and wear ([a fleet](fleet.md)), so that in a fleet that has them they go into these, and a
-    machine that is at rest is expected to move as much. Without a fleet its own certificates tell.
+    The first {of_fleet} machines of all five kinds, as one fleet, each with what all others taught as prior, and no settling,
+    season or wear ([a fleet](fleet.md)). Machines at rest after they settled or stepped are foreseen to move too early: what
+    the fleet's machines do has gone into its walk, steps and rates. Without a fleet a machine's own certificates tell.
 """
 WHY = """
     A machine that is of one kind is not one drawn from the prior. 90 % is what a right prior gives over machines of all

@@ -201,8 +201,6 @@ NODES = 128
 FAST, _FASTER = np.geomspace(0.5, 50.0, 12), 0.01
 """Rates of one machine in a hundred, beyond what is usual, in limits a year: a steady line, however steep, is a drift."""
 
-FEW = 16  # draws of a fleet's posterior that components are summed over at, :data:`POINTS` of them at each size of walk
-POINTS = 4
 _WALK_NODES, _WALK_WEIGHTS = np.polynomial.hermite_e.hermegauss(3)
 
 WRONG, WRONG_TIMES = 0.01, 5.0
@@ -266,18 +264,18 @@ def normal_lattice(count: int, d: int) -> Floats:
     return np.asarray(special.ndtri(points), dtype=np.float64)
 
 
-def learnt_prior(theta: Floats, rate: Floats, rate_sd: Floats, unit: float, *, plain: bool = False) -> DriftPrior:
+def learnt_prior(theta: Floats, rate: Floats, rate_sd: Floats, unit: float) -> DriftPrior:
     """Of a machine of a fleet: at (g, 8) draws of its posterior of logarithms, in units of ``unit``, and rates (g,).
 
-    What a machine does besides is not learnt from a fleet: at each draw it is summed over as without one, or ``plain``.
+    Without components: a fleet's walk, steps and rates were learnt without them, and have taken in what they do.
     """
-    g, w, c = len(theta), len(_WALK_NODES), 1 if plain else POINTS
-    values = _in_unit(NAMES[3:], np.repeat(theta[:, 3:], w * c, axis=0), unit)
-    values["walk"] *= np.tile(np.repeat(np.exp(WALKS_DIFFER * _WALK_NODES), c), g)
-    values |= _alone(ALONE[1:], normal_lattice(g * w * c, len(ALONE) - 1), unit, plain=plain)
-    rates = {"rate": np.repeat(rate, w * c), "rate_sd": np.repeat(rate_sd, w * c)}
-    weight = np.tile(np.repeat(_WALK_WEIGHTS / _WALK_WEIGHTS.sum() / c, c), g) / g
-    return DriftPrior(**rates, **values, weight=weight, group=np.repeat(np.arange(g), w * c))
+    g, w = len(theta), len(_WALK_NODES)
+    values = _in_unit(NAMES[3:], np.repeat(theta[:, 3:], w, axis=0), unit)
+    values["walk"] *= np.tile(np.exp(WALKS_DIFFER * _WALK_NODES), g)
+    values |= _alone(ALONE[1:], np.zeros((g * w, len(ALONE) - 1)), unit, plain=True)
+    rates = {"rate": np.repeat(rate, w), "rate_sd": np.repeat(rate_sd, w)}
+    weight = np.tile(_WALK_WEIGHTS / _WALK_WEIGHTS.sum(), g) / g
+    return DriftPrior(**rates, **values, weight=weight, group=np.repeat(np.arange(g), w))
 
 
 def _alone(names: Sequence[str], number: Floats, unit: float, *, plain: bool) -> dict[str, Floats]:

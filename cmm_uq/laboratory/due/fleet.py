@@ -110,7 +110,7 @@ def fit_fleet(members: Sequence[FleetMember], seed: int = 1, progress: Progress 
     shared = fleet_model.shared_by(machines, [each.model for each in members], [each.place for each in members])
     chains, count = _sampled(machines, shared, unit, seed, progress)
     count_of_draws = int(np.clip(MANY // len(members), LEAST_DRAWS, DRAWS))
-    theta = chains.draws[fleet_model.spread_draws(len(chains.draws), count_of_draws)]
+    theta = chains.draws[np.linspace(0, len(chains.draws) - 1, count_of_draws).astype(np.intp)]
     said = fleet_model.messages(machines, shared, theta, unit)
     all_together = fleet_model.together(said, shared, theta, unit)
     covariance = np.asarray(np.linalg.inv(all_together.precision), dtype=np.float64)
@@ -180,20 +180,16 @@ def _spreads(draws: Floats, unit: float) -> tuple[HyperParameter, ...]:
 def _estimated(
     machines: drift.Histories, start: DriftStart, theta: Floats, unit: float, limits: Sequence[float | None]
 ) -> Estimates:
-    """Rates as the hyper-parameters were learnt, without components; days of crossing with them, at fewer draws."""
-    plain = drift.learnt_prior(theta, np.zeros(len(theta)), np.ones(len(theta)), unit, plain=True)
-    few = fleet_model.spread_draws(len(theta), drift.FEW)
-    prior = drift.learnt_prior(theta[few], np.zeros(len(few)), np.ones(len(few)), unit)
+    prior = drift.learnt_prior(theta, np.zeros(len(theta)), np.ones(len(theta)), unit)
     limit = np.array([np.inf if each is None else each for each in limits])
     chunk = max(1, _FILTERED_AT_ONCE // len(prior))
     parts = []
     for i in range(0, len(machines), chunk):
         which = np.arange(i, min(i + chunk, len(machines)))
-        some = machines.some(which)
-        mean, covariance = start.mean[:, which], start.covariance[:, :, which]
-        at, at_few = (DriftStart(mean[..., i], covariance[..., i]) for i in (plain.group, few[prior.group]))
-        crossed = crossings(some, prior, filtered(some, prior, at_few), limit[which], paths=PATHS)
-        parts.append((_rates(filtered(some, plain, at), plain, at), crossed))
+        some = DriftStart(start.mean[:, which][..., prior.group], start.covariance[:, :, which][..., prior.group])
+        few = machines.some(which)
+        state = filtered(few, prior, some)
+        parts.append((_rates(state, prior, some), crossings(few, prior, state, limit[which], paths=PATHS)))
     rate, u, expected, u_expected, p = np.concatenate([part for part, _ in parts], axis=1)
     crossing = Crossings.joined([part for _, part in parts]) if np.isfinite(limit).any() else None
     return Estimates(rate, u, expected, u_expected, p, crossing)

@@ -16,7 +16,7 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.laboratory.due.drift import FEW, NAMES, USUAL_RATE_SD, DriftPrior, Histories, learnt_prior, log_density
+from cmm_uq.laboratory.due.drift import NAMES, USUAL_RATE_SD, DriftPrior, Histories, learnt_prior, log_density
 from cmm_uq.laboratory.due.drift_filter import DriftStart, DriftState, filtered, log_sum, usual_start
 
 _RATE, _MODEL, _PLACE = (NAMES.index(name) for name in ("rate_sd", "model_sd", "place_sd"))
@@ -95,7 +95,7 @@ def messages(machines: Histories, shared: SharedEffects, theta: Floats, unit: fl
     """What machines say, for W sets of hyper-parameters (W, 8), with no components: these are each machine's own."""
     rate_variance = (np.exp(2 * theta[:, _RATE]) + np.exp(2 * theta[:, _MODEL]) + np.exp(2 * theta[:, _PLACE])
                      + USUAL_RATE_SD**2) * unit**2  # fmt: skip
-    prior = learnt_prior(theta, np.zeros(len(theta)), np.sqrt(rate_variance), unit, plain=True)
+    prior = learnt_prior(theta, np.zeros(len(theta)), np.sqrt(rate_variance), unit)
     log_evidence, mean, covariance = _of_groups(filtered(machines, prior, kept=_KEPT), prior)
     common = np.asarray(shared.design.any(axis=2))
     common[:, 0] = True
@@ -175,11 +175,6 @@ def others(
     return DriftStart(mean, covariance)
 
 
-def spread_draws(count: int, most: int) -> Ints:
-    """Places of at most so many of the draws, as far from each other as they can be."""
-    return np.linspace(0, count - 1, min(count, most)).astype(np.intp)
-
-
 @dataclass(frozen=True, eq=False)
 class FleetPrior:
     """Draws of the hyper-parameters' posterior, and at each the Gaussian of what the fleet, models and places add to rates."""
@@ -215,24 +210,15 @@ class FleetPrior:
             "places": list(self.places), "effects": self.effects.tolist(), "covariance": self.covariance.tolist(),
         }  # fmt: skip
 
-    def few(self) -> FleetPrior:
-        """With no more draws than components are summed over at."""
-        which = spread_draws(len(self.theta), FEW)
-        return FleetPrior(
-            self.unit, self.theta[which], self.models, self.places, self.effects[which], self.covariance[which]
-        )
-
     def prior(self, model: str = "", place: str = "") -> DriftPrior:
         """Of a machine of a model at a place; either may be new to the fleet."""
-        some = self.few()
-        return learnt_prior(some.theta, *some._usual_rate(model, place), self.unit)
+        return learnt_prior(self.theta, *self._usual_rate(model, place), self.unit)
 
     def start(self, machines: Histories, models: Sequence[str], places: Sequence[str]) -> tuple[DriftPrior, DriftStart]:
         """The same of many machines, side by side: nodes common to all, and the rate of each."""
-        some = self.few()
-        known = {of: some._usual_rate(*of) for of in set(zip(models, places, strict=True))}
+        known = {of: self._usual_rate(*of) for of in set(zip(models, places, strict=True))}
         rates = np.array([known[of] for of in zip(models, places, strict=True)])
-        prior = some.prior()
+        prior = self.prior()
         start = usual_start(machines, prior)
         start.mean[0] = rates[:, 0][:, prior.group]
         start.covariance[0, 0] = rates[:, 1][:, prior.group] ** 2

@@ -77,7 +77,7 @@ def test_what_the_others_say_of_a_machine_is_the_conditional_of_one_normal_distr
     shared = shared_by(arrays, MODELS, PLACES)
     said = messages(arrays, shared, THETA, UNIT)
     start = others(said, together(said, shared, THETA, UNIT), shared, THETA, UNIT)
-    prior = learnt_prior(THETA, np.zeros(2), np.ones(2), UNIT, plain=True)
+    prior = learnt_prior(THETA, np.zeros(2), np.ones(2), UNIT)
     some = drift_filter.DriftStart(start.mean[..., prior.group], start.covariance[..., prior.group])
     mean, covariance = over_tales(drift_filter.filtered(arrays, prior, some))
     of = np.concatenate([[i] * len(each.day) for i, each in enumerate(MACHINES)])
