@@ -10,7 +10,9 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
+
+import numpy as np
 
 from benchmarks.coverage.cells import Cell
 from benchmarks.coverage.recordings import Recording, recording
@@ -66,6 +68,29 @@ def run(
         os.environ[name] = "1"
     with get_context("spawn").Pool(processes, maxtasksperchild=TASKS) as pool:
         yield from pool.imap_unordered(work, tasks)
+
+
+class StudyCell(Protocol):
+    """Of a study in which machines are drawn."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def key(self) -> tuple[int, ...]: ...
+
+
+def counted(
+    cell: StudyCell, seed: int, number: int, measure: Callable[[np.random.Generator], dict[str, Any]], *stream: int
+) -> dict[str, Any]:
+    """One case, with a stream and the processor time of its own; where one fails a study goes on, and counts it."""
+    random = np.random.default_rng([seed, *cell.key, number, *stream])
+    start = time.process_time()
+    try:
+        found = measure(random)
+    except Exception as fault:
+        found = {"fault": f"{type(fault).__name__}: {fault}"}
+    return {"cell": cell.name, "number": number, **found, "seconds": round(time.process_time() - start, 3)}
 
 
 def kept(folder: Path) -> list[dict[str, Any]]:

@@ -11,7 +11,6 @@ again; ``--page`` writes the table of the page.
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.coverage.artefacts import ARTEFACTS, Placed
-from benchmarks.coverage.measuring import kept
+from benchmarks.coverage.measuring import counted, kept
 from benchmarks.coverage.noises import IN_TIME, NOISES, Readings, displayed
 from benchmarks.coverage.study import PAGE, measure, waiting
 from benchmarks.parts import truth
@@ -131,13 +130,8 @@ def machine_of(cell: Cell, random: np.random.Generator) -> truth.Truth:
 def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
     """One machine: of each figure what is true, and what is stated."""
     cell, seed, number = task
-    random = np.random.default_rng([seed, *cell.key, number])
-    start = time.process_time()
-    try:
-        found: dict[str, Any] = {"figures": _measured(cell, random, before=number % EVERY == 0)}
-    except Exception as fault:  # a study of hundreds goes on, and counts it
-        found = {"fault": f"{type(fault).__name__}: {fault}"}
-    return {"cell": cell.name, "number": number, **found, "seconds": round(time.process_time() - start, 3)}
+    before = number % EVERY == 0
+    return counted(cell, seed, number, lambda random: {"figures": _measured(cell, random, before=before)})
 
 
 def _measured(cell: Cell, random: np.random.Generator, *, before: bool) -> dict[str, Any]:

@@ -11,7 +11,6 @@ Run: ``python -m benchmarks.parts.curved FOLDER [--machines N] [--only WORDS]``;
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +19,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from benchmarks.coverage.measuring import kept
+from benchmarks.coverage.measuring import counted, kept
 from benchmarks.coverage.study import measure, waiting
 from benchmarks.parts import machines, truth
 from benchmarks.parts.studied import CHARACTERISTICS, WORDS
@@ -158,14 +157,11 @@ CELLS = tuple(
 def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
     """One machine, as :func:`benchmarks.parts.machines.measured` has it."""
     cell, seed, number = task
-    random = np.random.default_rng([seed, *cell.key, number])
-    start = time.process_time()
-    try:
-        one = machines.Cell(cell.artefact, cell.noise, 0.0)
-        found = machines.on_machine(one, drawn(cell.sort, random), random, machines.Made(), 0.7e-3)
-    except Exception as fault:  # a study of thousands goes on, and counts it
-        found = {"fault": f"{type(fault).__name__}: {fault}"}
-    return {"cell": cell.name, "number": number, **found, "seconds": round(time.process_time() - start, 3)}
+    one = machines.Cell(cell.artefact, cell.noise, 0.0)
+    return counted(
+        cell, seed, number,
+        lambda random: machines.on_machine(one, drawn(cell.sort, random), random, machines.Made(), 0.7e-3),
+    )  # fmt: skip
 
 
 def tables(folder: Path) -> str:

@@ -13,7 +13,6 @@ Every machine is appended to ``FOLDER/<cell>.jsonl`` as it is done: a run can be
 from __future__ import annotations
 
 import argparse
-import time
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -21,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.coverage.measuring import kept
+from benchmarks.coverage.measuring import counted, kept
 from benchmarks.coverage.study import measure, waiting
 from benchmarks.parts import truth
 from benchmarks.parts.known_noise import joint_posterior
@@ -137,13 +136,7 @@ def placed(random: np.random.Generator) -> PartPose:
 def measured(task: tuple[Cell, int, int], made: Made = Made()) -> dict[str, Any]:
     """One machine: of each characteristic what is true, its value, u and interval; what was refused is kept in words."""
     cell, seed, number = task
-    random = np.random.default_rng([seed, *cell.key, number])
-    start = time.process_time()
-    try:
-        found = _measured(cell, random, made)
-    except Exception as fault:  # a study of thousands goes on, and counts it
-        found = {"fault": f"{type(fault).__name__}: {fault}"}
-    return {"cell": cell.name, "number": number, **found, "seconds": round(time.process_time() - start, 3)}
+    return counted(cell, seed, number, lambda random: _measured(cell, random, made))
 
 
 def _measured(cell: Cell, random: np.random.Generator, made: Made) -> dict[str, Any]:

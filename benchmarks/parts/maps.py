@@ -10,13 +10,12 @@ Run: ``python -m benchmarks.parts.maps FOLDER [--machines N] [--only WORDS]``; a
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.coverage.measuring import kept
+from benchmarks.coverage.measuring import counted, kept
 from benchmarks.parts import truth
 from benchmarks.parts.curved import Cell, drawn, study
 from benchmarks.parts.regions import EVERY, calibrated
@@ -32,13 +31,7 @@ PAIRS = 60
 def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
     """One machine: of each distance its length, error as read, error as corrected and u; and what was held out."""
     cell, seed, number = task
-    random = np.random.default_rng([seed, *cell.key, number, 11])
-    start = time.process_time()
-    try:
-        found = _measured(cell, drawn(cell.sort, random), random)
-    except Exception as fault:  # a study of thousands goes on, and counts it
-        found = {"fault": f"{type(fault).__name__}: {fault}"}
-    return {"cell": cell.name, "number": number, **found, "seconds": round(time.process_time() - start, 3)}
+    return counted(cell, seed, number, lambda random: _measured(cell, drawn(cell.sort, random), random), 11)
 
 
 def _measured(cell: Cell, hidden: truth.Truth, random: np.random.Generator) -> dict[str, Any]:

@@ -10,14 +10,13 @@ Run: ``python -m benchmarks.parts.read_axes FOLDER [--machines N] [--only WORDS]
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.coverage.measuring import kept
+from benchmarks.coverage.measuring import counted, kept
 from benchmarks.parts import curved, machines
 from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, WORDS
 from cmm_uq.base.points import AXES
@@ -89,16 +88,14 @@ CELLS = tuple(
 def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
     """One machine, as :func:`benchmarks.parts.machines.measured` has it."""
     cell, seed, number = task
-    random = np.random.default_rng([seed, *cell.key, number])
-    start = time.process_time()
-    try:
+    calibration = machines.Cell(cell.artefact, "stated", 0.0)
+    machine = replace(MACHINE, read_by={} if cell.stated is None else dict.fromkeys(AXES, cell.stated))
+
+    def measure(random: np.random.Generator) -> dict[str, Any]:
         hidden = curved.drawn(cell.sort, random)
-        calibration = machines.Cell(cell.artefact, "stated", 0.0)
-        machine = replace(MACHINE, read_by={} if cell.stated is None else dict.fromkeys(AXES, cell.stated))
-        found = machines.on_machine(calibration, hidden, random, machines.Made(), 0.7e-3, machine)
-    except Exception as fault:  # a study goes on, and counts it
-        found = {"fault": f"{type(fault).__name__}: {fault}"}
-    return {"cell": cell.name, "number": number, **found, "seconds": round(time.process_time() - start, 3)}
+        return machines.on_machine(calibration, hidden, random, machines.Made(), 0.7e-3, machine)
+
+    return counted(cell, seed, number, measure)
 
 
 def tables(folder: Path) -> str:

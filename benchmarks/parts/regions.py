@@ -10,14 +10,13 @@ Run: ``python -m benchmarks.parts.regions FOLDER [--machines N] [--only WORDS]``
 
 from __future__ import annotations
 
-import time
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.coverage.measuring import kept
+from benchmarks.coverage.measuring import counted, kept
 from benchmarks.parts import machines, truth
 from benchmarks.parts.curved import CELLS, SORTS, Cell, drawn, study
 from cmm_uq.analysis.machine.regions import factor_regions
@@ -58,13 +57,7 @@ def factors(machine: truth.Truth, ends: tuple[tuple[float, float], ...]) -> np.n
 def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
     """One machine: of each factor the truth, value, U and interval over the range; lowest and highest in eighths and told."""
     cell, seed, number = task
-    random = np.random.default_rng([seed, *cell.key, number, 7])
-    start = time.process_time()
-    try:
-        found: dict[str, Any] = {"factors": _measured(cell, drawn(cell.sort, random), random)}
-    except Exception as fault:  # a study of thousands goes on, and counts it
-        found = {"fault": f"{type(fault).__name__}: {fault}"}
-    return {"cell": cell.name, "number": number, **found, "seconds": round(time.process_time() - start, 3)}
+    return counted(cell, seed, number, lambda random: {"factors": _measured(cell, drawn(cell.sort, random), random)}, 7)
 
 
 def calibrated(

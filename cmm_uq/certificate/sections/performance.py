@@ -53,9 +53,8 @@ def performance(result: Result) -> Section:
         "this recording alone, and its U is the test uncertainty."
     )
     without = say(
-        "Without noise: the 95 % interval of the same figure of the machine alone, in the recorded set-ups, by all of its "
-        "errors together, what the named ones leave being noise or the machine's with even odds. Noise makes ranges and "
-        "largest deviations larger; nothing is decided by this interval."
+        "Without noise: the 95 % interval of the same figure of the machine alone, by all of its errors together; nothing is "
+        "decided by it."
     )
     notes: list[Text] = [UNCERTAINTY, measurand]
     if own:
