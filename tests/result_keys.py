@@ -292,6 +292,11 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = {
         "machine.bounds[].errors": ("", "Errors whose bound the job states."),
         "machine.bounds[].largest_um": ("µm", "What 95 of 100 do not exceed."),
         "machine.bounds[].source": ("", "Who states it."),
+        "machine.bounds[].recording[].error": ("", "One of the errors."),
+        "machine.bounds[].recording[].recording_against": (
+            "", "How probable the recording is without its bound, over that with it; null where it cannot tell.",
+        ),
+        "machine.bounds[].recording[].used": ("", "False where that is beyond 20: the bound is then not used."),
         "machine.axes[].axis": ("", "An axis of which it is stated how it is read; only where one is."),
         "machine.axes[].stated": ("", "Keys of the job that state it, with their source."),
         "machine.axes[].taken": ("mm, µm", "Deviations to either side within sections and within one period, and play."),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.machine.state import AxisStatement
+from cmm_uq.analysis.machine.state import StatementEvidence
 from cmm_uq.base.points import Machine
 from cmm_uq.certificate.sections.read_axes import (
     readings_data,
@@ -23,7 +23,7 @@ MACHINE = Machine("A", read_by={"x": GRATING, "z": SCREW})
 
 
 def test_a_table_has_what_was_stated_by_whom_and_what_is_taken_of_it() -> None:
-    found = readings_table(MACHINE, (AxisStatement("x", 0.01), AxisStatement("z", 1e6)))
+    found = readings_table(MACHINE, (StatementEvidence("x", 0.01), StatementEvidence("z", 1e6)))
     assert found is not None
     x, z = (tuple(map(str, row)) for row in found.rows)
     periodic = "0.2 µm within one period of 0.02 mm; 3 µm within 1000 mm; 0.3 µm within 10 mm"
@@ -39,7 +39,7 @@ def test_a_table_has_what_was_stated_by_whom_and_what_is_taken_of_it() -> None:
 
 @pytest.mark.parametrize(("ratio", "words"), [(np.nan, "shows nothing of it"), (2.0, "shows little of it")])
 def test_a_recording_that_says_little_says_so(ratio: float, words: str) -> None:
-    found = readings_table(Machine("A", read_by={"x": GRATING}), (AxisStatement("x", ratio),))
+    found = readings_table(Machine("A", read_by={"x": GRATING}), (StatementEvidence("x", ratio),))
     assert found is not None
     assert str(found.rows[0][-1]) == words
 
@@ -51,16 +51,19 @@ def test_a_machine_of_which_nothing_is_stated_has_no_table() -> None:
 
 def test_what_is_denied_or_exceeded_is_a_warning() -> None:
     large = {"play as stated": np.full(100, 2.5), "periodic as stated": np.full(100, 0.9), "play": np.full(100, 2.5)}
-    texts = [str(text) for text in readings_warnings((AxisStatement("x", 21.0), AxisStatement("y", 19.0)), large)]
+    said = [("x", 21.0), ("y", 19.0), ("periodic_scale_z", 4321.0), ("periodic_scale_y", 19.0)]
+    texts = [str(text) for text in readings_warnings([StatementEvidence(*one) for one in said], large)]
     assert texts == [
         "The recording denies how these axes are stated to be read, so that nothing of it is used: X.",
+        "The recording denies the bound that is stated, so that it is not used: Periodic scale error of Z. It is 4.3e+03 "
+        "times as probable without it.",
         "The recording shows more than is stated, and is followed: Play of axes that are stated, over what is stated 2.5 "
         "(2.5 to 2.5).",
     ]
 
 
 def test_results_have_what_was_stated_what_is_taken_and_what_the_recording_says() -> None:
-    x, z = readings_data(MACHINE, (AxisStatement("x", 0.01), AxisStatement("z", 1e6)))
+    x, z = readings_data(MACHINE, (StatementEvidence("x", 0.01), StatementEvidence("z", 1e6)))
     assert x["stated"] == {"reading": "exposed optical grating", "source": "Data sheet S-1, 2024", "period_mm": 0.02,
                            "deviation": [[1000.0, 3.0], [10.0, 0.3]]}  # fmt: skip
     assert x["taken"] == {

@@ -7,10 +7,10 @@ random field: each error of a size that its family has, the families' sizes and 
 recording says; what the machine corrects stays what its certificate states. What the recording does not see of a family keeps
 the size that the family is seen to have; of a family that it does not see at all, what physics allows.
 
-How an axis is stated to be read is taken as it is stated, unless the recording denies it. All sizes integrated out, the
-observations have the density p as stated, and pₐ with nothing stated of the axis a; where pₐ/p is beyond 20, what is stated of
-the axis is not used. Of correct statements one in twenty is denied at most (Markov's inequality: pₐ/p has the mean one). So
-are those of all axes together. What is denied most goes first, and the others are looked at anew without it.
+How an axis is stated to be read, and a bound of an error, is taken as stated, unless the recording denies it. All sizes
+integrated out, the observations have the density p as stated, and pₐ without the statement a; where pₐ/p is beyond 20, it is
+not used. Of correct statements one in twenty is denied at most (Markov's inequality: pₐ/p has the mean one). So are all
+together. What is denied most goes first, and the others are looked at anew without it.
 
 How far figures rest on what was taken to be known beforehand: sizes of families are half-normal then. With that prior half as
 wide, or twice, every draw of a machine has another weight, p′(s)/p(s), so that means and variances of what the machine does
@@ -27,9 +27,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.analysis.machine.state import AxisStatement, MachineState, StatedNoise, Unmodelled
+from cmm_uq.analysis.machine.state import MachineState, StatedNoise, StatementEvidence, Unmodelled
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model.field import GivenPeriod, covariance, family_of, linear
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import growing_lengths, noise_of
@@ -229,37 +229,39 @@ def _shares(state: MachineState, scales: Mapping[str, Floats] | None = None) -> 
 
 def as_recorded_allows(
     model: RecordingModel, others: Sequence[Unmodelled], known: Sizes | None = None
-) -> tuple[tuple[Unmodelled, ...], tuple[AxisStatement, ...]]:
+) -> tuple[tuple[Unmodelled, ...], tuple[StatementEvidence, ...]]:
     """Errors that were not modelled, without what the recording denies of what is stated of them; and what it says of each.
 
     ``known``: sizes of the noise, one draw, where these are not to be found.
     """
-    held, found = tuple(others), dict[str, AxisStatement]()
+    held, found = tuple(others), dict[str, StatementEvidence]()
     recorded = model.artefact.points.columns
-    every = dict.fromkeys(_axis(one) for one in held if one.unstated)
-    seen = {_axis(one) for one in held if one.unstated and all(name in recorded for name in one.effect.columns)}
-    while left := [axis for axis in AXES if axis in seen and not (axis in found and found[axis].denied)]:
-        alone, sets = _evidence(model, held, known), [(axis,) for axis in left] + [tuple(left)] * (len(left) > 1)
+    chains, every = list(held), set[str]()
+    while chains := [one for one in chains if one.unstated]:
+        every |= {one.stated_by for one in chains}
+        chains = [one.unstated for one in chains if one.unstated]
+    while True:
+        told = {one.stated_by for one in held if one.unstated and all(name in recorded for name in one.effect.columns)}
+        left = sorted(name for name in told if not (name in found and found[name].denied))
+        if not left:
+            break
+        alone, sets = _evidence(model, held, known), [(name,) for name in left] + [tuple(left)] * (len(left) > 1)
         logs = {some: _evidence(model, _without(held, some), known) - alone for some in sets}
         found |= {
-            some[0]: AxisStatement(some[0], float(np.exp(min(logs[some], _MOST_LOG))))
+            some[0]: StatementEvidence(some[0], float(np.exp(min(logs[some], _MOST_LOG))))
             for some in sets
             if len(some) == 1
         }
         worst = max(sets, key=lambda some: logs[some])
-        denied = {axis: AxisStatement(axis, float(np.exp(min(logs[worst], _MOST_LOG)))) for axis in worst}
+        denied = {name: StatementEvidence(name, float(np.exp(min(logs[worst], _MOST_LOG)))) for name in worst}
         if not any(one.denied for one in denied.values()):
             break
         held, found = _without(held, worst), found | denied
-    return held, tuple(found.get(axis, AxisStatement(axis, np.nan)) for axis in AXES if axis in every)
+    return held, tuple(found.get(name, StatementEvidence(name, np.nan)) for name in sorted(every))
 
 
-def _axis(one: Unmodelled) -> str:
-    return str(getattr(one.effect, "axis", ""))
-
-
-def _without(others: Iterable[Unmodelled], axes: Collection[str]) -> tuple[Unmodelled, ...]:
-    return tuple(one.unstated if one.unstated is not None and _axis(one) in axes else one for one in others)
+def _without(others: Iterable[Unmodelled], statements: Collection[str]) -> tuple[Unmodelled, ...]:
+    return tuple(one.unstated if one.unstated is not None and one.stated_by in statements else one for one in others)
 
 
 def _evidence(model: RecordingModel, others: Sequence[Unmodelled], known: Sizes | None) -> float:

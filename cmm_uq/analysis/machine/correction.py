@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from cmm_uq.analysis.diagnosis.held_out import FOLDS, held_out_groups, predicted
 from cmm_uq.analysis.machine.conditional import RecordedField
 from cmm_uq.analysis.machine.regions import DrawnErrors, Key, columns_of, disagreeing, doubted_draws
-from cmm_uq.analysis.machine.state import AxisStatement, of_machine
+from cmm_uq.analysis.machine.state import StatementEvidence, of_machine
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import AXES, Floats, Machine, Points
@@ -61,7 +61,7 @@ class FieldMap:
     range_um: tuple[float, float]
     disagree: tuple[Key, ...]  # named errors of which all errors together say something else of the recorded set-ups
     held_out: HeldOutCorrection | None  # ``None`` where too little is left to make a map without a part of it
-    statements: tuple[AxisStatement, ...]  # what the recording says of what is stated of axes
+    statements: tuple[StatementEvidence, ...]  # what the recording says of what is stated of axes
 
 
 def field_map(model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, observe: Observed, seed: int) -> FieldMap:

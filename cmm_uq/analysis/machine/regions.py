@@ -25,7 +25,7 @@ from scipy.special import ndtri
 from cmm_uq.analysis.diagnosis.held_out import thin_out
 from cmm_uq.analysis.machine.conditional import PriorInfluence, RecordedField, as_recorded_allows, influence_of
 from cmm_uq.analysis.machine.performance import MachinePerformance, performance_of, rows_of
-from cmm_uq.analysis.machine.state import AxisStatement, Unmodelled, of_machine, unmodelled_errors
+from cmm_uq.analysis.machine.state import StatementEvidence, Unmodelled, of_machine, unmodelled_errors
 from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
@@ -65,7 +65,7 @@ class FactorRegions:
     scales: Mapping[str, Floats]  # (N,) sizes of each family, of what physics allows
     influence: tuple[PriorInfluence, ...]  # of other priors on the factors over the measuring range, in their order
     observations: tuple[int, int]  # reckoned with, and of how many
-    statements: tuple[AxisStatement, ...] = ()  # what the recording says of what is stated of axes
+    statements: tuple[StatementEvidence, ...] = ()  # what the recording says of what is stated of axes
     performance: MachinePerformance | None = None  # without noise; of an artefact that has lengths
 
 
@@ -79,7 +79,7 @@ class DrawnErrors:
     own: Floats  # (N, k) of the coefficients of the named effects
     further: Floats  # (N, f) of those of the field's effects
     others: tuple[Unmodelled, ...]  # errors beside the named ones
-    statements: tuple[AxisStatement, ...]  # what the recording says of what is stated of axes
+    statements: tuple[StatementEvidence, ...]  # what the recording says of what is stated of axes
 
     @classmethod
     def of(cls, model: RecordingModel, observe: Observed, seed: int, draws: int = DRAWS) -> DrawnErrors:

@@ -47,7 +47,7 @@ class Unmodelled:
     # size of its (first) reported parameter that the calibration would have found; ``None`` where it would not have, or does
     # not say
     detected: float | None = None
-    # what it is taken for where how its axis is read is not regarded; ``None`` where nobody states that
+    # what it is taken for where the statement of it is not regarded; ``None`` where there is none
     unstated: Unmodelled | None = None
 
     @property
@@ -55,14 +55,20 @@ class Unmodelled:
         """Whether the calibration bounds it more tightly than physics does."""
         return bool(self.sd[0] < self.effect.coefficients[0].prior_sd)
 
+    @property
+    def stated_by(self) -> str:
+        """The statement of it: its own name of a bound, else the axis, of which it is stated how it is read."""
+        bound = self.effect.stated and not self.effect.of_family
+        return self.effect.name if bound else str(getattr(self.effect, "axis", ""))
+
 
 @dataclass(frozen=True)
-class AxisStatement:
-    """What a recording says of what is stated of an axis."""
+class StatementEvidence:
+    """What a recording says of what is stated of an axis, or of the bound of an error."""
 
-    axis: str
-    # how probable the recording is with nothing stated of the axis, over that with what is stated; not a number where the
-    # recording has nothing by which to tell
+    of: str  # the axis, or the error's name
+    # how probable the recording is without the statement, over that with it; not a number where the recording has nothing by
+    # which to tell
     ratio: float
 
     @property
@@ -130,7 +136,7 @@ class MachineState:
     # (M,) sizes of families of errors over what physics allows, where its recording says how large they are
     scales: Mapping[str, Floats] = field(default_factory=dict)
     unmodelled: tuple[Unmodelled, ...] = ()  # errors that it may have besides
-    statements: tuple[AxisStatement, ...] = ()  # what its recording says of what is stated of its axes
+    statements: tuple[StatementEvidence, ...] = ()  # what its recording says of what is stated of it
     # (k,) rms change of each coefficient since the calibration
     drift: Floats = field(default_factory=lambda: np.zeros(0))
     corrected: bool = True  # whether the machine corrects errors that were found, so that what remains is about zero
@@ -255,7 +261,7 @@ def with_bounds(state: MachineState, largest_um: Mapping[str, float]) -> Machine
     for one in state.unmodelled:
         if (largest := largest_um.get(one.effect.name)) is not None:
             effect = bounded(one.effect, largest)
-            one = replace(one, effect=effect, sd=np.array([c.prior_sd for c in effect.coefficients]))
+            one = replace(one, effect=effect, sd=np.array([c.prior_sd for c in effect.coefficients]), unstated=one)
         found.append(one)
     return replace(state, unmodelled=tuple(found))
 

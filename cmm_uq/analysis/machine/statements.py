@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,11 +25,13 @@ def _allowed(axis: str) -> float:
 
 
 def with_readings(others: Iterable[Unmodelled], machine: Machine) -> tuple[Unmodelled, ...]:
-    """Errors that were not modelled, those of axes as these are stated to be read; what has a bound keeps it."""
+    """Errors that were not modelled, those of axes as these are stated to be read; a bound stands before that."""
     known, found = readings_of(machine), list[Unmodelled]()
     for one in others:
         effect, reading = one.effect, known.get(getattr(one.effect, "axis", ""))
-        if reading is not None and not effect.stated:
+        if one.unstated is not None:
+            one = replace(one, unstated=with_readings((one.unstated,), machine)[0])
+        elif reading is not None:
             if isinstance(effect, PeriodicScale):
                 one = stated_as(one, as_read(effect, reading.largest_um, reading.errors))
             elif isinstance(effect, Hysteresis) and reading.play_um is not None:

@@ -15,7 +15,7 @@ from cmm_uq.certificate.document import Column, Paragraph, Section, Table, secti
 from cmm_uq.certificate.part.figures import CharacteristicFigures, by_margin, critical, figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement, UnseenError
 from cmm_uq.certificate.part.plots import shares_plots
-from cmm_uq.certificate.sections.read_axes import readings_table, shrinking, smaller_by
+from cmm_uq.certificate.sections.read_axes import readings_table, recording_words, shrinking, smaller_by
 from cmm_uq.certificate.sections.regions import changes_table, resting, sizes_table
 from cmm_uq.certificate.wording import effect_title
 
@@ -259,13 +259,15 @@ def priors_words(found: PartMeasurement) -> Text:
 
 
 def _stated_bounds(found: PartMeasurement) -> Table | None:
-    heads = (say("Errors"), Column(say("At most"), unit("µm")), say("Stated by"))
+    heads = (say("Error"), Column(say("At most"), unit("µm")), say("Stated by"), say("The recording"))
+    said = {one.of: one for one in found.given.machine.statements}
     rows = (
-        (commas([effect_title(name) for name in one.errors]), number(one.largest_um, "g"), Verbatim(one.source))
+        (effect_title(name), number(one.largest_um, "g"), Verbatim(one.source), recording_words(said.get(name)))
         for one in found.job.facts.machine_state.bound
+        for name in one.errors
     )
     note = say(
-        "Of play the gap, of a periodic error the amplitude, which 95 of 100 do not exceed. They are taken as stated: the "
-        "recording of the calibration cannot show these errors by itself."
+        "Of play the gap, of a periodic error the amplitude, which 95 of 100 do not exceed. They are taken as stated unless "
+        "the recording of the calibration denies them."
     )
     return table(say("Bounds that are stated"), heads, rows, note)

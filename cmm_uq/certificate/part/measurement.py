@@ -26,7 +26,7 @@ from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.origin import NAME
-from cmm_uq.certificate.sections.read_axes import readings_data, shrinking, smaller_by
+from cmm_uq.certificate.sections.read_axes import evidence_data, readings_data, shrinking, smaller_by
 from cmm_uq.certificate.sections.regions import families_data, priors_data
 from cmm_uq.jobs.part.feature import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
@@ -194,6 +194,7 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
     simulated, facts, further, job = found.simulated, found.job.facts, found.further, found.job.facts.job
     names, shares = [one.name for one in found.characteristics], found.budget
     stated = [_characteristic(found, i) for i in range(len(names))]
+    said = {one.of: one for one in found.given.machine.statements}
     read_by = readings_data(found.given.machine.machine, found.given.machine.statements)
     factors = np.array([_in(one, 1.0) for one in found.characteristics])
     return {
@@ -207,7 +208,10 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
                  "not_measured": list(facts.part.not_measured)},
         "machine": standing_data(found.standing) | {
             "families": families_data(found.given.machine.scales),
-            "bounds": [one.model_dump() for one in facts.machine_state.bound],
+            "bounds": [
+                one.model_dump() | {"recording": [{"error": name, **evidence_data(said.get(name))} for name in one.errors]}
+                for one in facts.machine_state.bound
+            ],
             **({"axes": read_by} if read_by else {}),
         },
         "simulation": {

@@ -1,4 +1,4 @@
-"""How the axes are read, as it was stated by whom, what is taken of it, and what the recording says to it.
+"""How the axes are read and what errors do not exceed, as stated by whom, and what the recording says to it.
 
 And what would show, or bound, an error that a calibration did not see.
 """
@@ -10,20 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.machine.state import AxisStatement
+from cmm_uq.analysis.machine.state import StatementEvidence
 from cmm_uq.analysis.machine.statements import readings_of
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, listed, number, say, semicolons
-from cmm_uq.base.points import Floats, Machine
+from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Column, Table, table
+from cmm_uq.certificate.wording import effect_title
 from cmm_uq.machine.model.field import PERIODIC, PLAY, READ, STATED, family_of
 from cmm_uq.machine.model.readings import AxisReading
 from cmm_uq.machine.physics.catalogue import every
 
 
-def readings_table(machine: Machine, statements: Sequence[AxisStatement]) -> Table | None:
+def readings_table(machine: Machine, statements: Sequence[StatementEvidence]) -> Table | None:
     """Of the axes of which it is stated how they are read."""
-    readings, said = readings_of(machine), {one.axis: one for one in statements}
+    readings, said = readings_of(machine), {one.of: one for one in statements}
     heads = (
         say("Axis"),
         say("Read by"),
@@ -39,7 +40,7 @@ def readings_table(machine: Machine, statements: Sequence[AxisStatement]) -> Tab
             _periodic(one),
             DASH if one.play_um is None else number(one.play_um, "g"),
             Verbatim(one.facts.source),
-            _recording(said.get(axis)),
+            recording_words(said.get(axis)),
         )
         for axis, one in readings.items()
     )
@@ -69,7 +70,7 @@ def _periodic(one: AxisReading) -> Text:
     return semicolons(sections) if sections else say("as physics allows")
 
 
-def _recording(one: AxisStatement | None) -> Text:
+def recording_words(one: StatementEvidence | None) -> Text:
     if one is None or np.isnan(one.ratio):
         return say("shows nothing of it")
     if one.denied:
@@ -77,20 +78,29 @@ def _recording(one: AxisStatement | None) -> Text:
     return say("supports it") if one.supported else say("shows little of it")
 
 
-def readings_warnings(statements: Iterable[AxisStatement], scales: Mapping[str, Floats]) -> list[Text]:
-    """What a recording says against what is stated of axes.
+def readings_warnings(statements: Iterable[StatementEvidence], scales: Mapping[str, Floats]) -> list[Text]:
+    """What a recording says against what is stated of axes, and against bounds.
 
     ``scales``: draws (N,) of each family's size; of stated ones over what is stated.
     """
-    denied = [Verbatim(one.axis.upper()) for one in statements if one.denied]
-    texts: list[Text] = []
-    if denied:
+    denied, texts = [one for one in statements if one.denied], list[Text]()
+    if axes := [Verbatim(one.of.upper()) for one in denied if one.of in AXES]:
         texts.append(
             say(
                 "The recording denies how these axes are stated to be read, so that nothing of it is used: {axes}.",
-                axes=listed(denied),
+                axes=listed(axes),
             )
         )
+    for one in denied:
+        if one.of not in AXES:
+            texts.append(
+                say(
+                    "The recording denies the bound that is stated, so that it is not used: {error}. It is {times} times as "
+                    "probable without it.",
+                    error=effect_title(one.of),
+                    times=number(one.ratio, ".2g"),
+                )
+            )
     for name, sizes in scales.items():
         low, middle, high = np.quantile(sizes, [0.025, 0.5, 0.975])
         if name.endswith(STATED) and low > 1:
@@ -106,27 +116,30 @@ def readings_warnings(statements: Iterable[AxisStatement], scales: Mapping[str, 
     return texts
 
 
-def readings_data(machine: Machine, statements: Iterable[AxisStatement]) -> list[dict[str, Any]]:
+def readings_data(machine: Machine, statements: Iterable[StatementEvidence]) -> list[dict[str, Any]]:
     """For results.json."""
-    said = {one.axis: one for one in statements}
-    rows = []
+    said, rows = {one.of: one for one in statements}, []
     for axis, one in readings_of(machine).items():
         own = said.get(axis)
         told = one.facts.model_dump(exclude={"names"}, exclude_none=True, exclude_defaults=True)
         period, most = one.interpolation or (None, None)
         taken = {"within": [list(each) for each in one.within], "period_mm": period, "interpolation_um": most}
-        ratio = None if own is None or np.isnan(own.ratio) else own.ratio
         rows.append(
             {
                 "axis": axis,
                 "stated": told,
                 "taken": {**taken, "play_um": one.play_um},
                 "published": one.source or None,
-                "recording_against": ratio,
-                "used": own is None or not own.denied,
+                **evidence_data(own),
             }
         )
     return rows
+
+
+def evidence_data(one: StatementEvidence | None) -> dict[str, Any]:
+    """For results.json, of one statement."""
+    ratio = None if one is None or np.isnan(one.ratio) else one.ratio
+    return {"recording_against": ratio, "used": one is None or not one.denied}
 
 
 _SHRINKS: Mapping[str, Text] = {

@@ -316,18 +316,22 @@ def test_a_machine_corrects_what_its_certificate_states_and_no_more(corrected: b
 
 
 def test_a_bound_that_is_stated_holds_what_a_recording_does_not_show() -> None:
-    """Bars show no play: it keeps what is stated. A periodic error they show a little: never larger than stated."""
+    """Bars show no play: it keeps what is stated. That the scale errs by so little they deny: nothing else explains them."""
     apart = left_out("hysteresis_x", "periodic_scale_y")
     state = MachineState(BARS.machine, effects(MODELLED), np.zeros((2, 6)), unmodelled=apart)
     found = with_bounds(state, {"hysteresis_x": 2.0, "periodic_scale_y": 0.5})
     assert found.unmodelled[0].sd == pytest.approx([2.0 / 1.959964])
     drawn = given_recording(found, calibration(), SIGMA, 4000)
     assert [one.effect.name for one in drawn.unmodelled] == ["hysteresis_x"]
-    assert drawn.scales == {}
-    periodic = drawn.effects[-1]
-    assert isinstance(periodic, GivenPeriod)
-    at = periodic.at(np.linspace(300.0, 800.0, 50))
-    assert 1e3 * float((drawn.draws[:, 6:] @ at.T).std()) == pytest.approx(0.5 / 2.447747, rel=0.1)
+    assert drawn.unmodelled[0].sd == found.unmodelled[0].sd
+    play, periodic = drawn.statements
+    assert np.isnan(play.ratio)
+    assert (periodic.of, periodic.denied) == ("periodic_scale_y", True)
+    assert list(drawn.scales) == ["periodic"]
+    error = drawn.effects[-1]
+    assert isinstance(error, GivenPeriod)
+    at = error.at(np.linspace(300.0, 800.0, 50))
+    assert 1e3 * float(np.sqrt(np.mean((drawn.draws[:, 6:] @ at.T) ** 2))) > 5
     with pytest.raises(CmmUqError, match="scale_x is neither play nor a periodic error"):
         with_bounds(state, {"scale_x": 1.0})
     with pytest.raises(CmmUqError, match="there is no error 'play_x'"):

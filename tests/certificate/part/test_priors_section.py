@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.machine.conditional import ALL, PriorInfluence
+from cmm_uq.analysis.machine.state import StatementEvidence
 from cmm_uq.certificate.document import Paragraph, Section, Table
 from cmm_uq.certificate.part.budget_section import priors_section, resting_on_priors
-from cmm_uq.certificate.part.measurement import PartMeasurement
+from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
 from cmm_uq.certificate.sections.regions import families_data, priors_data
 from cmm_uq.jobs.part.tables import BoundFacts
 from tests.certificate.parts_found import found_of, machine, measured_points
@@ -108,12 +109,22 @@ def test_a_tenth_of_u_or_of_expanded_uncertainty_makes_a_figure_rest_on_the_prio
     assert str(warned.text).startswith(f"1 of {len(names)} characteristics rest on what was taken")
 
 
-def test_bounds_stand_with_their_source(found: PartMeasurement) -> None:
+def test_bounds_stand_with_their_source_and_what_the_recording_says(found: PartMeasurement) -> None:
+    said = (StatementEvidence("hysteresis_y", 0.1), StatementEvidence("periodic_scale_x", 50.0))
+    found = replace(found, given=replace(found.given, machine=replace(found.given.machine, statements=said)))
     state = found.job.facts.machine_state.model_copy(update={"bound": [DATASHEET]})
     job = replace(found.job, facts=found.job.facts.model_copy(update={"machine_state": state}))
     for influence in ((), (change(found),)):
         rows = tables(told(replace(found, job=job), *influence))["Bounds that are stated"].rows
-        assert rows == (("Periodic scale error of X, Hysteresis of Y", "0.5", "Datasheet S-1, 2024"),)
+        assert rows == (
+            ("Periodic scale error of X", "0.5", "Datasheet S-1, 2024", "denies it: not used"),
+            ("Hysteresis of Y", "0.5", "Datasheet S-1, 2024", "supports it"),
+        )
+    (bound,) = part_results(replace(found, job=job))["machine"]["bounds"]
+    assert bound["recording"] == [
+        {"error": "periodic_scale_x", "recording_against": 50.0, "used": False},
+        {"error": "hysteresis_y", "recording_against": 0.1, "used": True},
+    ]
 
 
 def test_a_part_without_influence_or_bounds_has_no_such_section(found: PartMeasurement) -> None:
