@@ -29,7 +29,7 @@ import numpy as np
 
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, StatementEvidence, Unmodelled
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.machine.model.field import GivenPeriod, covariance, family_of, linear
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import growing_lengths, noise_of
@@ -37,7 +37,7 @@ from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import PeriodicScale
 from cmm_uq.maths.inference.families import HELD, FieldErrors, FieldModel, log_evidence, sample_sizes
 from cmm_uq.maths.inference.noise import Components, Sizes
-from cmm_uq.maths.inference.posterior import sample_with_noise
+from cmm_uq.maths.inference.posterior import Doubt, sample_with_noise
 
 
 class PointwiseEffect(Effect):
@@ -156,15 +156,24 @@ def white(sigma_mm: float) -> Sizes:
     return Sizes(np.full((1, 3), sigma_mm), none, none, none, none + 1)
 
 
+NO_DOUBT = Doubt(())
+
+
 def given_recording(
-    state: MachineState, model: RecordingModel, sigma_mm: float | None = None, draws: int = DRAWS, seed: int = 0
+    state: MachineState,
+    model: RecordingModel,
+    sigma_mm: float | None = None,
+    draws: int = DRAWS,
+    seed: int = 0,
+    doubt: Doubt = NO_DOUBT,
 ) -> MachineState:
     """The state of a machine with all of its errors drawn together, given the recording of its calibration.
 
     ``state``: as its certificate states it, its effects in the model's order; the model may have others, as of its artefact.
     How much the calibration bounds an error that it did not model is of no matter here: its recording says that again.
     ``model``: of the calibration, without the observations that its certificate set aside. ``sigma_mm``: standard deviation
-    of one recorded coordinate, where the noise is known and white; else it is sampled.
+    of one recorded coordinate, where the noise is known and white; else it is sampled. ``doubt``: what is stated to be in
+    doubt about the model's unknowns by causes that all its observations share, as of its certificate.
     """
     known = None if sigma_mm is None else white(sigma_mm)
     others, statements = as_recorded_allows(model, state.unmodelled, known)
@@ -182,10 +191,20 @@ def given_recording(
             some = np.linspace(0, len(alone.placing) - 1, HELD).astype(np.int64)[np.arange(draws) % HELD]
             sizes = replace(sample_sizes(whole.field, draws, seed, alone.typical), noise=alone.at(some))
         noise = stated_noise(model, whole.field.noise, sizes.noise)
-    drawn = whole.coefficients(sizes.noise, sizes.families, random)
+    drawn, k = whole.coefficients(sizes.noise, sizes.families, random), whole.modelled
+    drawn[:, :k] = doubted_draws(doubt, len(model.unknowns), np.arange(k), seed, drawn[:, :k])
     together = _with(state, model, whole, drawn, noise)
     scales = dict(zip(whole.field.families, sizes.families.T, strict=True))
     return replace(together, scales=scales, prior_share=_shares(together), family_share=_shares(together, scales))
+
+
+def doubted_draws(doubt: Doubt, count: int, named: Ints, seed: int, draws: Floats) -> Floats:
+    """Draws (N, k) of some of ``count`` unknowns with what is in doubt about all observations together."""
+    if not doubt.carried:
+        return draws
+    whole = np.zeros((len(draws), count))
+    whole[:, named] = draws
+    return doubt.widened(whole, seed)[:, named]
 
 
 def _with(

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.diagnosis.held_out import FOLDS, held_out_groups, predicted
-from cmm_uq.analysis.machine.conditional import RecordedField
-from cmm_uq.analysis.machine.regions import DrawnErrors, Key, columns_of, disagreeing, doubted_draws
+from cmm_uq.analysis.machine.conditional import RecordedField, doubted_draws
+from cmm_uq.analysis.machine.regions import DrawnErrors, Key, columns_of, disagreeing
 from cmm_uq.analysis.machine.state import StatementEvidence, of_machine
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text

@@ -23,7 +23,13 @@ import numpy as np
 from scipy.special import ndtri
 
 from cmm_uq.analysis.diagnosis.held_out import thin_out
-from cmm_uq.analysis.machine.conditional import PriorInfluence, RecordedField, as_recorded_allows, influence_of
+from cmm_uq.analysis.machine.conditional import (
+    PriorInfluence,
+    RecordedField,
+    as_recorded_allows,
+    doubted_draws,
+    influence_of,
+)
 from cmm_uq.analysis.machine.performance import MachinePerformance, performance_of, rows_of
 from cmm_uq.analysis.machine.state import StatementEvidence, Unmodelled, of_machine, unmodelled_errors
 from cmm_uq.analysis.machine.statements import with_readings
@@ -247,15 +253,6 @@ def _moved(
     found = inverse[: known.shape[1]] @ columns(others)
     found[np.any(told * length[: known.shape[1], None] > _ANOTHER * length, axis=1)] = np.nan
     return np.asarray(found)
-
-
-def doubted_draws(doubt: Doubt, count: int, named: Ints, seed: int, draws: Floats) -> Floats:
-    """Draws (N, k) of some of ``count`` unknowns with what is in doubt about all observations together."""
-    if not doubt.carried:
-        return draws
-    whole = np.zeros((len(draws), count))
-    whole[:, named] = draws
-    return doubt.widened(whole, seed)[:, named]
 
 
 def as_recorded(model: RecordingModel, field: RecordedField, posterior: NoisyPosterior) -> Floats:

@@ -161,11 +161,15 @@ def with_doubt(
     model: RecordingModel, estimate: Estimate, posterior: NoisyPosterior, draws: Floats, causes: Sequence[Cause]
 ) -> tuple[Floats, Doubt]:
     """Draws (N, k) of the model's unknowns with what is in doubt about all observations together; as they are without."""
-    if not causes:
-        return draws, Doubt(())
-    weights = gain(estimate.linear, float(np.median(posterior.sigma)))
-    doubt = Doubt.of([cause.at(model.used) for cause in causes], weights)
-    return doubt.widened(draws, posterior.seed), doubt
+    doubt = doubt_of(model, estimate, float(np.median(posterior.sigma)), causes)
+    return doubt.widened(draws, posterior.seed) if doubt.carried else draws, doubt
+
+
+def doubt_of(model: RecordingModel, estimate: Estimate, sigma_mm: float, causes: Sequence[Cause]) -> Doubt:
+    """What is in doubt about the model's unknowns, as they are estimated under noise ``sigma_mm`` of a coordinate."""
+    return (
+        Doubt.of([cause.at(model.used) for cause in causes], gain(estimate.linear, sigma_mm)) if causes else Doubt(())
+    )
 
 
 def contradictions(

@@ -30,17 +30,20 @@ from cmm_uq.analysis.machine.state import (
 )
 from cmm_uq.analysis.parts.plan import PartCharacteristic, PartPose, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
+from cmm_uq.app.commands.estimation import doubt_of
 from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty as Stated
 from cmm_uq.machine.model import RecordingModel
+from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.machine.model.field import TRIED, EveryPeriod, GivenPeriod, covariance
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.model.recorded import Noise
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.noise import Sizes
-from cmm_uq.maths.inference.posterior import sample_with_noise
+from cmm_uq.maths.inference.posterior import Doubt, sample_with_noise
 from tests.conftest import ROOT
 from tests.parts_drawn import MACHINE, spot
 
@@ -303,6 +306,46 @@ def test_faults_of_the_artefact_and_of_its_probe_stay_with_them() -> None:
     sd = np.sqrt(np.diagonal(covariance))[at]
     np.testing.assert_allclose((found.draws.mean(axis=0) - mean[at]) / sd, 0, atol=0.03)
     np.testing.assert_allclose(found.draws.std(axis=0) / sd, 1, rtol=0.03)
+
+
+def warm(kelvin: float) -> Doubt:
+    """Of the step gauge's lengths by its temperature and what else is stated of it, steel."""
+    model, stated = gauge(), Circumstances(cte_per_k=11.5e-6, uncertainty=Stated(u_temperature_k=kelvin))
+    return doubt_of(model, model.estimate(), 1e-3, causes_of(model.artefact, stated))
+
+
+def test_all_scales_are_in_doubt_by_what_the_gauge_expands() -> None:
+    """0.5 K of steel: 5.75 ppm of all three alike, and nothing of a squareness if all set-ups were warm alike."""
+    own, whole = warm(0.0).carried, warm(0.5).carried
+    (common, _), scales = whole[-1], np.eye(6)[:3]
+    assert len(whole) == len(own) + 1
+    np.testing.assert_allclose(np.abs(scales @ common[:6]), 5.75, rtol=1e-4)
+    assert len(set(np.sign(common[:3, 0]))) == 1
+    np.testing.assert_allclose(common[3:6], 0.0, atol=1e-3)
+    assert warm(0.5).covariance()[0, 0] - warm(0.0).covariance()[0, 0] == pytest.approx(5.75**2, rel=1e-4)
+
+
+def test_a_length_of_a_part_is_in_doubt_by_what_the_gauge_expanded() -> None:
+    """400 mm along each axis: L·α·u(t) = 2.3 µm in quadrature, about the same mean; 20 000 draws each.
+
+    Across no less, and no more than if the set-ups, each warm by itself, put squarenesses in doubt besides.
+    """
+    ends = {"x": [400, 0, 0], "y": [0, 400, 0], "z": [0, 0, 400], "xy": [240, 320, 0]}
+    plan = Plan(
+        (spot("one", [0, 0, 0]), *(spot(name, place) for name, place in ends.items())),
+        tuple(PartCharacteristic(name, "distance", ("one", name)) for name in ends),
+    )
+    pose, random = PartPose(np.eye(3), np.array([100.0, 100.0, -500.0])), np.random.default_rng(3)
+    state, found = MachineState(gauge().artefact.points.machine, effects(MODELLED), np.zeros((1, 6))), []
+    for doubt in (warm(0.0), warm(0.5)):
+        machine = given_recording(state, gauge(), 1e-3, 20_000, doubt=doubt)
+        at = AtPose(plan, MeasurementConditions(replace(machine, noise=StatedNoise())), pose)
+        found.append(1e3 * at.errors(at.drawn(random, 20_000)))
+    certain, doubted = found
+    expected = np.hypot(certain.std(axis=0), 400 * 11.5e-6 * 0.5 * 1e3)
+    np.testing.assert_allclose(doubted.std(axis=0)[:3], expected[:3], rtol=0.02)
+    assert 0.98 < doubted.std(axis=0)[3] / expected[3] < 1.02 * np.sqrt(2)
+    np.testing.assert_allclose(doubted.mean(axis=0), certain.mean(axis=0), atol=0.1)
 
 
 @pytest.mark.parametrize("corrected", [True, False])

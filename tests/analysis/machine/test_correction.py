@@ -21,6 +21,7 @@ from cmm_uq.machine.physics.error_map import ErrorMap
 from cmm_uq.machine.physics.map_covariance import MapCovariance
 from cmm_uq.machine.physics.map_interpolation import ErrorMaps
 from cmm_uq.machine.physics.superposition import Superposition
+from cmm_uq.maths.inference.posterior import Doubt
 from tests.artefacts.simulated import SCALE, SQUARE, analysed
 
 TRAVEL = np.array([[0.0, 900.0], [0.0, 600.0], [-500.0, 0.0]])
@@ -138,3 +139,24 @@ def test_without_a_travel_there_is_no_map() -> None:
     artefact.points = replace(points, machine=replace(points.machine, travel_mm=np.full((3, 2), np.nan)))
     with pytest.raises(CmmUqError, match="the travel of axis x is needed"):
         field_map(replace(found.model, artefact=artefact), found.posterior, found.doubt, lambda points: artefact, 0)
+
+
+@pytest.mark.long
+def test_distances_by_a_map_are_in_doubt_by_what_the_gauge_expanded() -> None:
+    """5.75 ppm of all scales alike, besides what the example's own certificate leaves open: L·5.75 ppm in quadrature."""
+    found = analysed("step-gauge-simulated")
+    observe = partial(
+        kind_of(found.job).observing("reported"), found.job.facts.artefact, where=found.job.recording_path
+    )
+    expands = np.zeros((len(found.model.unknowns), 1))
+    expands[:3] = 5.75
+    warm = field_map(
+        found.model, found.posterior, Doubt((*found.doubt.carried, (expands, 0 * expands))), observe, 0
+    ).error_map
+    readings = np.array([[100.0, 100.0, -400.0], [700.0, 100.0, -400.0]])
+    u = []
+    for one in (mapped("step-gauge-simulated").error_map, warm):
+        assert one.covariance is not None
+        root = one.covariance.root(one, readings, chain=found.artefact.points.machine.chain)
+        u.append(float(one.covariance.of_distances(root, readings, (np.array([0]), np.array([1])))[0]))
+    assert u[1] == pytest.approx(np.hypot(u[0], 600 * 5.75e-6), rel=0.05)

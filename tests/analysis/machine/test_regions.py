@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.machine import regions as room
-from cmm_uq.analysis.machine.conditional import RecordedField
+from cmm_uq.analysis.machine.conditional import RecordedField, doubted_draws
 from cmm_uq.analysis.machine.regions import FactorRegions, factor_regions
 from cmm_uq.analysis.machine.state import Unmodelled
 from cmm_uq.artefacts import kind_of
@@ -123,8 +123,8 @@ def test_doubt_of_the_artefact_widens_a_factor_wherever_it_holds() -> None:
     """3 ppm on the first of two unknowns: √(4² + 3²) = 5. 200 000 draws."""
     draws = 4 * np.random.default_rng(1).standard_normal((200_000, 1))
     cause = (np.array([[3.0], [0.0]]), np.zeros((2, 1)))
-    assert room.doubted_draws(Doubt((cause,)), 2, np.array([0]), 0, draws).std() == pytest.approx(5.0, rel=0.01)
-    assert room.doubted_draws(Doubt(()), 2, np.array([0]), 0, draws) is draws
+    assert doubted_draws(Doubt((cause,)), 2, np.array([0]), 0, draws).std() == pytest.approx(5.0, rel=0.01)
+    assert doubted_draws(Doubt(()), 2, np.array([0]), 0, draws) is draws
 
 
 @pytest.mark.parametrize(("times", "denied"), [(3.0, False), (4.5, True)])

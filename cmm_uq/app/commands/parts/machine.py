@@ -20,7 +20,7 @@ from cmm_uq.analysis.machine.state import MachineState, machine_stated, with_bou
 from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.app.commands.certificates.verification import Verification, examine_certificate, verify_given
 from cmm_uq.app.commands.diagnose import screened_model
-from cmm_uq.app.commands.estimation import with_noise
+from cmm_uq.app.commands.estimation import doubt_of, with_noise
 from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.parts.drift import FILE as HISTORY, with_drift
 from cmm_uq.app.commands.reading import job_of, read_job
@@ -37,6 +37,7 @@ from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.source import sha256 as hashes
 from cmm_uq.jobs.tables.identification import COMPENSATED, MEASURED, SIMULATED
 from cmm_uq.jobs.tables.machine import stated_axes
+from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.maths.inference.draws import Draws
 
 _ORIGINS = {SIMULATED: say("simulated"), COMPENSATED: say("compensated")}
@@ -362,14 +363,16 @@ def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineStat
         return state, say("The calibration is of another sort than one by named errors: {apart}.", apart=apart), False
     try:
         model, _ = screened_model(job)
-        model, _, _ = with_noise(model)
+        model, estimate, _ = with_noise(model)
+        sigma = float(np.sqrt(np.mean(state.noise.usual_mm**2))) or estimate.least_squares.sigma_of_residuals
+        doubt = doubt_of(model, estimate, sigma, causes_of(model.artefact, job.circumstances))
         count, observe = int(model.used.sum()), kind_of(job).observing("the machine of a part")
         artefact, rows = model.artefact, model.artefact.rows[model.used, 0]  # with which repeats are one quantity
         place = np.column_stack([artefact.measurement[model.used], artefact.points.point[rows]])
         quantities = np.unique(place, axis=0)
         most = _MOST * count // max(len(quantities), 1)
         model = thin_out(model, partial(observe, job.facts.artefact, where=job.recording_path), seed, most)
-        together = given_recording(with_curves(state), model, seed=seed)
+        together = given_recording(with_curves(state), model, seed=seed, doubt=doubt)
     except CmmUqError as error:
         why = Verbatim(error.problem)
         told = say("The errors could not be drawn given the recording ({why}): {apart}.", why=why, apart=apart)

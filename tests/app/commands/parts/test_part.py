@@ -13,16 +13,19 @@ import numpy as np
 import pytest
 
 from cmm_uq import __version__
+from cmm_uq.analysis.machine.state import MachineState
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import plan_of, refuse_unfit
-from cmm_uq.app.commands.parts.machine import state_machine
+from cmm_uq.app.commands.parts.machine import _given, state_machine
 from cmm_uq.app.commands.parts.part import PartOptions, affordable, decide_limits, evaluate_part
+from cmm_uq.app.commands.reading import job_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
 from cmm_uq.jobs.part.job import TABLES
+from cmm_uq.machine.physics.catalogue import effects
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_certificate, by_results, plate_of, report, results_keys
 from tests.result_keys import PART_RESULTS
@@ -70,6 +73,32 @@ def test_a_certificate_is_verified_and_its_recording_conditions_the_errors() -> 
     assert standing.origin == "simulated"
     assert "150 days" in standing.drift
     assert not [one for one in plain().given.machine.unmodelled if one.effect.name == "rotation_x_x"]  # drawn together
+
+
+@pytest.mark.long
+def test_what_is_stated_to_be_in_doubt_at_the_calibration_is_in_the_machine_given_its_recording() -> None:
+    """0.5 K of a steel gauge are 5.75 ppm of every scale; nothing moves where that is declared negligible."""
+    folder = ROOT / "examples" / "step-gauge-simulated"
+    files = {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+    declared = b'temperature = { by = "the simulation", reason = "the gauge was simulated at 20 \xc2\xb0C" }\n'
+    assert declared in files["job.toml"]
+    stated = (
+        files["job.toml"]
+        .replace(declared, b"")
+        .replace(
+            b"[test_uncertainty.negligible]",
+            b"[test_uncertainty]\nu_temperature_k = 0.5\n[test_uncertainty.negligible]",
+        )
+    )
+    found = []
+    for toml in (files["job.toml"], stated):
+        job = job_of({**files, "job.toml": toml})
+        own = effects(job.facts.model.effects)
+        state = MachineState(job.points.machine, own, np.zeros((1, sum(len(one.coefficients) for one in own))))
+        machine, _, given = _given(state, job, 1)
+        assert given
+        found.append(machine.draws[:, :3].std(axis=0))
+    np.testing.assert_allclose(found[1], np.hypot(found[0], 5.75), rtol=0.03)
 
 
 @pytest.mark.long
