@@ -14,11 +14,14 @@ from cmm_uq.analysis.planning.candidates import FAINT, certified, cosines, gram,
 from cmm_uq.analysis.planning.set_up import SetUp, repeat_points
 from cmm_uq.analysis.planning.setting import PlannedNoise, Setting, uncorrelated, white_noise
 from cmm_uq.base.points import Floats
+from cmm_uq.jobs.tables.conformity import Circumstances
 from cmm_uq.machine.model import RecordingModel
+from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.linear_model import RANK_TOLERANCE, LeastSquares, LinearModel, Unknown, reached, solve
 from cmm_uq.maths.inference.noise import Components, Sizes
+from cmm_uq.maths.inference.posterior import Doubt, gain
 
 _ROUNDING, _ZERO = 1e-9, 1e-8
 COMPARED = 10  # repeats that are compared, or one more than the plan has
@@ -32,13 +35,19 @@ class ExpectedUncertainty:
     with_prior: Floats  # the same when what physics allows is used too
 
 
-def expected_uncertainty(model: RecordingModel, noise: PlannedNoise) -> ExpectedUncertainty:
+def expected_uncertainty(
+    model: RecordingModel, noise: PlannedNoise, stated: Circumstances | None = None
+) -> ExpectedUncertainty:
+    """``stated``: what will be in doubt of the artefact, which no scatter shows; ``None``: nothing."""
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     linear, components = model.linearised(values), noise.components(model, values)
     sizes, weight = noise.spread(components)
+    causes = () if stated is None else causes_of(model.artefact, stated)
+    doubt = Doubt.of(causes, gain(linear, noise.white.coordinate)) if causes else Doubt(())
+    doubted = np.sqrt([doubt.variance(one) for one in np.eye(len(values))])
     with np.errstate(divide="ignore"):  # geometric means (k,) of values (w, k), infinite where one is
         return ExpectedUncertainty(*(
-            np.asarray(np.exp(weight @ np.log(each)) if len(weight) > 1 else each[0])
+            np.hypot(np.exp(weight @ np.log(each)) if len(weight) > 1 else each[0], doubted)
             for each in uncertainties(linear, components, sizes)
         ))  # fmt: skip
 
@@ -133,7 +142,7 @@ def compare_repeats(setting: Setting, placings: Sequence[SetUp]) -> RepeatsCompa
         sought = [i for i, unknown in enumerate(model.unknowns) if not unknown.known]
         # information of n + 1 set-ups is to that of n as if variances were n / (n + 1) of what they are
         lesser = noise.times(float(np.sqrt(n / (n + 1))))
-        now, later = (expected_uncertainty(model, each).u[sought] for each in (noise, lesser))
+        now, later = (expected_uncertainty(model, each, setting.circumstances).u[sought] for each in (noise, lesser))
         more = readings * (1 + 1 / n)
         rows.append(RepeatsRow(repeats, readings, minutes(n, readings), now, more, minutes(n + 1, more), later))
     unknowns = tuple(unknown for unknown in model.unknowns if not unknown.known)
@@ -178,9 +187,15 @@ class Identifiability:
 
 
 def identifiability(
-    model: RecordingModel, rivals: Sequence[Effect] = (), noise: PlannedNoise | None = None
+    model: RecordingModel,
+    rivals: Sequence[Effect] = (),
+    noise: PlannedNoise | None = None,
+    stated: Circumstances | None = None,
 ) -> Identifiability:
-    """What the set-ups determine of effects, and how rivals would show; ``noise`` ``None``: the model's white noise."""
+    """What the set-ups determine of effects, and how rivals would show; ``noise`` ``None``: the model's white noise.
+
+    ``stated``: as of :func:`expected_uncertainty`.
+    """
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     linear = model.linearised(values)
     k, free = len(linear.unknowns), linear.freedoms.dense()
@@ -193,8 +208,8 @@ def identifiability(
         placing=np.vstack([free, np.zeros((k + 1, free.shape[1]))]),
     ))  # fmt: skip
     white = white_noise(model) if noise is None else noise.white
-    under_white = expected_uncertainty(model, white)
-    under_noise = under_white if noise is None else expected_uncertainty(model, noise)
+    under_white = expected_uncertainty(model, white, stated)
+    under_noise = under_white if noise is None else expected_uncertainty(model, noise, stated)
     information = gram(model, values, noise) + certified(model.unknowns)
     names = [unknown.key[0] for unknown in model.unknowns]
     alike: list[Pair] = []

@@ -16,6 +16,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reports import noise_found, results_named
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.conformity import Circumstances
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
@@ -290,6 +291,7 @@ class Setting:
     sigma: float  # standard uncertainty of one coordinate, mm
     stated: float | None = None  # the same as the job states it; None where it does not
     noise: PlannedNoise | None = None  # with its set-up offsets; None where it is taken as white
+    circumstances: Circumstances | None = None  # what is stated to be in doubt of the artefact
 
     @classmethod
     def of(cls, job: Job, kind: Kind) -> Setting:
@@ -304,7 +306,7 @@ class Setting:
         return cls(
             facts.artefact, observe, planning, plan, Volume.of(job.points.machine, plan, recorded),
             effects(facts.model.effects, where="job.toml [model] effects"), noise.coordinate,
-            None if stated is None else stated * MICROMETRE, noise,
+            None if stated is None else stated * MICROMETRE, noise, job.circumstances,
         )  # fmt: skip
 
     @property

@@ -240,7 +240,7 @@ def _outlook(
     tell: Callable[[int, int], None],
 ) -> Outlook:  # fmt: skip
     model = setting.model(points)
-    found = design.identifiability(model, rivals, setting.noise)
+    found = design.identifiability(model, rivals, setting.noise, setting.circumstances)
     predicted: list[Power] = []
     if power and rivals:
         noise = setting.noise or white_noise(model)

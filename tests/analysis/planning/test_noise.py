@@ -9,14 +9,17 @@ import pytest
 from scipy import stats
 
 from cmm_uq.analysis.planning.candidates import gram, ready_plan, recording_information, set_up_information
-from cmm_uq.analysis.planning.identifiability import expected_uncertainty, identifiability
+from cmm_uq.analysis.planning.identifiability import compare_repeats, expected_uncertainty, identifiability
 from cmm_uq.analysis.planning.set_up import attitude_along, join
 from cmm_uq.analysis.planning.setting import PlannedNoise, Setting
+from cmm_uq.app.commands.estimation import doubt_of
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar import ballbar
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats
+from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty as Stated
 from cmm_uq.machine.model import RecordingModel
+from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.maths.inference.linear_model import solve
 from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, SIX, setting
 
@@ -163,3 +166,32 @@ def test_what_is_not_known_is_drawn_and_searched_with_an_offset_as_large_as_the_
     assert unknown.drawn.placing == pytest.approx(SIGMA)
     assert unknown.drawn.growth == 0.0
     assert replace(unknown, placing=0.0).drawn.placing == 0.0
+
+
+def test_what_will_be_in_doubt_of_the_artefact_is_expected_whatever_the_noise() -> None:
+    """Half a kelvin of a steel gauge: 5.75 ppm of each scale in quadrature, of few repeats and of many."""
+    chosen = setting(artefact_facts(kind="step_gauge", u_um=0.0), length_mm=820.0)
+    warm = Circumstances(cte_per_k=11.5e-6, uncertainty=Stated(u_temperature_k=0.5))
+    model, scales = model_of(chosen), [i for i, name in enumerate(SIX) if name.startswith("scale")]
+    for noise in (OFFSETS, PlannedNoise(READING, placing=None)):
+        alone, doubted = expected_uncertainty(model, noise), expected_uncertainty(model, noise, warm)
+        for one, other in ((alone.u, doubted.u), (alone.with_prior, doubted.with_prior)):
+            np.testing.assert_allclose(other[scales], np.hypot(one[scales], 5.75), rtol=1e-4)
+    found = identifiability(model, noise=OFFSETS, stated=warm).parameters
+    assert [one.u for one in found] == pytest.approx(expected_uncertainty(model, OFFSETS, warm).u[: len(SIX)])
+    worth = compare_repeats(replace(chosen, noise=OFFSETS, circumstances=warm), ready_plan(chosen)[1])
+    assert worth is not None
+    assert all(min(row.u[scales]) > 5.75 and min(row.u_more[scales]) > 5.75 for row in worth.rows)
+
+
+@pytest.mark.parametrize("kind", ["step_gauge", "plate", "gauge_blocks"])
+def test_what_is_expected_to_be_in_doubt_is_what_a_certificate_of_these_set_ups_says(kind: str) -> None:
+    facts, wishes = EVERY_KIND[kind]
+    stated = Stated(u_temperature_k=0.2, u_alignment_um=0.3, u_fixturing_um=0.1)
+    model, under = model_of(setting(facts, **wishes)), Circumstances(cte_per_k=11.5e-6, uncertainty=stated)
+    alone, doubted = (expected_uncertainty(model, OFFSETS, each).u for each in (None, under))
+    doubt = doubt_of(model, model.estimate(), SIGMA, causes_of(model.artefact, under))
+    seen = np.isfinite(alone)
+    assert seen.any()
+    expected = alone**2 + np.diag(doubt.covariance())
+    np.testing.assert_allclose(doubted[seen] ** 2, expected[seen], rtol=1e-6)

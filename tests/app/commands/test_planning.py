@@ -447,3 +447,22 @@ def test_a_plan_without_the_placings_of_b89_is_not_called_one(tmp_path: Path) ->
     assert len(plan.to_measure) == 6
     lacking = [text for condition in plan.conditions for text in condition.missing]
     assert lacking[0] == "14 of 20 positions: 6 distinct"
+
+
+def test_what_the_job_states_of_the_artefact_s_temperature_is_in_the_plan(tmp_path: Path) -> None:
+    """0.5 K of steel of the example's plan: 5.75 ppm of each scale, in quadrature.
+
+    Of Z, which lines across say as much of, a little more if the gauge is warm by itself in each of its positions.
+    """
+    toml = (ROOT / "examples" / "plan-step-gauge" / "job.toml").read_text(encoding="utf-8")
+    found = []
+    for name, more in (("as it is", ""), ("warm", "\n[test_uncertainty]\nu_temperature_k = 0.5\n")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "job.toml").write_text(toml + more, encoding="utf-8")
+        outlook = make_plan(read_job(tmp_path / name, recorded=False), power=False).start
+        assert outlook.identifiability is not None
+        u = {one.unknown.key[0]: one.u for one in outlook.identifiability.parameters}
+        found.append(np.array([u[f"scale_{axis}"] for axis in "xyz"], dtype=np.float64))
+    ratio = found[1] / np.hypot(found[0], 5.75)
+    np.testing.assert_allclose(ratio[:2], 1.0, rtol=1e-3)
+    assert 1.0 <= ratio[2] < 1.1
