@@ -323,13 +323,18 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = {
         "simulation.coefficients": ("", "Numbers that each virtual measurement draws."),
         "simulation.not_drawn[].effect": ("", "An error that could not be drawn."),
         "simulation.not_drawn[].lacks": ("", "Column that it needs."),
+        "reported.file": ("", "Report of another program that states the values, where no points were measured."),
+        "reported.program": ("", "What it is."),
+        "reported.values[].name": ("", "A characteristic whose value it states."),
+        "reported.values[].where": ("", "Where in it that stands."),
+        "reported.by_features": ("", "Characteristics that follow from features that it states."),
         "characteristics[].name": ("", "Name of the characteristic, as the job has it."),
         "characteristics[].what": ("", "What is asked for."),
         "characteristics[].features": ("", "Features that it is of."),
         "characteristics[].datums": ("", "Its datums."),
         "characteristics[].association": ("", "How its features are made of their points."),
         "characteristics[].unit": ("", "Of all values beside it: mm or °."),
-        "characteristics[].measured": (OWN, "Value of the measured points."),
+        "characteristics[].measured": (OWN, "Value of the measured points, or of the report."),
         "characteristics[].mean_error": (OWN, "What such measurements err by on average."),
         "characteristics[].value": (OWN, "What is stated, by `value_is`."),
         "characteristics[].stated_by": (
@@ -338,7 +343,8 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = {
             "`interval95`.",
         ),
         "characteristics[].value_is": (
-            "", "mean: measured less mean_error; median: of the values that such a measurement may come from, zero at least."),
+            "", "mean: measured less mean_error; median: of the values that such a measurement may come from, zero at least; "
+            "stated: the width that another program states."),
         "characteristics[].u": (OWN, "Standard uncertainty."),
         "characteristics[].U": (
             OWN,

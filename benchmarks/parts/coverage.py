@@ -13,7 +13,8 @@ Run: ``python -m benchmarks.parts.coverage [MACHINES] [free]``
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,7 +36,19 @@ SIGMA, DRAWS = 2e-3, 1000
 PLACES = np.array([[150.0, 100, -400], [400, 300, -200], [650, 150, -300]])
 
 
-def main(machines: int, *, free: bool = False) -> None:
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """A virtual machine with a hidden truth, and what its calibration says of it where a part is measured."""
+
+    plan: Plan
+    pose: PartPose
+    real: MachineState  # with its true errors
+    states: dict[str, MachineState]  # as (a), (b), (c) state it
+
+
+def calibrated(
+    machines: int, random: np.random.Generator, *, free: bool = False, ways: str = "abc"
+) -> Iterator[Calibrated]:
     job = cmm_uq.read(ROOT / "examples" / "iota-1102-20C")
     bars = job.points.select(job.points.measurement != 18)
     named = effects(MODELLED)
@@ -52,7 +65,6 @@ def main(machines: int, *, free: bool = False) -> None:
     features, characteristics = block()
     tip = Stylus("stylus", np.array([0.0, 0, -80.0]), 4.0, qualified_at_mm=np.array([100.0, 100, -400]))
     plan = Plan(features, characteristics, (tip,))
-    random, inside, u = np.random.default_rng(0), {name: [] for name in "abc"}, {name: [] for name in "abc"}
     for _ in range(machines):
         truth = sd * random.standard_normal(len(sd))
         length = designed.artefact.sizes[0]
@@ -66,12 +78,19 @@ def main(machines: int, *, free: bool = False) -> None:
         )
         pose = PartPose(np.eye(3), PLACES[random.integers(len(PLACES))] - bars.machine.origin_mm)
         real = MachineState(bars.machine, every, truth[None], noise, corrections=np.append(mean, np.zeros(len(sd) - 6)))
-        seen = AtPose(plan, MeasurementConditions(real), pose)
-        error = seen.errors(seen.drawn(random, 1), exact=True)[0]
         apart = replace(stated, unmodelled=unmodelled)
         states = {"a": stated, "b": apart, "c": given_recording(apart, model, SIGMA, 4000)}
-        for name, state in states.items():
-            at = AtPose(plan, MeasurementConditions(state), pose)
+        yield Calibrated(plan, pose, real, states)
+
+
+def main(machines: int, *, free: bool = False) -> None:
+    random, inside, u = np.random.default_rng(0), {name: [] for name in "abc"}, {name: [] for name in "abc"}
+    for one in calibrated(machines, random, free=free):
+        characteristics = one.plan.characteristics
+        seen = AtPose(one.plan, MeasurementConditions(one.real), one.pose)
+        error = seen.errors(seen.drawn(random, 1), exact=True)[0]
+        for name, state in one.states.items():
+            at = AtPose(one.plan, MeasurementConditions(state), one.pose)
             drawn = at.errors(at.drawn(random, DRAWS))
             low, high = np.quantile(drawn, [0.025, 0.975], axis=0)
             inside[name].append((low <= error) & (error <= high))

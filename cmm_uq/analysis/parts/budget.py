@@ -23,7 +23,7 @@ import numpy as np
 
 from cmm_uq.analysis.parts.causes.cause import Drawn, PartCause
 from cmm_uq.analysis.parts.causes.machine import MACHINE, NOISE, STYLUS
-from cmm_uq.analysis.parts.causes.surroundings import FIXTURE, FORM, OPERATOR, TEMPERATURE
+from cmm_uq.analysis.parts.causes.surroundings import FIXTURE, FORM, OPERATOR, ROUNDING, TEMPERATURE
 from cmm_uq.analysis.parts.plan import PartPose, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions, Virtual, in_parts
 from cmm_uq.base.errors import CmmUqError
@@ -67,6 +67,7 @@ FAMILIES: Mapping[str, Text] = {
     MACHINE: say("Errors of the machine"), NOISE: say("Noise of readings"), STYLUS: say("Stylus"),
     TEMPERATURE: say("Temperature"), FORM: say("Form of the part"), FIXTURE: say("Clamping"),
     OPERATOR: say("Operator and set-up"), PLACE: say("Place on the table"),
+    ROUNDING: say("Last digits of the report"),
 }  # fmt: skip
 _FACTORS: Mapping[str, Text] = {
     "noise: reading": say("Noise of a reading"), "noise: set-up": say("Noise that a set-up adds"),
@@ -90,6 +91,7 @@ _NAMED: Mapping[str, Callable[[Text], Text]] = {
     "form: form of ": lambda name: say("Form of {name}", name=name),
     "form: roughness of ": lambda name: say("Roughness of {name}", name=name),
     "operator: reproducibility of ": lambda name: say("Reproducibility of {name}", name=name),
+    "rounding: last digit of ": lambda name: say("Last digit of {name} in the report", name=name),
 }
 
 

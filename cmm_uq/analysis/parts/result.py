@@ -230,12 +230,14 @@ class StatedCharacteristic:
 
 
 def stated(
-    simulated: Simulated, measured: Floats | None = None, plan: Plan | None = None, errors: Floats | None = None
-) -> tuple[StatedCharacteristic, ...]:
+    simulated: Simulated, measured: Floats | None = None, plan: Plan | None = None, errors: Floats | None = None, *,
+    widths_alone: bool = False,
+) -> tuple[StatedCharacteristic, ...]:  # fmt: skip
     """Every characteristic, of its errors in virtual measurements and its measured values (c,).
 
     ``plan``, ``errors``: characteristics, and draws (N, c) of their errors, by which values and intervals of zones are those
-    of what is possible; without them they are those of the errors alone.
+    of what is possible; without them they are those of the errors alone. ``widths_alone``: whether of zones nothing but their
+    widths is known; errors are then as large as they can make them, to either side.
     """
     found = []
     zones = np.zeros(len(simulated.outputs), dtype=bool) if plan is None else never_negative(plan)
@@ -246,7 +248,10 @@ def stated(
         value = None if measured is None else at - error
         interval = at - high, at - low
         k = 0.5 * (high - low) / u if u else float("nan")
-        if value is not None and zones[i]:
+        if value is not None and zones[i] and errors is not None and widths_alone:
+            value, error, half = at, 0.0, float(np.quantile(np.abs(errors[:, i]), simulated.coverage))
+            interval, k = (max(0.0, at - half), at + half), half / u if u else k
+        elif value is not None and zones[i]:
             if errors is not None:
                 value = at - middle(errors[:, i])
                 interval = possible_interval(at - errors[:, i], simulated.coverage)

@@ -120,6 +120,8 @@ def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: in
     if asked:
         u = {one.name: MICROMETRE * one.u_operator_um + float(np.radians(one.u_operator_deg)) for one in asked}
         further.append(causes.reproducibility(plan, u))
+    if job.reported is not None and job.reported.rounding:
+        further.append(causes.reproducibility(plan, job.reported.rounding, causes.ROUNDING, "last digit"))
     poses, repeats = poses_of(job, places, machine.machine), job.facts.probing.repeats
     return MeasurementConditions(machine, poses, surroundings_of(job), forms_of(job), repeats, tuple(further))
 

@@ -30,6 +30,7 @@ from cmm_uq.certificate.sections.read_axes import evidence_data, readings_data, 
 from cmm_uq.certificate.sections.regions import families_data, priors_data
 from cmm_uq.jobs.part.feature import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
+from cmm_uq.jobs.part.values import Reported
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.verdicts import Verdicts, gravest
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated
@@ -255,9 +256,18 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
         "ways": [
             {"way": _plain(way.name), "u": list(map(_in, found.characteristics, way.u.tolist()))} for way in found.ways
         ],
-        "other_methods": methods_data(found.methods),
+        "other_methods": methods_data(found.methods), **_reported(found.job.reported),
         "warnings": [_plain(text) for text in found.warnings],
     }  # fmt: skip
+
+
+def _reported(said: Reported | None) -> dict[str, Any]:
+    """Of values that another program stated, where they stand; nothing of those of points."""
+    if said is None:
+        return {}
+    places = [{"name": name, "where": one.where[one.where.find(said.file) :]} for name, one in said.values.items()]
+    whose = {"file": said.file, "program": _plain(said.program)}
+    return {"reported": whose | {"values": places, "by_features": list(said.derived)}}
 
 
 def unit_of(one: CharacteristicFacts) -> str:
@@ -285,7 +295,7 @@ def standing_data(one: CertificateStatus) -> dict[str, Any]:
 
 def _characteristic(found: PartMeasurement, i: int) -> dict[str, Any]:
     facts, stated, judged = found.characteristics[i], found.stated[i], found.judged[i]
-    sided = bool(never_negative(found.plan)[i])
+    sided, known_as = bool(never_negative(found.plan)[i]), "stated" if found.job.reported else "median"
 
     def inside(value: float | None) -> float | None:
         return None if value is None else _in(facts, value)
@@ -294,7 +304,7 @@ def _characteristic(found: PartMeasurement, i: int) -> dict[str, Any]:
         "name": facts.name, "what": facts.what, "features": list(facts.features), "datums": list(facts.datums),
         "association": found.plan.characteristics[i].association, "unit": unit_of(facts),
         "measured": None if found.measured is None else _in(facts, float(found.measured[i])),
-        "mean_error": _in(facts, stated.error), "value": inside(stated.value), "value_is": "median" if sided else "mean",
+        "mean_error": _in(facts, stated.error), "value": inside(stated.value), "value_is": known_as if sided else "mean",
         "stated_by": "interval" if stated.value is not None and sided else "U",
         "u": _in(facts, stated.u), "U": _in(facts, stated.U), "k": stated.k if isfinite(stated.k) else None,
         "interval95": list(map(inside, stated.interval)), "worst_cause": found.budget.worst(facts.name),

@@ -171,7 +171,9 @@ def _particulars(found: PartMeasurement) -> tuple[doc.Facts, ...]:
 def results_section(found: PartMeasurement) -> Section:
     """Every characteristic with its value, if anything was measured, and its uncertainty."""
     measured = found.measured is not None
-    tables = (_table(part, measured=measured) for part in _parts(figures_of(found)))
+    tables = (
+        _table(part, measured=measured, reported=found.job.reported is not None) for part in _parts(figures_of(found))
+    )
     return section(say("Results"), None if measured else Paragraph(_UNMEASURED), *tables)
 
 
@@ -185,7 +187,7 @@ _UNMEASURED = say(
 )
 
 
-def _table(every: Sequence[CharacteristicFigures], *, measured: bool) -> Table | None:
+def _table(every: Sequence[CharacteristicFigures], *, measured: bool, reported: bool) -> Table | None:
     scale = every[0].scale
     heads = (
         Column(say("No.")), say("Characteristic"), *((Column(say("Value"), scale.value),) if measured else ()),
@@ -202,7 +204,10 @@ def _table(every: Sequence[CharacteristicFigures], *, measured: bool) -> Table |
         (True, say(
             "95 % interval: the shortest that holds 95 % of the virtual measurements. U = k · u is half of it, u the standard "
             "uncertainty; the value lies in the middle only where errors to both sides are alike.")),
-        (any(one.one_sided for one in every), say(
+        (any(one.one_sided for one in every) and reported, say(
+            "A form, orientation or location that another program states is within U of the true one at least as often, "
+            "however the part deviates; its interval is never below zero.")),
+        (any(one.one_sided for one in every) and not reported, say(
             "A measured form, orientation or location has one side and is stated by its interval, which is never below "
             "zero and as likely to hold a small width as a large one (Feldman and Cousins, 1998); its value is the median.")),
         (True, say("All other values are stated less the mean of their errors.") if every[0].stated.value is not None else

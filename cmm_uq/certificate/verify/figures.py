@@ -184,7 +184,7 @@ def check_part_figures(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> 
 def _characteristic(each: Mapping[str, Any]) -> Iterator[Wrong]:
     u, expanded, (low, high) = each["u"], each["U"], each["interval95"]
     value, measured = each["value"], each["measured"]
-    median = each.get("value_is") == "median"  # before 0.9.0 no value was
+    median = each.get("value_is") in ("median", "stated")  # before 0.9.0 no value was
     zone, most = is_zone(each), max(abs(low), abs(high), abs(each["mean_error"]), abs(measured or 0.0))
     if u < 0:
         yield "u", "is an uncertainty below zero", u, ""

@@ -212,6 +212,7 @@ class FeatureFacts(Modelled):
     points_mm: Annotated[list[Triple], Field(max_length=LISTED.most)] | None = None
     """In place of a pattern, its contact points on the nominal surface; normals follow from it."""
     form: FormFacts | None = key(None, "Its own form and roughness, in place of `[form]`.")
+    reported_as: str = key("", "Its name in the report that `[recording] values` names, where that is another.")
 
     @field_validator("direction", "along", "normal")
     @classmethod
@@ -345,6 +346,7 @@ class CharacteristicFacts(Modelled):
     u_operator_deg: Annotated[float, Field(ge=0, le=10)] = key(0.0, "The same of an angle, °.")
     association: Association | None = None
     """How its features are made of their points, where not as they say themselves."""
+    reported_as: str = key("", "Its name in the report that `[recording] values` names: `LOC1.D` of PC-DMIS.")
 
     @property
     def asks(self) -> Asks:

@@ -20,6 +20,7 @@ from cmm_uq.jobs.part.checks import check_names, check_plan
 from cmm_uq.jobs.part.probed import Probed, probed
 from cmm_uq.jobs.part.readings import OtherReadings, measured_points, other_readings
 from cmm_uq.jobs.part.tables import MachineStateFacts, PartFile, Places
+from cmm_uq.jobs.part.values import Reported, reported_values
 from cmm_uq.jobs.reading import PART
 from cmm_uq.jobs.source import RESULTS, FilesInFolder, FilesInMemory, JobFiles
 from cmm_uq.jobs.tables.identification import COMPENSATED, SIMULATED, check_examples, check_mark
@@ -42,6 +43,7 @@ class PartJob:
     measured: Floats | None = None
     stated_by: tuple[str, ...] = ()  # names of those of the inputs that state the machine
     others: OtherReadings = field(default_factory=OtherReadings)  # recordings of other methods
+    reported: Reported | None = None  # in place of measured points, what the report of another program says
 
     @property
     def machine_files(self) -> Mapping[str, bytes]:
@@ -138,13 +140,17 @@ def _read(source: JobFiles, *, machine: bool) -> PartJob:
         check_mark(folder, facts.job.origin, inputs[name], str(folder / name))
         return inputs[name], str(folder / name)
 
-    measured = None
+    measured, reported = None, None
     if facts.recording is not None:
         with wrong.going_on():
-            measured = measured_points(*recorded(facts.recording.file), features)
+            if facts.recording.values is None:
+                measured = measured_points(*recorded(facts.recording.recorded), features)
+            else:
+                said = facts.recording.values
+                reported = reported_values(*recorded(said), said, facts, places)
     others = other_readings(facts, features, places, recorded, wrong)
     wrong.refuse()
-    return PartJob(folder, facts, tuple(features), inputs, measured, stated_by, others)
+    return PartJob(folder, facts, tuple(features), inputs, measured, stated_by, others, reported)
 
 
 _GRID = {"pattern": "grid", "rows": 3, "columns": 4, "margin_mm": 5.0}

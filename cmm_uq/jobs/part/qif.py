@@ -31,7 +31,7 @@ _WHATS: Mapping[str, What] = {
     "Coaxiality": "coaxiality", "CircularRunout": "circular_runout", "TotalRunout": "total_runout",
     "DistanceBetween": "distance", "AngleBetween": "angle",
 }  # fmt: skip
-_ASSOCIATIONS = {
+ASSOCIATIONS = {
     "LEASTSQUARES": "least_squares", "MINMAX": "minimum_zone", "MAXINSCRIBED": "maximum_inscribed",
     "MINCIRCUMSCRIBED": "minimum_circumscribed",
 }  # fmt: skip
@@ -159,9 +159,9 @@ class _Document:
             raise NotUnderstoodError("has a list of points of its own (PointList), which is not read")
         found: Facts = {"name": name, "kind": sort.lower()}
         if (algorithm := inside(nominal, "SubstituteFeatureAlgorithm")) is not None:
-            if (word := whole_text(algorithm)) not in _ASSOCIATIONS:
+            if (word := whole_text(algorithm)) not in ASSOCIATIONS:
                 raise NotUnderstoodError(f"is to be associated by {word}, which is not read")
-            found["association"] = _ASSOCIATIONS[word]
+            found["association"] = ASSOCIATIONS[word]
         found |= self._nominal(sort.lower(), nominal, definition, place)
         self._between_its_ends(found, nominal, definition)
         self.names[item.get("id", "")] = self.of_nominal[nominal.get("id", "")] = name

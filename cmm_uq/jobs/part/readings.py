@@ -24,14 +24,14 @@ ReadFile = Callable[[str], tuple[bytes, str]]  # bytes of a file that the job na
 
 
 @dataclass(frozen=True, eq=False)
-class _Recording:
+class Recording:
     """A table as it was recorded, and its name in messages."""
 
     cells: Cells
     where: str
 
     @classmethod
-    def of(cls, content: bytes, where: str) -> _Recording:
+    def of(cls, content: bytes, where: str) -> Recording:
         cells = cells_of(content, where, "Save it as CSV in UTF-8, with commas between the columns")
         short = next((i for i, row in enumerate(cells.rows) if len(row) != len(cells.header)), None)
         if short is not None:
@@ -40,7 +40,7 @@ class _Recording:
         return cls(cells, where)
 
     @classmethod
-    def of_repeats(cls, content: bytes, where: str) -> _Recording:
+    def of_repeats(cls, content: bytes, where: str) -> Recording:
         found = cls.of(content, where)
         if not found.cells.rows:
             raise CmmUqError("has no rows", where=where, fix="Record the measurements")
@@ -80,7 +80,7 @@ class _Recording:
 
 def measured_points(content: bytes, where: str, features: Sequence[Probed]) -> Floats:
     """(n, 3) measured points in the order of the plan's, mm."""
-    table = _Recording.of(content, where)
+    table = Recording.of(content, where)
     for name in COLUMNS:
         if name not in table.cells.header:
             fix = f"Its columns are {', '.join(COLUMNS)}, with commas between them"
@@ -89,7 +89,7 @@ def measured_points(content: bytes, where: str, features: Sequence[Probed]) -> F
     return _in_order(table, list(range(len(number))), number, where, features)
 
 
-def _in_order(table: _Recording, some: Sequence[int], number: Floats, where: str, features: Sequence[Probed]) -> Floats:
+def _in_order(table: Recording, some: Sequence[int], number: Floats, where: str, features: Sequence[Probed]) -> Floats:
     """(n, 3) points in the order of the plan's, of some rows, which name feature and point; ``number``: of all rows."""
     known, names = {one.facts.name: one for one in features}, table.texts("feature")
     rows: dict[tuple[str, int], int] = {}
@@ -122,10 +122,15 @@ def _in_order(table: _Recording, some: Sequence[int], number: Floats, where: str
     return np.asarray(number[[rows[key] for key in planned_rows], 1:])
 
 
+def in_another_unit(factor: float) -> str | None:
+    """The unit in which figures are that are so many times those in mm; ``None`` where the factor is of none."""
+    return next((words for each, words in _IN_UNITS.items() if abs(factor / each - 1) < 0.01), None)
+
+
 def _refuse_another_unit(planned: Floats, found: Floats, where: str) -> None:
     """Say it once where all points (n, 3) are off by the factor of another unit, about the part's origin."""
     factor = float(np.sum(found * planned)) / (float(np.sum(planned**2)) or 1.0)
-    unit = next((words for each, words in _IN_UNITS.items() if abs(factor / each - 1) < 0.01), None)
+    unit = in_another_unit(factor)
     if unit and np.linalg.norm(found / factor - planned, axis=1).max() <= FAR_MM:
         raise CmmUqError(f"the points are {factor:.4g} times those of the plan, as if they were {unit}", where=where,
                          fix="Give them in mm in the frame of the part")  # fmt: skip
@@ -223,7 +228,7 @@ def _repeats(
 
     ``needed``: characteristics whose values must be there; ``None`` takes those that are.
     """
-    table = _Recording.of_repeats(content, where)
+    table = Recording.of_repeats(content, where)
     by_points = "feature" in table.cells.header
     if not by_points and "characteristic" not in table.cells.header:
         raise CmmUqError("has neither a column 'characteristic' nor 'feature'", where=where,
@@ -242,7 +247,7 @@ def _repeats(
 
 
 def _values(
-    table: _Recording, keys: Sequence[tuple[int, int]], group: str, facts: PartFile, needed: Sequence[str] | None
+    table: Recording, keys: Sequence[tuple[int, int]], group: str, facts: PartFile, needed: Sequence[str] | None
 ) -> dict[str, Floats]:
     """(n,) by characteristic, mm or rad, in the order of the measurements."""
     asked = {one.name: one for one in facts.characteristic}
@@ -272,7 +277,7 @@ def _values(
     }
 
 
-def _value(table: _Recording, row: int, *, angle: bool) -> float:
+def _value(table: Recording, row: int, *, angle: bool) -> float:
     """A value of a row, mm or rad."""
     column, header = _VALUES[angle], table.cells.header
     if column not in header:
@@ -285,7 +290,7 @@ def _value(table: _Recording, row: int, *, angle: bool) -> float:
 
 
 def _standard(content: bytes, where: str, column: str, calibrated: float) -> StandardReadings:
-    table = _Recording.of_repeats(content, where)
+    table = Recording.of_repeats(content, where)
     keys, values = table.keys("orientation"), table.numbers(column)
     first, wrong = {key: row for row, key in reversed(list(enumerate(keys)))}, Gathered()
     for row, (key, value) in enumerate(zip(keys, values.tolist(), strict=True)):

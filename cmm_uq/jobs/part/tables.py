@@ -183,11 +183,24 @@ class DecisionFacts(JobTable):
 
 
 class MeasuredFacts(JobTable):
-    """``[recording]``: the points as they were measured."""
+    """``[recording]``: the points as they were measured, or the values that another program found of them."""
 
-    file: Name
+    file: Name | None = None
     """CSV with the columns `feature`, `point` (1, 2, … in the order of the plan), `x_mm`, `y_mm`, `z_mm`: contact points in
     the frame of the part, the tip's radius taken off."""
+    values: Name | None = None
+    """In place of points, the report of another program: results of QIF, a PC-DMIS text report, actual features of DMIS, or
+    CSV with the columns `characteristic` and `value_mm` or `value_deg`, or `feature` with `x_mm`, `y_mm`, `z_mm`, `i`, `j`,
+    `k`, `diameter_mm`."""
+
+    def problems(self) -> Iterator[str]:
+        if (self.file is None) == (self.values is None):
+            yield "give either file with the measured points, or values with the report of another program"
+
+    @property
+    def recorded(self) -> str:
+        """The file of points or of values."""
+        return self.file or self.values or ""
 
 
 Seconds = Annotated[float, Field(gt=0, le=1e6)]

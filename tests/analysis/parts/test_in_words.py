@@ -11,6 +11,7 @@ import pytest
 from cmm_uq.analysis.machine.state import StatedNoise
 from cmm_uq.analysis.parts import budget as in_words, plan
 from cmm_uq.analysis.parts.budget import PLACE, variance_shares
+from cmm_uq.analysis.parts.reported import measured_of
 from cmm_uq.analysis.parts.setup import circumstances_of, plan_of
 from cmm_uq.analysis.parts.virtual import Virtual
 from cmm_uq.base.messages import Message, Verbatim, say
@@ -35,11 +36,13 @@ def test_every_line_of_a_budget_has_words() -> None:
     }  # fmt: skip
     stylus = [{**one, "u_offset_um": [0.1, 0.1, 0.1]} for one in TABLES["stylus"]]
     characteristic = [{**TABLES["characteristic"][0], "u_operator_um": 1.0}, *TABLES["characteristic"][1:]]
-    job = plate(
-        environment=environment, stylus=stylus, characteristic=characteristic, placing={"u_origin_mm": [9.0, 9.0, 0.0],
+    values = b"characteristic,value_mm\n1,30.00\n2,0.01\n3,0.01\n4,0.01\n5,40.00\n"
+    job = measured_of(plate(
+        {"report.csv": values}, recording={"values": "report.csv"}, environment=environment,
+        stylus=stylus, characteristic=characteristic, placing={"u_origin_mm": [9.0, 9.0, 0.0],
         "origin_mm": [300.0, 450.0, -500.0], "u_fixture_um": 0.5},
         probing={"u_operator_um": 1.0, "seconds_per_point": 5.0},
-    )  # fmt: skip
+    )).job  # fmt: skip
     plan = plan_of(job)
     noise = StatedNoise(np.full(3, 1e-3), placing_mm=1e-3, growth_mm=1e-3, longest_mm=500.0, slow_mm=1e-3)
     given = circumstances_of(job, replace(machine(), noise=noise), plan, 2)

@@ -27,7 +27,7 @@ from cmm_uq.base.units import METRE, MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.part.feature import ORIENTED
 from cmm_uq.maths.geometry.feature import frame_about
 
-FORM, TEMPERATURE, FIXTURE, OPERATOR = "form", "temperature", "fixture", "operator"
+FORM, TEMPERATURE, FIXTURE, OPERATOR, ROUNDING = "form", "temperature", "fixture", "operator", "rounding"
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,10 +263,12 @@ class Reproducibility(PartCause):
         return np.zeros((len(coefficients), len(range(*rows.indices(self.count))), 3))
 
 
-def reproducibility(plan: Plan, u: Mapping[str, float]) -> Reproducibility:
+def reproducibility(
+    plan: Plan, u: Mapping[str, float], cause: str = OPERATOR, line: str = "reproducibility"
+) -> Reproducibility:
     """A standard uncertainty of some characteristics, each on its own.
 
-    ``u``: by name of the characteristic, mm or rad.
+    ``u``: by name of the characteristic, mm or rad. ``line``: how its lines of the budget begin.
     """
     names = [one.name for one in plan.characteristics]
     for name in u:
@@ -275,8 +277,8 @@ def reproducibility(plan: Plan, u: Mapping[str, float]) -> Reproducibility:
             raise CmmUqError(f"there is no characteristic {name!r}", where="reproducibility", fix=fix)
     adds = np.zeros((len(u), len(names)))
     adds[np.arange(len(u)), [names.index(name) for name in u]] = 1.0
-    factors, draw = tuple(f"reproducibility of {name}" for name in u), normal(list(u.values()))
-    return Reproducibility(name=OPERATOR, factors=factors, draw=draw, adds=adds, count=len(plan.points))
+    factors, draw = tuple(f"{line} of {name}" for name in u), normal(list(u.values()))
+    return Reproducibility(name=cause, factors=factors, draw=draw, adds=adds, count=len(plan.points))
 
 
 def of_points(plan: Plan, u_um: float) -> PointScatter:

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cmm_uq.analysis.parts.result import evaluated
+from cmm_uq.analysis.parts.reported import measured_of
 from cmm_uq.analysis.parts.setup import plan_of
 from cmm_uq.app.commands.certificates import verification
 from cmm_uq.app.commands.files import Stage
@@ -75,12 +75,12 @@ def _check_job(inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], file: st
         inquiry.wrong("inputs", file, "job.inputs_sha256", "names other files than the job",
                       sorted(data["job"]["inputs_sha256"]), sorted(job.inputs))  # fmt: skip
     try:
-        plan = plan_of(job)
-        measured = None if job.measured is None else evaluated(plan, job.measured)
+        of_part = measured_of(job)
+        plan = plan_of(of_part.job)
     except CmmUqError as error:
         inquiry.wrong("inputs", file, "", f"is of a job that cannot be evaluated: {error}")
         return
-    check_part_job(inquiry, job, plan, measured, data, file)
+    check_part_job(inquiry, of_part.job, plan, of_part.values, data, file)
 
 
 def _check_machine(

@@ -137,6 +137,7 @@ def _checked(name: str, job: Job | None, path: Path, wrong: Gathered) -> JobChec
 def _check_part(folder: Path, path: Path) -> JobCheck:
     """The job of a part: what its readers refuse, and that its figures are an example's."""
     from cmm_uq.analysis.parts.methods.of_job import lacking
+    from cmm_uq.analysis.parts.reported import measured_of
     from cmm_uq.analysis.parts.setup import refuse_out_of_reach, refuse_unfit
     from cmm_uq.app.commands.parts.machine import refuse_machine
 
@@ -144,8 +145,10 @@ def _check_part(folder: Path, path: Path) -> JobCheck:
     with wrong.going_on():
         job = read_part(folder, machine=False)
         refuse_unfit(job)
+        told_of_values = measured_of(job).warnings
         told = ((str.__str__(text), f"[{table}]", fix) for table, text, fix in lacking(job))
         warnings += [Problem(text, str(path), key=key, fix=fix) for text, key, fix in told]
+        warnings += [Problem(str.__str__(text), str(path), key="[recording] values") for text in told_of_values]
     if job is not None:
         with wrong.going_on():
             whole = read_part(folder)  # with the files that state the machine

@@ -8,8 +8,10 @@ from __future__ import annotations
 import datetime as dt
 import json
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from pydantic import ValidationError
@@ -169,7 +171,19 @@ def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]: 
     marked |= set() if drawing.styli else {f"stylus.{key}" for key in whole["stylus"][0]}
     marked |= {"alignment.best_fit"}
     opened = {name: set(keys) for name, keys in drawing.open_keys.items()}
-    return _files(_with(whole, said, id), marked - _given_keys(said), opened, drawing.unknown)
+    tables, beside = _with_results(_with(whole, said, id), content, path)
+    return {**_files(tables, marked - _given_keys(said), opened, drawing.unknown, beside), **beside}
+
+
+def _with_results(tables: dict[str, Any], content: bytes, path: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """With the values that a QIF document has beside its plan, of one part, and the file that has them."""
+    named = f"report{path.suffix.lower()}"
+    if b"CharacteristicMeasurement" in content and "recording" not in tables:
+        whole = {**tables, "recording": {"values": named}}
+        with suppress(CmmUqError):
+            part_of({"job.toml": as_toml(whole, "job.toml"), named: content}, machine=False)
+            return whole, {named: content}
+    return tables, {}
 
 
 def _aligned(drawing: Drawing) -> dict[str, Any]:
@@ -198,9 +212,9 @@ def _with(tables: dict[str, Any], given: Tables, id: str) -> dict[str, Any]:  # 
 
 def _files(
     tables: Mapping[str, Any], marked: Collection[str], opened: Mapping[str, Collection[str]],
-    left_out: Collection[NotUnderstood] = (),
+    left_out: Collection[NotUnderstood] = (), beside: Mapping[str, bytes] = MappingProxyType({}),
 ) -> dict[str, bytes]:  # fmt: skip
-    part_of({"job.toml": as_toml(tables, "job.toml")}, machine=False)
+    part_of({"job.toml": as_toml(tables, "job.toml"), **beside}, machine=False)
     return {
         "job.toml": _text(tables, marked, opened).encode(), README: _readme(left_out).encode(),
         SCHEMA: shipped(PART).encode(),
@@ -271,7 +285,8 @@ def _readme(left_out: Collection[NotUnderstood]) -> str:
         f"- **The figures marked {EXAMPLE} are nobody's.** Put in your own, then take the marks away, and "
         '`origin = "simulated"`.',
         "- `cmm-uq check .` says what is missing or wrong; `cmm-uq part .` gives the uncertainties.",
-        "- Points that were measured make values and decisions of them: name their file in `[recording]`.",
+        "- Points that were measured make values and decisions of them: name their file in `[recording]`, or the report of "
+        "another program that has values.",
     ]  # fmt: skip
     if left_out:
         lines += ["", "What was not understood of the plan, and is not measured:", ""]

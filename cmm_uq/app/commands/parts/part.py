@@ -9,13 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.decision import PriorKnowledge
 from cmm_uq.analysis.conformity.limits import LimitDecision, Limits, judge
 from cmm_uq.analysis.parts.budget import DRAWS as SHARED, point_errors, variance_shares, ways
+from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.methods.of_job import compare_methods, methods_of
 from cmm_uq.analysis.parts.plan import Plan
-from cmm_uq.analysis.parts.result import conforming, evaluated, middle, stated, within_bounds
+from cmm_uq.analysis.parts.reported import measured_of
+from cmm_uq.analysis.parts.result import conforming, middle, stated, within_bounds
 from cmm_uq.analysis.parts.setup import (
     PLACES,
     circumstances_of,
@@ -84,9 +87,10 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
     options = options or PartOptions()
     seed = options.seed
     refuse_unfit(job)
+    of_part = measured_of(job)
+    job, measured = of_part.job, of_part.values
     plan = plan_of(job)
     trials = affordable(TRIALS, plan) if options.trials is None else options.trials
-    measured = None if job.measured is None else evaluated(plan, job.measured)
     methods = methods_of(job, plan, measured)
 
     # the machine: its certificate verified, its errors on the day of the measurement
@@ -100,7 +104,8 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
     circumstances = replace(circumstances_of(job, machine.state, plan, PLACES), measured=job.measured)
     stage("Preparing the virtual measurements", 0.25)
     virtual = Virtual(plan, circumstances)
-    simulated, errors = _simulate(virtual, trials, options.digits, seed, stage)
+    either_side = never_negative(plan) & (job.reported is not None)
+    simulated, errors = _simulate(virtual, trials, options.digits, seed, stage, either_side)
 
     # where the uncertainty comes from, and what would reduce it
     stage("Shares of each cause", 0.6)
@@ -124,7 +129,7 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
 
     # values, limits, decisions (JCGM 106)
     stage("Decisions", 0.85)
-    characteristics = stated(simulated, measured, plan, errors)
+    characteristics = stated(simulated, measured, plan, errors, widths_alone=job.reported is not None)
     decisions = decide_limits(job, plan, errors, measured)
     together = None if measured is None else _together(conforming(plan, errors, measured)[1], decisions)
     x, y, z = origin_of(job, machine.state.machine).tolist()
@@ -132,7 +137,7 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
         job, plan, circumstances, virtual, simulated, characteristics, measured, shares, unseen,
         further, decisions, together, tuple(reductions),
         point_errors(virtual, seed=seed), (x, y, z), machine.standing, compare_methods(characteristics, shares, methods),
-        digits=options.digits, seed=seed, asked=trials, warnings=machine.warnings,
+        digits=options.digits, seed=seed, asked=trials, warnings=(*of_part.warnings, *machine.warnings),
         files=files, influence=influence,
     )  # fmt: skip
 
@@ -154,13 +159,20 @@ def _together(together: float, decisions: Iterable[LimitDecision | None]) -> flo
     return within_bounds(together, np.array(each)) if each else None
 
 
-def _simulate(virtual: Virtual, trials: int, digits: int | None, seed: int, stage: Stage) -> tuple[Simulated, Floats]:
-    """Figures of the errors, and (N, c) errors of the first of the virtual measurements that they come from."""
+def _simulate(
+    virtual: Virtual, trials: int, digits: int | None, seed: int, stage: Stage, either_side: NDArray[np.bool_]
+) -> tuple[Simulated, Floats]:
+    """Figures of the errors, and (N, c) errors of the first of the virtual measurements that they come from.
+
+    ``either_side``: (c,) which errors are sizes that may have made the value larger or smaller.
+    """
     blocks, made = list[Floats](), 0
 
     def draw(random: np.random.Generator, n: int) -> Floats:
         nonlocal made
         errors = virtual.errors(random, n)
+        if either_side.any():
+            errors[:, either_side] *= random.choice((-1.0, 1.0), (n, np.count_nonzero(either_side)))
         if made < KEPT:
             blocks.append(errors[: KEPT - made].copy())
         made += n
@@ -185,13 +197,18 @@ def decide_limits(
     ``errors``: (N, c) of virtual measurements. ``measured``: (c,) values; ``None`` where nothing was measured.
     """
     found: list[LimitDecision | None] = []
+    sides = never_negative(plan) & (job.reported is not None)
     for i, (facts, one) in enumerate(zip(job.facts.characteristic, plan.characteristics, strict=True)):
         if one.lower is None and one.upper is None:
             found.append(None)
             continue
         zone = facts.asks.limits == "zone"
         mean = middle(errors[:, i]) if zone and measured is not None else float(errors[:, i].mean())
-        about = errors[:, i] - mean
+        if sides[i]:  # the larger half, to either side: beyond the median each tail is that of all sizes
+            larger, mean = np.sort(np.abs(errors[:, i]))[len(errors) // 2 :], 0.0
+            about = np.concatenate([larger, -larger])
+        else:
+            about = errors[:, i] - mean
         if measured is None and zone:
             size = float(np.sqrt(np.mean(errors[:, i] ** 2)))
             about = size * np.random.default_rng(0).standard_normal(len(errors))
@@ -278,7 +295,7 @@ def contents_of(found: PartMeasurement, stage: Stage = silent, *, finished: Fini
     stage("Rendering", 0.92)
     page = render_html(document).encode()
     facts, standing = job.facts, found.standing
-    recording = "" if facts.recording is None else facts.recording.file
+    recording = "" if facts.recording is None else facts.recording.recorded
     behind = provenance_of(
         Behind(COMMAND, facts.job, facts.laboratory, facts.job.origin, job.inputs, recording,
                (standing.number, standing.laboratory)), results, {html: page, RESULTS: data},

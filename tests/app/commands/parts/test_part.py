@@ -239,6 +239,7 @@ def test_every_key_of_results_is_told_in_the_reference_and_no_other() -> None:
         "machine.bounds[]",
         "machine.axes[]",
         "other_methods.",
+        "reported.",
     )
     assert {key for key in told - there if not key.startswith(sometimes)} == set()
 

@@ -1,0 +1,158 @@
+"""Text reports of PC-DMIS (Hexagon): the places of features, and every dimension with what was measured."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import say
+from cmm_uq.jobs.importing.format import Fact, ImportKeys, Sheet, sheets_of
+from cmm_uq.jobs.importing.reports import AXES, WITH_DIRECTION, ReportedPlace, TextReport, facts_of
+
+_HEADING = re.compile(r"^[ \t]*AX[ \t]+(?=.*\bMEAS\b)", re.MULTILINE)
+_LOCATED = re.compile(r"\s*(?P<what>[A-Z0-9 ]*?)\s*\bOF\s+(?P<sort>[A-Z]+)\s+(?P<of>\S+)", re.IGNORECASE)
+_UNITS = re.compile(r"UNITS\s*=\s*(\w+)", re.IGNORECASE)
+_DIMENSION = re.compile(r"^\s*(?:DIM\s|\S.*=\s.*UNITS\s*=)", re.IGNORECASE)
+_FIGURES = re.compile(r"^\s*(?P<axis>[A-Z][A-Z0-9]?)\s+(?:(?:RFS|MMC|LMC)\s+)?[-+\d.]", re.IGNORECASE)
+_CONDITION = re.compile(r"^\s*[A-Z]+\s+(RFS|MMC|LMC)\s", re.IGNORECASE)
+_NUMBER = re.compile(r"(?<!\S)(?:[-+]?\d*[.,]?\d+|[-+]?\d+[^\s\d.,]{1,3}\d+'\d+(?:[.,]\d+)?\")(?!\S)")
+
+
+class PcDmis(TextReport):
+    """The places of features, as ``LOCATION OF SPHERE SPH1`` with its lines X, Y and Z.
+
+    The figures stand below the words of a heading line (``AX NOMINAL +TOL -TOL MEAS DEV OUTTOL``), flushed right; which are
+    there and in which order is an option of the program, so each figure belongs to the word whose end is nearest to its own.
+    """
+
+    name = "pc-dmis"
+    title = say("PC-DMIS text report")
+    shows = (_HEADING, re.compile(r"^[ \t]*DIM\s|UNITS\s*=", re.MULTILINE))
+
+    def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
+        every, others = _places(lines, where)
+        located = {place.sort.upper() for place in every if len(place.xyz) == len(AXES)}
+        places = [place for place in every if place.xyz and place.sort.upper() in located]
+        odd = [place for place in places or every if 0 < len(place.xyz) < len(AXES)]
+        if odd:
+            missing = next(axis for axis in AXES if axis not in odd[0].xyz)
+            problem = f"{odd[0].dimension}, the place of {odd[0].feature}, has no {missing}"
+            fix = "Report X, Y and Z of every feature; if it is the last one, the file was cut off"
+            raise CmmUqError(problem, where=f"{where} line {odd[0].line}", fix=fix)
+        if not places:
+            problem = f"reports {others + len(every)} dimensions and no place of a feature by X, Y and Z"
+            raise CmmUqError(problem, where=where, fix="Report the location of every ball or point with its X, Y and Z")
+        units = {place.unit.upper(): place for place in places}
+        if len(units) > 1:
+            first, second = islice(units.values(), 2)
+            raise CmmUqError(f"{first.dimension} is in {first.unit} and {second.dimension} in {second.unit}",
+                             where=f"{where} line {second.line}", fix="Report all dimensions in one unit")  # fmt: skip
+        unused = others + len(every) - len(places)
+        facts = facts_of(encoding, "dimensions_not_used", say("Dimensions that are no place"), unused)
+        return sheets_of([place.row for place in places], WITH_DIRECTION[:4], unit=places[0].unit, facts=facts)
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A dimension that a PC-DMIS report prints."""
+
+    name: str
+    text: str  # what it is of, after its name
+    line: int
+    rows: dict[
+        str, tuple[str, dict[str, int], str]
+    ]  # by axis, its line, where the heading's words end, and place in messages
+
+    def measured(self, axis: str) -> str:
+        """The figure below MEAS, which differs from that below NOMINAL by that below DEV where these are printed."""
+        return _measured(*self.rows[axis])
+
+    def at_material_condition(self, axis: str) -> bool:
+        """Whether its tolerance grows with a size."""
+        condition = _CONDITION.match(self.rows[axis][0])
+        return condition is not None and condition[1].upper() != "RFS"
+
+    @property
+    def unit(self) -> str:
+        found = _UNITS.search(self.text)
+        return found[1] if found else ""
+
+    @property
+    def location_of(self) -> tuple[str, str] | None:
+        """Sort and name of the feature whose location it is; ``None`` of another dimension."""
+        of = _LOCATED.match(self.text)
+        if of is None or not self.unit or of["what"].strip().upper() not in ("LOCATION", ""):
+            return None
+        return of["sort"], of["of"]
+
+
+def dimensions(lines: Sequence[str], where: str) -> list[Dimension]:
+    """Dimensions of a PC-DMIS report; of each axis the last line."""
+    found: list[Dimension] = []
+    ends: dict[str, int] = {}
+    for line, content in enumerate(lines, 1):
+        if _HEADING.match(content):
+            ends = {word[0].upper(): word.end() for word in re.finditer(r"\S+", content)}
+        elif _DIMENSION.match(content):
+            name, _, text = content.partition("=")
+            found.append(Dimension(re.sub(r"^DIM\s+", "", name.strip()), text, line, {}))
+        elif found and (row := _FIGURES.match(content)):
+            found[-1].rows[row["axis"].upper()] = content, ends, f"{where} line {line}"
+    return found
+
+
+def _places(lines: Sequence[str], where: str) -> tuple[list[ReportedPlace], int]:
+    """Locations of features, and the number of other dimensions."""
+    places: list[ReportedPlace] = []
+    every = dimensions(lines, where)
+    for one in every:
+        if (of := one.location_of) is not None:
+            xyz = {axis: one.measured(axis) for axis in AXES if axis in one.rows}
+            places.append(ReportedPlace(of[1], one.line, one.unit, one.name, of[0], xyz))
+    return places, len(every) - len(places)
+
+
+def _measured(content: str, ends: dict[str, int], place: str) -> str:
+    if not ends:
+        raise CmmUqError("figures stand ahead of any heading line AX … MEAS", where=place, fix="Print the report again")
+    below: dict[str, str] = {}
+    for figure in _NUMBER.finditer(content):
+        below.setdefault(min(ends, key=lambda word: abs(ends[word] - figure.end())), figure[0])
+    if "MEAS" not in below:
+        raise CmmUqError("no measured value stands below MEAS", where=place, fix="Print the report again")
+    if {"NOMINAL", "DEV"} <= set(ends) and not _agree(below, toleranced=_CONDITION.match(content) is not None):
+        raise CmmUqError(f"MEAS {below['MEAS']} is not NOMINAL and DEV together: the line is damaged", where=place,
+                         fix="Print the report again")  # fmt: skip
+    return below["MEAS"]
+
+
+def _agree(below: dict[str, str], *, toleranced: bool) -> bool:
+    """Whether the deviation is what it must be, to the last printed digits of the three; that of a position from 0."""
+    below = {"NOMINAL": "0", **below} if toleranced else below
+    if not {"NOMINAL", "DEV"} <= set(below):
+        return False
+    measured, nominal, deviation = (below[word] for word in ("MEAS", "NOMINAL", "DEV"))
+    last = max(step_of(figure) for figure in (measured, nominal, deviation))
+    return abs(figure_of(measured) - figure_of(nominal) - figure_of(deviation)) <= 1.6 * last
+
+
+_SEXAGESIMAL = re.compile(r"([-+]?)(\d+)[^\d.,]{1,3}(\d+)'(\d+(?:[.,]\d+)?)\"")
+
+
+def figure_of(text: str) -> float:
+    """A printed figure; degrees of ``45°00'00"``."""
+    if match := _SEXAGESIMAL.fullmatch(text):
+        degrees, minutes, seconds = (float(part.replace(",", ".")) for part in match.groups()[1:])
+        return (-1.0 if match[1] == "-" else 1.0) * (degrees + minutes / 60 + seconds / 3600)
+    return float(text.replace(",", "."))
+
+
+def step_of(text: str) -> float:
+    """The step of its last digit."""
+    if match := _SEXAGESIMAL.fullmatch(text):
+        return step_of(match[4]) / 3600
+    mantissa, _, power = text.lower().replace(",", ".").partition("e")
+    return float(10.0 ** (int(power or 0) - len(mantissa.partition(".")[2])))
