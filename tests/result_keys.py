@@ -123,6 +123,8 @@ RESULTS: Mapping[str, str] = {
     "regions.priors[].value_percent": "The largest change of a value, % of its u, likewise.",
     "accuracy.FIGURE": "A figure of performance of the lengths.",
     "accuracy_uncertainty.FIGURE": "Quantity: the same with its uncertainty.",
+    "accuracy_if_left_returns.FIGURE": "Quantity: likewise if what named errors leave at each set-up is the machine's; only "
+    "where U is less by a tenth or more.",
     "conformity[].standard": "Standard with its edition.",
     "conformity[].characteristic": "What of it is decided.",
     "conformity[].quantity": "What was compared, in words.",

@@ -210,9 +210,9 @@ class Result:
     statements: tuple[Statement, ...]  # of conformity, in the job's order
     diagnosed: JobDiagnosis  # what the job's model leaves out, if anything
     stating: StatedUncertainty | None = None  # how a certificate states it; ``None`` of a result as evaluated
+    returning: Mapping[str, Quantity] = field(default_factory=dict)  # figures if what set-ups leave were there again
     causes: tuple[Cause, ...] = ()  # of what is stated to be in doubt about all observations together
-    # what the causes make of the model's unknowns; it is in ``values``
-    doubt: Doubt = field(default_factory=lambda: Doubt(()))
+    doubt: Doubt = field(default_factory=lambda: Doubt(()))  # what they make of the unknowns; it is in ``values``
     contradictions: tuple[Contradiction, ...] = ()  # what denies averaged estimates, which are then not given
     # what all errors together, computed once when it is first asked for, say of the factors elsewhere, or why nothing
     all_errors: Callable[[], FactorRegions | Text] = lambda: NOTHING

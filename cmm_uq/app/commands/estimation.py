@@ -226,21 +226,35 @@ def _lines(model: RecordingModel, along: Floats, placings: Freedoms) -> Iterator
 
 
 def accuracy(
-    model: RecordingModel, estimate: Estimate, posterior: NoisyPosterior, causes: Sequence[Cause], seed: int
+    model: RecordingModel,
+    estimate: Estimate,
+    posterior: NoisyPosterior,
+    causes: Sequence[Cause],
+    seed: int,
+    *,
+    returning: bool = False,
 ) -> Mapping[str, Quantity]:
     """Figures of performance of all recorded lengths, the noise drawn anew; empty for an artefact that has none.
+
+    ``returning``: what the named errors leave of a length on average over its repeats is of the machine, and there again.
 
     What is in doubt is drawn anew with the noise, the same for all set-ups and for each by itself; the larger U stands.
     """
     artefact = model.artefact
     lengths = artefact.lengths()
-    if lengths is None:
+    if lengths is None or (returning and not np.any(posterior.sizes.placing)):
         return {}
     every = replace(model, used=np.ones_like(model.used))
     linear, components, sizes = every.linearised(estimate.about), noise_of(every), posterior.sizes
     chosen = repeated_draws(len(posterior.draws), len(lengths))
     predicted, sizes = lengths - linear.observed + posterior.draws[chosen] @ linear.design.T, sizes.at(chosen)
     copies = counted_with(artefact.points)[artefact.rows[:, 0]]
+    if returning:
+        place = np.column_stack([artefact.measurement, artefact.points.point[artefact.rows]])
+        _, which, count = np.unique(place, axis=0, return_inverse=True, return_counts=True)
+        order, first = np.argsort(which.ravel(), kind="stable"), np.cumsum(count) - count
+        mean = np.add.reduceat((lengths - predicted)[:, order], first, axis=1) / count
+        predicted, sizes = predicted + mean[:, which.ravel()], replace(sizes, placing=np.zeros_like(sizes.placing))
 
     def figures(apart: bool) -> dict[str, Quantity]:
         def again(some: Ints, times: int, random: np.random.Generator) -> Floats:

@@ -72,6 +72,7 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
 
     # figures of performance of the lengths as recorded, and decisions
     figures = accuracy(model, estimate, posterior, causes, seed)
+    returning = accuracy(model, estimate, posterior, causes, seed, returning=True)
     outside = OutsideReadings.of(job.points, findings, observe)
     statements = tuple(
         statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested, None, job.circumstances, outside)
@@ -93,7 +94,7 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
         named_draws(model, components, posterior, values, mixture=averaged is not None),
         parameters(model, values), sizes(model, values),
         noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, statements,
-        diagnosis, causes=causes, doubt=doubt, contradictions=denied, all_errors=all_errors,
+        diagnosis, returning=returning, causes=causes, doubt=doubt, contradictions=denied, all_errors=all_errors,
     )  # fmt: skip
     for name, quantity in result.quantities():
         figures_of = (quantity.value, quantity.u, *quantity.interval95)

@@ -8,7 +8,7 @@ from typing import Any
 from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.analysis.machine.performance import MachinePerformance
 from cmm_uq.analysis.machine.regions import FactorRegions
-from cmm_uq.base.messages import NOTHING, Text, say
+from cmm_uq.base.messages import NOTHING, Text, say, semicolons
 from cmm_uq.certificate import wording
 from cmm_uq.certificate.document import Column, Section, Table, columns, section
 from cmm_uq.certificate.origin import quantity_data
@@ -28,6 +28,16 @@ def own_figures(result: Result) -> Mapping[str, Quantity]:
     machine = machine_alone(result)
     found: Mapping[str, Quantity] = {} if machine is None else machine.figures
     return found if result.stating is None else result.stating.all("performance_of_machine", found)
+
+
+_LESS = 0.9  # part of U below which it is said what U would be
+
+
+def returning_figures(result: Result) -> dict[str, Quantity]:
+    """Whose U would be less by a tenth or more if what named errors leave at each set-up were the machine's."""
+    found = result.returning if result.stating is None else result.stating.all("accuracy", result.returning)
+    each = ((name, one, result.accuracy[name]) for name, one in found.items())
+    return {name: one for name, one, stated in each if one.expanded < _LESS * stated.expanded}
 
 
 def performance(result: Result) -> Section:
@@ -57,6 +67,19 @@ def performance(result: Result) -> Section:
         "decided by it."
     )
     notes: list[Text] = [UNCERTAINTY, measurand]
+    if again := returning_figures(result):
+        each = [
+            say("{figure:small} {U} {unit}", figure=TITLES[name], U=rounded(one.value, one.expanded)[1], unit=one.unit)
+            for name, one in again.items()
+        ]
+        notes.append(
+            say(
+                "U counts what the named errors leave at each set-up, and its repeats share, as noise that would be another "
+                "if the recording were repeated. If it is other errors of the machine, which would be there again, U is "
+                "too wide, and would be: {figures}.",
+                figures=semicolons(each),
+            )
+        )
     if own:
         notes.append(without)
     elif not isinstance(regions, FactorRegions) and regions:
@@ -69,6 +92,8 @@ def with_performance(data: Mapping[str, Any], result: Result) -> dict[str, Any]:
     """Contents of results.json with the machine's own figures, and those of each statement."""
     own, machine = {name: quantity_data(one) for name, one in own_figures(result).items()}, machine_alone(result)
     found = dict(data) | ({"performance_of_machine": own} if own else {})
+    if again := returning_figures(result):
+        found["accuracy_if_left_returns"] = {name: quantity_data(one) for name, one in again.items()}
     if machine is None:
         return found
     each = [machine.of_statement(statement) for statement in result.statements]

@@ -10,14 +10,22 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from benchmarks.coverage.performance import ALONE, CORRECTED, FIGURES, LARGEST, Cell, measured
+from benchmarks.parts import curved, machines
+from cmm_uq.analysis.conformity.accuracy import figures
 from cmm_uq.analysis.machine.performance import performance_of
 from cmm_uq.analysis.machine.regions import FactorRegions
+from cmm_uq.app.commands.estimation import accuracy
+from cmm_uq.app.commands.reading import job_of
+from cmm_uq.app.commands.report import report_outcome
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.certificate.certificate import certified
 from cmm_uq.certificate.result import Page, Result
+from cmm_uq.certificate.sections.performance import performance, returning_figures
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model import RecordingModel
+from cmm_uq.machine.model.noise import noise_of
+from cmm_uq.maths.inference.posterior import sample_with_noise
 from tests.artefacts.simulated import analysed, outcome
 
 JOBS = ("iota-1102-20C", "step-gauge-simulated")
@@ -139,3 +147,86 @@ def test_beside_each_decision_stands_what_of_it_is_the_machine_s() -> None:
         low, high = one["largest_without_noise_um"]["interval95"]
         assert 0 < low < high
     assert outcome(JOBS[0]).results["performance_of_machine"].keys() == set(FIGURES)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("sort", ["ordinary", "ten times worse"])
+def test_errors_of_the_machine_that_come_again_leave_the_noise_in_u_and_no_more(sort: str) -> None:
+    """Bars thrice in each of twenty places, on three machines with curves that no job names: U beside half of the width within
+    which 95 % of figures truly lie when the same is measured again. U as recorded is several times too wide."""
+    wide, narrow = list[float](), list[float]()
+    for seed in range(3):
+        random = np.random.default_rng(seed)
+        hidden = curved.drawn(next(one for one in curved.SORTS if one.name == sort), random)
+        shown, still = (
+            machines.calibrated(
+                machines.Cell("bars", "white", 0.0), hidden, sigma, 0.0, np.random.default_rng(100 + seed)
+            )
+            for sigma in (1e-3, 0.0)
+        )
+        model = RecordingModel(shown, machines.NAMED)
+        estimate = model.estimate()
+        posterior = sample_with_noise(estimate.linear, noise_of(model), estimate.least_squares, seed)
+        again = still.points.xyz + 1e-3 * random.standard_normal((400, *still.points.xyz.shape))
+        each = figures(np.linalg.norm(again[:, still.rows[:, 1]] - again[:, still.rows[:, 0]], axis=2))
+        as_recorded, returning = (
+            accuracy(model, estimate, posterior, (), seed, returning=one) for one in (False, True)
+        )
+        for name in FIGURES:
+            half = 0.5 * float(np.diff(np.quantile(each[name], [0.025, 0.975]))[0])
+            wide.append(as_recorded[name].expanded / half)
+            narrow.append(returning[name].expanded / half)
+            assert returning[name].value == as_recorded[name].value
+            assert abs(returning[name].value - each[name].mean()) < 1.2 * returning[name].expanded
+    assert min(wide) > 2
+    assert 0.9 < min(narrow) < max(narrow) < 1.6
+
+
+def test_a_certificate_says_by_how_much_less_u_would_be_and_decides_by_nothing_of_it() -> None:
+    job = JOBS[0]
+    result = analysed(job)
+    name = "b89_range_um"
+    stated = result.accuracy[name]
+    assert not returning_figures(result)  # each bar measured once: nothing tells noise from errors
+    for part, told in ((0.91, False), (0.89, True)):
+        half = part * stated.expanded
+        less = replace(stated, u=0.5 * half, interval95=(stated.value - half, stated.value + half))
+        other = replace(result, returning={name: less})
+        new, old = (certified(one, Page(lambda found: [], lambda found: {})).results for one in (other, result))
+        assert ("accuracy_if_left_returns" in new) == told
+        assert decided(dict(new)) == decided(dict(old))
+        texts = [str(note) for note in performance(other).blocks[0].notes]  # type: ignore[union-attr]
+        assert any("would be there again" in text for text in texts) == told
+
+
+JOB = b"""
+[job]
+id = "thrice"
+date = 2026-01-01
+origin = "simulated"
+[machine]
+name = "M"
+travel_mm = { x = [0, 900], y = [0, 550], z = [-500, 0] }
+[artefact]
+kind = "ballbar"
+length_mm = 400.0
+u_um = 0.5
+[recording]
+file = "recording.csv"
+[model]
+effects = ["scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx"]
+"""
+
+
+@pytest.mark.long
+def test_a_report_of_bars_that_are_measured_thrice_has_it() -> None:
+    random = np.random.default_rng(0)
+    hidden = curved.drawn(curved.Sort("ordinary"), random)
+    points = machines.calibrated(machines.Cell("bars", "white", 0.0), hidden, 1e-3, 0.0, random).points
+    rows = zip(points.measurement, points.point, points.repeat, points.xyz.tolist(), strict=True)
+    lines = [f"{m},{p},{r},{x:.5f},{y:.5f},{z:.5f}" for m, p, r, (x, y, z) in rows]
+    csv = "\n".join(["# origin: simulated", "measurement,point,repeat,x_mm,y_mm,z_mm", *lines, ""])
+    data = report_outcome(job_of({"job.toml": JOB, "recording.csv": csv.encode()})).results
+    assert set(FIGURES) <= set(data["accuracy_if_left_returns"])
+    for name, one in data["accuracy_if_left_returns"].items():
+        assert one["U"] < 0.9 * data["accuracy_uncertainty"][name]["U"]
