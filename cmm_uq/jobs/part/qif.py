@@ -24,7 +24,7 @@ from cmm_uq.jobs.part.feature import ASKS, What
 
 PROGRAM = "QIF plan"
 _KINDS = ("Point", "Line", "Plane", "Circle", "Sphere", "Cylinder", "Cone")
-_WHATS: Mapping[str, What] = {
+WHATS: Mapping[str, What] = {
     "Diameter": "size", "SphericalDiameter": "size", "Straightness": "straightness", "Flatness": "flatness",
     "Circularity": "roundness", "Cylindricity": "cylindricity", "Sphericity": "sphericity", "Position": "position",
     "Parallelism": "parallelism", "Perpendicularity": "perpendicularity", "Angularity": "angularity",
@@ -97,7 +97,7 @@ class _Document:
             self._named(item, "feature", self._feature, labels.get(item.get("id", ""), ""))
         for item in self._all("CharacteristicItem" if planned else "CharacteristicNominal"):
             ids = listed(inside(item, "FeatureNominalIds"))
-            what = _WHATS.get(local(item).removesuffix("CharacteristicNominal"))
+            what = WHATS.get(local(item).removesuffix("CharacteristicNominal"))
             if planned or len(ids) < 2 or (what is not None and ASKS[what].features > 1):
                 self._named(item, "characteristic", self._characteristic)
                 continue
@@ -263,12 +263,12 @@ class _Document:
             if axis not in axes:
                 raise NotUnderstoodError(f"is a coordinate along {axis or 'no axis'}, which is not read")
             return axes[axis]
-        if sort not in _WHATS:
+        if sort not in WHATS:
             raise NotUnderstoodError(_SORTS.get(sort) or f"is a characteristic of kind {sort}, which is not read")
         mode = child(nominal, "AnalysisMode")
         if sort == "DistanceBetween" and mode not in ("", "THREEDIMENSIONAL"):
             raise NotUnderstoodError(f"is a distance in the analysis {mode}, which is not read")
-        return _WHATS[sort]
+        return WHATS[sort]
 
     def _features(self, item: Element, what: What) -> list[str]:
         numbers = listed(inside(item, "FeatureItemIds")) or self._numbers(item)

@@ -25,7 +25,7 @@ from cmm_uq.jobs.importing.format import HEAD, length_named
 from cmm_uq.jobs.importing.pcdmis import Dimension, PcDmis, dimensions, figure_of, step_of
 from cmm_uq.jobs.importing.reports import ACTUAL, DMIS_UNIT, Dmis, one_unit, statements
 from cmm_uq.jobs.part.drawing import NotUnderstoodError, QifUnits, inside, text, whole_text
-from cmm_uq.jobs.part.qif import ASSOCIATIONS
+from cmm_uq.jobs.part.qif import ASSOCIATIONS, WHATS
 from cmm_uq.jobs.part.readings import Recording
 from cmm_uq.jobs.part.tables import PartFile, Places
 
@@ -89,7 +89,11 @@ def reported_values(content: bytes, where: str, file: str, facts: PartFile, plac
     values, features = dict[str, ReportedValue](), dict[str, ReportedFeature]()
     for i, one in enumerate(facts.characteristic):
         at = places.of("characteristic", "reported_as", i)
-        for found in _asked(one.name, one.reported_as, contents.values, "value", at, where, wrong):
+        name = one.reported_as or one.name
+        if len(contents.values.get(name, ())) > 1:  # of several kinds, as the diameter and the position of one call-out
+            kinds = [f"{name}.{sort}" for sort, what in WHATS.items() if what == one.what]
+            name = next((kind for kind in kinds if kind in contents.values), name)
+        for found in _asked(name, contents.values, "value", at if one.reported_as else "", where, wrong):
             values[one.name] = found
             if found.angle != angles[one.name]:
                 said = "an angle" if found.angle else "a length"
@@ -102,7 +106,8 @@ def reported_values(content: bytes, where: str, file: str, facts: PartFile, plac
                 )
     for i, feature in enumerate(facts.feature):
         at = places.of("feature", "reported_as", i)
-        for known in _asked(feature.name, feature.reported_as, contents.features, "feature", at, where, wrong):
+        name = feature.reported_as or feature.name
+        for known in _asked(name, contents.features, "feature", at if feature.reported_as else "", where, wrong):
             features[feature.name] = known
             if known.association and known.association != feature.association:
                 said = f"{feature.name!r} was associated by {known.association}, and by the job it is by {feature.association}"
@@ -135,34 +140,23 @@ def _printed_alike(given: Reported) -> Reported:
 
 
 def _refuse_strange(contents: _Contents, facts: PartFile, where: str, wrong: Gathered) -> None:
-    own = [
-        *(one.reported_as or one.name for one in facts.characteristic),
-        *(one.reported_as or one.name for one in facts.feature),
-    ]
+    own = [one.reported_as or one.name for one in facts.characteristic]
+    own += [one.reported_as or one.name for one in facts.feature]
     for name in (*contents.values, *contents.features):
         if name not in own:
-            wrong.add(
-                CmmUqError(
-                    f"there is no characteristic or feature {name!r} in the job", where=where, fix=suggestion(name, own)
-                )
-            )
+            said = f"there is no characteristic or feature {name!r} in the job"
+            wrong.add(CmmUqError(said, where=where, fix=suggestion(name, own)))
 
 
 def _asked(
-    name: str,
-    reported_as: str,
-    held: Mapping[str, Sequence[Callable[[], _Of]]],
-    what: str,
-    at: str,
-    where: str,
-    wrong: Gathered,
+    name: str, held: Mapping[str, Sequence[Callable[[], _Of]]], what: str, at: str, where: str, wrong: Gathered
 ) -> list[_Of]:
-    """What the report holds by a name: nothing, or one; anything else is gathered as wrong."""
-    found = held.get(reported_as or name, ())
-    if reported_as and not found:
-        wrong.add(CmmUqError(f"{where} has no {what} {reported_as!r}", where=at, fix=suggestion(reported_as, held)))
+    """What the report holds by a name, nothing or one; wrong is anything else, and nothing by what is named ``at`` a key."""
+    found = held.get(name, ())
+    if at and not found:
+        wrong.add(CmmUqError(f"{where} has no {what} {name!r}", where=at, fix=suggestion(name, held)))
     if len(found) > 1:
-        said = f"has {len(found)} {what}s {reported_as or name!r}, and which of them is of this part is not known"
+        said = f"has {len(found)} {what}s {name!r}, and which of them is of this part is not known"
         wrong.add(CmmUqError(said, where=where, fix="Give the report of one part, or name another by reported_as"))
     if len(found) == 1:
         with wrong.going_on():
@@ -296,7 +290,7 @@ def _actual(sort: str, words: Sequence[str], unit: str, where: str) -> ReportedF
 
 
 def _of_qif(content: bytes, where: str) -> _Contents:
-    """Measured characteristics by the name of their item, or else its designator; measured features by that of theirs."""
+    """Measured characteristics by the name of their item, with their kind as ``10.Diameter``, or else its designator."""
     root = root_of(content, where)
     found, units = _Contents(say("QIF results")), QifUnits(root, where)
     by_id = {element.get("id", ""): element for element in root.iter() if element.get("id")}
@@ -309,7 +303,8 @@ def _of_qif(content: bytes, where: str) -> _Contents:
             read = partial(_measured_characteristic, element, units, at, angle=tag.startswith("Angle"))
             if item is not None:
                 name = child(item, "Name") or f"characteristic {item.get('id', '')}"
-                found.values.setdefault(name, []).append(read)
+                for key in (name, f"{name}.{tag.removesuffix('CharacteristicMeasurement')}"):
+                    found.values.setdefault(key, []).append(read)
                 if (designator := _within(item, "Designator")) != name:
                     designated.setdefault(designator, []).append(read)
         elif tag.endswith("FeatureMeasurement"):

@@ -133,6 +133,22 @@ def test_results_of_qif_are_found_by_name_or_designator_in_the_units_of_the_docu
     assert bore.step == pytest.approx(25.4e-6)  # that of its finest length, 2.362205: 0 is 0.000000
 
 
+def test_of_several_kinds_by_one_name_the_one_that_is_asked_for_is_taken() -> None:
+    """As in the samples of the QIF community: one call-out is the name of a diameter and of a position."""
+    item = '<PositionCharacteristicItem id="60"><Name>1</Name></PositionCharacteristicItem></CharacteristicItems>'
+    place = (
+        '<PositionCharacteristicMeasurement id="61"><CharacteristicItemId>60</CharacteristicItemId><Value>0.001</Value>'
+        "</PositionCharacteristicMeasurement></CharacteristicMeasurements>"
+    )
+    both = QIF.replace("</CharacteristicItems>", item).replace("</CharacteristicMeasurements>", place)
+    both = both.replace("<Name>DIAM_B</Name>", "<Name>1</Name>")
+    found = reported(both, **named(("2", "1")))
+    values = {name: one.value for name, one in found.values.items()}
+    assert values == {"1": pytest.approx(25.4 * 1.18155), "2": pytest.approx(0.0254)}
+    with pytest.raises(CmmUqError, match="has 2 values '1'"):
+        reported(both, **named(("5", "1")))
+
+
 def test_an_association_other_than_that_of_the_job_is_refused() -> None:
     with pytest.raises(
         CmmUqError, match="'bore' was associated by maximum_inscribed, and by the job it is by least_squares"
