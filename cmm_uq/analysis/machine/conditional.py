@@ -26,16 +26,18 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
+from cmm_uq.analysis.machine.recordings import FurtherRecording, mean_noise, model_of_machine, stacked
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, StatementEvidence, Unmodelled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.machine.model.field import GivenPeriod, covariance, family_of, linear
 from cmm_uq.machine.model.measurement import RecordingModel
-from cmm_uq.machine.model.noise import growing_lengths, noise_of
+from cmm_uq.machine.model.noise import growing_lengths
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import PeriodicScale
-from cmm_uq.maths.inference.families import HELD, FieldErrors, FieldModel, log_evidence, sample_sizes
+from cmm_uq.maths.inference.families import HELD, FieldErrors, FieldModel, log_evidence, normal, sample_sizes
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import Doubt, sample_with_noise
 
@@ -70,19 +72,21 @@ class RecordedField:
     sd: Floats  # (f,) of a unit of each of their coefficients, in its own unit
 
     @classmethod
-    def of(cls, model: RecordingModel, further: Sequence[Unmodelled], *, learned: bool = True) -> RecordedField:
+    def of(
+        cls, model: RecordingModel, further: Sequence[Unmodelled], *, learned: bool = True,
+        beside: Sequence[FurtherRecording] = (),
+    ) -> RecordedField:  # fmt: skip
         """Of a calibration and of what it left out; what needs columns that were not recorded takes no part.
 
-        ``learned``: whether families have sizes to be found; else all are as large as physics allows.
+        ``learned``: whether families have sizes to be found; else all are as large as physics allows. ``beside``: further
+        recordings of the machine.
         """
-        recorded = model.artefact.points.columns
-        which = tuple(i for i, one in enumerate(further) if all(name in recorded for name in one.effect.columns))
-        estimate = model.estimate()
+        models = (model, *(one.model for one in beside))
+        which = tuple(i for i, one in enumerate(further) if any(_recorded(each, one.effect) for each in models))
         # where the artefact stands, not what was read: noise of readings would explain itself
-        points = model.artefact.points.at(model.where(estimate.about))
-        errors = [_errors(model, further[i].effect, points, estimate.about, learned) for i in which]
-        components = replace(noise_of(model), known=model.least_noise)
-        whole = FieldModel(estimate.linear, components, estimate.least_squares, tuple(errors))
+        points = [each.artefact.points.at(each.where(each.estimate().about)) for each in models]
+        errors = [_errors(models, further[i].effect, points, learned) for i in which]
+        whole = FieldModel(*stacked(model, beside), (*errors, *_own(models, beside)))
         effects, sds = list[Effect](), [np.zeros(0)]
         for i, one in zip(which, errors, strict=True):
             effect = further[i].effect
@@ -90,7 +94,7 @@ class RecordedField:
             if one.impulse is not None and isinstance(effect, PeriodicScale):
                 seen = whole.shown(one.impulse)
                 sds.append(np.ones(len(seen)))
-                effects.append(GivenPeriod(effect, points.readings[effect.axis], seen.T))
+                effects.append(GivenPeriod(effect, _readings(points, effect), seen.T))
             else:
                 effects.append(effect)
         return cls(
@@ -99,9 +103,8 @@ class RecordedField:
 
     def coefficients(self, sizes: Sizes, scales: Floats, random: np.random.Generator) -> Floats:
         """Exact draws (N, k + f) of the calibration's effects, then of what it left out, for N sizes of noise and families."""
-        drawn = self.field.draw(sizes, scales, random)
-        further = drawn[:, drawn.shape[1] - len(self.sd) :] * self.sd
-        return np.hstack([drawn[:, : self.modelled], further])
+        drawn, start = self.field.draw(sizes, scales, random), len(self.field.linear.unknowns)
+        return np.hstack([drawn[:, : self.modelled], drawn[:, start : start + len(self.sd)] * self.sd])
 
 
 def _sd(effect: Effect) -> Floats:
@@ -109,16 +112,59 @@ def _sd(effect: Effect) -> Floats:
     return np.array([coefficient.prior_sd for coefficient in effect.coefficients])
 
 
-def _errors(model: RecordingModel, effect: Effect, points: Points, about: Floats, learned: bool) -> FieldErrors:
+def _recorded(model: RecordingModel, effect: Effect) -> bool:
+    return all(name in model.artefact.points.columns for name in effect.columns)
+
+
+def _readings(points: Iterable[Points], effect: PeriodicScale) -> Floats:
+    return np.concatenate([each.readings[effect.axis] for each in points])
+
+
+def _errors(models: Sequence[RecordingModel], effect: Effect, points: Sequence[Points], learned: bool) -> FieldErrors:
     whole, family = linear(effect), family_of(effect) if learned else None
     if not isinstance(effect, PeriodicScale):
-        columns = model.seen(model.columns(whole, (), about), about) * _sd(whole)
-        j = columns.shape[1]
-        return FieldErrors(family, columns, lambda random, count: random.standard_normal((count, j)))
-    readings, impulse = points.readings[effect.axis], shown(model, effect)
-    columns = impulse @ whole.basis(points)[:, "xyz".index(effect.axis)] * _sd(whole)
+        columns = np.vstack([_shown(each, whole) for each in models]) * _sd(whole)
+        return FieldErrors(family, columns, normal(columns.shape[1]))
+    readings = _readings(points, effect)
+    impulse = scipy.linalg.block_diag(*(shown(each, effect) for each in models))
+    waves = np.vstack([whole.basis(each)[:, "xyz".index(effect.axis)] for each in points])
     beforehand = GivenPeriod(effect, readings, np.zeros((len(readings), 0))).beforehand
-    return FieldErrors(family, columns, beforehand, impulse, covariance(effect, readings, readings))
+    return FieldErrors(
+        family, impulse @ waves * _sd(whole), beforehand, impulse, covariance(effect, readings, readings)
+    )
+
+
+def _shown(model: RecordingModel, effect: Effect) -> Floats:
+    """(m, j) of the used observations for one unit of each coefficient; nothing where its columns were not recorded."""
+    if not _recorded(model, effect):
+        return np.zeros((int(model.used.sum()), len(effect.coefficients)))
+    about = model.estimate().about
+    return model.seen(model.columns(effect, (), about), about)
+
+
+def _own(models: Sequence[RecordingModel], beside: Sequence[FurtherRecording]) -> Iterator[FieldErrors]:
+    """What each further recording has alone: its noise, and the machine's change since the calibration."""
+    ends = np.cumsum([int(each.used.sum()) for each in models])
+    for one, start in zip(beside, ends.tolist(), strict=False):
+        columns = np.hstack([one.noise, one.changed[:, np.any(one.changed, axis=0)]])
+        whole = np.zeros((ends[-1], columns.shape[1]))
+        whole[start : start + len(columns)] = columns
+        yield FieldErrors(None, whole, normal(columns.shape[1]))
+
+
+def further_recording(
+    first: RecordingModel, other: RecordingModel, errors: Sequence[Unmodelled], seed: int = 0,
+    sigma_mm: float | None = None,
+) -> FurtherRecording:  # fmt: skip
+    """Another recording of the machine, with its noise as its own posterior has it, all of the machine's errors beside it.
+
+    ``other``: without the observations that its certificate set aside. ``errors``: that the calibration did not model.
+    ``sigma_mm``: of one recorded coordinate, where the noise is known and white.
+    """
+    model = model_of_machine(first, other)
+    own = RecordedField.of(model, errors).field
+    sizes = white(sigma_mm) if sigma_mm is not None else sample_sizes(own, HELD, seed).noise
+    return FurtherRecording(model, mean_noise(own.noise, sizes))
 
 
 def stated_noise(model: RecordingModel, components: Components, sizes: Sizes) -> StatedNoise:
@@ -166,6 +212,7 @@ def given_recording(
     draws: int = DRAWS,
     seed: int = 0,
     doubt: Doubt = NO_DOUBT,
+    beside: Sequence[FurtherRecording] = (),
 ) -> MachineState:
     """The state of a machine with all of its errors drawn together, given the recording of its calibration.
 
@@ -173,12 +220,13 @@ def given_recording(
     How much the calibration bounds an error that it did not model is of no matter here: its recording says that again.
     ``model``: of the calibration, without the observations that its certificate set aside. ``sigma_mm``: standard deviation
     of one recorded coordinate, where the noise is known and white; else it is sampled. ``doubt``: what is stated to be in
-    doubt about the model's unknowns by causes that all its observations share, as of its certificate.
+    doubt about the model's unknowns by causes that all its observations share, as of its certificate. ``beside``: further
+    recordings.
     """
     known = None if sigma_mm is None else white(sigma_mm)
-    others, statements = as_recorded_allows(model, state.unmodelled, known)
+    others, statements = as_recorded_allows(model, state.unmodelled, known, beside)
     state = replace(state, unmodelled=others, statements=statements)
-    whole, random = RecordedField.of(model, state.unmodelled), np.random.default_rng(seed)
+    whole, random = RecordedField.of(model, state.unmodelled, beside=beside), np.random.default_rng(seed)
     noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
     sizes = sample_sizes(whole.field, draws, seed, known)
     if known is None:
@@ -247,25 +295,31 @@ def _shares(state: MachineState, scales: Mapping[str, Floats] | None = None) -> 
 
 
 def as_recorded_allows(
-    model: RecordingModel, others: Sequence[Unmodelled], known: Sizes | None = None
+    model: RecordingModel,
+    others: Sequence[Unmodelled],
+    known: Sizes | None = None,
+    beside: Sequence[FurtherRecording] = (),
 ) -> tuple[tuple[Unmodelled, ...], tuple[StatementEvidence, ...]]:
     """Errors that were not modelled, without what the recording denies of what is stated of them; and what it says of each.
 
     ``known``: sizes of the noise, one draw, where these are not to be found.
     """
     held, found = tuple(others), dict[str, StatementEvidence]()
-    recorded = model.artefact.points.columns
+    models = (model, *(one.model for one in beside))
     chains, every = list(held), set[str]()
     while chains := [one for one in chains if one.unstated]:
         every |= {one.stated_by for one in chains}
         chains = [one.unstated for one in chains if one.unstated]
     while True:
-        told = {one.stated_by for one in held if one.unstated and all(name in recorded for name in one.effect.columns)}
+        told = {one.stated_by for one in held if one.unstated and any(_recorded(each, one.effect) for each in models)}
         left = sorted(name for name in told if not (name in found and found[name].denied))
         if not left:
             break
-        alone, sets = _evidence(model, held, known), [(name,) for name in left] + [tuple(left)] * (len(left) > 1)
-        logs = {some: _evidence(model, _without(held, some), known) - alone for some in sets}
+        alone, sets = (
+            _evidence(model, held, known, beside),
+            [(name,) for name in left] + [tuple(left)] * (len(left) > 1),
+        )
+        logs = {some: _evidence(model, _without(held, some), known, beside) - alone for some in sets}
         found |= {
             some[0]: StatementEvidence(some[0], float(np.exp(min(logs[some], _MOST_LOG))))
             for some in sets
@@ -283,8 +337,10 @@ def _without(others: Iterable[Unmodelled], statements: Collection[str]) -> tuple
     return tuple(one.unstated if one.unstated is not None and one.stated_by in statements else one for one in others)
 
 
-def _evidence(model: RecordingModel, others: Sequence[Unmodelled], known: Sizes | None) -> float:
-    return log_evidence(RecordedField.of(model, others).field, _EVIDENCE_SEED, known)
+def _evidence(
+    model: RecordingModel, others: Sequence[Unmodelled], known: Sizes | None, beside: Sequence[FurtherRecording]
+) -> float:
+    return log_evidence(RecordedField.of(model, others, beside=beside).field, _EVIDENCE_SEED, known)
 
 
 ALL = "all"

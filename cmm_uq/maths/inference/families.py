@@ -30,6 +30,13 @@ from cmm_uq.maths.inference.posterior import start
 from cmm_uq.maths.inference.proposals import NEVER, LogDensity, weighed, weights
 
 Drawn = Callable[[np.random.Generator, int], Floats]
+
+
+def normal(count: int) -> Drawn:
+    """Independent standard normal numbers, so many for each draw."""
+    return lambda random, draws: random.standard_normal((draws, count))
+
+
 # of the residuals' scatter: an observation that each coefficient, as large as physics allows, moves less shows only noise, as
 # contrasts of repeats do, whose points are nearly the same; less still where all are as large as that. The same of orthonormal
 # columns of the placings

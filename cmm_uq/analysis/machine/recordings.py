@@ -1,0 +1,128 @@
+"""Several recordings of one machine as one linear model: its errors in common; artefacts, placings and noise apart.
+
+    y₁ = X₁·β + A₁·a₁ + C₁·c + P₁·(anything) + ε₁,     y₂ = X₂·(β + d − g) + A₂·a₂ + C₂·c + P₂·(anything) + ε₂
+
+β, c: named errors of the machine, and all others. a, P: of each recording's own artefact and placings. d: change of the
+machine between the two, as records let expect. g: what it corrected while the second was made. The noise of the second has the
+mean covariance of its posterior, with all errors beside it and given that recording alone; only that of the first is sampled
+together with the errors' sizes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy
+
+from cmm_uq.analysis.machine.state import MachineState, of_machine
+from cmm_uq.base.points import Floats
+from cmm_uq.machine.model.measurement import RecordingModel
+from cmm_uq.machine.model.noise import noise_of
+from cmm_uq.maths.inference.linear_model import Freedoms, LeastSquares, LinearModel
+from cmm_uq.maths.inference.noise import Components, Sizes
+
+_NO_NOISE = 1e-12  # part of the variance of a reading of the first recording that is none in another
+
+
+@dataclass(frozen=True, eq=False)
+class FurtherRecording:
+    """A recording of the same machine beside that of its calibration."""
+
+    model: RecordingModel  # with the calibration's named errors of the machine, and those of its own artefact and probe
+    noise: Floats  # (m, m) factor of the covariance of its noise, mm
+    # by effect and coefficient: root mean square change between the recordings, and what the machine corrected during this one
+    change: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    corrections: Mapping[tuple[str, str], float] = field(default_factory=dict)
+
+    @property
+    def linear(self) -> LinearModel:
+        """Its linear model, of the machine as it is without corrections."""
+        found = self.model.estimate().linear
+        added = np.array([self.corrections.get(one.key, 0.0) for one in found.unknowns])
+        return replace(found, observed=found.observed + found.design @ added)
+
+    @property
+    def changed(self) -> Floats:
+        """(m, k) of its observations for the root mean square change of each named error since the calibration, or before."""
+        found = self.model.estimate().linear
+        return np.asarray(found.design * [self.change.get(one.key, 0.0) for one in found.unknowns])
+
+    def contradiction(self, state: MachineState) -> float:
+        """Probability, by the machine as it is known without this recording, of one that deviates as much from it."""
+        model, linear, about = self.model, self.linear, self.model.estimate().about
+        recorded, start = model.artefact.points.columns, 0
+        foretold = np.zeros((len(state.draws), len(linear.observed)))
+        for effect in state.effects:
+            own = state.draws[:, start : start + len(effect.coefficients)]
+            start += len(effect.coefficients)
+            if all(name in recorded for name in effect.columns):
+                foretold += own @ model.seen(model.columns(effect, (), about), about).T
+        named = {(one.name, each.name) for one in state.effects for each in one.coefficients}
+        others = [i for i, one in enumerate(linear.unknowns) if one.key not in named]
+        known = [i for i in others if np.isfinite(linear.prior_sd[i])]
+        open_ = [i for i in others if i not in known]
+        free = np.hstack([linear.freedoms.dense(), linear.design[:, open_] * linear.scale[open_]])
+        into = scipy.linalg.null_space(free.T) if free.size else np.eye(len(free))
+        left = (linear.observed - linear.design[:, known] @ linear.prior_mean[known] - foretold.mean(axis=0)) @ into
+        doubt = np.hstack([linear.design[:, known] * linear.prior_sd[known], self.changed, self.noise])
+        covariance = into.T @ (np.cov(foretold.T) + doubt @ doubt.T) @ into
+        squares = left @ scipy.linalg.solve(covariance, left, assume_a="pos")
+        return float(scipy.special.chdtrc(len(left), squares))
+
+
+def model_of_machine(first: RecordingModel, other: RecordingModel) -> RecordingModel:
+    """The model of another recording, with the first one's named errors of the machine whose columns it has."""
+    recorded = other.artefact.points.columns
+    shared = [one for one in first.effects if of_machine(one) and all(name in recorded for name in one.columns)]
+    return replace(other, effects=(*shared, *(one for one in other.effects if not of_machine(one))))
+
+
+def mean_noise(components: Components, sizes: Sizes) -> Floats:
+    """(m, m) factor of the mean covariance, mm², of noise of sizes (N,)."""
+    (fast, slow), walks = components.variances(sizes), sizes.rate == 0
+    own = np.asarray(components.turn.T @ np.diag(np.sqrt(components.shares @ fast.mean(axis=0))))
+    covariance = own @ own.T
+    if components.slow.shape[1]:
+        for some, columns in ((~walks, components.slow), (walks, components.anchored)):
+            covariance += (columns * (some @ slow / len(slow))) @ columns.T
+    return np.asarray(np.linalg.cholesky(covariance))
+
+
+def stacked(model: RecordingModel, beside: Sequence[FurtherRecording]) -> tuple[LinearModel, Components, LeastSquares]:
+    """The linear model of all observations, those of the first before others; the noise of the first; what is estimated."""
+    first, components = model.estimate(), replace(noise_of(model), known=model.least_noise)
+    if not beside:
+        return first.linear, components, first.least_squares
+    each, solved = [first.linear, *(one.linear for one in beside)], [first.least_squares]
+    solved += [one.model.estimate().least_squares for one in beside]
+    shared = {(one.name, c.name) for one in model.effects if of_machine(one) for c in one.coefficients}
+    unknowns, value, places = list(first.linear.unknowns), first.least_squares.value.tolist(), list[list[int]]()
+    where = {one.key: i for i, one in enumerate(unknowns) if one.key in shared}
+    for number, (linear, found) in enumerate(zip(each, solved, strict=True)):
+        places.append(list(range(len(unknowns))) if not number else [])
+        for unknown, estimate in zip(linear.unknowns if number else (), found.value, strict=False):
+            places[-1].append(where.get(unknown.key, len(unknowns)))
+            if unknown.key not in where:
+                unknowns.append(unknown)
+                value.append(float(estimate))
+    sizes = [len(linear.observed) for linear in each]
+    design, ends = np.zeros((sum(sizes), len(unknowns))), np.cumsum([0, *sizes])
+    for linear, place, start, end in zip(each, places, ends, ends[1:], strict=False):
+        design[start:end, place] = linear.design
+    placing = scipy.linalg.block_diag(*(linear.freedoms.dense() for linear in each))
+    whole = LinearModel(
+        np.concatenate([linear.observed for linear in each]), design, tuple(unknowns), Freedoms.of(placing),
+        np.concatenate([linear.noise_scale for linear in each]), first.linear.sigma,
+    )  # fmt: skip
+    return whole, _with_rows(components, sum(sizes[1:])), replace(first.least_squares, value=np.array(value))
+
+
+def _with_rows(components: Components, more: int) -> Components:
+    """The noise of the first recording in observations of others too, where it is none; its proportions are kept."""
+    turn = scipy.sparse.block_diag([components.turn, scipy.sparse.eye_array(more)], format="csr")
+    part = np.mean(components.shares / components.shares[:, :3].sum(axis=1, keepdims=True), axis=0)
+    shares = np.vstack([components.shares, np.tile(_NO_NOISE * part, (more, 1))])
+    slow = np.vstack([components.slow, np.zeros((more, components.slow.shape[1]))])
+    return replace(components, turn=scipy.sparse.csr_array(turn), shares=shares, slow=slow)
