@@ -60,6 +60,12 @@ def thin_out(model: RecordingModel, observe: Observed, seed: int, most: int = MO
     return replace(model, artefact=found, used=~found.unread())
 
 
+def quantities(model: RecordingModel) -> int:
+    """How many different ones are observed: repeats are of one."""
+    artefact, rows = model.artefact, model.artefact.rows[model.used, 0]
+    return len(np.unique(np.column_stack([artefact.measurement[model.used], artefact.points.point[rows]]), axis=0))
+
+
 def _first_of_each(owner: Ints, part: Ints, most: int, random: np.random.Generator) -> NDArray[np.bool_]:
     """(m,) which of every owner's observations: its parts in random order, each of them whole, until ``most`` are reached."""
     _, part = np.unique(np.column_stack([owner, part]), axis=0, return_inverse=True)

@@ -11,18 +11,11 @@ How an axis is stated to be read, and a bound of an error, is taken as stated, u
 integrated out, the observations have the density p as stated, and pₐ without the statement a; where pₐ/p is beyond 20, it is
 not used. Of correct statements one in twenty is denied at most (Markov's inequality: pₐ/p has the mean one). So are all
 together. What is denied most goes first, and the others are looked at anew without it.
-
-How far figures rest on what was taken to be known beforehand: sizes of families are half-normal then. With that prior half as
-wide, or twice, every draw of a machine has another weight, p′(s)/p(s), so that means and variances of what the machine does
-follow without drawing anew. Where such weights have no finite variance, as those of a family that the recording does not show
-(Pareto tails of k above 0.5: Vehtari, Simpson, Gelman, Yao, Gabry 2024, J. Mach. Learn. Res. 25(72)), the family's errors are
-scaled with its prior, which is then what happens, and elsewhere no less. Errors that are no part of the recording scale with
-theirs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,7 +32,7 @@ from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import PeriodicScale
 from cmm_uq.maths.inference.families import HELD, FieldErrors, FieldModel, log_evidence, normal, sample_sizes
 from cmm_uq.maths.inference.noise import Components, Sizes
-from cmm_uq.maths.inference.posterior import Doubt, sample_with_noise
+from cmm_uq.maths.inference.posterior import Cause, Doubt, sample_with_noise
 
 
 class PointwiseEffect(Effect):
@@ -153,18 +146,25 @@ def _own(models: Sequence[RecordingModel], beside: Sequence[FurtherRecording]) -
 
 
 def further_recording(
-    first: RecordingModel, other: RecordingModel, errors: Sequence[Unmodelled], seed: int = 0,
+    first: RecordingModel,
+    other: RecordingModel,
+    errors: Sequence[Unmodelled],
+    seed: int = 0,
     sigma_mm: float | None = None,
-) -> FurtherRecording:  # fmt: skip
+    causes: Sequence[Cause] = (),
+) -> FurtherRecording:
     """Another recording of the machine, with its noise as its own posterior has it, all of the machine's errors beside it.
 
     ``other``: without the observations that its certificate set aside. ``errors``: that the calibration did not model.
-    ``sigma_mm``: of one recorded coordinate, where the noise is known and white.
+    ``sigma_mm``: of one recorded coordinate, where the noise is known and white. ``causes``: of doubt about all its
+    observations, which act on them together and, as that is not known, on each block by itself besides.
     """
     model = model_of_machine(first, other)
     own = RecordedField.of(model, errors).field
     sizes = white(sigma_mm) if sigma_mm is not None else sample_sizes(own, HELD, seed).noise
-    return FurtherRecording(model, mean_noise(own.noise, sizes))
+    doubted = [cause.common for cause in causes]
+    doubted += [cause.apart.dense() for cause in causes if cause.apart is not None]
+    return FurtherRecording(model, np.hstack([mean_noise(own.noise, sizes), *(each[model.used] for each in doubted)]))
 
 
 def stated_noise(model: RecordingModel, components: Components, sizes: Sizes) -> StatedNoise:
@@ -341,62 +341,3 @@ def _evidence(
     model: RecordingModel, others: Sequence[Unmodelled], known: Sizes | None, beside: Sequence[FurtherRecording]
 ) -> float:
     return log_evidence(RecordedField.of(model, others, beside=beside).field, _EVIDENCE_SEED, known)
-
-
-ALL = "all"
-TIMES = (0.5, 2.0)  # by which a prior is narrower or wider
-MATTERS = 0.1  # part of U by which it or the value then changes, from which on a figure rests on the prior
-_WORTH, _HEAVY = 50.0, 0.5
-_NOTHING = 1e-9  # of u, below which a change is of rounding
-
-
-@dataclass(frozen=True, eq=False)
-class PriorInfluence:
-    """What another prior of one family of errors, or of all, would change."""
-
-    family: str
-    times: float  # its width, over the one that was taken
-    u: Floats  # (c,) over u as stated
-    shift: Floats  # (c,) change of the value over u
-
-
-def influence_of(
-    values: Floats, u: Floats, scales: Mapping[str, Floats], own: Callable[[str], Floats], apart: Mapping[str, Floats]
-) -> tuple[PriorInfluence, ...]:
-    """Of each family, and of all together, on figures whose draws depend on the families' sizes.
-
-    ``values``: draws (N, c). ``u``: (c,) as stated. ``scales``: (N,) sizes of each family. ``own``: (N, c), what of the values
-    errors of a family make. ``apart``: (c,) variances, by family or error, of what is no part of the draws.
-    """
-
-    def changed(family: str, names: Collection[str]) -> Iterator[PriorInfluence]:
-        for times in TIMES:
-            logs = {name: 0.5 * scales[name] ** 2 * (1 - times**-2) for name in names if name in scales}
-            shown = [name for name, log in logs.items() if _weights(log) is not None]
-            weight = _weights(sum((logs[name] for name in shown), np.zeros(len(values))))
-            if weight is None:
-                shown, weight = [], np.full(len(values), 1 / len(values))
-            before, mean = values.var(axis=0), weight @ values
-            ratio = np.divide(weight @ (values - mean) ** 2, before, out=np.ones_like(u), where=before > 0)
-            # of no more than the whole variance, which other draws have given
-            more, shift = np.minimum(before, u**2) * (ratio - 1), mean - values.mean(axis=0)
-            for name in (one for one in logs if one not in shown):
-                scaled = own(name)
-                more, shift = more + (times**2 - 1) * scaled.var(axis=0), shift + (times - 1) * scaled.mean(axis=0)
-            more = more + sum((times**2 - 1) * apart[name] for name in names if name in apart)
-            scale = np.where(u > 0, u, 1.0)  # nothing changes what is not uncertain at all
-            ratio = np.where(u > 0, np.sqrt(np.maximum(u**2 + more, 0.0)) / scale, 1.0)
-            moved = np.where(np.abs(shift) > _NOTHING * scale, shift / scale, 0.0)
-            yield PriorInfluence(family, times, np.where(np.abs(ratio - 1) > _NOTHING, ratio, 1.0), moved)
-
-    found = [one for name in (*scales, *apart) for one in changed(name, (name,))]
-    return (*found, *(changed(ALL, (*scales, *apart)) if len(found) > len(TIMES) else ()))
-
-
-def _weights(logs: Floats) -> Floats | None:
-    """Of draws whose density has another one's ratio (N,), as its logarithm; ``None`` where they say nothing of it."""
-    weight = np.exp(logs - logs.max())
-    weight /= weight.sum()
-    largest = np.sort(weight)[-int(3 * np.sqrt(len(weight))) :]
-    tail = float(np.mean(np.log(largest / largest[0])))  # Hill's estimate of k
-    return weight if tail < _HEAVY and 1 / np.sum(weight**2) > _WORTH else None

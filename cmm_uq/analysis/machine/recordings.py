@@ -31,7 +31,7 @@ class FurtherRecording:
     """A recording of the same machine beside that of its calibration."""
 
     model: RecordingModel  # with the calibration's named errors of the machine, and those of its own artefact and probe
-    noise: Floats  # (m, m) factor of the covariance of its noise, mm
+    noise: Floats  # (m, c) factor of the covariance, mm, of its noise and of what is in doubt of it
     # by effect and coefficient: root mean square change between the recordings, and what the machine corrected during this one
     change: Mapping[tuple[str, str], float] = field(default_factory=dict)
     corrections: Mapping[tuple[str, str], float] = field(default_factory=dict)

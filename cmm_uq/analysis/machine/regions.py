@@ -23,13 +23,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from cmm_uq.analysis.diagnosis.held_out import thin_out
-from cmm_uq.analysis.machine.conditional import (
-    PriorInfluence,
-    RecordedField,
-    as_recorded_allows,
-    doubted_draws,
-    influence_of,
-)
+from cmm_uq.analysis.machine.conditional import RecordedField, as_recorded_allows, doubted_draws
+from cmm_uq.analysis.machine.influence import PriorInfluence, influence_of
 from cmm_uq.analysis.machine.performance import MachinePerformance, performance_of, rows_of
 from cmm_uq.analysis.machine.state import StatementEvidence, Unmodelled, of_machine, unmodelled_errors
 from cmm_uq.analysis.machine.statements import with_readings

@@ -329,7 +329,7 @@ def aged(state: MachineState, on: date, change: Change | None = None) -> Machine
     days = 0 if state.calibrated is None else abs((on - state.calibrated).days)
     sizes, unknown = list[Floats](), list[str]()
     for effect in state.effects:
-        found = _changes(effect, days, change)
+        found = changes(effect, days, change)
         sizes.append(np.array([0.0 if one is None else one for one in found]))
         if None in found and (days or state.calibrated is None):
             unknown.append(effect.name)
@@ -337,8 +337,8 @@ def aged(state: MachineState, on: date, change: Change | None = None) -> Machine
     return replace(state, drift=drift, drift_unknown=tuple(unknown), measured=on)
 
 
-def _changes(effect: Effect, days: float, change: Change | None) -> list[float | None]:
-    """Of each coefficient; of an amplitude and a phase, that of the amplitude for both."""
+def changes(effect: Effect, days: float, change: Change | None) -> list[float | None]:
+    """Root mean square change of each coefficient within so many days; of a phase that of its amplitude."""
     if change is None:
         return [None] * len(effect.coefficients)
     reported = [one.name for one in effect.reported]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from math import degrees, isfinite
 from typing import Any, Literal
@@ -14,7 +14,7 @@ import numpy as np
 from cmm_uq import __version__
 from cmm_uq.analysis.conformity.decision import Outcome, rule_name, rule_words
 from cmm_uq.analysis.conformity.limits import LimitDecision
-from cmm_uq.analysis.machine.conditional import PriorInfluence
+from cmm_uq.analysis.machine.influence import PriorInfluence
 from cmm_uq.analysis.parts.budget import PointErrors, VarianceShares, Way
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.methods import method as other_methods
@@ -50,6 +50,23 @@ class VerificationCheck:
 
 
 @dataclass(frozen=True)
+class FurtherCertificate:
+    """Another certificate of the machine, whose recording is taken together with that of its calibration."""
+
+    file: str
+    number: str
+    laboratory: str
+    artefact: str
+    date: dt.date
+    verdict: str  # of the verification
+    corrected: bool  # whether the machine then corrected what its calibration found
+    origin: str  # of the recording
+    observations: int = 0  # that are reckoned with
+    chance: float = 1.0  # of a recording that contradicts the machine as much, as its other certificates have it
+    used: bool = True
+
+
+@dataclass(frozen=True)
 class CertificateStatus:
     """The machine's certificate on the day of the measurement."""
 
@@ -78,6 +95,7 @@ class CertificateStatus:
     # root mean square change of each reported parameter since the calibration, in its unit, as records let expect; ``None``
     # of one where they do not say, and as a whole without records
     changes: Mapping[str, float | None] | None = None
+    further: tuple[FurtherCertificate, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -290,6 +308,7 @@ def standing_data(one: CertificateStatus) -> dict[str, Any]:
             {"parameter": name, "change": change} for name, change in one.changes.items()
         ],
         "temperature_c": one.temperature_c, "inputs_sha256": dict(one.inputs_sha256),
+        **({"further": [asdict(each) | {"date": each.date.isoformat()} for each in one.further]} if one.further else {}),
     }  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.origin import NAME
 from cmm_uq.certificate.part.figures import ANGLES, LENGTHS, figures_of
-from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, Source
+from cmm_uq.certificate.part.measurement import CertificateStatus, FurtherCertificate, PartMeasurement, Source
 from cmm_uq.certificate.wording import titles
 from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 
@@ -328,7 +328,20 @@ def machine_section(found: PartMeasurement) -> Section:
         (say("Noise of a coordinate"), _noise(found)),
     )
     told = (Paragraph(text) for text in (standing.path, standing.drift) if text)
-    return section(say("The machine and its certificate"), Facts(tuple(row for row in rows if row[1])), *told)
+    facts = Facts(tuple(row for row in rows if row[1]))
+    return section(say("The machine and its certificate"), facts, *told, _further(standing.further))
+
+
+def _further(certificates: Sequence[FurtherCertificate]) -> Table | None:
+    heads = [say("Certificate"), say("Issued by"), say("Artefact"), say("Calibrated on"), say("Machine")]
+    figures = [say("Observations"), say("Chance of as much contradiction"), say("Reckoned with")]
+    rows = []
+    for one in certificates:
+        seen = say("corrected") if one.corrected else say("not corrected")
+        named = (Verbatim(one.number), Verbatim(one.laboratory), Verbatim(one.artefact), messages.day(one.date), seen)
+        used = say("yes") if one.used else say("no")
+        rows.append((*named, number(one.observations), number(one.chance, ".2g"), used))
+    return table(say("Further certificates of the machine"), [*heads, *figures], rows)
 
 
 def certificate_rows(standing: CertificateStatus) -> tuple[tuple[Text, Text], ...]:

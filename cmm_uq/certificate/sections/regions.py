@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.machine.conditional import ALL, MATTERS, PriorInfluence
+from cmm_uq.analysis.machine.influence import ALL, MATTERS, PriorInfluence
 from cmm_uq.analysis.machine.regions import FactorRegions, Key
 from cmm_uq.base.messages import DASH, NOTHING, Text, listed, number, say, signed
 from cmm_uq.base.points import Floats

@@ -272,6 +272,7 @@ _OF_THE_MACHINE = (
     "source", "files", "number", "laboratory", "machine", "serial", "origin", "date", "age_days", "valid_until", "draft",
     "inputs_sha256",
 )  # fmt: skip
+_OF_FURTHER = ("file", "number", "laboratory", "artefact", "date", "corrected", "origin")
 """Of ``machine``, what its certificate says; what was verified of it depends on the version that did."""
 
 _SAME = 1e-9
@@ -323,3 +324,8 @@ def check_standing(inquiry: Inquiry, standing: CertificateStatus, data: Mapping[
     should, said, problem = standing_data(standing), data["machine"], "is not what the machine's certificate says"
     for key in _OF_THE_MACHINE:
         inquiry.compare("inputs", file, f"machine.{key}", problem, said[key], should[key])
+    more, found = said.get("further", []), should.get("further", [])
+    inquiry.compare("inputs", file, "machine.further", "has other certificates than the job", len(more), len(found))
+    for i, (one, other) in enumerate(zip(more, found, strict=False)):
+        for key in _OF_FURTHER:
+            inquiry.compare("inputs", file, f"machine.further[{i}].{key}", problem, one[key], other[key])

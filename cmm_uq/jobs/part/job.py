@@ -44,6 +44,7 @@ class PartJob:
     stated_by: tuple[str, ...] = ()  # names of those of the inputs that state the machine
     others: OtherReadings = field(default_factory=OtherReadings)  # recordings of other methods
     reported: Reported | None = None  # in place of measured points, what the report of another program says
+    further: tuple[str, ...] = ()  # names of those of the inputs that are further certificates of the machine
 
     @property
     def machine_files(self) -> Mapping[str, bytes]:
@@ -96,6 +97,15 @@ def files_of_the_machine(facts: MachineStateFacts, source: JobFiles) -> tuple[st
     return (results, drawn, *certificates)
 
 
+def _further_certificate(name: str, source: JobFiles) -> str:
+    """The file of a further certificate, which must have its recording inside; a folder's is that which a report wrote."""
+    name = name.removesuffix("/")
+    if name.lower().endswith(_WHOLE):
+        return name
+    each = [f"{name}/{one}" for one in _CERTIFICATES]
+    return next((one for one in each if source.has(one, written=True)), each[0])
+
+
 def _posterior_named(source: JobFiles, results: str) -> str:
     """The file of draws that ``results.json`` names; the usual one where it cannot be read or names none."""
     try:
@@ -126,7 +136,8 @@ def _read(source: JobFiles, *, machine: bool) -> PartJob:
     fix = (
         f"Put the machine's certificate (PDF) or its report's files there, or mend its name in {path}: [machine_state]"
     )
-    for name in stated_by:
+    further = tuple(_further_certificate(one.certificate, source) for one in facts.machine_state.further if machine)
+    for name in (*stated_by, *further):
         with wrong.going_on():
             inputs[name] = source.content(name, TABLE_BYTES, fix, written=True)
     beside = f"Put it beside job.toml, or mend its name in {path}"
@@ -150,7 +161,7 @@ def _read(source: JobFiles, *, machine: bool) -> PartJob:
                 reported = reported_values(*recorded(said), said, facts, places)
     others = other_readings(facts, features, places, recorded, wrong)
     wrong.refuse()
-    return PartJob(folder, facts, tuple(features), inputs, measured, stated_by, others, reported)
+    return PartJob(folder, facts, tuple(features), inputs, measured, stated_by, others, reported, further)
 
 
 _GRID = {"pattern": "grid", "rows": 3, "columns": 4, "margin_mm": 5.0}

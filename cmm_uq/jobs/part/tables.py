@@ -59,6 +59,19 @@ class BoundFacts(JobTable):
     source: Name = required("Where that is stated, for the report: datasheet or certificate, with its date.")
 
 
+class FurtherFacts(JobTable):
+    """One ``[[machine_state.further]]``: another certificate of the machine, of another artefact or an earlier day."""
+
+    certificate: Name = required(
+        "The certificate (PDF, or XML with its inputs), or the folder with it, inside the job's."
+    )
+    corrected: bool = key(
+        False,
+        "Whether the machine corrected what its calibration found while that recording was made; the artefact is then "
+        "seen by a corrected machine.",
+    )
+
+
 class MachineStateFacts(JobTable):
     """``[machine_state]``: the machine as its certificate states it, and where its axes go."""
 
@@ -81,6 +94,9 @@ class MachineStateFacts(JobTable):
     axes: AxesFacts = key([], "How axes are read; as the certificate says where left out.")
     bound: Annotated[list[BoundFacts], Field(max_length=LISTED.most)] = []
     """Bounds of errors that the calibration's recording cannot show, with their sources."""
+    further: Annotated[list[FurtherFacts], Field(max_length=8)] = []
+    """Further certificates of the machine, whose recordings are taken together with that of its calibration: another
+    artefact, other lines, an earlier year."""
 
     def problems(self) -> Iterator[str]:
         stated = [name for one in self.bound for name in one.errors]

@@ -13,6 +13,7 @@ from cmm_uq.analysis.parts.setup import plan_of
 from cmm_uq.app.commands.certificates import verification
 from cmm_uq.app.commands.files import Stage
 from cmm_uq.app.commands.parts.drift import FILE as HISTORY
+from cmm_uq.app.commands.parts.further import further_certificates, verify_further
 from cmm_uq.app.commands.parts.machine import CALIBRATION, attached_calibration, standing_of, verified, with_history
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
 from cmm_uq.app.commands.reading import in_language
@@ -106,15 +107,19 @@ def _check_machine(
         inquiry.wrong("inputs", where, "", f"is no certificate that states the machine: {error}")
         return
     _merge(inquiry, found.inquiry, where)
-    if found.inquiry.findings:
+    further = tuple(verify_further(job, rerun=rerun, trust=trust if held else None))
+    for name, one in further:
+        _merge(inquiry, one.inquiry, name)
+    if found.inquiry.findings or any(one.inquiry.findings for _, one in further):
         return
     inquiry.looked("dates")
     try:
         standing = standing_of(job, found)
+        more = further_certificates(job, found.job, further)
     except CmmUqError as error:
         inquiry.wrong("dates", where, "", f"does not hold for this part: {error.problem}")
         return
-    check_standing(inquiry, standing, data, file)
+    check_standing(inquiry, replace(standing, further=tuple(one.certificate for one in more)), data, file)
 
 
 def _merge(inquiry: Inquiry, inner: Inquiry, where: str) -> None:

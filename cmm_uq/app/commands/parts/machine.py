@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import datetime as dt
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -14,22 +13,27 @@ from typing import Any
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.analysis.diagnosis.held_out import thin_out
 from cmm_uq.analysis.machine.conditional import given_recording
-from cmm_uq.analysis.machine.state import MachineState, machine_stated, with_bounds, with_curves
+from cmm_uq.analysis.machine.state import Change, MachineState, machine_stated, with_bounds, with_curves
 from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.app.commands.certificates.verification import Verification, examine_certificate, verify_given
-from cmm_uq.app.commands.diagnose import screened_model
-from cmm_uq.app.commands.estimation import doubt_of, with_noise
+from cmm_uq.app.commands.estimation import doubt_of
 from cmm_uq.app.commands.files import Stage, silent
-from cmm_uq.app.commands.parts.drift import FILE as HISTORY, with_drift
+from cmm_uq.app.commands.parts.drift import FILE as HISTORY, known_of, with_drift
+from cmm_uq.app.commands.parts.further import (
+    VerifiedCertificate,
+    further_certificates,
+    given_together,
+    recording_of,
+    verify_further,
+)
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, day, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, day, listed, names, say
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.certificate.clauses import draft
-from cmm_uq.certificate.part.measurement import CertificateStatus, Source, VerificationCheck
+from cmm_uq.certificate.part.measurement import CertificateStatus, FurtherCertificate, Source, VerificationCheck
 from cmm_uq.certificate.sections.read_axes import readings_warnings
 from cmm_uq.certificate.verify.given import CHECKS, Given, given_of
 from cmm_uq.jobs.job import Job
@@ -98,9 +102,6 @@ def _thermal(job: PartJob, calibrated: Job | None) -> Iterable[Text]:
 WHERE = "job.toml [machine_state]"
 # before the names of inputs of the machine's own job, where they are attached to a part's report
 CALIBRATION = "machine-job/"
-# quantities of a recording, with their repeats, by which a machine's errors are drawn: time grows with the cube of what they
-# show of errors left out
-_MOST = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,9 +162,13 @@ def state_machine(
     since = with_drift(state, serial, job.facts.job.date, records, _where(job), kept=history)
     state = since.state
     stage("The machine's errors, given the recording of its calibration", 0.15)
-    state, path, given = _given(state, stated.job, seed)
-    standing = replace(standing, path=path, drift=since.told, given_recording=given, changes=since.changes)
-    told = [*machine_warnings(job, standing, stated.job), *readings_warnings(state.statements, state.scales)]
+    more = further_certificates(job, stated.job, verify_further(job, rerun=rerun, trust=trust))
+    change = None if since.history is None else known_of(since.history).change
+    state, path, given, further, warned = _given(state, stated.job, more, change, seed)
+    standing = replace(
+        standing, path=path, drift=since.told, given_recording=given, changes=since.changes, further=further
+    )
+    told = [*warned, *machine_warnings(job, standing, stated.job), *readings_warnings(state.statements, state.scales)]
     if rerun and stated.not_again:
         told = [stated.not_again, *told]
     return StatedMachine(state, standing, stated.job, tuple(told), since.history)
@@ -176,6 +181,7 @@ def refuse_machine(job: PartJob, fits: Callable[[Machine], None] = lambda machin
         return
     stated = _certified(job, verified(job), rerun=False)
     _standing(job, stated, trusted=False)
+    further_certificates(job, stated.job, verify_further(job))
     fits(_machine(job, stated.job))
 
 
@@ -354,29 +360,27 @@ def _machine(job: PartJob, calibrated: Job | None) -> Machine:
     return Machine(name, chain, travel, np.array(origin, dtype=np.float64), read_by=read_by)
 
 
-def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineState, Text, bool]:
-    """The state given the recording, where that is at hand; and how its errors are drawn, in a sentence."""
+def _given(
+    state: MachineState, job: Job | None, more: Sequence[VerifiedCertificate], change: Change | None, seed: int
+) -> tuple[MachineState, Text, bool, tuple[FurtherCertificate, ...], tuple[Text, ...]]:
+    """The state given the recordings that are at hand; how its errors are drawn, in a sentence; what of further recordings."""
     apart = say("errors that it did not model are each drawn on its own, which makes most uncertainties too large")
     if job is None:
-        return state, say("The recording of the calibration is not at hand: {apart}.", apart=apart), False
+        return state, say("The recording of the calibration is not at hand: {apart}.", apart=apart), False, (), ()
     if kind_of(job).observe is None:
-        return state, say("The calibration is of another sort than one by named errors: {apart}.", apart=apart), False
+        told = say("The calibration is of another sort than one by named errors: {apart}.", apart=apart)
+        return state, told, False, (), ()
     try:
-        model, _ = screened_model(job)
-        model, estimate, _ = with_noise(model)
+        whole, model = recording_of(job, seed)
+        estimate, count, curved = whole.estimate(), int(whole.used.sum()), with_curves(state)
         sigma = float(np.sqrt(np.mean(state.noise.usual_mm**2))) or estimate.least_squares.sigma_of_residuals
-        doubt = doubt_of(model, estimate, sigma, causes_of(model.artefact, job.circumstances))
-        count, observe = int(model.used.sum()), kind_of(job).observing("the machine of a part")
-        artefact, rows = model.artefact, model.artefact.rows[model.used, 0]  # with which repeats are one quantity
-        place = np.column_stack([artefact.measurement[model.used], artefact.points.point[rows]])
-        quantities = np.unique(place, axis=0)
-        most = _MOST * count // max(len(quantities), 1)
-        model = thin_out(model, partial(observe, job.facts.artefact, where=job.recording_path), seed, most)
-        together = given_recording(with_curves(state), model, seed=seed, doubt=doubt)
+        doubt = doubt_of(whole, estimate, sigma, causes_of(whole.artefact, job.circumstances))
+        together = given_recording(curved, model, seed=seed, doubt=doubt)
+        together, further, warned = given_together(curved, together, model, doubt, more, change, seed)
     except CmmUqError as error:
         why = Verbatim(error.problem)
         told = say("The errors could not be drawn given the recording ({why}): {apart}.", why=why, apart=apart)
-        return state, told, False
+        return state, told, False, (), ()
     text: Text = say(
         "All errors are drawn together, given the recording of the calibration, those included that it did not model."
     )
@@ -384,4 +388,7 @@ def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineStat
         text = after(text, say("Errors of each kind are as large as the recording shows that kind to be."))
     if (some := int(model.used.sum())) < count:
         text = after(text, say("{some} of its {count} observations are reckoned with.", some=some, count=count))
-    return together, text, True
+    if used := [one for one in further if one.used]:
+        numbers = listed(names([one.number for one in used]))
+        text = after(text, say("The recordings of {certificates} are taken together with it.", certificates=numbers))
+    return together, text, True, further, warned
