@@ -21,7 +21,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from cmm_uq.analysis.machine.recordings import FurtherRecording, mean_noise, model_of_machine, stacked
+from cmm_uq.analysis.machine.recordings import (
+    FurtherRecording,
+    components_of,
+    mean_noise,
+    model_of_machine,
+    recorded,
+    shown_by,
+    stacked,
+)
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, StatementEvidence, Unmodelled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
@@ -30,7 +38,15 @@ from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import growing_lengths
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import PeriodicScale
-from cmm_uq.maths.inference.families import HELD, FieldErrors, FieldModel, log_evidence, normal, sample_sizes
+from cmm_uq.maths.inference.families import (
+    HELD,
+    FieldErrors,
+    FieldModel,
+    FieldSizes,
+    log_evidence,
+    normal,
+    sample_sizes,
+)
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import Cause, Doubt, sample_with_noise
 
@@ -75,7 +91,7 @@ class RecordedField:
         recordings of the machine.
         """
         models = (model, *(one.model for one in beside))
-        which = tuple(i for i, one in enumerate(further) if any(_recorded(each, one.effect) for each in models))
+        which = tuple(i for i, one in enumerate(further) if any(recorded(each, one.effect) for each in models))
         # where the artefact stands, not what was read: noise of readings would explain itself
         points = [each.artefact.points.at(each.where(each.estimate().about)) for each in models]
         errors = [_errors(models, further[i].effect, points, learned) for i in which]
@@ -105,10 +121,6 @@ def _sd(effect: Effect) -> Floats:
     return np.array([coefficient.prior_sd for coefficient in effect.coefficients])
 
 
-def _recorded(model: RecordingModel, effect: Effect) -> bool:
-    return all(name in model.artefact.points.columns for name in effect.columns)
-
-
 def _readings(points: Iterable[Points], effect: PeriodicScale) -> Floats:
     return np.concatenate([each.readings[effect.axis] for each in points])
 
@@ -116,7 +128,7 @@ def _readings(points: Iterable[Points], effect: PeriodicScale) -> Floats:
 def _errors(models: Sequence[RecordingModel], effect: Effect, points: Sequence[Points], learned: bool) -> FieldErrors:
     whole, family = linear(effect), family_of(effect) if learned else None
     if not isinstance(effect, PeriodicScale):
-        columns = np.vstack([_shown(each, whole) for each in models]) * _sd(whole)
+        columns = np.vstack([shown_by(each, whole) for each in models]) * _sd(whole)
         return FieldErrors(family, columns, normal(columns.shape[1]))
     readings = _readings(points, effect)
     impulse = scipy.linalg.block_diag(*(shown(each, effect) for each in models))
@@ -125,14 +137,6 @@ def _errors(models: Sequence[RecordingModel], effect: Effect, points: Sequence[P
     return FieldErrors(
         family, impulse @ waves * _sd(whole), beforehand, impulse, covariance(effect, readings, readings)
     )
-
-
-def _shown(model: RecordingModel, effect: Effect) -> Floats:
-    """(m, j) of the used observations for one unit of each coefficient; nothing where its columns were not recorded."""
-    if not _recorded(model, effect):
-        return np.zeros((int(model.used.sum()), len(effect.coefficients)))
-    about = model.estimate().about
-    return model.seen(model.columns(effect, (), about), about)
 
 
 def _own(models: Sequence[RecordingModel], beside: Sequence[FurtherRecording]) -> Iterator[FieldErrors]:
@@ -145,26 +149,37 @@ def _own(models: Sequence[RecordingModel], beside: Sequence[FurtherRecording]) -
         yield FieldErrors(None, whole, normal(columns.shape[1]))
 
 
+def own_noise(
+    model: RecordingModel,
+    errors: Sequence[Unmodelled],
+    seed: int = 0,
+    known: Sizes | None = None,
+    beside: Sequence[FurtherRecording] = (),
+) -> Floats:
+    """(m, m) factor of the mean covariance, mm, of a recording's noise, all of the machine's errors and others beside it."""
+    whole = RecordedField.of(model, errors, beside=beside)
+    return mean_noise(components_of(model), known or _sizes(whole, model, HELD, seed, None).noise)
+
+
 def further_recording(
-    first: RecordingModel,
+    first: FurtherRecording,
     other: RecordingModel,
     errors: Sequence[Unmodelled],
     seed: int = 0,
     sigma_mm: float | None = None,
     causes: Sequence[Cause] = (),
 ) -> FurtherRecording:
-    """Another recording of the machine, with its noise as its own posterior has it, all of the machine's errors beside it.
+    """Another recording of the machine, its noise as it follows from both of them together, that of the first being known.
 
     ``other``: without the observations that its certificate set aside. ``errors``: that the calibration did not model.
     ``sigma_mm``: of one recorded coordinate, where the noise is known and white. ``causes``: of doubt about all its
     observations, which act on them together and, as that is not known, on each block by itself besides.
     """
-    model = model_of_machine(first, other)
-    own = RecordedField.of(model, errors).field
-    sizes = white(sigma_mm) if sigma_mm is not None else sample_sizes(own, HELD, seed).noise
+    model, known = model_of_machine(first.model, other), None if sigma_mm is None else white(sigma_mm)
     doubted = [cause.common for cause in causes]
     doubted += [cause.apart.dense() for cause in causes if cause.apart is not None]
-    return FurtherRecording(model, np.hstack([mean_noise(own.noise, sizes), *(each[model.used] for each in doubted)]))
+    noise = own_noise(model, errors, seed, known, (first,))
+    return FurtherRecording(model, np.hstack([noise, *(each[model.used] for each in doubted)]))
 
 
 def stated_noise(model: RecordingModel, components: Components, sizes: Sizes) -> StatedNoise:
@@ -228,22 +243,28 @@ def given_recording(
     state = replace(state, unmodelled=others, statements=statements)
     whole, random = RecordedField.of(model, state.unmodelled, beside=beside), np.random.default_rng(seed)
     noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
-    sizes = sample_sizes(whole.field, draws, seed, known)
+    sizes = _sizes(whole, model, draws, seed, known)
     if known is None:
-        low, high = np.quantile(sizes.noise.coordinate, [0.05, 0.95])
-        if (
-            high > _UNTOLD * low
-        ):  # any noise would do: it is taken for what the calibration took it for, which is no less
-            estimate = model.estimate()
-            alone = sample_with_noise(estimate.linear, whole.field.noise, estimate.least_squares, seed).sizes
-            some = np.linspace(0, len(alone.placing) - 1, HELD).astype(np.int64)[np.arange(draws) % HELD]
-            sizes = replace(sample_sizes(whole.field, draws, seed, alone.typical), noise=alone.at(some))
         noise = stated_noise(model, whole.field.noise, sizes.noise)
     drawn, k = whole.coefficients(sizes.noise, sizes.families, random), whole.modelled
     drawn[:, :k] = doubted_draws(doubt, len(model.unknowns), np.arange(k), seed, drawn[:, :k])
     together = _with(state, model, whole, drawn, noise)
     scales = dict(zip(whole.field.families, sizes.families.T, strict=True))
     return replace(together, scales=scales, prior_share=_shares(together), family_share=_shares(together, scales))
+
+
+def _sizes(whole: RecordedField, model: RecordingModel, draws: int, seed: int, known: Sizes | None) -> FieldSizes:
+    """Of noise and families; where any noise would do, it is taken for what the calibration took it for, which is no less."""
+    sizes = sample_sizes(whole.field, draws, seed, known)
+    if known is not None:
+        return sizes
+    low, high = np.quantile(sizes.noise.coordinate, [0.05, 0.95])
+    if high <= _UNTOLD * low:
+        return sizes
+    estimate = model.estimate()
+    alone = sample_with_noise(estimate.linear, components_of(model), estimate.least_squares, seed).sizes
+    some = np.linspace(0, len(alone.placing) - 1, HELD).astype(np.int64)[np.arange(draws) % HELD]
+    return replace(sample_sizes(whole.field, draws, seed, alone.typical), noise=alone.at(some))
 
 
 def doubted_draws(doubt: Doubt, count: int, named: Ints, seed: int, draws: Floats) -> Floats:
@@ -311,7 +332,7 @@ def as_recorded_allows(
         every |= {one.stated_by for one in chains}
         chains = [one.unstated for one in chains if one.unstated]
     while True:
-        told = {one.stated_by for one in held if one.unstated and any(_recorded(each, one.effect) for each in models)}
+        told = {one.stated_by for one in held if one.unstated and any(recorded(each, one.effect) for each in models)}
         left = sorted(name for name in told if not (name in found and found[name].denied))
         if not left:
             break

@@ -4,8 +4,8 @@
 
 β, c: named errors of the machine, and all others. a, P: of each recording's own artefact and placings. d: change of the
 machine between the two, as records let expect. g: what it corrected while the second was made. The noise of the second has the
-mean covariance of its posterior, with all errors beside it and given that recording alone; only that of the first is sampled
-together with the errors' sizes.
+mean covariance of its posterior given both recordings, with all errors beside it, that of the first taken for known; then only
+that of the first is sampled together with the errors' sizes.
 """
 
 from __future__ import annotations
@@ -18,8 +18,10 @@ import scipy
 
 from cmm_uq.analysis.machine.state import MachineState, of_machine
 from cmm_uq.base.points import Floats
+from cmm_uq.machine.model.field import linear as trials
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import noise_of
+from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.linear_model import Freedoms, LeastSquares, LinearModel
 from cmm_uq.maths.inference.noise import Components, Sizes
 
@@ -50,33 +52,56 @@ class FurtherRecording:
         return np.asarray(found.design * [self.change.get(one.key, 0.0) for one in found.unknowns])
 
     def contradiction(self, state: MachineState) -> float:
-        """Probability, by the machine as it is known without this recording, of one that deviates as much from it."""
-        model, linear, about = self.model, self.linear, self.model.estimate().about
-        recorded, start = model.artefact.points.columns, 0
-        foretold = np.zeros((len(state.draws), len(linear.observed)))
+        """Probability, by the machine as it is known without this recording, of one that deviates as much from it.
+
+        Errors that no recording has shown yet are as large as they may be.
+        """
+        model, linear = self.model, self.linear
+        foretold, start = np.zeros((len(state.draws), len(linear.observed))), 0
         for effect in state.effects:
             own = state.draws[:, start : start + len(effect.coefficients)]
             start += len(effect.coefficients)
-            if all(name in recorded for name in effect.columns):
-                foretold += own @ model.seen(model.columns(effect, (), about), about).T
+            foretold += own @ shown_by(model, effect).T
+        unseen = [shown_by(model, whole) * _sd(whole) for whole in (trials(one.effect) for one in state.unmodelled)]
         named = {(one.name, each.name) for one in state.effects for each in one.coefficients}
-        others = [i for i, one in enumerate(linear.unknowns) if one.key not in named]
-        known = [i for i in others if np.isfinite(linear.prior_sd[i])]
-        open_ = [i for i in others if i not in known]
-        free = np.hstack([linear.freedoms.dense(), linear.design[:, open_] * linear.scale[open_]])
+        others = np.array([one.key not in named for one in linear.unknowns], dtype=bool)
+        known = others & np.isfinite(linear.prior_sd)
+        open_ = linear.design[:, others & ~known] * linear.scale[others & ~known]
+        free = np.hstack([linear.freedoms.dense(), open_])
         into = scipy.linalg.null_space(free.T) if free.size else np.eye(len(free))
         left = (linear.observed - linear.design[:, known] @ linear.prior_mean[known] - foretold.mean(axis=0)) @ into
-        doubt = np.hstack([linear.design[:, known] * linear.prior_sd[known], self.changed, self.noise])
+        doubt = np.hstack([linear.design[:, known] * linear.prior_sd[known], self.changed, self.noise, *unseen])
         covariance = into.T @ (np.cov(foretold.T) + doubt @ doubt.T) @ into
         squares = left @ scipy.linalg.solve(covariance, left, assume_a="pos")
         return float(scipy.special.chdtrc(len(left), squares))
 
 
+def recorded(model: RecordingModel, effect: Effect) -> bool:
+    """Whether all that an effect depends on was recorded."""
+    return all(name in model.artefact.points.columns for name in effect.columns)
+
+
+def shown_by(model: RecordingModel, effect: Effect) -> Floats:
+    """(m, j) of the used observations for one unit of each coefficient; nothing where its columns were not recorded."""
+    if not recorded(model, effect):
+        return np.zeros((int(model.used.sum()), len(effect.coefficients)))
+    about = model.estimate().about
+    return model.seen(model.columns(effect, (), about), about)
+
+
+def _sd(effect: Effect) -> Floats:
+    return np.array([one.prior_sd for one in effect.coefficients])
+
+
 def model_of_machine(first: RecordingModel, other: RecordingModel) -> RecordingModel:
     """The model of another recording, with the first one's named errors of the machine whose columns it has."""
-    recorded = other.artefact.points.columns
-    shared = [one for one in first.effects if of_machine(one) and all(name in recorded for name in one.columns)]
+    shared = [one for one in first.effects if of_machine(one) and recorded(other, one)]
     return replace(other, effects=(*shared, *(one for one in other.effects if not of_machine(one))))
+
+
+def components_of(model: RecordingModel) -> Components:
+    """The noise of a recording's observations."""
+    return replace(noise_of(model), known=model.least_noise)
 
 
 def mean_noise(components: Components, sizes: Sizes) -> Floats:
@@ -92,7 +117,7 @@ def mean_noise(components: Components, sizes: Sizes) -> Floats:
 
 def stacked(model: RecordingModel, beside: Sequence[FurtherRecording]) -> tuple[LinearModel, Components, LeastSquares]:
     """The linear model of all observations, those of the first before others; the noise of the first; what is estimated."""
-    first, components = model.estimate(), replace(noise_of(model), known=model.least_noise)
+    first, components = model.estimate(), components_of(model)
     if not beside:
         return first.linear, components, first.least_squares
     each, solved = [first.linear, *(one.linear for one in beside)], [first.least_squares]

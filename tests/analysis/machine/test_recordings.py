@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import kstest
 
 import cmm_uq
-from cmm_uq.analysis.machine.conditional import RecordedField, further_recording, given_recording, white
+from cmm_uq.analysis.machine.conditional import RecordedField, further_recording, given_recording, own_noise, white
 from cmm_uq.analysis.machine.recordings import FurtherRecording, mean_noise, model_of_machine
 from cmm_uq.analysis.machine.state import MachineState, Unmodelled
 from cmm_uq.app.commands.model import recorded_model
@@ -70,6 +70,10 @@ def calibrated(xyz: Floats, draws: int = 4000) -> tuple[RecordingModel, MachineS
     return first, given_recording(state, first, SIGMA, draws, seed=5)
 
 
+def known(model: RecordingModel) -> FurtherRecording:
+    return FurtherRecording(model, own_noise(model, (), known=white(SIGMA)))
+
+
 TRUE = np.array([30.0, -20.0, 10.0, 4.0, -3.0, 2.0])  # ppm, ″
 
 
@@ -79,7 +83,9 @@ def test_a_recording_of_the_same_machine_contradicts_it_as_often_as_chance_does(
     for seed in range(60):
         xyz = simulated(TRUE, seed)
         first, state = calibrated(xyz, 2000)
-        found.append(further_recording(first, of(~FIRST, xyz), state.unmodelled, sigma_mm=SIGMA).contradiction(state))
+        found.append(
+            further_recording(known(first), of(~FIRST, xyz), state.unmodelled, sigma_mm=SIGMA).contradiction(state)
+        )
     assert kstest(found, "uniform").pvalue > 1e-3
     assert min(found) < 0.2 < 0.8 < max(found)
 
@@ -87,7 +93,7 @@ def test_a_recording_of_the_same_machine_contradicts_it_as_often_as_chance_does(
 def test_a_machine_that_is_another_is_contradicted_unless_so_much_change_is_expected() -> None:
     xyz, moved = simulated(TRUE, 1), simulated(TRUE + np.array([200.0, 0, 0, 0, 0, 0]), 2)
     first, state = calibrated(xyz)
-    second = further_recording(first, of(~FIRST, moved), (), sigma_mm=SIGMA)
+    second = further_recording(known(first), of(~FIRST, moved), (), sigma_mm=SIGMA)
     assert second.contradiction(state) < 1e-6
     scale = first.unknowns[0].key
     assert replace(second, change={scale: 200.0}).contradiction(state) > 0.01
@@ -99,7 +105,7 @@ def test_what_a_further_recording_says_goes_less_far_the_more_the_machine_may_ha
     """Of a drift without bound nothing: as the first recording alone."""
     xyz = simulated(TRUE, 3)
     first, alone = calibrated(xyz)
-    second = further_recording(first, of(~FIRST, xyz), (), sigma_mm=SIGMA)
+    second = further_recording(known(first), of(~FIRST, xyz), (), sigma_mm=SIGMA)
     state = replace(alone, effects=alone.effects[:6], draws=alone.draws[:, :6], drift=np.zeros(6),
                     corrections=np.zeros(6), unmodelled=left_out("straightness_x_y"))  # fmt: skip
     u = []

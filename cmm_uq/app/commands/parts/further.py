@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from cmm_uq.analysis.diagnosis.held_out import quantities, thin_out
-from cmm_uq.analysis.machine.conditional import further_recording, given_recording
+from cmm_uq.analysis.machine.conditional import further_recording, given_recording, own_noise
 from cmm_uq.analysis.machine.recordings import FurtherRecording
 from cmm_uq.analysis.machine.state import Change, MachineState, changes
 from cmm_uq.app.commands.certificates.verification import Verification, examine_certificate, verify_given
@@ -130,7 +130,10 @@ def given_together(
     stated to be in doubt. ``change``: by the records.
     """
     taken, told, warned = list[FurtherRecording](), list[FurtherCertificate](), list[Text]()
-    known, most = alone, _MOST_FURTHER // max(len(further), 1)
+    if not further:
+        return alone, (), ()
+    known, most = alone, _MOST_FURTHER // len(further)
+    first = FurtherRecording(model, own_noise(model, state.unmodelled, seed))
     keys = [(effect.name, one.name) for effect in state.effects for one in effect.coefficients]
     for one in further:
         _, other = recording_of(one.job, seed, most)
@@ -138,7 +141,7 @@ def given_together(
         days = abs((one.certificate.date - state.calibrated).days) if state.calibrated else 0
         each = [size for effect in state.effects for size in changes(effect, days, change)]
         found = replace(
-            further_recording(model, other, state.unmodelled, seed, causes=causes),
+            further_recording(first, other, state.unmodelled, seed, causes=causes),
             change={key: size for key, size in zip(keys, each, strict=True) if size},
             corrections=dict(zip(keys, state.corrects.tolist(), strict=True)) if one.corrected else {},
         )

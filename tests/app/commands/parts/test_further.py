@@ -1,82 +1,125 @@
-"""What to measure on the machine next: a plan that shows what the calibration did not, and what its artefact never will."""
+"""Further certificates of the machine that measured a part: verified, of the same machine, taken together or contradicted."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import datetime as dt
+import json
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from cmm_uq.app.commands.parts.drift import further_of
-from cmm_uq.app.commands.planning import make_plan
-from cmm_uq.app.commands.reading import job_of, read_job
-from cmm_uq.base.messages import say
-from cmm_uq.certificate.part.measurement import FurtherSetUps, UnseenError
-from cmm_uq.jobs.job import Job
+from cmm_uq.app.commands.certificates.verify import verify
+from cmm_uq.app.commands.parts.machine import StatedMachine, refuse_machine, state_machine
+from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.app.commands.report import REPORT, report_outcome
+from cmm_uq.base.errors import CmmUqError
+from tests.app.commands.test_verify_part import OTHER
 from tests.conftest import ROOT
+from tests.part_machines import by_certificate, by_results, plate_of
+from tests.part_reports import put, sampled_once, unchanged
+
+IOTA = ROOT / "examples" / "part-iota" / "machine" / "certificate.pdf"
+GAUGE = {"gauge.pdf": OTHER.read_bytes()}
+
+
+def state(*further: str, **more: Any) -> dict[str, Any]:
+    return {"machine_state": {"certificate": "machine", "further": [{"certificate": one, **more} for one in further]}}
+
+
+REFUSED = [
+    (
+        {"again.pdf": by_certificate()["machine/certificate-simulated.pdf"]},
+        "is of a recording that is reckoned with already",
+    ),
+    ({"other.pdf": IOTA.read_bytes()}, "is of another name: DEA Iota 1102"),
+    ({"half.pdf": OTHER.read_bytes()[:5000]}, "half.pdf"),
+    ({"altered.pdf": OTHER.read_bytes() + b"further\n"}, "does not verify"),
+]
+
+
+@pytest.mark.parametrize(("files", "words"), REFUSED, ids=[words for _, words in REFUSED])
+def test_a_further_certificate_must_verify_and_be_another_one_of_the_same_machine(
+    files: dict[str, bytes], words: str
+) -> None:
+    with pytest.raises(CmmUqError) as raised:
+        refuse_machine(plate_of({**by_certificate(), **files}, **state(*files)))
+    assert words in str(raised.value)
+    assert raised.value.fix
+
+
+def test_a_certificate_that_is_not_there_or_later_than_the_part_is_refused() -> None:
+    with pytest.raises(CmmUqError, match=r"nowhere\.pdf"):
+        plate_of(by_certificate(), **state("nowhere.pdf"))
+    early = {"job": {"id": "plate", "date": dt.date(2026, 1, 1), "origin": "simulated"}}
+    refuse_machine(plate_of({**by_certificate(), **GAUGE}, **state("gauge.pdf"), **early))
+    with pytest.raises(CmmUqError, match="beside a certificate without its recording"):
+        refuse_machine(plate_of({**by_results(), **GAUGE}, **state("gauge.pdf")))
 
 
 @cache
-def calibrated(name: str = "step-gauge-simulated") -> Job:
-    return read_job(ROOT / "examples" / name)
-
-
-def unseen(effect: str, share: float, characteristic: str = "1") -> UnseenError:
-    return UnseenError(
-        characteristic, f"machine: {effect}", effect, say("{e}", e=say("error")), share, say("nobody saw it")
-    )
-
-
-@cache
-def planned() -> tuple[FurtherSetUps, Mapping[str, bytes]]:
-    shares = [
-        unseen("rotation_x_y", 0.2),
-        unseen("rotation_x_y", 0.6, "2"),
-        unseen("periodic_scale_x", 0.3),
-        unseen("tip size", 0.9),
-    ]
-    further, files = further_of(calibrated(), shares)
-    assert further is not None
-    return further, files
+def stated(*further: str) -> StatedMachine:
+    return state_machine(plate_of({**by_certificate(), **GAUGE}, **state(*further)))
 
 
 @pytest.mark.long
-def test_errors_of_the_machine_are_told_by_their_largest_share() -> None:
-    assert planned()[0].effects == ("rotation_x_y", "periodic_scale_x")
+def test_what_a_further_certificate_shows_is_known_of_the_machine() -> None:
+    """A swept bar shows no play, a step gauge that is met from both sides does: its errors are as the gauge shows them."""
+    alone, together = stated(), stated("gauge.pdf")
+    (one,) = together.standing.further
+    assert (one.number, one.date, one.corrected) == ("step-gauge-simulated", dt.date(2026, 1, 1), False)
+    assert one.used == (one.chance >= 1e-3)
+    assert one.used
+    assert [each.effect.name for each in alone.state.unmodelled if each.effect.name.startswith("hysteresis")]
+    names = [effect.name for effect in together.state.effects for _ in effect.coefficients]
+    for axis, gap in (("x", 1.8), ("y", -0.9), ("z", 1.2)):  # µm, as examples/step-gauge-simulated has it
+        draws = together.state.draws[:, names.index(f"hysteresis_{axis}")]
+        assert draws.std() < 1.0
+        assert abs(draws.mean() - gap) < 4 * draws.std()
+    for name in ("scale_x", "scale_y", "scale_z"):
+        wide, narrow = (one.state.draws[:, names.index(name)].std() for one in (alone, together))
+        assert narrow < wide
+    assert "taken together" in together.standing.path
 
 
-def test_what_a_bar_never_shows_is_told_with_what_does() -> None:
-    found, _ = further_of(calibrated("iota-1102-20C"), [unseen("hysteresis_x", 0.4)])
-    assert found is not None
-    assert (found.setups, found.missed) == (0, ("hysteresis_x",))
-    assert "Hysteresis of X (a gauge whose faces are met from both sides" in found.text
+@pytest.mark.long
+def test_a_certificate_of_a_machine_that_has_moved_is_told_and_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the machine is said to have corrected while the gauge was measured makes it another one."""
+    monkeypatch.setattr("cmm_uq.app.commands.parts.further.CONTRADICTED", 1.1)
+    found = state_machine(plate_of({**by_certificate(), **GAUGE}, **state("gauge.pdf")))
+    (one,) = found.standing.further
+    assert not one.used
+    assert any("contradicts the machine" in text for text in found.warnings)
+    np.testing.assert_array_equal(found.state.draws, stated().state.draws)
 
 
-def test_the_job_beside_the_page_plans_the_set_ups_that_are_told() -> None:
-    further, named = planned()
-    assert further.setups == 4
-    assert further.command == "cmm-uq plan further"
-    files = {name.removeprefix("further/"): content for name, content in named.items()}
-    job = job_of(files)
-    assert job.facts.job.id == "step-gauge-simulated-further"
-    assert job.facts.model.effects == [*calibrated().facts.model.effects, "rotation_x_y"]
-    again = make_plan(replace(job, facts=job.facts.model_copy(
-        update={"plan": job.facts.plan.model_copy(update={"candidates": 60})})), power=False)  # fmt: skip
-    assert [placing.ends in further.text for placing in again.to_measure] == [True] * 4
-    assert again.better is not None
-    assert again.better.identifiability is not None
-    (one,) = [one for one in again.better.identifiability.parameters if one.unknown.key[0] == "rotation_x_y"]
-    assert one.u_with_prior < 0.5 * one.unknown.prior_sd
+def gauge() -> dict[str, bytes]:
+    """Made here, so that computing it again gives the same to the last digit."""
+    files = REPORT.contents(report_outcome(read_job(ROOT / "examples" / "step-gauge-simulated")))
+    return {"gauge.pdf": files["certificate-simulated.pdf"]}
 
 
-def test_where_no_set_up_helps_there_is_no_job() -> None:
-    found, files = further_of(calibrated(), [unseen("periodic_scale_x", 0.5)])
-    assert found is not None
-    assert (found.setups, found.command, files) == (0, "", {})
-    assert found.missed == ("periodic_scale_x",)
-
-
-def test_without_the_calibration_or_anything_unseen_nothing_is_planned() -> None:
-    assert further_of(None, [unseen("rotation_x_y", 0.5)]) == (None, {})
-    assert further_of(calibrated(), []) == (None, {})
+@pytest.mark.long
+def test_a_report_with_a_further_certificate_is_computed_again_to_the_byte(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cmm_uq.analysis.machine.conditional.sample_sizes", sampled_once)
+    monkeypatch.setattr("cmm_uq.app.commands.parts.part.ways", unchanged)
+    job = plate_of({**by_certificate(), **gauge()}, np.zeros((60, 3)), **state("gauge.pdf"))
+    made = evaluate_part(job, PartOptions(trials=2000))
+    files = contents_of(made)
+    said = json.loads(files["results.json"])["machine"]["further"]
+    assert [one["file"] for one in said] == ["gauge.pdf"]
+    assert b"Further certificates of the machine" in files["part-simulated.html"]
+    found = verify([put(tmp_path / "good", files) / "part-simulated.pdf"])
+    assert not found.inquiry.findings, found.inquiry.findings
+    (one,) = made.standing.further
+    forged = replace(
+        made, standing=replace(made.standing, further=(replace(one, number="7", date=dt.date(2020, 1, 1)),))
+    )
+    found = verify([put(tmp_path / "forged", contents_of(forged)) / "part-simulated.pdf"], rerun=False)
+    assert {each.place for each in found.inquiry.findings} == {"machine.further[0].number", "machine.further[0].date"}
