@@ -13,7 +13,8 @@ Every machine is appended to ``FOLDER/<cell>.jsonl`` as it is done: a run can be
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,8 @@ from benchmarks.coverage.study import measure, waiting
 from benchmarks.parts import truth
 from benchmarks.parts.known_noise import joint_posterior
 from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, as_points, joined, plan
-from cmm_uq.analysis.machine.conditional import given_recording
+from cmm_uq.analysis.machine.conditional import further_recording, given_recording, own_noise, white
+from cmm_uq.analysis.machine.recordings import FurtherRecording
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, unmodelled_errors, with_curves
 from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
@@ -33,6 +35,7 @@ from cmm_uq.analysis.parts.evaluation import Evaluator, Known
 from cmm_uq.analysis.parts.plan import PartPose
 from cmm_uq.analysis.parts.result import evaluated, stated
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
+from cmm_uq.app.commands.parts.further import CONTRADICTED
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.points import Machine
@@ -145,11 +148,18 @@ def _measured(cell: Cell, random: np.random.Generator, made: Made) -> dict[str, 
 
 
 def on_machine(
-    cell: Cell, hidden: truth.Truth, random: np.random.Generator, made: Made, sigma: float, machine: Machine = MACHINE
+    cell: Cell,
+    hidden: truth.Truth,
+    random: np.random.Generator,
+    made: Made,
+    sigma: float,
+    machine: Machine = MACHINE,
+    beside: Sequence[str] = (),
 ) -> dict[str, Any]:
     """A machine with a hidden truth, calibrated, corrected, measuring the part.
 
-    ``sigma``: its noise, mm. ``machine``: as it is known, its axes read as is stated.
+    ``sigma``: its noise, mm. ``machine``: as it is known, its axes read as is stated. ``beside``: artefacts of further
+    certificates, in order; how probable each is by those before is kept, and one that is not is left out.
     """
     unmodelled = tuple(one for one in UNMODELLED if made.periods or not one.effect.name.startswith("periodic"))
     offset = sigma * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
@@ -158,7 +168,17 @@ def on_machine(
     _, mean, _ = joint_posterior(model, (), sigma)
     certificate = with_curves(MachineState(machine, NAMED, mean[None], StatedNoise(np.full(3, sigma)),
                                            unmodelled=with_readings(unmodelled, machine), corrections=mean))  # fmt: skip
-    state = given_recording(certificate, model, given, TRIALS, int(random.integers(2**31)))
+    seed, taken, chances = int(random.integers(2**31)), list[FurtherRecording](), list[float]()
+    state = given_recording(certificate, model, given, TRIALS, seed)
+    known = None if given is None else white(given)
+    for artefact in beside:
+        first = FurtherRecording(model, own_noise(model, certificate.unmodelled, seed, known))
+        other = RecordingModel(calibrated(replace(cell, artefact=artefact), hidden, sigma, offset, random), NAMED)
+        found = further_recording(first, other, certificate.unmodelled, seed, given)
+        chances.append(found.contradiction(state))
+        if chances[-1] >= CONTRADICTED:
+            taken.append(found)
+            state = given_recording(certificate, model, given, TRIALS, seed, beside=taken)
     growth = (PART.cte_per_k + PART.u_cte_per_k * random.standard_normal()) * (
         PART.temperature_c - 20 + PART.u_temperature_k * random.standard_normal()
     ) - PART.cte_per_k * (PART.temperature_c - 20)
@@ -178,10 +198,11 @@ def on_machine(
     simulated = simulate(Source(virtual.names, lambda _, n: np.ascontiguousarray(errors[:n].T)), TRIALS)
     rows = {one.name: [true[one.name], one.value, one.u, *one.interval]
             for one in stated(simulated, evaluated(plan(), points), plan(), errors)}  # fmt: skip
-    denied = [one.axis for one in state.statements if one.denied]
+    denied = [one.of for one in state.statements if one.denied]
     return {
         "intervals": rows,
         **({"denied": denied} if machine.read_by else {}),
+        **({"chances": chances} if beside else {}),
         "sigma_um": round(1e3 * sigma, 3),
         "offset_um": round(1e3 * offset, 3),
     }
