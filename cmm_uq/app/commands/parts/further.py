@@ -106,6 +106,18 @@ def _refuse_other(own: Job, calibrated: Job, on: dt.date, refuse: Callable[..., 
         raise refuse(f"is of {own.facts.job.date}, after the part was measured on {on}", fix="Leave it out")
 
 
+def refuse_adjusted(further: Iterable[VerifiedCertificate], adjusted: Iterable[dt.date], calibrated: dt.date) -> None:
+    """Refuse a certificate between which and the machine's calibration records have an adjustment."""
+    for one in further:
+        low, high = sorted((one.certificate.date, calibrated))
+        if (between := max((day for day in adjusted if low < day <= high), default=None)) is not None:
+            raise CmmUqError(
+                f"is of {one.certificate.date}, and the machine, calibrated on {calibrated}, was adjusted on {between}",
+                where=f"job.toml [[machine_state.further]] {one.certificate.file}",
+                fix="Leave it out: it states the machine before its adjustment",
+            )
+
+
 def recording_of(job: Job, seed: int, most: int = MOST) -> tuple[RecordingModel, RecordingModel]:
     """The model of a calibration's recording, and that of no more than so many of its quantities."""
     model, _ = screened_model(job)

@@ -25,6 +25,7 @@ from cmm_uq.app.commands.parts.further import (
     further_certificates,
     given_together,
     recording_of,
+    refuse_adjusted,
     verify_further,
 )
 from cmm_uq.app.commands.reading import job_of, read_job
@@ -163,8 +164,9 @@ def state_machine(
     state = since.state
     stage("The machine's errors, given the recording of its calibration", 0.15)
     more = further_certificates(job, stated.job, verify_further(job, rerun=rerun, trust=trust))
-    change = None if since.history is None else known_of(since.history).change
-    state, path, given, further, warned = _given(state, stated.job, more, change, seed)
+    known = None if since.history is None else known_of(since.history)
+    refuse_adjusted(more, known.adjusted if known else (), standing.date)
+    state, path, given, further, warned = _given(state, stated.job, more, known.change if known else None, seed)
     standing = replace(
         standing, path=path, drift=since.told, given_recording=given, changes=since.changes, further=further
     )

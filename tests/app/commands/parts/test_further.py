@@ -12,12 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+import cmm_uq
 from cmm_uq.app.commands.certificates.verify import verify
+from cmm_uq.app.commands.parts.further import VerifiedCertificate, refuse_adjusted
 from cmm_uq.app.commands.parts.machine import StatedMachine, refuse_machine, state_machine
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import REPORT, report_outcome
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.part.measurement import FurtherCertificate
 from tests.app.commands.test_verify_part import OTHER
 from tests.conftest import ROOT
 from tests.part_machines import by_certificate, by_results, plate_of
@@ -59,6 +62,20 @@ def test_a_certificate_that_is_not_there_or_later_than_the_part_is_refused() -> 
     refuse_machine(plate_of({**by_certificate(), **GAUGE}, **state("gauge.pdf"), **early))
     with pytest.raises(CmmUqError, match="beside a certificate without its recording"):
         refuse_machine(plate_of({**by_results(), **GAUGE}, **state("gauge.pdf")))
+
+
+def test_a_certificate_of_before_an_adjustment_is_of_another_machine() -> None:
+    dates = [dt.date(2025, 3, 1), dt.date(2025, 6, 1), dt.date(2026, 1, 1)]
+    before, adjusted, calibrated = dates
+    named = FurtherCertificate(
+        "gauge.pdf", "7", "", "Step gauge", before, "VERIFIED", corrected=False, origin="measured"
+    )
+    one = VerifiedCertificate(named, cmm_uq.read(ROOT / "examples" / "step-gauge-simulated"), corrected=False)
+    with pytest.raises(CmmUqError, match="was adjusted on 2025-06-01"):
+        refuse_adjusted([one], [adjusted], calibrated)
+    refuse_adjusted([one], [before, calibrated + dt.timedelta(1)], calibrated)
+    with pytest.raises(CmmUqError, match="was adjusted on 2026-01-01"):
+        refuse_adjusted([one], [calibrated], calibrated)
 
 
 @cache
