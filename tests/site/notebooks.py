@@ -29,12 +29,13 @@ def executed(path: Path) -> nbformat.NotebookNode:
 
 
 def printed(notebook: nbformat.NotebookNode) -> list[str]:
-    """What every cell printed or shows as text; pictures by nothing but that there is one."""
-    return [
-        output.get("text") or output.get("data", {}).get("text/plain") or output.output_type
-        for cell in notebook.cells if cell.cell_type == "code"
-        for output in cell.outputs
-    ]  # fmt: skip
+    """What every cell printed, in however many pieces a kernel sent it, and shows as text; pictures that there is one."""
+    found = list[str]()
+    for cell in (one for one in notebook.cells if one.cell_type == "code"):
+        found.append("".join(one["text"] for one in cell.outputs if one.output_type == "stream"))
+        shown = [one for one in cell.outputs if one.output_type != "stream"]
+        found += [one.get("data", {}).get("text/plain") or one.output_type for one in shown]
+    return found
 
 
 if __name__ == "__main__":

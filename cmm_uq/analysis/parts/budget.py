@@ -170,7 +170,9 @@ def variance_shares(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Vari
     # the second sample stands in other places, so that nothing of it is that of the first
     elsewhere = [places[i] for i in random.permutation(len(places))]
     several = [cause for cause in causes if len(set(cause.factors)) > 1]
-    drawn, found = list[list[Floats]](), list[list[Floats]]()
+    # filled block by block: with thousands of coefficients, lists of blocks would be held twice when they are joined
+    drawn, found = [np.empty((each * len(places), len(cause.factors))) for cause in several], list[list[Floats]]()
+    filled = 0
     for part in in_parts(virtual.plan, each):
         A = [place.drawn(random, part) for place in places]
         B = [place.drawn(random, part) for place in places]
@@ -184,14 +186,16 @@ def variance_shares(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Vari
             *(_errors(places, mixed, virtual.exact) for mixed in exchanged), *of_place,
         ])  # fmt: skip
         by_cause = zip(causes, zip(*A, strict=True), strict=True)
-        drawn.append([np.concatenate(own) for cause, own in by_cause if cause in several])
+        for whole, own in zip(drawn, (own for cause, own in by_cause if cause in several), strict=True):
+            np.concatenate(own, out=whole[filled : filled + part * len(places)])
+        filled += part * len(places)
     yA, yB, *mixed = (np.concatenate(each) for each in zip(*found, strict=True))
     both = np.vstack([yA, yB])
     variance = np.maximum(both.var(axis=0), np.finfo(np.float64).tiny)
     centred = yB - both.mean(axis=0)
     first = [np.mean(centred * (y - yA), axis=0) / variance for y in mixed]
     total = [0.5 * np.mean((y - yA) ** 2, axis=0) / variance for y in mixed]
-    factors, within = _within(several, [np.concatenate(own) for own in zip(*drawn, strict=True)], yA)
+    factors, within = _within(several, drawn, yA)
     names, u = (*lines, *([PLACE] if len(places) > 1 else [])), np.sqrt(variance)
     return VarianceShares(tuple(virtual.names), names, np.array(first), np.array(total), factors, within, u)
 
@@ -206,9 +210,9 @@ def _within(causes: Sequence[PartCause], drawn: Sequence[Floats], y: Floats) -> 
     centred = y - y.mean(axis=0)
     variance = np.maximum(y.var(axis=0), np.finfo(np.float64).tiny)
     for cause, coefficients in zip(causes, drawn, strict=True):
-        X = coefficients - coefficients.mean(axis=0)
         for factor in dict.fromkeys(cause.factors):
-            own = X[:, [i for i, name in enumerate(cause.factors) if name == factor]]
+            own = coefficients[:, [i for i, name in enumerate(cause.factors) if name == factor]]
+            own -= own.mean(axis=0)
             explained = own @ np.linalg.lstsq(own, centred, rcond=None)[0]
             chance = own.shape[1] / len(own)  # what as many columns explain of anything
             share = np.mean(explained**2, axis=0) / variance

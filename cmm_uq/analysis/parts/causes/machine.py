@@ -236,8 +236,7 @@ def modelled(state: MachineState, qualified: Qualified, pose: PartPose, measured
         ),
     ], axis=2)  # fmt: skip
     factors = [effect.name for effect in state.effects for _ in effect.coefficients]
-    deviations = state.draws - state.mean
-    drift = np.append(state.drift, np.zeros(len(factors) - len(state.drift)))
+    deviations, drift = state.deviations, np.append(state.drift, np.zeros(len(factors) - len(state.drift)))
 
     def draw(random: np.random.Generator, n: int) -> Drawn:
         drawn = Rows(deviations, random.integers(len(deviations), size=n))
