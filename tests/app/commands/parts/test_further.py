@@ -25,6 +25,7 @@ from tests.app.commands.test_verify_part import OTHER
 from tests.conftest import ROOT
 from tests.part_machines import by_certificate, by_results, plate_of
 from tests.part_reports import put, sampled_once, unchanged
+from tests.result_keys import PART_RESULTS
 
 IOTA = ROOT / "examples" / "part-iota" / "machine" / "certificate.pdf"
 GAUGE = {"gauge.pdf": OTHER.read_bytes()}
@@ -131,6 +132,7 @@ def test_a_report_with_a_further_certificate_is_computed_again_to_the_byte(
     files = contents_of(made)
     said = json.loads(files["results.json"])["machine"]["further"]
     assert [one["file"] for one in said] == ["gauge.pdf"]
+    assert {f"machine.further[].{key}" for key in said[0]} == {key for key in PART_RESULTS if "machine.further" in key}
     assert b"Further certificates of the machine" in files["part-simulated.html"]
     found = verify([put(tmp_path / "good", files) / "part-simulated.pdf"])
     assert not found.inquiry.findings, found.inquiry.findings

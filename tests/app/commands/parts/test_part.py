@@ -238,6 +238,7 @@ def test_every_key_of_results_is_told_in_the_reference_and_no_other() -> None:
         "machine.families[]",
         "machine.bounds[]",
         "machine.axes[]",
+        "machine.further[]",
         "other_methods.",
         "reported.",
     )
