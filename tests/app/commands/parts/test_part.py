@@ -95,7 +95,7 @@ def test_what_is_stated_to_be_in_doubt_at_the_calibration_is_in_the_machine_give
         job = job_of({**files, "job.toml": toml})
         own = effects(job.facts.model.effects)
         state = MachineState(job.points.machine, own, np.zeros((1, sum(len(one.coefficients) for one in own))))
-        machine, _, given = _given(state, job, 1)
+        machine, _, given, _, _ = _given(state, job, (), None, 1)
         assert given
         found.append(machine.draws[:, :3].std(axis=0))
     np.testing.assert_allclose(found[1], np.hypot(found[0], 5.75), rtol=0.03)
@@ -120,7 +120,8 @@ def test_chain_travel_and_place_are_the_certificates_where_the_job_leaves_them_o
 @pytest.mark.long
 def test_a_machines_job_states_the_same_as_its_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Draws of one posterior, of which a file has some in single precision: means and spreads agree to a few of a hundred."""
-    monkeypatch.setattr("cmm_uq.app.commands.parts.machine._given", lambda state, job, seed: (state, say(""), False))
+    unchanged = "cmm_uq.app.commands.parts.machine._given"
+    monkeypatch.setattr(unchanged, lambda state, *_: (state, say(""), False, (), ()))
     from cmm_uq.jobs.part.job import read_part
     from tests.part_machines import plate_files
 
