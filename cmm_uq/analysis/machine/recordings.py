@@ -52,9 +52,10 @@ class FurtherRecording:
         return np.asarray(found.design * [self.change.get(one.key, 0.0) for one in found.unknowns])
 
     def contradiction(self, state: MachineState) -> float:
-        """Probability, by the machine as it is known without this recording, of one that deviates as much from it.
+        """Chance, by the machine as it is known without this recording, of one that deviates as much from it.
 
-        Errors that no recording has shown yet are as large as they may be.
+        As a whole (χ²), or as a change of one of the named errors would make it deviate; no less than the true chance
+        (Bonferroni). Errors that no recording has shown yet are as large as they may be.
         """
         model, linear = self.model, self.linear
         foretold, start = np.zeros((len(state.draws), len(linear.observed))), 0
@@ -72,8 +73,13 @@ class FurtherRecording:
         left = (linear.observed - linear.design[:, known] @ linear.prior_mean[known] - foretold.mean(axis=0)) @ into
         doubt = np.hstack([linear.design[:, known] * linear.prior_sd[known], self.changed, self.noise, *unseen])
         covariance = into.T @ (np.cov(foretold.T) + doubt @ doubt.T) @ into
-        squares = left @ scipy.linalg.solve(covariance, left, assume_a="pos")
-        return float(scipy.special.chdtrc(len(left), squares))
+        gain = scipy.linalg.solve(
+            covariance, np.column_stack([left, into.T @ linear.design[:, ~others]]), assume_a="pos"
+        )
+        whole = float(scipy.special.chdtrc(len(left), left @ gain[:, 0]))
+        shifts = (left @ gain[:, 1:]) ** 2 / np.sum((into.T @ linear.design[:, ~others]) * gain[:, 1:], axis=0)
+        each = scipy.special.chdtrc(1, shifts[np.isfinite(shifts)])
+        return float(min(1.0, 2 * min(whole, len(each) * float(each.min(initial=1.0)))))
 
 
 def recorded(model: RecordingModel, effect: Effect) -> bool:
