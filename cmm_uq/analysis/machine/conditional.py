@@ -27,6 +27,7 @@ from cmm_uq.analysis.machine.recordings import (
     mean_noise,
     model_of_machine,
     recorded,
+    sd_of,
     shown_by,
     stacked,
 )
@@ -99,7 +100,7 @@ class RecordedField:
         effects, sds = list[Effect](), [np.zeros(0)]
         for i, one in zip(which, errors, strict=True):
             effect = further[i].effect
-            sds.append(_sd(linear(effect)))
+            sds.append(sd_of(linear(effect)))
             if one.impulse is not None and isinstance(effect, PeriodicScale):
                 seen = whole.shown(one.impulse)
                 sds.append(np.ones(len(seen)))
@@ -116,11 +117,6 @@ class RecordedField:
         return np.hstack([drawn[:, : self.modelled], drawn[:, start : start + len(self.sd)] * self.sd])
 
 
-def _sd(effect: Effect) -> Floats:
-    """Of its coefficients beforehand: what physics allows, since the recording itself says how large it may be."""
-    return np.array([coefficient.prior_sd for coefficient in effect.coefficients])
-
-
 def _readings(points: Iterable[Points], effect: PeriodicScale) -> Floats:
     return np.concatenate([each.readings[effect.axis] for each in points])
 
@@ -128,14 +124,14 @@ def _readings(points: Iterable[Points], effect: PeriodicScale) -> Floats:
 def _errors(models: Sequence[RecordingModel], effect: Effect, points: Sequence[Points], learned: bool) -> FieldErrors:
     whole, family = linear(effect), family_of(effect) if learned else None
     if not isinstance(effect, PeriodicScale):
-        columns = np.vstack([shown_by(each, whole) for each in models]) * _sd(whole)
+        columns = np.vstack([shown_by(each, whole) for each in models]) * sd_of(whole)
         return FieldErrors(family, columns, normal(columns.shape[1]))
     readings = _readings(points, effect)
     impulse = scipy.linalg.block_diag(*(shown(each, effect) for each in models))
     waves = np.vstack([whole.basis(each)[:, "xyz".index(effect.axis)] for each in points])
     beforehand = GivenPeriod(effect, readings, np.zeros((len(readings), 0))).beforehand
     return FieldErrors(
-        family, impulse @ waves * _sd(whole), beforehand, impulse, covariance(effect, readings, readings)
+        family, impulse @ waves * sd_of(whole), beforehand, impulse, covariance(effect, readings, readings)
     )
 
 

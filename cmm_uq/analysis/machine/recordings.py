@@ -63,7 +63,7 @@ class FurtherRecording:
             own = state.draws[:, start : start + len(effect.coefficients)]
             start += len(effect.coefficients)
             foretold += own @ shown_by(model, effect).T
-        unseen = [shown_by(model, whole) * _sd(whole) for whole in (trials(one.effect) for one in state.unmodelled)]
+        unseen = [shown_by(model, whole) * sd_of(whole) for whole in (trials(one.effect) for one in state.unmodelled)]
         named = {(one.name, each.name) for one in state.effects for each in one.coefficients}
         others = np.array([one.key not in named for one in linear.unknowns], dtype=bool)
         known = others & np.isfinite(linear.prior_sd)
@@ -73,13 +73,13 @@ class FurtherRecording:
         left = (linear.observed - linear.design[:, known] @ linear.prior_mean[known] - foretold.mean(axis=0)) @ into
         doubt = np.hstack([linear.design[:, known] * linear.prior_sd[known], self.changed, self.noise, *unseen])
         covariance = into.T @ (np.cov(foretold.T) + doubt @ doubt.T) @ into
-        gain = scipy.linalg.solve(
-            covariance, np.column_stack([left, into.T @ linear.design[:, ~others]]), assume_a="pos"
-        )
-        whole = float(scipy.special.chdtrc(len(left), left @ gain[:, 0]))
-        shifts = (left @ gain[:, 1:]) ** 2 / np.sum((into.T @ linear.design[:, ~others]) * gain[:, 1:], axis=0)
-        each = scipy.special.chdtrc(1, shifts[np.isfinite(shifts)])
-        return float(min(1.0, 2 * min(whole, len(each) * float(each.min(initial=1.0)))))
+        columns = np.column_stack([left, into.T @ linear.design[:, ~others]])
+        gain = scipy.linalg.solve(covariance, columns, assume_a="pos")
+        size = np.einsum("ij,ij->j", columns, gain)
+        seen = np.flatnonzero(size[1:] > 0) + 1
+        whole = float(scipy.special.chdtrc(len(left), size[0]))
+        each = scipy.special.chdtrc(1, (left @ gain[:, seen]) ** 2 / size[seen])
+        return min(1.0, 2 * min(whole, len(seen) * float(each.min()) if len(seen) else 1.0))
 
 
 def recorded(model: RecordingModel, effect: Effect) -> bool:
@@ -95,7 +95,8 @@ def shown_by(model: RecordingModel, effect: Effect) -> Floats:
     return model.seen(model.columns(effect, (), about), about)
 
 
-def _sd(effect: Effect) -> Floats:
+def sd_of(effect: Effect) -> Floats:
+    """(j,) of its coefficients beforehand: what physics allows, or what is stated."""
     return np.array([one.prior_sd for one in effect.coefficients])
 
 

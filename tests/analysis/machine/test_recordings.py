@@ -112,6 +112,17 @@ def test_a_machine_that_is_another_is_contradicted_unless_so_much_change_is_expe
     assert replace(second, corrections={scale: 200.0}).contradiction(state) < 1e-6
 
 
+def test_a_calibration_that_names_no_error_of_the_machine_is_contradicted_no_sooner() -> None:
+    first = replace(of(FIRST), effects=())
+    state = MachineState(BARS.machine, (), np.zeros((2, 0)), unmodelled=left_out(*MODELLED, "straightness_x_y"))
+    alone = given_recording(state, first, SIGMA, 2000)
+    same = further_recording(known(first), of(~FIRST), alone.unmodelled, sigma_mm=SIGMA)
+    assert same.contradiction(alone) > 1e-3
+    moved = simulated(TRUE + np.array([2000.0, 0, 0, 0, 0, 0]), 2)
+    other = further_recording(known(first), of(~FIRST, moved), alone.unmodelled, sigma_mm=SIGMA)
+    assert other.contradiction(alone) < 1e-6
+
+
 def test_what_a_further_recording_says_goes_less_far_the_more_the_machine_may_have_changed() -> None:
     """Of a drift without bound nothing: as the first recording alone."""
     xyz = simulated(TRUE, 3)
