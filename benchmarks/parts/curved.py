@@ -166,23 +166,25 @@ def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
 
 def tables(folder: Path) -> str:
     """By class: how often all intervals hold, and of some what they are beside the errors that values really had."""
-    records = kept(folder)
-    lines = [
-        "| class, calibration, noise | machines | all 15 hold | " + " | ".join(WORDS[name] for name in SHOWN) + " |"
-    ]
-    lines.append("| --- " * (len(SHOWN) + 3) + "|")
-    for cell in CELLS:
-        done = [r["intervals"] for r in records if r["cell"] == cell.name and "intervals" in r]
+    return table_of(folder, CELLS, ("class, calibration, noise", "machines"), lambda cell, done: ())
+
+
+def table_of(
+    folder: Path, cells: Sequence[Any], heads: Sequence[str], more: Callable[[Any, list[dict[str, Any]]], Sequence[str]]
+) -> str:
+    """A row a cell, with ``more`` by its records between how many machines there are and how often their intervals hold."""
+    records, shown = kept(folder), " | ".join(WORDS[name] for name in SHOWN)
+    lines = [f"| {' | '.join(heads)} | all 15 hold | {shown} |", "| --- " * (len(heads) + 1 + len(SHOWN)) + "|"]
+    for cell in cells:
+        done = [r for r in records if r["cell"] == cell.name and "intervals" in r]
         if not done:
             continue
-        each = {one.name: np.array([r[one.name] for r in done]).T for one in CHARACTERISTICS}
-        row = [cell.name, str(len(done)), f"{100 * np.mean([holds(rows).mean() for rows in each.values()]):.1f} %"]
-        row += [figures(each[name]) for name in SHOWN]
+        each = {one.name: np.array([r["intervals"][one.name] for r in done]).T for one in CHARACTERISTICS}
+        hold = f"{100 * np.mean([holds(rows).mean() for rows in each.values()]):.1f} %"
+        row = [cell.name, str(len(done)), *more(cell, done), hold, *(figures(each[name]) for name in SHOWN)]
         lines.append("| " + " | ".join(row) + " |")
-    faults = sum("fault" in r for r in records)
-    return "\n".join(
-        [*lines, "", f"{faults} faults; {np.mean([r['seconds'] for r in records]):.2f} s of CPU a machine"]
-    )
+    faults, seconds = sum("fault" in r for r in records), np.mean([r["seconds"] for r in records])
+    return "\n".join([*lines, "", f"{faults} faults; {seconds:.2f} s of CPU a machine"])
 
 
 def figures(rows: np.ndarray) -> str:

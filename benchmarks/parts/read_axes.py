@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.coverage.measuring import counted, kept
+from benchmarks.coverage.measuring import counted
 from benchmarks.parts import curved, machines
-from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, WORDS
+from benchmarks.parts.studied import MACHINE
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.tables.machine import AxisFacts
 
@@ -39,7 +39,6 @@ SCREW = AxisFacts(
     play_um=15.0,
 )
 ROUGH = AxisFacts(names=["x", "y", "z"], reading="exposed optical grating", source="study")
-SHOWN = ("d2", "apart", "x1", "length", "position 1", "flat")
 
 
 @dataclass(frozen=True)
@@ -100,22 +99,11 @@ def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
 
 def tables(folder: Path) -> str:
     """As of :func:`benchmarks.parts.curved.tables`, and of how many machines an axis' statement was denied."""
-    records = kept(folder)
-    heads = " | ".join(WORDS[name] for name in SHOWN)
-    lines = [f"| axes truly, calibration, what is stated | machines | denied | all 15 hold | {heads} |"]
-    lines.append("| --- " * (len(SHOWN) + 4) + "|")
-    for cell in CELLS:
-        done = [r for r in records if r["cell"] == cell.name and "intervals" in r]
-        if not done:
-            continue
-        each = {one.name: np.array([r["intervals"][one.name] for r in done]).T for one in CHARACTERISTICS}
-        all_hold = 100 * np.mean([curved.holds(rows).mean() for rows in each.values()])
-        denied = "–" if cell.stated is None else f"{100 * np.mean([bool(r['denied']) for r in done]):.0f} %"
-        row = [cell.name, str(len(done)), denied, f"{all_hold:.1f} %", *(curved.figures(each[name]) for name in SHOWN)]
-        lines.append("| " + " | ".join(row) + " |")
-    faults = sum("fault" in r for r in records)
-    seconds = np.mean([r["seconds"] for r in records])
-    return "\n".join([*lines, "", f"{faults} faults; {seconds:.2f} s of CPU a machine"])
+
+    def denied(cell: Cell, done: list[dict[str, Any]]) -> list[str]:
+        return ["–" if cell.stated is None else f"{100 * np.mean([bool(r['denied']) for r in done]):.0f} %"]
+
+    return curved.table_of(folder, CELLS, ("axes truly, calibration, what is stated", "machines", "denied"), denied)
 
 
 if __name__ == "__main__":

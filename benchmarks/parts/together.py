@@ -15,9 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.coverage.measuring import counted, kept
+from benchmarks.coverage.measuring import counted
 from benchmarks.parts import curved, machines
-from benchmarks.parts.studied import CHARACTERISTICS, WORDS
 from cmm_uq.app.commands.parts.further import CONTRADICTED
 
 BEGIN, END = "<!-- written by benchmarks.parts.together -->", "<!-- end of together -->"
@@ -58,23 +57,11 @@ def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
 
 def tables(folder: Path) -> str:
     """As of :func:`benchmarks.parts.curved.tables`, and of how many machines a further certificate was contradicted."""
-    records = kept(folder)
-    heads = " | ".join(WORDS[name] for name in curved.SHOWN)
-    lines = [f"| class, certificates | machines | contradicted | all 15 hold | {heads} |"]
-    lines.append("| --- " * (len(curved.SHOWN) + 4) + "|")
-    for cell in CELLS:
-        done = [r for r in records if r["cell"] == cell.name and "intervals" in r]
-        if not done:
-            continue
-        each = {one.name: np.array([r["intervals"][one.name] for r in done]).T for one in CHARACTERISTICS}
-        all_hold = 100 * np.mean([curved.holds(rows).mean() for rows in each.values()])
-        against = sum(min(r["chances"]) < CONTRADICTED for r in done) if cell.artefacts[1:] else "–"
-        row = [cell.name, str(len(done)), str(against), f"{all_hold:.1f} %"]
-        row += [curved.figures(each[name]) for name in curved.SHOWN]
-        lines.append("| " + " | ".join(row) + " |")
-    faults = sum("fault" in r for r in records)
-    seconds = np.mean([r["seconds"] for r in records])
-    return "\n".join([*lines, "", f"{faults} faults; {seconds:.2f} s of CPU a machine"])
+
+    def against(cell: Cell, done: list[dict[str, Any]]) -> list[str]:
+        return [str(sum(min(r["chances"]) < CONTRADICTED for r in done)) if cell.artefacts[1:] else "–"]
+
+    return curved.table_of(folder, CELLS, ("class, certificates", "machines", "contradicted"), against)
 
 
 if __name__ == "__main__":
