@@ -25,7 +25,7 @@ SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
 MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.reference\.")
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
-    "": 140, "base": 2_713, "maths": 10_612, "jobs": 11_947, "machine": 6_242, "analysis": 16_857, "laboratory": 14_104,
+    "": 140, "base": 2_713, "maths": 10_612, "jobs": 11_947, "machine": 6_242, "analysis": 16_854, "laboratory": 14_104,
     "certificate": 15_552, "artefacts": 8_509, "app": 14_212,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
