@@ -81,12 +81,19 @@ def _bar(design: Design, **more: object) -> Placed:
     return _placed(design, node=design.point.copy(), own=own, axes=axes, **more)
 
 
-def gauge(random: np.random.Generator, *, equal: bool = False) -> Placed:
-    """Faces of a step gauge there and back, twice: seven lines and unequal steps, or the axes and twelve equal steps."""
+LINES = np.array([
+    [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [1, 1, 1], [1, -1, 1],
+    [0, 1, 1], [1, -1, 0], [1, 0, -1], [0, 1, -1], [1, 1, -1],
+], dtype=float)  # fmt: skip
+"""Along which a step gauge lies."""
+
+
+def gauge(random: np.random.Generator, *, equal: bool = False, count: int = 7) -> Placed:
+    """Faces of a step gauge there and back, twice: some lines and unequal steps, or the axes and twelve equal steps."""
     lines = np.eye(3)
     faces = np.arange(12) * float(random.choice([25.0, 30.0, 36.0]))
     if not equal:
-        lines = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [1, 1, 1], [1, -1, 1]], dtype=float)
+        lines = LINES[:count]
         faces = np.concatenate([[0.0], np.sort(random.choice(np.arange(1, 23) * 20.0, 5, replace=False))])
     parts: dict[str, list] = {
         "true": [],
@@ -103,14 +110,14 @@ def gauge(random: np.random.Generator, *, equal: bool = False) -> Placed:
         start = np.where(line < 0, TRAVEL[:, 1] - free, TRAVEL[:, 0] + free)
         for repeat in (1, 2):
             order = np.concatenate([np.arange(len(faces)), np.arange(len(faces))[::-1]])
-            count = len(order)
+            many = len(order)
             parts["true"].append(start + faces[order, None] * line)
             parts["node"].append(order + 1)
-            parts["measurement"].append(np.full(count, number))
-            parts["point"].append(np.arange(1, count + 1))
-            parts["repeat"].append(np.full(count, repeat))
-            parts["sense"].append(np.repeat([1.0, -1.0], count // 2)[:, None] * np.sign(line))
-            parts["line"].append(np.tile(line, (count, 1)))
+            parts["measurement"].append(np.full(many, number))
+            parts["point"].append(np.arange(1, many + 1))
+            parts["repeat"].append(np.full(many, repeat))
+            parts["sense"].append(np.repeat([1.0, -1.0], many // 2)[:, None] * np.sign(line))
+            parts["line"].append(np.tile(line, (many, 1)))
     one = {name: np.concatenate(values) for name, values in parts.items()}
     n, line, sense, node = len(one["true"]), one.pop("line"), one.pop("sense"), one.pop("node")
     D = np.zeros((n, n, 3))

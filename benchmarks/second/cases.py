@@ -51,7 +51,7 @@ DESIGNS: Mapping[str, Callable[[np.random.Generator], Placed]] = {
     "plate, one way": lambda random: artefacts.plate(random, 1), "plate, two ways": lambda random: artefacts.plate(random, 2),
 }  # fmt: skip
 ORDINARY = ("ballbar", "step gauge", "plate", "sphere")
-_COLUMNS = (("time_s",), ("approach_x", "approach_y", "approach_z"), ("temp_x_c", "temp_y_c", "temp_z_c"),
+COLUMNS = (("time_s",), ("approach_x", "approach_y", "approach_z"), ("temp_x_c", "temp_y_c", "temp_z_c"),
             ("temp_artefact_c",), ("temp_table_top_c", "temp_table_bottom_c"), ("load_kg",))  # fmt: skip
 """Columns that are recorded or not."""
 
@@ -224,7 +224,7 @@ def _attempt(random: np.random.Generator, kind: str, number: int) -> Case | None
     placed = DESIGNS[what](random)
     noise = noises.drawn(random, noise_kind, placed)
     timed = noise_kind in noises.IN_TIME
-    gone = [columns for columns in _COLUMNS if random.random() < 0.35 and not (timed and "time_s" in columns)]
+    gone = [columns for columns in COLUMNS if random.random() < 0.35 and not (timed and "time_s" in columns)]
     before = placed.recorded
     covariance = noises.of_observations(noises.of_coordinates(noise, placed), placed)
     placed.recorded = {k: v for k, v in before.items() if not any(k in columns for columns in gone)}
@@ -243,9 +243,9 @@ def _attempt(random: np.random.Generator, kind: str, number: int) -> Case | None
         name: float(random.normal(0, LARGEST[kind_of(name)] / 6)) for name in (named or SIX if simulated else named)
     }
     machine = int(random.choice([0, *maps.SQUARENESS])) if simulated else 0
-    known = _of_effects({name: KNOWN[name] for name in base}, base, seen.context)
+    known = of_effects({name: KNOWN[name] for name in base}, base, seen.context)
     simulation = (lambda p: maps.error(p, machine)) if machine else known
-    more = _of_effects(hidden["errors"], hidden["sizes"], seen.context)
+    more = of_effects(hidden["errors"], hidden["sizes"], seen.context)
     moved = placed.true + hidden["moved"]
     p = indicated(moved, lambda q: simulation(q) + more(q))
     full = Placed(**{**placed.__dict__, "recorded": before})
@@ -305,7 +305,7 @@ def _hidden(random: np.random.Generator, kind: str, seen: Seen) -> dict | None:
         left = {name: min(seen.left(sizes[names[0]] * signals[names[0]], [v]) for v in seen.versions(name, rivals))
                 for name in rivals if name not in seen.named}  # fmt: skip
         return found | {"stands_in": min(left.values())} if min(left.values()) > STANDS_IN else None
-    return found | {"rivals": {name: _rivals(seen, name, sizes, signals, rivals) for name in names}}
+    return found | {"rivals": {name: rivals_of(seen, name, sizes, signals, rivals) for name in names}}
 
 
 def _among(random: np.random.Generator, kind: str, seen: Seen) -> dict[str, Error]:
@@ -316,7 +316,7 @@ def _among(random: np.random.Generator, kind: str, seen: Seen) -> dict[str, Erro
     return visible(seen.design)
 
 
-def _rivals(seen: Seen, name: str, sizes: dict, signals: dict, among: Mapping[str, Error]) -> list[str]:
+def rivals_of(seen: Seen, name: str, sizes: dict, signals: dict, among: Mapping[str, Error]) -> list[str]:
     """Effects that could stand in the place of a hidden one without anyone noticing."""
     others = [signal for key, signal in signals.items() if key != name]
     return [
@@ -350,7 +350,7 @@ def _alike(seen: Seen, kind: str, words: str, moved: np.ndarray) -> dict[str, li
     return {**found, "alike": sorted({*found["alike"], *machine})}
 
 
-def _of_effects(
+def of_effects(
     errors: Mapping[str, Error], sizes: Mapping[str, float], context: dict
 ) -> Callable[[np.ndarray], np.ndarray]:
     def e(p: np.ndarray) -> np.ndarray:

@@ -1,0 +1,211 @@
+"""What could be known of a hidden error outside the catalogue: an oracle that is told covariate, axis and noise exactly.
+
+It asks whether there is anything, told the form and not told it; what the true form predicts of set-ups that its fit had not
+seen; and the odds of the form against the others of the dictionary and against a smooth function. Every explanation has the
+same prior for what it makes visible. Nothing here comes from the package.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from scipy import special, stats
+
+from benchmarks.second.cases import baseline
+from benchmarks.second.oracle import searched
+from benchmarks.third.cases import Hidden
+from benchmarks.third.forms import DICTIONARY, TWO, Outside
+from benchmarks.third.known import rivals
+
+VISIBLE = (2.0, 5.0, 12.0, 30.0)
+"""Standard deviations of √λ that an explanation may have, each as probable as any other."""
+LENGTHS = (0.08, 0.15, 0.3, 0.6)
+"""Over which a smooth function changes, as a part of the covariate's range."""
+WAVES, WAVES_OF_TWO, PLAIN = 24, 7, 8
+"""Cosines of a smooth function, of one and for each of two covariates; of a test of no form."""
+DRAWS = 199
+LEAST = 1e-6
+"""Length of a column, over its length before the model took its part, below which nothing of it is seen."""
+
+
+def searched_for(found: Hidden, seed: int) -> dict[str, Any]:
+    """What oracles say of a case: of effects of the catalogue that of the second study, which estimates the noise."""
+    if found.outside is not None:
+        return told(found, seed)
+    search = searched(found.one, knows_noise=False, seed=seed)
+    return {"effects": list(search.effects), "p": search.p_value, "rivals": rivals(found)}
+
+
+def told(found: Hidden, seed: int) -> dict[str, Any]:
+    """Of a hidden error outside the catalogue."""
+    y = found.seen.rest @ found.one.y
+    outside = found.outside
+    assert outside is not None
+    column = found.seen.seen(found.errors[outside.name])
+    before, after = held_out(found, column_of(found, outside))
+    log_odds, true = odds(found, y), outside.form
+    others = {name: value for name, value in log_odds.items() if name != true}
+    return {
+        "p_form": float(stats.chi2.sf((column @ y) ** 2 / (column @ column), 1)),
+        "p_covariate": unformed(found, y, np.random.default_rng([seed, 77])),
+        "heldout_before_um": before, "heldout_after_um": after,
+        "log_odds": {name: float(log_odds.get(true, np.nan) - value) for name, value in others.items()},
+        "log_evidence": {name: float(value) for name, value in log_odds.items()},
+    }  # fmt: skip
+
+
+def column_of(found: Hidden, outside: Outside) -> np.ndarray:
+    """Observations (m,) per unit, not whitened."""
+    return found.seen.column(outside.error())
+
+
+def families(found: Hidden) -> Iterator[tuple[str, np.ndarray]]:
+    """Every form of the dictionary that its covariates may have: name, columns (m, members, c), whitened."""
+    outside = found.outside
+    assert outside is not None
+    each = [outside] if len(outside.of) == 1 else [outside.only(0), outside.only(1)]
+    for form, (_, _, members) in DICTIONARY.items():
+        if form in TWO:
+            columns = [_columns(found, outside, form, members())] if len(outside.of) == 2 else []
+        elif form == "sign":
+            columns = [_columns(found, one, form, members()) for one in each if one.of[0].startswith("approach")]
+        elif form == "exponential":
+            columns = [_columns(found, one, form, members()) for one in each if one.of == ("time_s",)]
+        else:
+            columns = [_columns(found, one, form, members()) for one in each if not one.of[0].startswith("approach")]
+        if columns:
+            yield form, np.concatenate(columns, axis=1)
+
+
+def _columns(found: Hidden, outside: Outside, form: str, members: list[list[dict[str, float]]]) -> np.ndarray:
+    placed, context = found.one.placed, found.one.context
+    e = [outside.error(form, parameters)(placed.true, context).ravel() for member in members for parameters in member]
+    whole = -found.seen.rest @ (placed.D @ np.column_stack(e))
+    plain = np.linalg.norm(placed.D @ np.column_stack(e), axis=0) / found.one.noise.sigma
+    whole = np.where(np.linalg.norm(whole, axis=0) > LEAST * np.maximum(plain, 1e-300), whole, 0.0)
+    return whole.reshape(len(whole), len(members), -1)
+
+
+def smooth(found: Hidden) -> Iterator[np.ndarray]:
+    """Columns (m, q) of a smooth function of the covariates, weighted by how it changes over each length; whitened."""
+    outside = found.outside
+    assert outside is not None
+    u = outside.covariates(found.one.placed.true, found.one.context)
+    waves = _waves(u, WAVES if len(u) == 1 else WAVES_OF_TWO)
+    columns = _acting(found, outside, [wave for wave, _ in waves])
+    squares = np.array([order for _, order in waves])
+    for length in LENGTHS:
+        yield columns * np.exp(-0.25 * np.pi**2 * squares * length**2)
+
+
+def _waves(u: list[np.ndarray], most: int) -> list[tuple[np.ndarray, float]]:
+    """Cosines (n,) of one or two covariates, and the squares of their orders."""
+    if len(u) == 1:
+        return [(np.cos(np.pi * k * u[0]), float(k**2)) for k in range(1, most + 1)]
+    return [(np.cos(np.pi * k * u[0]) * np.cos(np.pi * j * u[1]), float(k**2 + j**2))
+            for k in range(most) for j in range(most) if k + j]  # fmt: skip
+
+
+def _acting(found: Hidden, outside: Outside, values: list[np.ndarray]) -> np.ndarray:
+    placed = found.one.placed
+    e = np.column_stack([outside.acting(value, placed.true).ravel() for value in values])
+    return np.asarray(-found.seen.rest @ (placed.D @ e))
+
+
+def log_evidence(columns: np.ndarray, y: np.ndarray) -> float:
+    """Of columns (m, q) with one prior for all of them, over that of nothing; averaged over :data:`VISIBLE`."""
+    size = float(np.linalg.norm(columns))
+    if size <= 0:
+        return -np.inf
+    U, s, _ = np.linalg.svd(columns / size, full_matrices=False)
+    seen, variances = (U.T @ y) ** 2, np.multiply.outer(np.square(VISIBLE), s**2)
+    each = 0.5 * np.sum(seen * variances / (1 + variances) - np.log1p(variances), axis=1)
+    return float(special.logsumexp(each) - np.log(len(VISIBLE)))
+
+
+def of_family(columns: np.ndarray, y: np.ndarray) -> float:
+    """Of a form: the mean over its members that the recording could show."""
+    sizes = np.linalg.norm(columns, axis=(0, 2))
+    shown = np.flatnonzero(sizes > 1e-3 * sizes.max(initial=0.0))
+    if not len(shown):
+        return -np.inf
+    if columns.shape[2] > 1:
+        each = np.array([log_evidence(columns[:, i], y) for i in shown])
+    else:
+        seen = ((columns[:, shown, 0].T @ y) / sizes[shown]) ** 2
+        variances = np.square(VISIBLE)[:, None]
+        every = 0.5 * (seen * variances / (1 + variances) - np.log1p(variances))
+        each = special.logsumexp(every, axis=0) - np.log(len(VISIBLE))
+    return float(special.logsumexp(each) - np.log(len(each)))
+
+
+def odds(found: Hidden, y: np.ndarray) -> dict[str, float]:
+    """Log evidence of every form of the dictionary and of a smooth function, over nothing."""
+    said = {form: of_family(columns, y) for form, columns in families(found)}
+    each = [log_evidence(columns, y) for columns in smooth(found)]
+    return said | {"smooth": float(special.logsumexp(each) - np.log(len(each))), "nothing": 0.0}
+
+
+def unformed(found: Hidden, y: np.ndarray, random: np.random.Generator) -> float:
+    """p-value of nothing, told the covariate and not the form: the most surprising form, or a sum of cosines, among draws."""
+    every = [_basis(columns[:, i]) for _, columns in families(found) for i in range(columns.shape[1])]
+    outside = found.outside
+    assert outside is not None
+    u = outside.covariates(found.one.placed.true, found.one.context)
+    plain = _acting(found, outside, [wave for wave, _ in _waves(u, PLAIN if len(u) == 1 else 4)])
+    every += [_basis(plain[:, :k]) for k in range(2, plain.shape[1] + 1, 2)]
+    L = np.linalg.cholesky(found.seen.covariance)
+    noise = found.seen.rest @ (L @ random.standard_normal((len(L), DRAWS)))
+    all_y = np.column_stack([y, noise])
+    ones = [basis for basis in every if basis.shape[1] == 1]
+    best = np.zeros(DRAWS + 1)
+    if ones:
+        best = -stats.chi2.logsf(np.max(np.square(np.hstack(ones).T @ all_y), axis=0), 1)
+    for basis in every:
+        if basis.shape[1] > 1:
+            best = np.maximum(best, -stats.chi2.logsf(np.sum(np.square(basis.T @ all_y), axis=0), basis.shape[1]))
+    return float((1 + np.sum(best[1:] >= best[0])) / (DRAWS + 1))
+
+
+def _basis(columns: np.ndarray) -> np.ndarray:
+    U, s, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(U[:, s > 1e-7 * s.max(initial=0.0)] if s.max(initial=0.0) > 0 else U[:, :0])
+
+
+def held_out(found: Hidden, column: np.ndarray) -> tuple[float, float]:
+    """Rms, µm, of predictions of set-ups that the fit had not seen (of points, where there are fewer than ten), without and
+    with the true form, whose size alone is fitted."""
+    placed = found.one.placed
+    rows = placed.D.reshape(len(placed.D), len(placed.true), 3).any(axis=2)
+    first = rows.argmax(axis=1)
+    group = placed.measurement[first]
+    if len(np.unique(group)) < 10:
+        group = 1000 * group + placed.point[first]
+    B = baseline(found.seen)
+    return tuple(_predicted(B_, found.one.y, group) for B_ in (B, np.column_stack([B, column])))  # type: ignore[return-value]
+
+
+def _predicted(B: np.ndarray, y: np.ndarray, group: np.ndarray) -> float:
+    squares, count = 0.0, 0
+    for k in np.unique(group):
+        out = group == k
+        known = np.abs(B[~out]).max(axis=0, initial=0.0) > 1e-12 * np.abs(B).max(axis=0, initial=1e-300)
+        size = np.maximum(np.linalg.norm(B[~out][:, known], axis=0), 1e-300)
+        x = np.linalg.lstsq(B[~out][:, known] / size, y[~out], rcond=1e-9)[0] / size
+        left, own = y[out] - B[out][:, known] @ x, _basis(B[out][:, ~known])
+        left = left - own @ (own.T @ left)
+        squares += float(left @ left)
+        count += max(int(out.sum()) - own.shape[1], 0)
+    return 1e3 * float(np.sqrt(squares / max(count, 1)))
+
+
+def alike(found: Hidden, form: str, outside: Outside) -> float:
+    """√λ that the best member of a form, of these covariates along this axis, leaves of all that is hidden."""
+    signal = found.signal
+    of_it = Hidden(found.one, found.seen, found.errors, found.sizes, outside)
+    columns = next((c for name, c in families(of_it) if name == form), None)
+    if columns is None:
+        return float(np.linalg.norm(signal))
+    return min(found.seen.left(signal, [columns[:, i]]) for i in range(columns.shape[1]))
