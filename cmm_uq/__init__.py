@@ -28,12 +28,13 @@ if TYPE_CHECKING:
     )
     from cmm_uq.app.api.recertification import due, history
     from cmm_uq.base.errors import CmmUqError
+    from cmm_uq.machine.physics.catalogue import register
 
 __version__ = "0.15.0"
 
 __all__ = [
     "CmmUqError", "__version__", "budget", "check", "compensate", "diagnose", "due", "history", "job", "new", "part",
-    "plan", "prove", "read", "report", "simulate",
+    "plan", "prove", "read", "register", "report", "simulate",
 ]  # fmt: skip
 
 
@@ -43,7 +44,8 @@ def __getattr__(name: str) -> object:
     from importlib import import_module
 
     places = {"CmmUqError": "cmm_uq.base.errors", "check": "cmm_uq.app.api.calls", "new": "cmm_uq.app.api.calls",
-              "due": "cmm_uq.app.api.recertification", "history": "cmm_uq.app.api.recertification"}  # fmt: skip
+              "due": "cmm_uq.app.api.recertification", "history": "cmm_uq.app.api.recertification",
+              "register": "cmm_uq.machine.physics.catalogue"}  # fmt: skip
     found = getattr(import_module(places.get(name, "cmm_uq.app.api.calls")), name)
     globals()[name] = found
     return found

@@ -25,11 +25,11 @@ SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
 MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.reference\.")
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
-    "": 140, "base": 2_713, "maths": 10_612, "jobs": 11_947, "machine": 6_242, "analysis": 16_854, "laboratory": 14_104,
-    "certificate": 15_552, "artefacts": 8_509, "app": 14_212,
+    "": 140, "base": 2_728, "maths": 10_618, "jobs": 12_023, "machine": 6_542, "analysis": 16_854, "laboratory": 14_104,
+    "certificate": 15_561, "artefacts": 8_509, "app": 14_304,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
-OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1496
+OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1495
 """Imports of the package within functions, and exemptions from the formatter: only falling."""
 LOADED_LATE = {
     "arviz", "asn1crypto", "contourpy", "cryptography", "ctypes", "defusedxml", "emcee", "fcntl",

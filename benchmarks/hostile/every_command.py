@@ -69,7 +69,8 @@ LINES = (
     Line("report --scheduled @mount --schedule @schedule.toml --quiet", ("schedule.toml", "mount/")),
     Line("part @part --trials 1000 --out out --records none", ("part/",)),
     Line("batch @mount --out out --records none --workers 1", JOB),
-    Line("diagnose @iota --out out --records none", IOTA), Line("plan @plan --out out --no-power", ("plan/",)),
+    Line("diagnose @iota --out out --records none", IOTA), Line("effects wave --job @own", ("own/job.toml",)),
+    Line("check @own", ("own/job.toml",)), Line("plan @plan --out out --no-power", ("plan/",)),
     Line("prove @iota --cases 1 --out out", IOTA),
     Line("history 77 = --out out", (RECORDS,)), Line("due =", (RECORDS,)), Line("fleet = --out out", (RECORDS,)),
     Line("acquire @live --plain", ("live/",)), Line("acquire @live --plain --skip-damaged", ("live/acquisition/",)),
@@ -111,6 +112,15 @@ name = "table"
 profile = "own.toml"
 port = "file:log.txt"
 values = { value1 = "temp_artefact_c" }
+"""
+OWN_PHYSICS = b"""
+[[effect]]
+name = "wave"
+formula = ["e_x = k*sin(2*pi*y/250)", "e_z = l*abs(x - 100)**1.5*exp(-y/tau)"]
+[effect.parameters]
+k = { unit = "um", prior = 5.0 }
+l = { unit = "um/m", prior = 1.0 }
+tau = { unit = "mm", low = 20.0, high = 500.0 }
 """
 
 
@@ -182,6 +192,8 @@ def _made() -> Mapping[str, bytes]:
             if path.is_file()
         }
     made |= {f"iota/{name}": content for name, content in seeds()["compensable"].files.items()}
+    made |= {name.replace("iota/", "own/", 1): content for name, content in made.items() if name.startswith("iota/")}
+    made["own/job.toml"] += OWN_PHYSICS
     rows = b"".join(b"%d,%d,%d,%d,-%d\n" % (i, -i, 100 + i, 150 + 2 * i, 200 + i) for i in range(30))
     return made | {
         "truth.toml": small_truth(), "budget.toml": BUDGETS["sum"], "key.pem": key.certificate,

@@ -64,6 +64,9 @@ UNITS: Mapping[str, Unit] = MappingProxyType({row[0]: Unit(*row) for row in (
     ("nm", r"\nano\metre", "nanometer", 1e-9),
     ("mm²", r"\milli\metre\tothe{2}", "square millimeter", 1e-6),
     ("µm/m", r"\micro\metre\metre\tothe{-1}", "micrometer per meter", 1e-6),
+    ("µm/m²", r"\micro\metre\metre\tothe{-2}", "micrometer per square meter", 1e-6),
+    ("µm/K", r"\micro\metre\kelvin\tothe{-1}", "micrometer per kelvin", 1e-6),
+    ("µm/(m·K)", r"\micro\metre\metre\tothe{-1}\kelvin\tothe{-1}", "micrometer per meter and kelvin", 1e-6),
     ("µm/mm", r"\micro\metre\milli\metre\tothe{-1}", "micrometer per millimeter", 1e-3),
     ("µm/°", r"\micro\metre\degree\tothe{-1}", "micrometer per degree", 1e-6 * 180 / pi),
     ("µm/h", r"\micro\metre\hour\tothe{-1}", "micrometer per hour", 1e-6 / HOUR),
@@ -94,6 +97,15 @@ def unit(symbol: str) -> Unit:
     return UNITS[symbol]
 
 
+def unit_as_typed(text: str) -> Unit:
+    """The unit of a symbol, also as a keyboard has it: ``um/m2``, ``arcsec/m``, ``um/(m*K)``."""
+    plain = "".join(text.split())
+    for typed, symbol in _TYPED.items():
+        plain = plain.replace(typed, symbol)
+    return unit(f"µ{plain[1:]}" if plain.startswith("um") else plain)
+
+
+_TYPED = {"μ": "µ", "arcsec": "″", "deg": "°", "*": "·", "^2": "²", "m2": "m²", "ppm/K": "10⁻⁶/K"}
 _SPELLED: Mapping[str, str] = MappingProxyType({"degC": "°C", "percent": "%"})
 """Units of the table as files spell them that are read by pint."""
 
@@ -105,7 +117,9 @@ def unit_as_written(text: str) -> Text:
 
 PRINTED: Mapping[str, Unit] = MappingProxyType({ending: UNITS[symbol] for ending, symbol in {
     "mm": "mm", "um": "µm", "arcsec": "″", "rad": "rad", "ppm": "ppm", "c": "°C", "k": "K", "h": "h", "s": "s",
-    "per_k": "1/K", "um_per_h": "µm/h", "arcsec_per_m": "″/m", "arcsec_per_m_k": "″/(m K)",
+    "per_k": "1/K", "um_per_h": "µm/h", "arcsec_per_m": "″/m", "arcsec_per_m_k": "″/(m K)", "arcsec_per_k": "″/K", "ms": "ms",
+    "um_per_m": "µm/m", "um_per_mm": "µm/mm", "um_per_m2": "µm/m²", "um_per_deg": "µm/°", "um_per_k": "µm/K",
+    "um_per_m_k": "µm/(m·K)", "ppm_per_h": "ppm/h", "ppm_per_k": "10⁻⁶/K",
 }.items()})  # fmt: skip
 """Units as printed, by the ending of a quantity's name."""
 

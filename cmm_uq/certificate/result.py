@@ -30,6 +30,7 @@ from cmm_uq.jobs.verdicts import NO_VERDICTS, Verdicts
 from cmm_uq.machine.model import Estimate, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.artefact_doubt import growth
+from cmm_uq.machine.physics.stated import physics_of
 from cmm_uq.maths.inference.draws import Draws
 from cmm_uq.maths.inference.linear_model import LeastSquares
 from cmm_uq.maths.inference.posterior import Cause, Doubt, NoisyPosterior
@@ -63,8 +64,7 @@ class SimulatedTwin:
         }  # fmt: skip
 
 
-AtLeast = Callable[..., tuple[float, float]]
-"""U and k of a figure as a certificate states them; see :meth:`StatedUncertainty.raised_to`."""
+AtLeast = Callable[..., tuple[float, float]]  # U and k as a certificate states them; see StatedUncertainty.raised_to
 
 
 def as_evaluated(name: str, expanded: float, factor: float, *length: Any, **further: Any) -> tuple[float, float]:
@@ -355,7 +355,7 @@ class Outcome:
     @cached_property
     def document(self) -> Document:
         """Certificate, or page of a diagnosis; composed when it is first asked for."""
-        with lettered_in(self.found.job.facts.job.language):
+        with lettered_in(self.found.job.facts.job.language), physics_of(self.found.job):
             return self.composed()
 
     @property

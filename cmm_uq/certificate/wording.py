@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, foreign, number, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, foreign, lines, number, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Standing
 from cmm_uq.machine.model.measurement import ARTEFACT
-from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.machine.physics.catalogue import every, stated_effects
 from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.stated import StatedEffect
 from cmm_uq.machine.physics.words import Amount
 from cmm_uq.maths.uncertainty.quantity import Quantity, figure, limit_in_full, rounded
 
@@ -201,6 +202,12 @@ def figure_row(name: Text, quantity: Quantity, *, known: bool = True) -> Figure:
 def effect_of(name: str, own: Iterable[Effect] = ()) -> Effect | None:
     """The effect of a name, first among a model's ``own``; ``None`` of what is no effect."""
     return next((effect for effect in own if effect.name == name), every().get(name))
+
+
+def stated_physics() -> tuple[tuple[Text, Text], ...]:
+    """A row with the formulas and parameters that the job at hand states of its own; none where it states none."""
+    told = lines(one.words for one in stated_effects().values() if isinstance(one, StatedEffect))
+    return ((say("Physics stated by the job"), told),) if told else ()
 
 
 def effect_title(name: str, own: Iterable[Effect] = ()) -> Text:

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, ValidationInfo, create_model, field_validator, model_validator
 
 from cmm_uq.base.errors import suggestion
-from cmm_uq.base.files.limits import CONFORMITY, EFFECTS, LISTED
+from cmm_uq.base.files.limits import CONFORMITY, EFFECTS, LISTED, STATED
 from cmm_uq.base.files.table import JobTable, Limit, Names, Number, at_least, key, required
 from cmm_uq.base.messages import html_table
 from cmm_uq.base.output import Owner, staged
@@ -35,6 +35,7 @@ from cmm_uq.jobs.tables.conformity import (
     standards_in,
     uncertainty_missing,
 )
+from cmm_uq.jobs.tables.effect import EffectFacts
 from cmm_uq.jobs.tables.identification import MEASURED, DerivedFrom, Identification, Laboratory, Origin
 from cmm_uq.jobs.tables.machine import MachineFacts, ProbeFacts
 from cmm_uq.jobs.tables.plan import AcquireFacts, PlanFacts, ProveFacts
@@ -140,6 +141,8 @@ class JobFile(JobTable):
     rated_conditions: RatedConditions = RatedConditions()
     """Conditions under which the limits of the machine hold, by its data sheet."""
     model: ModelFacts = required("The physics that the simulation is told about.")
+    effect: Annotated[list[EffectFacts], Field(max_length=STATED.most)] = []
+    """Physics of your own, each a formula with its parameters: named in `[model] effects`, or a candidate of the diagnosis."""
     conformity: Annotated[list[ConformityFacts], Field(max_length=CONFORMITY.most)] = []
     """Statements of conformity: a standard, a limit and a rule each."""
     plan: PlanFacts = key(PlanFacts(), "What may be measured, where, and what it should tell; read by `cmm-uq plan`.")

@@ -58,9 +58,10 @@ def job_schema(
     keys = found["properties"]
     each = {kind: schema_of(table) for kind, table in tables.items()}
     keys["artefact"] = {"description": keys["artefact"]["description"], **chosen_by("kind", each, "Kinds")}
-    keys["model"]["properties"]["effects"]["items"] = {
-        "enum": list(effects), "x-taplo": {"docs": {"enumValues": list(effects.values())}},
-    }  # fmt: skip
+    known = {"enum": list(effects), "x-taplo": {"docs": {"enumValues": list(effects.values())}}}
+    stated = keys["effect"]["items"]["properties"]["name"]  # any other is one of the job's own
+    own = {"type": "string", "pattern": stated["pattern"]}
+    keys["model"]["properties"]["effects"]["items"] = {"anyOf": [known, own]}
     keys["conformity"]["items"]["properties"]["standard"]["enum"] = list(standards)
     without = [name for name, table in tables.items() if not table.with_recording]
     found["required"] = [name for name in found["required"] if name != "recording"]

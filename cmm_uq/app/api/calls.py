@@ -51,6 +51,7 @@ def job(
     points: pd.DataFrame | None = None, *, machine: Mapping[str, Any] | str, artefact: Mapping[str, Any] | str,
     effects: Sequence[str], id: str = "job", date: dt.date | str | None = None,  # noqa: A002
     recording: Mapping[str, Any] | None = None, conformity: Sequence[Mapping[str, Any]] = (),
+    effect: Sequence[Mapping[str, Any]] = (),
     files: Mapping[str, pd.DataFrame] | None = None, **tables: Mapping[str, Any],
 ) -> Job:  # fmt: skip
     """A job from DataFrames, checked as a job folder is. ``job.write(folder)`` makes it one.
@@ -63,6 +64,7 @@ def job(
     id, date : of the job; without a date it has 1970-01-01 and says that none was given.
     recording : further keys of ``[recording]``, as ``u_coordinate_um``.
     conformity : a table for each statement of conformity.
+    effect : a table for each effect of your own, with its formula.
     files : error maps and other tables that job.toml names, by name.
     tables : further tables of job.toml: ``job``, ``laboratory``, ``model``, ``plan``, ``test_uncertainty``,
         ``rated_conditions``, ``probe``.
@@ -86,7 +88,7 @@ def job(
         "machine": {"name": machine} if isinstance(machine, str) else machine,
         "artefact": {"kind": artefact} if isinstance(artefact, str) else artefact,
         "recording": recording, "model": {"effects": list(effects), **tables.get("model", {})},
-        "conformity": list(conformity),
+        "conformity": list(conformity), "effect": list(effect),
     }  # fmt: skip
     return job_from_frames(points, stated, files or {})
 

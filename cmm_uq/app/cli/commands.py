@@ -44,6 +44,8 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, *tuple[str, ...]]] = {
         "batch jobs --scheduler tcp://head:8786"),
     "diagnose": (evaluations.diagnose, "What a recording shows that its model leaves out.", "diagnose examples/iota-1102-20C",
         "diagnose JOB --against predicted.csv", "diagnose JOB --strict --quiet"),
+    "effects": (evaluations.effects, "The effects that jobs name and the diagnosis looks for.", "effects", "effects guideway",
+        "effects periodic --json", "effects --job JOB"),
     "plan": (evaluations.plan, "What to measure, and what it will tell.", "plan examples/plan-ballbar", "plan JOB --no-power",
         "plan JOB --verbose"),
     "prove": (evaluations.prove, "The diagnosis tried on sealed cases with a job's set-ups.", "prove examples/iota-1102-20C",

@@ -1,4 +1,4 @@
-"""``cmm-uq report``, ``diagnose``, ``plan``, ``prove``, ``part``, ``budget`` and ``selftest``: all that is evaluated."""
+"""``cmm-uq report``, ``diagnose``, ``effects``, ``plan``, ``prove``, ``part``, ``budget``, ``selftest``: what is evaluated."""
 
 from __future__ import annotations
 
@@ -94,6 +94,26 @@ def diagnose(
         written = write_diagnosis(job, out, seed=seed, alpha=alpha, against=against, force=end.force, stage=stage, told=told,
                                   language=end.language, records=records)  # fmt: skip
     conclude(written, end)
+
+
+def effects(
+    word: str = argument("", "Only those that have it in name, title, formula, mechanism or remedy.", "[WORD]", "all"),
+    job: Path | None = option(None, "Job whose own effects are listed too.", "JOB", "none"),
+    end: Ending = opt.ONLY_JSON,
+) -> None:
+    """List the effects that a job can name and a diagnosis looks for: of the program, of packages, of the job itself."""
+    from cmm_uq.app.commands.forms import listed_effects
+
+    found = listed_effects(word, job)
+    if end.json:
+        put_data({"effects": found})
+        return
+    said = {"parameters": "prior", "columns": "needs", "mechanism": "lies in", "points_to": "points to"}
+    rows: list[tuple[str, str]] = []
+    for each in found:
+        rows.append((each.pop("name"), each.pop("title")))
+        rows += [("", f"{said.get(key, key)}: {text}") for key, text in each.items() if text]
+    show(screen_layout(verbose=True).table(rows))
 
 
 def plan(

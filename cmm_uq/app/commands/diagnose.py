@@ -39,6 +39,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.compared import KEY
 from cmm_uq.laboratory.records.place import NONE
 from cmm_uq.machine.model import RecordingModel
+from cmm_uq.machine.physics.stated import physics_of, with_own_physics
 from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.inference.posterior import NoisyPosterior
 
@@ -121,7 +122,8 @@ def detection_goals(job: Job, diagnosis: Diagnosis, unseen: Sequence[SmallestEff
 
 
 def outcome_of(result: AnalysisResult, seed: int = 0) -> Outcome:
-    return _recipe(result.job).outcome(result, seed)
+    with physics_of(result.job):
+        return _recipe(result.job).outcome(result, seed)
 
 
 def _recipe(job: Job) -> Recipe:
@@ -140,6 +142,7 @@ def _recipe(job: Job) -> Recipe:
 
 
 @naming_package()
+@with_own_physics
 def diagnosis_outcome(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, stage: Stage = silent) -> Outcome:
     """Diagnose a job that was read and compose the page; nothing is written."""
     readings = f": {len(job.points)} readings" if job.facts.artefact.with_recording else ""

@@ -23,6 +23,9 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.content import certificate_content, folder_from, kind_of_entry
 from cmm_uq.laboratory.records.facts import KEY, Heads
 from cmm_uq.laboratory.records.place import DEFAULT, NONE, beside, is_url, place_of
+from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.stated import physics_of, with_own_physics
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.signing import Signing
@@ -53,7 +56,8 @@ def ledger_of(
     records: Records, job: Job, command: str, folder: Path, files: Mapping[str, bytes], results: str
 ) -> Ledger:
     hashes = {name: sha256(data).hexdigest() for name, data in files.items()}
-    content = content_of(records.home, files[results], job, command, folder, hashes)
+    with physics_of(job):
+        content = content_of(records.home, files[results], job, command, folder, hashes)
     return records.ledger(kind_of_entry(content), content)
 
 
@@ -67,13 +71,14 @@ def content_of(
     )  # fmt: skip
 
 
-@cache
 def called(name: str) -> str:
     """How a value of results.json is called in the field: by its effect's title, else by its own name in words."""
-    from cmm_uq.machine.physics.catalogue import every
+    return _called(name, every().get(name.partition(".")[0]))
 
-    owner, _, own = name.partition(".")
-    effect = every().get(owner)
+
+@cache
+def _called(name: str, effect: Effect | None) -> str:
+    own = name.partition(".")[2]
     if effect is None:
         words = own.split("_")
         while len(words) > 1 and words[-1] in _UNITS_AT_THE_END:
@@ -226,6 +231,7 @@ def results_at(results: Mapping[str, Any], heads: Heads) -> tuple[bytes, Text]:
     return data, made_after(head)
 
 
+@with_own_physics
 def _digital(job: Job, results: bytes, rendered: Mapping[str, bytes]) -> bytes:
     """The digital certificate, of results.json and the job alone, with the page as its human-readable copy."""
     from cmm_uq.certificate.digital_certificate.certificate import digital_certificate

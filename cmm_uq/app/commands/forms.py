@@ -15,6 +15,7 @@ from typing import Any
 from cmm_uq import __version__
 from cmm_uq.analysis.conformity import standards
 from cmm_uq.analysis.conformity.statement import Clause
+from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import names, table_of
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.output.new_file import refuse_taken, write_new
@@ -24,6 +25,9 @@ from cmm_uq.jobs.schema import DRAFT, Schema, chosen_by, job_schema, schema_of
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.laboratory.live.instruments.profile import ProfileFile
 from cmm_uq.laboratory.schedule.settings import ScheduleFile
+from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.machine.physics.effect import Effect, Parameter
+from cmm_uq.machine.physics.stated import physics_of
 
 
 def tables() -> dict[str, type[ArtefactFacts]]:
@@ -32,8 +36,6 @@ def tables() -> dict[str, type[ArtefactFacts]]:
 
 def job() -> Schema:
     """Of job.toml, ``[plan]`` with it: what an effect is, its formula, and the columns that it needs."""
-    from cmm_uq.machine.physics.catalogue import every
-
     effects = {
         name: f"{effect.title}: {effect.formula}"
         + (f"; needs the columns {', '.join(effect.columns)}." if effect.columns else ".")
@@ -85,6 +87,28 @@ def shipped(name: str) -> str:
 
 def as_text(schema: Mapping[str, Any]) -> str:
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
+
+
+@naming_package()
+def listed_effects(word: str = "", job: Path | None = None) -> list[dict[str, str]]:
+    """Every effect, with what a job states of its own: all that have a word anywhere; a ``CmmUqError`` where none has."""
+    with physics_of(None if job is None else read_job(job, recorded=False)):
+        found = [_said(effect) for effect in every().values()]
+    chosen = [one for one in found if any(word.casefold() in said.casefold() for said in one.values())]
+    if not chosen:
+        known = {part for one in found for part in (one["name"], one["mechanism"], *one["name"].split("_")) if part[2:]}
+        raise CmmUqError(f"no effect has {word!r} in it", where="cmm-uq effects", fix=suggestion(word, known))
+    return chosen
+
+
+def _said(effect: Effect) -> dict[str, str]:
+    parameters = []
+    for one in effect.reported:
+        size = f"±{one.prior_sd:g}" if isinstance(one, Parameter) else f"{one.low:g} to {one.high:g}"
+        parameters.append(f"{one.name} {size} {one.unit}".removesuffix(" 1"))
+    told = {"name": effect.name, "title": str.__str__(effect.title), "formula": effect.formula}
+    told |= {"parameters": ", ".join(parameters), "columns": ", ".join(effect.columns)}
+    return told | {"mechanism": effect.mechanism, "points_to": str.__str__(effect.points_to)}
 
 
 @naming_package()

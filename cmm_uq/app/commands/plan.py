@@ -25,12 +25,14 @@ from cmm_uq.certificate.result import Outcome
 from cmm_uq.certificate.results.contents import head
 from cmm_uq.certificate.wording import Figure, Headline, Summary
 from cmm_uq.jobs.job import Job
+from cmm_uq.machine.physics.stated import with_own_physics
 
 TO_FILL_IN = "plan.csv"
 PLAN = Form("plan", ("plan.html",), "plan", (TO_FILL_IN,))
 
 
 @naming_package()
+@with_own_physics
 def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = silent) -> Outcome:
     """Plan a job that was read, whose recording may be missing; nothing is written."""
     plan = make_plan(job, power=power, seed=seed, progress=stage)

@@ -26,7 +26,7 @@ from cmm_uq.certificate.document import (
 )
 from cmm_uq.certificate.origin import program
 from cmm_uq.certificate.plots.volume import gain_plot, placing_pictures
-from cmm_uq.certificate.wording import effect_title
+from cmm_uq.certificate.wording import effect_title, stated_physics
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.inference.linear_model import Unknown
@@ -232,6 +232,7 @@ def plan_document(plan: MeasurementPlan) -> Document:
             Facts((
                 (say("Machine"), Verbatim(facts.machine.name)), (say("Artefact"), artefact),
                 (say("Effects to determine"), (commas(names(facts.model.effects)) or say("the error of one axis"))),
+                *stated_physics(),
             )),
             Facts((
                 (say("Start from"), start), (say("To be measured"), to_measure_words(plan)), *noise_facts(plan),

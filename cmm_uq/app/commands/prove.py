@@ -42,7 +42,8 @@ from cmm_uq.laboratory.proving.judgement import ANSWER, REFUSED, ProofJudgement,
 from cmm_uq.laboratory.schedule.processes import check_workers, serve
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.noise import noise_of
-from cmm_uq.machine.physics.catalogue import every, plugins
+from cmm_uq.machine.physics.catalogue import every, plugins, registered
+from cmm_uq.machine.physics.stated import physics_of, with_own_physics
 from cmm_uq.maths.inference.posterior import sample_with_noise
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
@@ -80,6 +81,9 @@ def prove_job(
 ) -> tuple[DiagnosisProof, AnswersFolder | None]:
     """The diagnosis proved on the set-ups of a job, and the folder of answers, still open."""
     stage("Finding the noise of the job", 0.0)
+    if registered():
+        only_here = f"{', '.join(registered())}: registered in this process, and cases are diagnosed in others"
+        raise CmmUqError(only_here, where="cmm_uq.register", fix="Make a package of them, or state them in [[effect]]")
     with refusing_overflow(job.recording_path, OVERFLOW_FIX):
         job, design = design_of(job)
         stage(f"Drawing {options.cases} cases", 0.02)
@@ -201,6 +205,7 @@ UNFINISHED = "cases.unfinished"  # folder, beside the files, with truth and answ
 
 
 @naming_package()
+@with_own_physics
 def prove_outcome(
     job: Job, options: ProofOptions, *, stage: Stage = silent, folder: Path | None = None, sealed: Sealed | None = None,
     kept: list[AnswersFolder] | None = None,
@@ -269,10 +274,13 @@ def model_on(job: Job, points: Points) -> RecordingModel:
 
 def begin(setting: CaseSetting) -> Callable[[int, Case], Record]:
     job = replace(job_of(setting.files, recorded=False), points=setting.points, planned=False)
-    design = Design(model_on(job, setting.points), setting.values, setting.noise, setting.cte_per_k, setting.dates)
+    with physics_of(job):
+        model = model_on(job, setting.points)
+    design = Design(model, setting.values, setting.noise, setting.cte_per_k, setting.dates)
     return lambda number, case: diagnosed_case(job, design, case, setting)
 
 
+@with_own_physics
 def diagnosed_case(job: Job, design: Design, case: Case, setting: CaseSetting) -> Record:
     """What is said of a case; what the diagnosis refuses, or breaks on, is an answer too."""
     points = design.recording(case, setting.seed, every())

@@ -41,6 +41,7 @@ from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.machine.model.kind import Kind, Observed
 from cmm_uq.machine.model.measurement import RecordingModel, with_curvature
 from cmm_uq.machine.model.noise import noise_of
+from cmm_uq.machine.physics.stated import physics_of, with_own_physics
 from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior, sample_with_noise
 
@@ -127,6 +128,7 @@ def report_recipe(job: Job) -> Recipe:
     return recipe_of(job, lambda own: own.report, usual, "reported")
 
 
+@with_own_physics
 def evaluate_job(job: Job, *, seed: int = 0, progress: Progress | None = None) -> AnalysisResult:
     """What the analysis of a job finds, of any kind; the same seed gives the same result."""
     with refusing_overflow(job.recording_path, OVERFLOW_FIX):
@@ -138,10 +140,12 @@ def analyse(folder: Path, *, seed: int = 0, progress: Progress | None = None) ->
 
 
 def outcome_of(found: AnalysisResult, seed: int = 0) -> Outcome:
-    return report_recipe(found.job).outcome(found, seed)
+    with physics_of(found.job):
+        return report_recipe(found.job).outcome(found, seed)
 
 
 @naming_package()
+@with_own_physics
 def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent, composed: bool = True) -> Outcome:
     """Analyse a job that was read and compose its certificate; nothing is written."""
 

@@ -58,6 +58,7 @@ WORD = Limit(
 )
 FILE_NAME = Limit(200, "characters", "file name in a job", "file systems take 255 bytes")
 EFFECTS = Limit(100, "entries", "effects, rivals or tolerances of a model", "the catalogue has fewer")
+STATED = Limit(20, "entries", "[[effect]]", "each is one more explanation that every diagnosis tries")
 MAPS = Limit(20, "entries", "error maps of a machine", "one a degree")
 CONFORMITY = Limit(50, "entries", "[[conformity]]", "each is a section of the certificate")
 LISTED = Limit(10_000, "entries", "other lists of a job", "measurements to set aside, shifts, lengths, directions")

@@ -57,7 +57,8 @@ def diagnosis_document(result: JobDiagnosis) -> doc.Document:
     return doc.working_page(
         facts, say("Diagnosis"),
         say("{came_about} {date}", came_about=came_about(result.job), date=day(facts.job.date)),
-        overview=words.overview_of(result), particulars=(doc.Facts(particulars), doc.Facts((explained,))),
+        overview=words.overview_of(result),
+        particulars=(doc.Facts(particulars), doc.Facts((explained, *wording.stated_physics()))),
         warnings=(say("{why:capital}.", why=f.why) for f in result.findings), sections=_sections(result),
         produced_by=say("{program}, {sampler}, seed {seed}", program=program(result.job), sampler=sampler, seed=seed),
         attachments=(*names(result.job.inputs), Verbatim("results.json")),

@@ -10,7 +10,7 @@ from cmm_uq.certificate.document import Facts, Paragraph, Section, section
 from cmm_uq.certificate.plots.corner import corner_plot
 from cmm_uq.certificate.result import RecordingNoise, Result
 from cmm_uq.certificate.sections.regions import regions_warnings
-from cmm_uq.certificate.wording import title_of, with_uncertainty
+from cmm_uq.certificate.wording import stated_physics, title_of, with_uncertainty
 from cmm_uq.machine.model.artefact_doubt import CALIBRATION
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.inference.ensembles import Chains
@@ -113,6 +113,7 @@ def method(result: Result) -> Section:
             "each as many as it is probable; residuals, noise, least squares and the sampler are of the named model, where "
             "what it leaves out counts as noise", rivals=result.averaged, count=len(result.values),
         ) if result.averaged else NOTHING),
+        *stated_physics(),
         (say("Stated of the artefact"), _stated(result)),
         (say("Calibrated lengths together"), _calibration(result)),
     )  # fmt: skip

@@ -1,22 +1,28 @@
-"""Every effect by its name, built in or from other packages (entry points of the group ``cmm_uq.effects``).
+"""Every effect by its name: built in, of other packages (entry points of the group ``cmm_uq.effects``), registered, stated.
 
 ``CATALOGUE`` holds the effects that every job file may count on. ``FURTHER`` holds rarer ones: a job may name them, simulate
 them and have them estimated like the others; a diagnosis thinks of them less readily. ``OWN`` holds the faults of the artefact
-itself. An entry point has the name of the effect and gives an ``Effect``, or a class of one that is made without arguments.
+itself. An entry point has the name of the effect and gives an ``Effect``, or a class of one that is made without arguments;
+the same is registered in a running program. What a job states of its own is there while a command is at that job.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from importlib.metadata import EntryPoint
 from types import MappingProxyType
+from typing import Any, TypeVar
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.messages import Text, foreign
-from cmm_uq.base.plugins import EFFECTS, Plugin, offered
+from cmm_uq.base.plugins import EFFECTS, BrokenPluginError, Plugin, offered
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.physics.effect import CONTRACT, FURTHER as RARER, OWN as OF_ARTEFACTS, Effect, Parameter, Shape
 from cmm_uq.machine.physics.effects import drives, own_errors, own_states, probing, rigid_body, thermal
@@ -28,11 +34,32 @@ class EffectPlugin(Plugin):
 
     @cached_property
     def effect(self) -> Effect:
-        made = self.loaded(Effect)  # type: ignore[type-abstract]
+        return self.checked(self.loaded(Effect))  # type: ignore[type-abstract]
+
+    def checked(self, made: Effect) -> Effect:
+        """The effect with its package's name, where it says all that it must."""
         for field in ("title", "formula", "mechanism", "points_to", "coefficients"):
             if not getattr(made, field, None):
                 raise self.broken(f"says no {field}")
         return _Outside(made, self)
+
+
+@dataclass(frozen=True)
+class _Registered(EffectPlugin):
+    """The same that a running program registers."""
+
+    given: object = None
+
+    def loaded(self, of: type[Any]) -> Any:
+        made = self.attempt(self.given) if isinstance(self.given, type) else self.given
+        if not isinstance(made, of):
+            raise self.broken(f"is no {of.__name__} but {type(made).__name__}")
+        if not str(getattr(made, "name", "")).isidentifier():
+            raise self.broken("has no name of letters, digits and _")
+        return made
+
+    def broken(self, why: str) -> BrokenPluginError:
+        return BrokenPluginError(f"{self.what} {why}", where=f"registered by {self.package}", fix="Mend its class")
 
 
 class _Outside(Effect):
@@ -107,20 +134,22 @@ EVERY = MappingProxyType({**CATALOGUE, **FURTHER, **OWN})
 
 
 def every() -> Mapping[str, Effect]:
-    """All effects by name, the built-in ones first, then those of other packages in the order of their names."""
-    return _every(tuple(sys.path))
+    """All effects by name: built in, of other packages in the order of their names, registered, stated by the job at hand."""
+    found, own = _every(tuple(sys.path)), _own()
+    return MappingProxyType({**found, **own}) if own else found
 
 
 def effects(names: Sequence[str], *, where: str | None = None) -> tuple[Effect, ...]:
     """The named effects, in order. Of other packages only those named are imported."""
-    outside, chosen, wrong = _outside(tuple(sys.path)), list[Effect](), Gathered()
+    outside, own, chosen, wrong = _outside(tuple(sys.path)), _own(), list[Effect](), Gathered()
+    known = {*EVERY, *outside, *own}
     for i, name in enumerate(names):
         with wrong.going_on():
-            if name not in EVERY and name not in outside:
-                raise CmmUqError(f"unknown effect {name!r}", where=where, fix=suggestion(name, {*EVERY, *outside}))
+            if name not in known:
+                raise CmmUqError(f"unknown effect {name!r}", where=where, fix=suggestion(name, known))
             if name in names[:i]:
                 raise CmmUqError(f"the effect {name!r} is named twice", where=where, fix="Name it once")
-            chosen.append(EVERY[name] if name in EVERY else outside[name].effect)
+            chosen.append(EVERY.get(name) or own.get(name) or outside[name].effect)
     wrong.refuse()
     return tuple(chosen)
 
@@ -128,8 +157,63 @@ def effects(names: Sequence[str], *, where: str | None = None) -> tuple[Effect, 
 def plugins(names: Iterable[str] | None = None) -> dict[str, str]:
     """Version of every package whose effects are in the catalogue here, or of those with effects named, by its name."""
     outside = _outside(tuple(sys.path))
-    asked = outside.keys() if names is None else outside.keys() & set(names)
-    return {plugin.package: plugin.version for name, plugin in outside.items() if name in asked}
+    asked = None if names is None else set(names)
+    each = {**outside, **_REGISTERED}.items()
+    return {plugin.package: plugin.version for name, plugin in each if asked is None or name in asked}
+
+
+Registered = TypeVar("Registered", Effect, type[Effect])
+
+
+def register(effect: Registered) -> Registered:
+    """An effect, or a class of one, in the catalogue of this process, as if a package offered it; given back as it is.
+
+    Raises
+    ------
+    CmmUqError : it is none, does not say all that one must, or another has its name; the same class may come again.
+    """
+    of = effect if isinstance(effect, type) else type(effect)
+    entry = EntryPoint(of.__qualname__, f"{of.__module__}:{of.__qualname__}", EFFECTS)
+    plugin = _Registered(of.__module__, "(registered)", entry, effect)
+    name = plugin.effect.name
+    if name not in _REGISTERED or _REGISTERED[name].entry != entry:
+        refuse_known(name, f"registered by {of.__module__}")
+    _REGISTERED[name] = plugin
+    return effect
+
+
+def refuse_known(name: str, where: str, further: Container[str] = ()) -> None:
+    """Refuse the name of an effect that there is already, or ``further`` ones."""
+    if name in EVERY or name in _outside(tuple(sys.path)) or name in _REGISTERED or name in further:
+        raise CmmUqError(f"there is a {name!r} already", where=where, fix="Call the effect otherwise")
+
+
+@contextmanager
+def beside_the_catalogue(stated: Mapping[str, Effect]) -> Iterator[None]:
+    """What a job states of its own is in the catalogue for a while; nothing of another job."""
+    token = _STATED.set(stated)
+    try:
+        yield
+    finally:
+        _STATED.reset(token)
+
+
+def registered() -> tuple[str, ...]:
+    """Names of the effects that this process registered."""
+    return tuple(_REGISTERED)
+
+
+def stated_effects() -> Mapping[str, Effect]:
+    """What the job at hand states of its own."""
+    return _STATED.get()
+
+
+_REGISTERED: dict[str, _Registered] = {}
+_STATED: ContextVar[Mapping[str, Effect]] = ContextVar("effects of the job at hand", default=MappingProxyType({}))
+
+
+def _own() -> dict[str, Effect]:
+    return {**{name: plugin.effect for name, plugin in _REGISTERED.items()}, **_STATED.get()}
 
 
 # What is installed follows from where packages are looked for, so that is the key.

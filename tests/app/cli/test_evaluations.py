@@ -15,6 +15,7 @@ import typer
 from cmm_uq.app.cli.evaluations import selftest as command
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.certificate.plots import style as fonts
+from cmm_uq.machine.physics.catalogue import EVERY
 from cmm_uq.maths.uncertainty.reference import jcgm, selftest
 from cmm_uq.maths.uncertainty.reference.jcgm import ReferenceCase
 from tests.app.cli.process import run, run_apart
@@ -51,6 +52,25 @@ def test_it_names_what_was_left_out_and_keeps_the_contract(told_of_scale_only: P
             [sys.executable, checker, out / "results.json"], capture_output=True, text=True, check=False
         )
         assert kept.returncode == 0, kept.stdout
+
+
+def test_effects_are_listed_with_all_that_is_said_of_them_or_asked_for_in_another_word() -> None:
+    points_to = EVERY["trigger_delay"].points_to
+    assert (
+        run("effects", "trigger_delay").stdout
+        == f"""\
+  trigger_delay  Delay of the probe's trigger
+                 formula: e = delay·speed·n
+                 prior: delay_ms ±1 ms
+                 needs: nx, ny, nz, speed_mm_s
+                 lies in: controller
+                 points to: {points_to}
+"""
+    )
+    assert len(json.loads(run("effects", "--json").stdout)["effects"]) == len(EVERY)
+    wrong = run("effects", "sqareness")
+    assert (wrong.returncode, wrong.stdout) == (2, "")
+    assert wrong.stderr == "cmm-uq: cmm-uq effects: no effect has 'sqareness' in it. Did you mean 'squareness'?\n"
 
 
 @pytest.mark.long

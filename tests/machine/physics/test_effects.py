@@ -10,8 +10,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import NOTHING
 from cmm_uq.base.points import Floats, Machine, Points
-from cmm_uq.machine.physics.catalogue import CATALOGUE, effects
+from cmm_uq.base.units import UNITS, Unit, printed_unit
+from cmm_uq.machine.physics.catalogue import CATALOGUE, EVERY, effects
 from tests.machine.physics.effect_table import END, PAGE, START, table
 from tests.recordings import TRAVEL, bars, with_columns
 
@@ -223,3 +225,11 @@ def test_the_page_of_effects_is_up_to_date() -> None:
     """Written anew by ``python -m tests.machine.physics.effect_table``."""
     text = PAGE.read_text(encoding="utf-8")
     assert text.partition(START)[2].partition(END)[0].strip() == table()
+
+
+def test_a_parameter_s_name_ends_in_its_unit_where_it_has_one() -> None:
+    """What reads results.json, a digital certificate or QIF has nothing else."""
+    for effect in EVERY.values():
+        for one in effect.reported:
+            said = printed_unit(one.name)
+            assert said == NOTHING if one.unit == UNITS["1"] else isinstance(said, Unit) and said.dsi == one.unit.dsi

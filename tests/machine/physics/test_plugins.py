@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Verbatim
 from cmm_uq.base.plugins import BrokenPluginError
-from cmm_uq.base.points import Machine
-from cmm_uq.machine.physics.catalogue import EVERY, effects, every, plugins
+from cmm_uq.base.points import Floats, Machine, Points
+from cmm_uq.base.units import unit
+from cmm_uq.machine.physics import catalogue
+from cmm_uq.machine.physics.catalogue import EVERY, effects, every, plugins, register
+from cmm_uq.machine.physics.effect import Effect, Parameter
 from tests.plugin.packages import OUTSIDE_EFFECTS, describe, install
 from tests.recordings import TRAVEL, bars
 
@@ -145,3 +150,56 @@ def test_what_the_user_has_to_give_is_no_fault_of_the_package(offer: Offer) -> N
 def test_an_instance_serves_as_well_as_a_class(offer: Offer) -> None:
     offer(made() + "\nINSTANCE = Made()", where="other:INSTANCE")
     assert every()["made_up"].title == "said"
+
+
+class Bulge(Effect):
+    """A quarter of a millionth of x² along z."""
+
+    name = "bulge"
+    title, points_to = Verbatim("Bulge"), Verbatim("its middle")
+    formula, mechanism = "e_z = b·x²", "frame"
+    coefficients = (Parameter("um_per_m2", unit("µm/m²"), 4.0),)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return np.asarray(1e-9 * points.readings["x"][:, None, None] ** 2 * np.array([[0.0], [0.0], [1.0]]))
+
+
+@pytest.fixture
+def none_registered(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(catalogue, "_REGISTERED", {})
+
+
+@pytest.mark.usefixtures("none_registered")
+def test_a_class_is_registered_without_a_package_and_named_with_where_it_comes_from() -> None:
+    assert register(Bulge) is Bulge
+    register(Bulge)  # as a cell of a notebook that is run again does
+    assert list(every()) == [*EVERY, "bulge"]
+    assert plugins() == plugins(["bulge"]) == {__name__: "(registered)"}
+    assert plugins(["scale_x"]) == {}
+    (found,) = effects(["bulge"])
+    x = POINTS.carriages[:, 0]
+    np.testing.assert_allclose(found.displacement(POINTS, {"um_per_m2": 3.0})[:, 2], 3e-9 * x**2, rtol=1e-14)
+
+
+@pytest.mark.usefixtures("none_registered")
+@pytest.mark.parametrize(("wrong", "said"), [
+    (3, "is no Effect but int"), (dict, "is no Effect but dict"), (type("Bare", (Bulge,), {"name": ""}), "has no name"),
+    (type("Silent", (Bulge,), {"points_to": ""}), "says no points_to"),
+    (type("Asking", (Bulge,), {"__init__": lambda self, axis: None}), "fails with TypeError"),
+    (type("Known", (Bulge,), {"name": "scale_x"}), "there is a 'scale_x' already"),
+    (type("Again", (Bulge,), {}), "there is a 'bulge' already"),
+])  # fmt: skip
+def test_what_cannot_be_registered_is_refused_as_a_package_s_would_be(wrong: Any, said: str) -> None:
+    register(Bulge())
+    with pytest.raises(CmmUqError, match=said):
+        register(wrong)
+    assert list(every()) == [*EVERY, "bulge"]
+
+
+@pytest.mark.usefixtures("none_registered")
+def test_a_registered_effect_that_fails_at_work_is_named_with_where_it_comes_from() -> None:
+    register(type("Failing", (Bulge,), {"basis": lambda *_: np.zeros(3), "__module__": __name__}))
+    with pytest.raises(
+        BrokenPluginError, match=rf"registered by {__name__}: the effect 'Failing' gives a basis .*class"
+    ):
+        every()["bulge"].basis(POINTS)

@@ -235,6 +235,7 @@ def _compare(inquiry: Inquiry, given: Given) -> Job | None:
     if given.results is None:
         return None
     from cmm_uq.certificate.verify import again, decisions, figures
+    from cmm_uq.machine.physics.stated import physics_of
 
     name, data, _ = given.results
     with inquiry.reading("figures", name):
@@ -249,7 +250,8 @@ def _compare(inquiry: Inquiry, given: Given) -> Job | None:
         if given.xml is not None and (made := _version(given)) != __version__:
             inquiry.left(f"{given.xml[0]} element by element", f"made by version {made}, and this is {__version__}")
         else:
-            views.check_digital(inquiry, given, job)
+            with physics_of(job):
+                views.check_digital(inquiry, given, job)
     return job
 
 

@@ -31,6 +31,7 @@ from cmm_uq.jobs.reading import PART
 from cmm_uq.jobs.source import inside
 from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.machine.physics.stated import with_own_physics
 
 _PLACE = re.compile(
     r"(?P<file>.*?)(?: lines? (?P<line>\d+)(?: and \d+)?)?(?:: ?(?P<key>\[.*))?(?:, column (?P<column>.+))?", re.DOTALL
@@ -160,6 +161,7 @@ def _check_part(folder: Path, path: Path) -> JobCheck:
     return JobCheck(str(folder), tuple(problems), tuple(warnings), command=PART)
 
 
+@with_own_physics
 def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
     """Gather what the model and the standards refuse of a job that was read; what the screening found."""
     kind, facts = kind_of(job), job.facts
@@ -208,9 +210,12 @@ def _parts_by_themselves(path: Path, wrong: Gathered) -> None:
     except (CmmUqError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
         return
     tables = [table if isinstance(table := data.get(title), dict) else {} for title in ("model", "recording")]
+    entries = data.get("effect")
+    stated = [one.get("name") for one in entries if isinstance(one, dict)] if isinstance(entries, list) else []
     if isinstance(named := tables[0].get("effects"), list):
         with wrong.going_on():
-            effects([name for name in named if isinstance(name, str)], where="job.toml [model] effects")
+            others = [name for name in named if isinstance(name, str) and name not in stated]
+            effects(others, where="job.toml [model] effects")
     if isinstance(name := tables[1].get("file"), str) and name:
         with wrong.going_on():
             found = inside(path.parent, name, str(path))

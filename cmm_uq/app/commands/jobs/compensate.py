@@ -39,6 +39,7 @@ from cmm_uq.machine.physics.kinematics import euler_313
 from cmm_uq.machine.physics.map_covariance import MapCovariance, SampledPoints, covariance_file, uncertain_map
 from cmm_uq.machine.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.machine.physics.point_cloud import cloud_files, cloud_header, transform_cloud
+from cmm_uq.machine.physics.stated import physics_of
 
 NEW_MAP, COVARIANCE, MAP_KEYS = "error-map.csv", "error-map-covariance.npy", "error-map.toml"
 POINTS_U = "points-u.csv"  # standard uncertainties of corrected coordinates
@@ -118,7 +119,8 @@ def write_new_map(
         observe = partial(kind.observing("reported"), read.facts.artefact, where=read.recording_path)
         stage("Drawing all errors together", 0.4)
         try:
-            found = field_map(result.model, result.posterior, result.doubt, observe, seed)
+            with physics_of(read):
+                found = field_map(result.model, result.posterior, result.doubt, observe, seed)
         except CmmUqError as error:
             raise CmmUqError(error.problem, where=error.where or str(read.folder), fix=error.fix) from error
         if found.disagree:

@@ -32,6 +32,7 @@ from cmm_uq.jobs.tables.identification import PLANNED, first_line
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.machine.physics.stated import physics_of
 
 TRUTH = "truth.toml"  # name of the truth in the folder of a simulated job
 _TRUTH_GIVES = "It gives the effects, the noise and the seed"
@@ -41,6 +42,11 @@ _FIX = "Give effects, sizes and noise that a machine can have"
 @naming_package()
 def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str = TRUTH) -> Points:
     """The points of a recording with the placings of the job's own."""
+    with physics_of(job, *truth.columns):
+        return _simulated(job, truth, seed, truth_path)
+
+
+def _simulated(job: Job, truth: Truth, seed: int | None, truth_path: str) -> Points:
     columns = {name: np.full(len(job.points), value) for name, value in truth.columns.items()}
     points = replace(job.points, columns={**job.points.columns, **columns})
     observe = kind_of(job).observing("simulated")

@@ -44,6 +44,7 @@ from cmm_uq.laboratory.live.simulated import SimulatedMachine, simulated
 from cmm_uq.laboratory.live.story import FOLDER, Story, begin, read_story
 from cmm_uq.machine.model.kind import Observe
 from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.machine.physics.stated import physics_of, with_own_physics
 
 
 def _take(file: DroppedFile, job: Job, watched: WatchedFolder, conductor: Conductor, clock: Clock) -> None:
@@ -106,7 +107,8 @@ def begin_acquisition(
     story = read_story(sessions, skip_damaged=skip_damaged)
     plan, titles = _plan(job, story)
     table = LiveRecording(Path(job.recording_path), sessions, simulated=simulate)
-    lead, judge = _lead(job, plan, titles), _judge(job)
+    with physics_of(job):
+        lead, judge = _lead(job, plan, titles), _judge(job)
     _check_columns(job)
     facts = job.facts.acquire
     watched = None if facts.folder is None or simulate else WatchedFolder(job.folder / facts.folder, clock)
@@ -170,6 +172,7 @@ def _check_columns(job: Job) -> None:
         raise CmmUqError(error.problem, where=where, fix=error.fix) from None
 
 
+@with_own_physics
 def _plan(job: Job, story: Story) -> tuple[str, list[str]]:
     """The plan as CSV, and the titles of its measurements: as the first session had it, as a file says, or as planned now."""
     if story.sessions:

@@ -43,6 +43,7 @@ from cmm_uq.jobs.source import sha256 as hashes
 from cmm_uq.jobs.tables.identification import COMPENSATED, MEASURED, SIMULATED
 from cmm_uq.jobs.tables.machine import stated_axes
 from cmm_uq.machine.model.artefact_doubt import causes_of
+from cmm_uq.machine.physics.stated import physics_of
 from cmm_uq.maths.inference.draws import Draws
 
 _ORIGINS = {SIMULATED: say("simulated"), COMPENSATED: say("compensated")}
@@ -151,7 +152,8 @@ def state_machine(
     standing = _standing(job, stated, trusted=trust is not None)
     machine = _machine(job, stated.job)
     fits(machine)
-    state = machine_stated(stated.results, stated.draws, machine, corrected=job.facts.machine_state.corrected)
+    with physics_of(stated.job):
+        state = machine_stated(stated.results, stated.draws, machine, corrected=job.facts.machine_state.corrected)
     stated_bounds = {name: one.largest_um for one in job.facts.machine_state.bound for name in one.errors}
     state = with_bounds(state, stated_bounds)
     state = replace(state, unmodelled=with_readings(state.unmodelled, machine))

@@ -26,6 +26,8 @@ FUNCTIONS: Mapping[str, np.ufunc] = {
     **{f"a{name}": getattr(np, f"arc{name}") for name in ("sin", "cos", "tan", "tan2")},
     "abs": np.absolute,
 }
+# with those whose derivatives break off, for what is only ever evaluated
+FURTHER = {**FUNCTIONS, "tanh": np.tanh, "sign": np.sign, "min": np.minimum, "max": np.maximum}
 CONSTANTS: Mapping[str, float] = {"pi": np.pi}
 
 _SIGNS = ("+", "-", "*", "/", "**", "negative", "positive")
@@ -33,7 +35,7 @@ _NODES = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd)
 _OPERATORS: Mapping[type[ast.AST], str] = dict(zip(_NODES, _SIGNS, strict=True))
 # the operator of a power, for it knows squares and square roots
 _APPLIED = (np.add, np.subtract, np.multiply, np.divide, power, np.negative, np.positive)
-_CALLS: Mapping[str, Callable[..., Any]] = {**dict(zip(_SIGNS, _APPLIED, strict=True)), **FUNCTIONS}
+_CALLS: Mapping[str, Callable[..., Any]] = {**dict(zip(_SIGNS, _APPLIED, strict=True)), **FURTHER}
 
 LONGEST = TEXT.most
 _LONG_NUMERAL = re.compile(rf"\w{{{NUMERAL.most + 1}}}")
@@ -74,7 +76,9 @@ class Expression:
         return stack[0]
 
 
-def parse(text: str, known: Collection[str], where: str | None = None) -> Expression:
+def parse(
+    text: str, known: Collection[str], where: str | None = None, functions: Mapping[str, np.ufunc] = FUNCTIONS
+) -> Expression:
     """Parse an expression of known quantities, such as ``"sqrt(x1**2 + x2**2)"``."""
     if len(text) > LONGEST:
         raise CmmUqError(f"an expression of {len(text)} characters", where=where, fix=f"{LONGEST} are the most")
@@ -88,8 +92,8 @@ def parse(text: str, known: Collection[str], where: str | None = None) -> Expres
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         detail = _short(error.msg) if isinstance(error, SyntaxError) else "it is nested too deeply"
         problem = f"{_short(text)!r} is no arithmetic expression: {detail}"
-        raise CmmUqError(problem, where=where, fix=_ALLOWED) from error
-    translation = _Translation(source, frozenset(known), where, [])
+        raise CmmUqError(problem, where=where, fix=_allowed(functions)) from error
+    translation = _Translation(source, frozenset(known), where, [], functions)
     translation.translate(tree.body, 0)
     return Expression(text, tuple(translation.steps))
 
@@ -103,7 +107,8 @@ def name_problem(name: str) -> str | None:
     return None
 
 
-_ALLOWED = f"Numbers, names, + - * / **, brackets, pi and {', '.join(FUNCTIONS)} can be used"
+def _allowed(functions: Mapping[str, np.ufunc]) -> str:
+    return f"Numbers, names, + - * / **, brackets, pi and {', '.join(functions)} can be used"
 
 
 def _short(text: str) -> str:
@@ -116,6 +121,7 @@ class _Translation:
     known: frozenset[str]
     where: str | None
     steps: list[Step]
+    functions: Mapping[str, np.ufunc]
 
     def translate(self, node: ast.AST, depth: int) -> None:
         if depth > _DEEPEST:
@@ -132,11 +138,11 @@ class _Translation:
         elif isinstance(node, ast.Call):
             self._function(node, depth)
         else:
-            raise self._refused(f"{self._text(node)!r} is not arithmetic", _ALLOWED)
+            raise self._refused(f"{self._text(node)!r} is not arithmetic", _allowed(self.functions))
 
     def _number(self, node: ast.Constant) -> None:
         if isinstance(node.value, bool) or not isinstance(node.value, (int, float)):
-            raise self._refused(f"{node.value!r} is no real number", _ALLOWED)
+            raise self._refused(f"{node.value!r} is no real number", _allowed(self.functions))
         try:
             self.steps.append(Step("number", float(node.value)))
         except OverflowError as error:
@@ -147,7 +153,7 @@ class _Translation:
             self.steps.append(Step("number", CONSTANTS[node.id]))
         elif node.id in self.known:
             self.steps.append(Step("name", node.id))
-        elif node.id in FUNCTIONS:
+        elif node.id in self.functions:
             raise self._refused(f"{node.id} is a function and needs brackets", f"Write {node.id}(…)")
         else:
             raise self._refused(f"there is no input {node.id!r}", suggestion(node.id, {*self.known, *CONSTANTS}))
@@ -166,15 +172,15 @@ class _Translation:
 
     def _operation(self, operator: ast.AST, operands: int) -> None:
         if type(operator) not in _OPERATORS:
-            fix = "A power is written **" if isinstance(operator, ast.BitXor) else _ALLOWED
+            fix = "A power is written **" if isinstance(operator, ast.BitXor) else _allowed(self.functions)
             raise self._refused(f"the operator {type(operator).__name__} is not arithmetic here", fix)
         self.steps.append(Step("operation", _OPERATORS[type(operator)], operands))
 
     def _function(self, node: ast.Call, depth: int) -> None:
         name = node.func.id if isinstance(node.func, ast.Name) else self._text(node.func)
-        if name not in FUNCTIONS:
-            raise self._refused(f"there is no function {name!r}", suggestion(name, FUNCTIONS))
-        wanted = FUNCTIONS[name].nin
+        if name not in self.functions:
+            raise self._refused(f"there is no function {name!r}", suggestion(name, self.functions))
+        wanted = self.functions[name].nin
         if node.keywords or len(node.args) != wanted or any(isinstance(a, ast.Starred) for a in node.args):
             raise self._refused(f"{name} takes {wanted} argument{'s' if wanted > 1 else ''}", None)
         for argument in node.args:
