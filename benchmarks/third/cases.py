@@ -87,7 +87,9 @@ def _attempt(random: np.random.Generator, number: int) -> Hidden | None:
     placed.recorded = {name: v for name, v in full.items() if not any(name in names for names in gone)}
     alone = kind in ("squareness", "ratio")
     simulated = not alone and kind != "real" and bool(random.random() < 0.15)
-    named = () if alone or simulated else (SIX, SIX, SIX[:3], ())[int(random.integers(4))]
+    # a bend without its straight line is outside the catalogue, one with it is a scale and a bend
+    some = (SIX,) if kind in OUTSIDE else (SIX, SIX, SIX[:3], ())
+    named = () if alone or simulated else some[int(random.integers(len(some)))]
     certified = placed.size is not None and bool(random.random() < 0.7)
     shape = {"period": float(np.exp(random.uniform(np.log(30), np.log(300)))), "phase": float(random.uniform(-3, 3))}
     seen = Seen(placed, named, certified, covariance, placed.recorded | placed.extra | shape, noise.sigma)

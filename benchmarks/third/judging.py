@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from benchmarks.second.artefacts import SIX
 from benchmarks.second.cases import UNSEEN
 from benchmarks.second.judging import hit, of_oracle
 from benchmarks.third.cases import Hidden
@@ -21,8 +22,6 @@ Record = Mapping[str, Any]
 QUIET = ("consistent", "undetermined")
 """Verdicts that assert nothing."""
 DECIDED = float(np.log(20.0))
-PARTED = float(np.sqrt(2 * DECIDED))
-"""√λ that an explanation leaves where the oracle has odds of 20 : 1 against it."""
 NEEDS_PROOF = ("squareness", "ratio")
 """Kinds in which one effect may be two others in a ratio: the one is right only where the others are said with it."""
 
@@ -80,10 +79,9 @@ def judged(found: Hidden, truth: Record, said: Record, oracle: Record) -> Judged
         good = _effect(found, kind, each["effect"], group, own, every, effects if fits else [])
         together = float(each.get("probability_together", each["probability"]))
         one.names.append(Name(each["effect"], together if group else float(each["probability"]), good, not good, False))
-        members = [name for name in {each["effect"], *group} if name in every]
+        members = sorted(name for name in {each["effect"], *group} if name in every)
         if len(members) > 1 and found.errors:
-            rest = [key for key in effects if key != each["effect"]]
-            one.classes.append((len(members), sum(left_by(found, [*rest, m], every) > PARTED for m in members)))
+            one.classes.append((len(members), _parted(found, effects, each["effect"], members, every)))
     if outside is None:
         if kind != "nothing":
             names = {each["effect"]: {"group": group_of(each, said)} for each in said.get("effects", ())}
@@ -120,9 +118,21 @@ def _effect(found: Hidden, kind: str, name: str, group: set[str], own: dict[str,
         return True
     if kind in NEEDS_PROOF:
         return False
+    if found.outside is not None and name in SIX:  # against a prediction: of a bend the best straight line is a scale
+        return 0.5 * (float(np.linalg.norm(found.signal)) ** 2 - left_by(found, [name], every) ** 2) > DECIDED
     if any(name in alike_ for alike_ in own.values()):
         return True
     return name in fitting and left_by(found, [each for each in fitting if each != name], every) >= UNSEEN
+
+
+def _parted(
+    found: Hidden, effects: list[str], name: str, members: list[str], every: dict[str, list[np.ndarray]]
+) -> int:
+    """How many members of a class the recording, its noise known, parts from the best of them by likelihoods of 20 : 1."""
+    rest = [key for key in effects if key != name]
+    y = found.seen.rest @ found.one.y
+    left = np.array([left_by(found, [*rest, member], every, y) for member in members])
+    return int(np.sum(0.5 * (left**2 - left.min() ** 2) > DECIDED))
 
 
 def _words(outside: Outside) -> set[str]:

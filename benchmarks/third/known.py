@@ -78,9 +78,11 @@ def others(signals: dict[str, np.ndarray], name: str) -> list[np.ndarray]:
     return [signal for key, signal in signals.items() if key != name]
 
 
-def left_by(found: Hidden, names: list[str], every: dict[str, list[np.ndarray]]) -> float:
-    """√λ of what effects, each of the form that suits best, leave of all that is hidden."""
-    signal = found.signal
+def left_by(
+    found: Hidden, names: list[str], every: dict[str, list[np.ndarray]], seen: np.ndarray | None = None
+) -> float:
+    """√λ of what effects, each of the form that suits best, leave of all that is hidden, or of what was ``seen``."""
+    signal = found.signal if seen is None else seen
     columns: list[np.ndarray] = []
     for name in names:
         if name in every:

@@ -48,7 +48,8 @@ they take of `benchmarks/second/`) share no code with the package.
 - **Located**: something is asserted, and the covariate is named in `where` or in the empirical model, or effects are named
   that leave less than √λ = 2 of it. **Named**: the true form, or effects that leave less than that. **Wrong**: a name that is
   neither the truth, nor said to be one with it, nor is it for all that is seen (√λ below 2), nor a form against which the
-  oracle has less than 20 : 1. Of *squareness* and *ratio* an effect is right only where the truth is said with it.
+  oracle has less than 20 : 1. Of *squareness* and *ratio* an effect is right only where the truth is said with it; against a
+  prediction, a scale or a squareness is right that is worth 20 : 1 of what is hidden.
 - Chains are a tenth as long as those of a diagnosis, and what to measure next is left out: nothing here counts either."""
 
 
@@ -200,7 +201,7 @@ def _outside(every: Sequence[Judged]) -> list[str]:
         a, b = _taken(seen)
         lines.append(
             f"| {cause} | {len(own)} | {len(seen)} | {sum(bool(o.located) for o in seen)} | "
-            f"−{100 * a:.0f} %, −{100 * b:.0f} % | {len(decided)} | {sum(bool(o.form_named) for o in decided)} | "
+            f"{-100 * a:+.0f} %, {-100 * b:+.0f} % | {len(decided)} | {sum(bool(o.form_named) for o in decided)} | "
             f"{sum(o.form_said is None for o in left)} of {len(left)} | {sum(n.wrong for o in own for n in o.names)} |"
         )
     return lines
@@ -215,7 +216,7 @@ def _others(every: Sequence[Judged]) -> list[str]:
         own = [one for one in out if low <= one.root_lambda < high]
         a, b = _taken(own)
         lines.append(
-            f"| {low:.0f} – {high:.0f} | {len(own)} | {share(o.located for o in own)} | −{100 * a:.0f} %, −{100 * b:.0f} % |"
+            f"| {low:.0f} – {high:.0f} | {len(own)} | {share(o.located for o in own)} | {-100 * a:+.0f} %, {-100 * b:+.0f} % |"
         )
     return lines
 

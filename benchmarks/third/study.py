@@ -8,6 +8,8 @@ oracle is asked. Every result is a line in ``FOLDER``; stopped with Ctrl-C, what
 from __future__ import annotations
 
 import argparse
+import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +17,11 @@ import numpy as np
 
 from benchmarks.second.running import lines
 from benchmarks.third.cases import case
-from benchmarks.third.judging import Judged, judged
+from benchmarks.third.judging import Judged, Name, judged
 from benchmarks.third.page import write
 from benchmarks.third.running import run, truths
+
+COUNTED = "counted.json"
 
 
 def main() -> None:
@@ -46,7 +50,8 @@ def main() -> None:
         except KeyboardInterrupt:
             print("Stopped; --resume goes on.", flush=True)
     counted, records = tally(chosen.folder)
-    before = tally(chosen.before)[0] if chosen.before else []
+    (chosen.folder / COUNTED).write_text(json.dumps([asdict(one) for one in counted], default=str), encoding="utf-8")
+    before = recounted(chosen.before / COUNTED) if chosen.before else []
     faults = [f"{record['name']}: {record['fault']}" for record in records if "fault" in record]
     seconds = [record["seconds"] for record in records]
     state = (
@@ -75,6 +80,12 @@ def tally(folder: Path) -> tuple[list[Judged], list[dict[str, Any]]]:
         judged(case(seed, truth[record["name"]]["number"]), truth[record["name"]], record["said"], record["oracle"])
         for record in records if "said" in record
     ], records  # fmt: skip
+
+
+def recounted(file: Path) -> list[Judged]:
+    """Cases of another run as that run counted them: its cases may have been made by another state of this program."""
+    every = json.loads(file.read_text(encoding="utf-8"))
+    return [Judged(**{**one, "names": [Name(**name) for name in one["names"]]}) for one in every]
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +86,27 @@ def test_an_effect_is_right_where_the_truth_is_in_its_group() -> None:
     assert judged(found, truth, listed, nothing).names[0].right
     all_three = [{"effect": name, "probability": 0.9} for name in ("squareness_xy", "squareness_yz", "squareness_zx")]
     assert judged(found, truth, said("explained", effects=tuple(all_three)), nothing).found == (True, False)
+
+
+def test_a_class_is_counted_with_the_members_that_the_recording_parts_from_its_best() -> None:
+    """Of three squarenesses of √λ above 4.5 each, two named, the third is one with itself and parted from a scale of Z."""
+    found, truth = of_kind("squareness")
+    first, second, third = found.errors
+    effects = [{"effect": name, "probability": 0.9} for name in (first, second)]
+    effects.append(
+        {"effect": third, "probability": 0.5, "probability_together": 0.9, "group": ["scale_z", "some words"]}
+    )
+    one = judged(found, truth, said("explained", effects=tuple(effects)), {"effects": [], "p": 0.5})
+    assert one.classes == [(2, 1)]
+    assert one.found == (True, False)
+
+
+def test_another_run_is_read_as_it_was_counted(tmp_path: Path) -> None:
+    one = Judged("0", "dictionary", "step", "plate", "white", 9.0, "partial", taken=(0.2, 0.4), classes=[(2, 1)],
+                 names=[Name("scale_x", 0.9, right=False, wrong=True, form=False)])  # fmt: skip
+    (tmp_path / "counted.json").write_text(json.dumps([asdict(one)]), encoding="utf-8")
+    (again,) = study.recounted(tmp_path / "counted.json")
+    assert figures([again]) == figures([one])
 
 
 def test_nothing_is_a_false_alarm_where_something_is_asserted() -> None:
