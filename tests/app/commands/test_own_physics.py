@@ -20,9 +20,11 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import evaluate_job, write_report
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.job import Job
+from cmm_uq.machine.physics import catalogue
 from cmm_uq.machine.physics.catalogue import EVERY, every
 from cmm_uq.machine.physics.stated import physics_of
 from tests.conftest import ROOT
+from tests.machine.physics.test_plugins import Bulge
 
 IOTA = ROOT / "examples" / "iota-1102-20C"
 WAVE = {
@@ -34,9 +36,9 @@ MACHINE = {"name": "DEA Iota 1102", "serial": "7", "travel_mm": {"x": [0, 900], 
            "origin_mm": [805.0, 303.0, -294.0]}  # fmt: skip
 
 
-def job(*names: str, **more: object) -> Job:
+def job(*names: str, timed: bool = True, **more: object) -> Job:
     """The set-ups of a real recording, with one effect of the job's own and those named."""
-    frame = pd.read_csv(IOTA / "ballbar.csv").assign(time_s=np.arange(40.0) * 60)
+    frame = pd.read_csv(IOTA / "ballbar.csv").assign(**({"time_s": np.arange(40.0) * 60} if timed else {}))
     return cmm_uq.job(
         frame, machine=MACHINE, artefact={"kind": "ballbar", "length_mm": 404.2357, "u_um": 0.5},
         effects=[*SIX, *names], effect=[{**WAVE, **more}], date="2026-01-31",
@@ -149,6 +151,27 @@ def test_what_a_job_states_wrongly_is_refused_by_every_command(
     (problem,) = check_job(tmp_path / "job").problems
     assert problem.line
     assert (problem.file, said.rpartition(": ")[2]) == (str(tmp_path / "job" / "job.toml"), said.rpartition(": ")[2])
+
+
+def test_cases_are_not_drawn_of_what_other_processes_do_not_know(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(catalogue, "_REGISTERED", {})
+    cmm_uq.register(Bulge)
+    with pytest.raises(CmmUqError, match=r"^cmm_uq.register: bulge: registered in this process"):
+        cmm_uq.prove(IOTA, cases=1)
+
+
+@pytest.mark.long
+def test_a_part_is_measured_on_a_machine_with_what_its_job_states(tmp_path: Path) -> None:
+    """The machine's errors are drawn given its recording, which takes the effect's own formula."""
+    shutil.copytree(ROOT / "examples" / "part-plate-simulated", tmp_path / "part")
+    drawn(job("guide_wave", timed=False), 40.0).write(tmp_path / "part" / "calibration")
+    toml = tmp_path / "part" / "job.toml"
+    text = toml.read_text("utf-8").replace(
+        'certificate = "machine"', 'job = "calibration"\norigin_mm = [805, 303, -294]'
+    )
+    toml.write_text(text.replace("-simulated", "-drawn"), encoding="utf-8")
+    found = cmm_uq.part(tmp_path / "part", trials=2000).found
+    assert "drawn together, given the recording" in found.standing.path
 
 
 def test_two_of_one_name_are_refused(tmp_path: Path) -> None:

@@ -175,6 +175,15 @@ def test_a_parameter_has_a_prior_or_two_ends(given: dict[str, Any], said: str) -
         EffectParameter.model_validate(given)
 
 
+def test_no_more_than_two_parameters_shape_an_effect() -> None:
+    """All their values are tried with each other: seven, 49, 343 members of one explanation."""
+    shaping = {"unit": "mm", "low": 1.0, "high": 2.0}
+    table = {"k": {"unit": "µm", "prior": 1.0}, "a": shaping, "b": shaping}
+    assert len(list(effect("e_x = k*a*b", None, None, parameters=table).trials())) == 49
+    with pytest.raises(ValueError, match="more than 2 parameters have low and high"):
+        effect("e_x = k*a*b*c", None, None, parameters={**table, "c": shaping})
+
+
 @pytest.mark.parametrize("given", [
     {"unit": "µm"}, {"prior": 1.0}, {}, {"unit": "µm", "prior": 1.0, "parameters": {"k": {"unit": "µm", "prior": 1.0}}},
 ])  # fmt: skip

@@ -29,6 +29,7 @@ from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.machine.model.measurement import RecordingModel
+from cmm_uq.machine.physics.stated import with_own_physics
 from cmm_uq.maths.inference.posterior import Doubt
 
 # quantities of a recording, with their repeats, by which a machine's errors are drawn: time grows with the cube of what they
@@ -118,6 +119,7 @@ def refuse_adjusted(further: Iterable[VerifiedCertificate], adjusted: Iterable[d
             )
 
 
+@with_own_physics
 def recording_of(job: Job, seed: int, most: int = MOST) -> tuple[RecordingModel, RecordingModel]:
     """The model of a calibration's recording, and that of no more than so many of its quantities."""
     model, _ = screened_model(job)
