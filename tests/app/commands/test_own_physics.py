@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from cmm_uq.machine.physics.catalogue import EVERY, every
 from cmm_uq.machine.physics.stated import physics_of
 from tests.conftest import ROOT
 from tests.machine.physics.test_plugins import Bulge
+from tests.site.pages import snippets
 
 IOTA = ROOT / "examples" / "iota-1102-20C"
 WAVE = {
@@ -105,6 +107,17 @@ def test_a_plan_says_what_placings_tell_of_it() -> None:
     plan = cmm_uq.plan(job("guide_wave"), power=False)
     assert [row[0] for row in plan.outcome.summary.figures].count("Wave of a guideway") == 1
     assert "Physics stated by the job" in str(plan.outcome.document)
+
+
+def test_what_the_page_shows_is_taken() -> None:
+    (text,) = (one.text for one in snippets(ROOT / "docs" / "machine" / "effects.md", "toml", excerpt=True))
+    page = tomllib.loads(text)
+    frame = pd.read_csv(IOTA / "ballbar.csv").assign(time_s=np.arange(40.0) * 60, temp_x_c=21.0)
+    shown = cmm_uq.job(
+        frame, machine=MACHINE, artefact="ballbar", effects=page["model"]["effects"], effect=page["effect"]
+    )
+    with physics_of(shown):
+        assert list(every()) == [*EVERY, "table_tilt", "warming_ram"]
 
 
 def test_a_document_that_is_composed_later_knows_what_the_job_states() -> None:
