@@ -188,7 +188,7 @@ def certified(result: Result, page: Page) -> Outcome:
         with_performance(with_regions(page.with_further(result, data), result), result),
         of_result.summary(result, warned), warned, {draws.name: draws.content} if draws else {}, draws=result.draws,
         verdicts=result.verdicts,
-        in_order=result.diagnosed.diagnosis.verdict == "consistent",
+        in_order=result.diagnosed.diagnosis.agrees,
     )  # fmt: skip
 
 

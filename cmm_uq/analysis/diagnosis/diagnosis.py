@@ -14,12 +14,15 @@ import scipy
 
 from cmm_uq.analysis.diagnosis import joint as jointly
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key
-from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN
+from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, effect_of
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import log_prior
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, with_effects, withhold
+from cmm_uq.analysis.diagnosis.empirical import EmpiricalModel, empirical_model
 from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement, thin_out
 from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, WithheldEffect, joint_posterior, period_modes
 from cmm_uq.analysis.diagnosis.location import Place, locate
 from cmm_uq.analysis.diagnosis.noise import has_heavy_tails, probability_by_name
+from cmm_uq.analysis.diagnosis.repeats import RepeatComparison, against_repeats
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
@@ -177,6 +180,8 @@ def _reported(model: RecordingModel, draws: Floats) -> dict[str, dict[str, Quant
     return found
 
 
+# nothing is found; it cannot be told from noise; a cause, or part of it, is found; a function is; nothing that predicts is
+VERDICTS = ("consistent", "undetermined", "explained", "partial", "empirical", "unexplained")
 FALSE_ALARMS = 0.01  # default rate at which a recording without any fault is found to have one
 _TOLD_APART = 0.95
 # Odds of another in the place of an effect from which both are named together: a set-up is suggested that gives 20 : 1
@@ -214,11 +219,23 @@ class NoiseDiagnosis:
     contradicts_stated: bool
 
 
+@dataclass(frozen=True)
+class BestKnown:
+    """The known effect that by itself explains most."""
+
+    effect: str
+    title: Text
+    probability: float  # among all combinations
+    odds_of_function: float  # of the best nonparametric term over it, each alone, without what is known beforehand
+    improvement: Improvement
+    points_to: Text
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """See the module's docstring."""
 
-    verdict: str  # consistent, explained, partial or unexplained
+    verdict: str  # one of :data:`VERDICTS`
     p_value: float
     alpha: float
     where: tuple[Place, ...]
@@ -236,6 +253,14 @@ class Diagnosis:
     withheld: tuple[WithheldEffect, ...] = ()  # effects that are probable, and yet not asserted
     # combinations of explanations that remain, and what they make of the named effects
     remaining: ModelAverage = field(default_factory=ModelAverage)
+    empirical: EmpiricalModel | None = None  # of what no effect accounts for
+    repeats: RepeatComparison | None = None  # of what the model after leaves
+    best_known: BestKnown | None = None  # where something is missing
+
+    @property
+    def agrees(self) -> bool:
+        """Whether nothing is found to be missing."""
+        return self.verdict in ("consistent", "undetermined")
 
 
 def diagnose(
@@ -248,7 +273,8 @@ def diagnose(
     some = model if observe is None else thin_out(model, observe, seed)
     found, joint, withheld = _asserted(search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known)
     gain = improvement(model, found.model)
-    if found.effects and gain.elpd_gain <= gain.elpd_gain_se:
+    worse = gain.heldout_rms_after_um > gain.heldout_rms_before_um
+    if found.effects and (gain.elpd_gain <= gain.elpd_gain_se or worse):
         withheld = (*withheld, *jointly.withhold_unpredicted(found, gain.unseen))
         found = _of_all(withhold(found, found.chosen), model)
         gain, joint = improvement(model, model), joint_posterior(found, seed, progress, known)
@@ -256,14 +282,38 @@ def diagnose(
     after = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
     most = np.argsort(-first.probability)[:12]
     rivals = tuple((first.explanations[i].name, float(first.probability[i])) for i in most)
-    verdict = "consistent" if first.p_value >= alpha else "unexplained"
-    if first.p_value < alpha and found.effects:
-        verdict = "partial" if found.rough or found.unexplained > _UNKNOWN else "explained"
+    repeats, wrong = against_repeats(found.model), first.p_value < alpha
+    above = repeats is not None and repeats.p_value < alpha
+    verdict = "undetermined" if above else "consistent"
+    if wrong and found.effects:
+        verdict = "partial" if found.rough or found.unexplained > _UNKNOWN or above else "explained"
+    empirical = empirical_model(found) if wrong and verdict != "explained" else None
+    if wrong and not found.effects:
+        verdict = "empirical" if empirical is not None and empirical.predicts else "unexplained"
     return Diagnosis(
         verdict, first.p_value, alpha, locate(first, alpha, found.chosen), _left_out(found, joint, model),
         _indistinguishable(found), rivals, noise, gain, model, after, joint.components, joint.posterior,
-        int(some.used.sum()), found, withheld, average_models(found, joint, model, seed),
+        int(some.used.sum()), found, withheld, average_models(found, joint, model, seed), empirical, repeats,
+        best_known(found, model) if wrong else None,
     )  # fmt: skip
+
+
+def best_known(result: SearchResult, before: RecordingModel) -> BestKnown | None:
+    """The effect of the catalogue that by itself makes the recording most probable, asserted or not."""
+    first, prior = result.first, log_prior(result.first.explanations)
+    known = [i for i, e in enumerate(first.explanations) if e.kind == EFFECT and np.isfinite(first.log_odds[i])]
+    if not known:
+        return None
+    best = max(known, key=lambda i: float(first.log_odds[i] + prior[i]))
+    functions = [i for i, e in enumerate(first.explanations) if e.kind == UNKNOWN]
+    odds = float(np.exp(min(max(first.log_odds[functions], default=-np.inf) - first.log_odds[best], 700.0)))
+    versions = [first.comparison.beside((), (best,))[best][1]]
+    model = with_effects(first, versions, frozenset({best}))
+    model = replace(model, artefact=before.artefact, used=before.used)
+    effect = effect_of(first.explanations[best])
+    combinations = result.combinations
+    probability = 0.0 if combinations is None else combinations.of(best)
+    return BestKnown(effect.name, effect.title, probability, odds, improvement(before, model), effect.points_to)
 
 
 def _asserted(

@@ -144,14 +144,18 @@ class _Fit:
     def function(self, number: int, x: Floats, values: Floats) -> tuple[Floats, Floats]:
         """One function and its standard uncertainty, mm, each (p,), from its values (p, r) for unit coefficients."""
         own = self.parts[number]
-        left = self.left[:, own]
-        lines = np.column_stack([np.ones_like(x), (x - x.mean()) / np.ptp(x)])
-        among = np.linalg.lstsq(values, lines, rcond=None)[0]
-        shown = np.sqrt(np.mean((left @ among) ** 2, axis=0))
-        unseen = shown < _UNSEEN * np.sqrt(np.mean((values @ among) ** 2, axis=0))
-        lines = lines[:, unseen]
-        values = values - lines @ np.linalg.lstsq(lines, values, rcond=None)[0]
+        values = without_unseen(x, values, self.left[:, own])
         return values @ self.mean[own], np.sqrt(np.einsum("pi,ij,pj->p", values, self.covariance[own, own], values))
+
+
+def without_unseen(x: Floats, values: Floats, left: Floats) -> Floats:
+    """Functions (p, r) of a covariate less the constant and the line in them that the observations ``left`` (m, r) miss."""
+    lines = np.column_stack([np.ones_like(x), (x - x.mean()) / np.ptp(x)])
+    among = np.linalg.lstsq(values, lines, rcond=None)[0]
+    shown = np.sqrt(np.mean((left @ among) ** 2, axis=0))
+    unseen = shown < _UNSEEN * np.sqrt(np.mean((values @ among) ** 2, axis=0))
+    lines = lines[:, unseen]
+    return np.asarray(values - lines @ np.linalg.lstsq(lines, values, rcond=None)[0])
 
 
 def _jump(compared: ModelComparison, index: int, x: Floats, order: Ints) -> tuple[float, float]:

@@ -35,6 +35,7 @@ FILES = {
     "plan.html": "the plan, with a picture of each placing",
     "plan.csv": "the placings, to be filled in as the recording",
     "next_plan.csv": "the set-ups to measure next, to be filled in",
+    "empirical.toml": "what no known effect accounts for, as effects of the job's own",
     "validation.html": "the validation of the diagnosis",
     "validation.pdf": "the validation of the diagnosis",
     "truth.json": "what was true of each case, sealed beforehand",

@@ -32,6 +32,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.plugins import naming_package
+from cmm_uq.certificate.diagnosis.empirical import EMPIRICAL, stated_functions
 from cmm_uq.certificate.diagnosis.page import diagnosed_outcome
 from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
 from cmm_uq.certificate.result import AnalysisResult, JobDiagnosis, Outcome, Recipe
@@ -43,7 +44,7 @@ from cmm_uq.machine.physics.stated import physics_of, with_own_physics
 from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.inference.posterior import NoisyPosterior
 
-DIAGNOSE = Form("diagnose", ("diagnosis.html", "diagnosis.pdf"), "diagnosis", (TO_FILL_IN,), recorded=True)
+DIAGNOSE = Form("diagnose", ("diagnosis.html", "diagnosis.pdf"), "diagnosis", (TO_FILL_IN, EMPIRICAL), recorded=True)
 
 
 def diagnose_read(
@@ -110,7 +111,7 @@ def detection_goals(job: Job, diagnosis: Diagnosis, unseen: Sequence[SmallestEff
     Of each effect all that physics allows, or half of what shows already.
     """
     show = job.facts.plan.unseen
-    if not (diagnosis.verdict == "consistent" if show is None else show):
+    if not (diagnosis.agrees if show is None else show):
         return ()
     usual = max((row.length for row in unseen if row.length is not None), default=USUAL_LENGTH)
     goals = []
@@ -135,7 +136,10 @@ def _recipe(job: Job) -> Recipe:
         from cmm_uq.app.commands.jobs.simulate import to_fill_in
 
         plan = result.next_plan
-        return replace(diagnosed_outcome(result), files={} if plan is None else {TO_FILL_IN: to_fill_in(plan.points)})
+        files = {} if plan is None else {TO_FILL_IN: to_fill_in(plan.points)}
+        if stated := stated_functions(result.diagnosis):
+            files[EMPIRICAL] = stated.encode()
+        return replace(diagnosed_outcome(result), files=files)
 
     usual = Recipe(_diagnose, outcome)
     return recipe_of(job, lambda own: own.diagnose, lambda kind: usual, "diagnosed as a recording of an artefact")

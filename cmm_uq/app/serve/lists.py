@@ -91,7 +91,9 @@ def diagnoses_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     """Verdicts of certificates and of diagnoses on whether a recording agrees with its model."""
     request.only(("text", "verdict", "since", "until", "page"))
     verdict = request.one_of("verdict", (*p.VERDICTS, "all"))
-    verdicts = {"": ("explained", "partial", "unexplained"), "all": tuple(p.VERDICTS)}.get(verdict, (verdict,))
+    verdicts = {"": ("undetermined", "explained", "partial", "empirical", "unexplained"), "all": tuple(p.VERDICTS)}.get(
+        verdict, (verdict,)
+    )
     since, until, dates = _dates(request)
     choice = CertificateFilter(text=request.text("text"), command="", verdicts=verdicts, since=since, until=until)
     rows, total = v.paged(view.records, choice, request)

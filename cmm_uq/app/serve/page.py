@@ -209,8 +209,9 @@ DECISIONS: Mapping[str, Word] = {
 }  # fmt: skip
 
 VERDICTS: Mapping[str, Word] = {
-    "consistent": (say("Consistent"), "good"), "explained": (say("Explained"), "open"),
-    "partial": (say("Partly explained"), "open"), "unexplained": (say("Unexplained"), "bad"),
+    "consistent": (say("Consistent"), "good"), "undetermined": (say("Undetermined"), "open"),
+    "explained": (say("Explained"), "open"), "partial": (say("Partly explained"), "open"),
+    "empirical": (say("Modelled, not named"), "open"), "unexplained": (say("Unexplained"), "bad"),
 }  # fmt: skip
 
 ORIGINS: Mapping[str, Text] = {

@@ -11,6 +11,7 @@ from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, day, lines, say, semicolons
+from cmm_uq.certificate.diagnosis.empirical import empirical_words, nearest_words, repeats_words
 from cmm_uq.certificate.diagnosis.sections import by_columns, explanation, next_sentence, place_words, without_power
 from cmm_uq.certificate.document import Overview, Standing
 from cmm_uq.certificate.result import JobDiagnosis, SimulatedTwin
@@ -20,19 +21,32 @@ from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 # What a verdict means for who is to act
-STANDING: Mapping[str, Standing] = {"consistent": "good", "explained": "open", "partial": "open", "unexplained": "bad"}
+STANDING: Mapping[str, Standing] = {
+    "consistent": "good", "undetermined": "open", "explained": "open", "partial": "open", "empirical": "open",
+    "unexplained": "bad",
+}  # fmt: skip
 
 # A verdict as the title of its overview
 VERDICT_TITLES: Mapping[str, Text] = {
     "consistent": say("Consistent: nothing is found to be missing"),
+    "undetermined": say("Undetermined: noise or an error, this recording cannot tell"),
     "explained": say("Explained: the cause is found"),
     "partial": say("Partly explained: a cause is found, and there is more"),
+    "empirical": say("Modelled, not named: no known effect accounts for it"),
     "unexplained": say("Unexplained: something is wrong that no known effect accounts for"),
 }
 VERDICTS: Mapping[str, Text] = {
     "consistent": say("The recording agrees with the model that the job names."),
+    "undetermined": say(
+        "The recording agrees with the model that the job names as far as its set-ups tell; what repeats share is more than "
+        "they scatter by."
+    ),
     "explained": say("The recording does not agree with the model that the job names; what was left out is found."),
     "partial": say("Something that was left out is found, but structure remains that no known effect accounts for."),
+    "empirical": say(
+        "The recording does not agree with the model that the job names; a function that was fitted predicts it, and no known "
+        "effect accounts for it."
+    ),
     "unexplained": say(
         "The recording does not agree with the model that the job names, and no known effect accounts for it."
     ),
@@ -40,8 +54,8 @@ VERDICTS: Mapping[str, Text] = {
 
 # A verdict in a word
 VERDICT_WORDS: Mapping[str, Text] = {
-    "consistent": say("consistent"), "explained": say("explained"), "partial": say("partial"),
-    "unexplained": say("unexplained"),
+    "consistent": say("consistent"), "undetermined": say("undetermined"), "explained": say("explained"),
+    "partial": say("partial"), "empirical": say("empirical"), "unexplained": say("unexplained"),
 }  # fmt: skip
 
 _RAREST = 1e-4  # probability below which only this is told
@@ -65,12 +79,15 @@ def overview_of(result: JobDiagnosis) -> Overview:
 
 def _found(result: JobDiagnosis) -> Text:
     d = result.diagnosis
+    if d.verdict == "undetermined":
+        return lines((say("Nothing that stands out of noise of the set-ups."), repeats_words(d)))
     if d.verdict == "consistent":
         if result.simulated is None:
             return say("Nothing beyond the effects that the job names: what they leave is noise.")
         return say("Nothing beyond the simulation: what it leaves is noise.")
     if not d.effects:
-        return lines((say("A misfit that no known effect accounts for."), *withheld_words(d.withheld)))
+        beyond = empirical_words(d) or [say("A misfit that no known effect accounts for.")]
+        return lines((*beyond, *withheld_words(d.withheld)))
     texts: list[Text] = []
     for item in d.effects:
         size = size_of(effect_of(item.effect, d.after.effects), item.parameters, factors=False)
@@ -80,7 +97,8 @@ def _found(result: JobDiagnosis) -> Text:
             told = say("{told} It could as well be: {others}.", told=told, others=small)
         texts.append(after(told, contained(result.simulated, item.effect)))
     if d.verdict == "partial":
-        texts.append(say("And more that no known effect accounts for."))
+        texts += empirical_words(d) or [say("And more that no known effect accounts for.")]
+        texts += filter(None, [repeats_words(d)])
     return lines(texts)
 
 
@@ -92,7 +110,7 @@ def _instead(d: Diagnosis, item: OmittedEffect) -> list[str]:
 
 
 def _where(d: Diagnosis) -> Text:
-    if d.verdict == "consistent":
+    if d.agrees:
         return say("No place, direction or time stands out.")
     if not d.where:
         return by_columns(d) or say("Spread over the recording: no reading or direction by itself stands out.")
@@ -102,10 +120,11 @@ def _where(d: Diagnosis) -> Text:
 def _sure(result: JobDiagnosis) -> Text:
     d = result.diagnosis
     by_chance = say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
-    if d.verdict == "consistent":
+    if d.agrees:
         return lines(filter(None, (by_chance, without_power(result))))
     if not d.effects:
-        return by_chance
+        found = d.empirical
+        return lines((by_chance, gained(found.improvement))) if found is not None and found.predicts else by_chance
     probable = say("Probability: {each}.", each=semicolons(map(_probable, d.effects)))
     return lines(filter(None, (by_chance, probable, _otherwise(d), gained(d.improvement))))
 
@@ -150,15 +169,23 @@ def share_of(p_value: float) -> Text:
 def _to_do(result: JobDiagnosis) -> Text:
     d, further = result.diagnosis, result.next_plan is not None
     told: list[Text] = []
-    if further and d.verdict != "consistent":
+    if further and not d.agrees:
         told.append(say("First measure the set-ups that are told below, to part what this recording cannot."))
     told += [_look_at(d, item) for item in d.effects]
     if d.verdict in ("partial", "unexplained"):
         look = say("Look at the pictures below and measure again: do not compensate by a model that does not fit.")
         told.append(look)
+    if d.verdict == "empirical":
+        told.append(
+            say("Look for what acts where it is; until that is found, the function can be corrected and counted.")
+        )
+    if d.verdict in ("empirical", "unexplained"):
+        told += filter(None, [nearest_words(d)])
     if d.verdict == "explained":
         told.append(say("Then measure again."))
-    if d.verdict == "consistent":
+    if d.verdict == "undetermined":
+        told.append(say("Place the artefact anew in the same set-ups and measure again: what stays is the machine's."))
+    if d.agrees:
         warned = say("Nothing on account of the machine; see the warnings on the recording.")
         told.append(warned if result.findings else say("Nothing on account of this recording."))
         if further:
@@ -243,7 +270,7 @@ def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[Text, ..
     texts = (
         (noise.contradicts_stated and stated_um is not None,
          say("This contradicts the stated {stated_um:g} µm.", stated_um=stated_um or 0.0)),
-        (noise.placing.value > 0.3 * value,
+        (noise.placing.value > 0.3 * value and diagnosis.verdict != "empirical",
          say("Each set-up is off by about {value:.2g} µm that its repeats share.", value=noise.placing.value)),
         (noise.correlated_in_time, say("Neighbouring readings are correlated in time.")),
         (noise.heavy_tails, say("The scatter has heavier tails than a normal distribution.")),
@@ -297,8 +324,15 @@ def _listed(modes: Sequence[Mode]) -> Text:
 
 AGAINST_SIMULATION: Mapping[str, Text] = {
     "consistent": say("The recording agrees with the simulation."),
+    "undetermined": say(
+        "The recording agrees with the simulation as far as its set-ups tell; what repeats share is more than they scatter by."
+    ),
     "explained": say("The recording does not agree with the simulation; what differs is found."),
     "partial": say("Something that differs is found, but structure remains that no known effect accounts for."),
+    "empirical": say(
+        "The recording does not agree with the simulation; a function that was fitted predicts what differs, and no known "
+        "effect accounts for it."
+    ),
     "unexplained": say("The recording does not agree with the simulation, and no known effect accounts for it."),
 }
 

@@ -14,6 +14,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, names, nu
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate import document as doc, wording
 from cmm_uq.certificate.diagnosis import overview as words
+from cmm_uq.certificate.diagnosis.empirical import empirical_section
 from cmm_uq.certificate.diagnosis.sections import costs_section, next_section, unseen_section, where_section
 from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.origin import came_about, program
@@ -32,8 +33,7 @@ def diagnosed_outcome(result: JobDiagnosis) -> Outcome:
     short = words.summary_of(result.job.facts, d.verdict, words.summary_lines(result), result.findings)
     with lettered_in(result.job.facts.job.language):
         document = diagnosis_document(result)
-    consistent = d.verdict == "consistent"
-    return Outcome(result, lambda: document, diagnosis_results(result), short, document.warnings, in_order=consistent)
+    return Outcome(result, lambda: document, diagnosis_results(result), short, document.warnings, in_order=d.agrees)
 
 
 def diagnosis_results(result: JobDiagnosis) -> dict[str, Any]:
@@ -76,6 +76,7 @@ def _sections(result: JobDiagnosis) -> tuple[Section, ...]:
     compared = () if simulated is None else (simulation_section(simulated, corrections(result, simulated)),)
     sections = (
         Section(say("What was left out"), _left_out(result)), where_section(d),
+        empirical_section(d, _improved),
         Section(say("What remains"), _consistent(result)), next_section(result),
         section(say("Before and after"), *_before_after(result)),
         section(say("What a correction would change"), *_consequences(result)),
@@ -87,7 +88,7 @@ def _sections(result: JobDiagnosis) -> tuple[Section, ...]:
 
 def _left_out(result: JobDiagnosis) -> tuple[doc.Block, ...]:
     d = result.diagnosis
-    if d.verdict == "consistent":
+    if d.agrees:
         return ()
     groups = (wording.titles(group, d.after.effects) for group in d.indistinguishable)
     alike = (doc.Paragraph(words.ambiguous(group), tone="warning") for group in groups)
@@ -111,7 +112,7 @@ def _effect(result: JobDiagnosis, item: OmittedEffect) -> doc.Facts:
 
 def _consistent(result: JobDiagnosis) -> tuple[doc.Block, ...]:
     d = result.diagnosis
-    if d.verdict != "consistent":
+    if not d.agrees:
         return ()
     plot = _residuals(
         result, d.before, caption=say("Residual of each observation, with U (k = {k}) from the noise.", k=_factor(d)),
@@ -130,11 +131,14 @@ def _before_after(result: JobDiagnosis) -> tuple[doc.Block | None, ...]:
         caption=say("Residual of each observation before and after, with U (k = {k}) from the noise.", k=_factor(d)),
         alternative=say("Residual rms {before} µm before and {after} µm after.", before=before, after=after),
     )  # fmt: skip
-    improved = improvement_table(
+    return plot, _improved(gain), _changes(d)
+
+
+def _improved(gain: Improvement) -> doc.Table:
+    return improvement_table(
         gain, say("Residual rms"), say("Rms on held-out {unseen}", unseen=gain.unseen),
         say("{unseen:capital} are left out with all their repeats; ± is one standard error.", unseen=gain.unseen),
     )  # fmt: skip
-    return plot, improved, _changes(d)
 
 
 def _factor(d: Diagnosis) -> Text:

@@ -297,7 +297,7 @@ def by_columns(d: Diagnosis) -> Text:
 
 def where_section(d: Diagnosis) -> Section:
     """Pictures and table of where the residuals lie; without a mismatch, nothing."""
-    if d.verdict == "consistent":
+    if d.agrees:
         return section(say("Where it is"))
     further = (_profile(d.where[0]), _table(d.where)) if d.where else ()
     return section(say("Where it is"), Paragraph(where_sentence(d)), field_picture(d), *further)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from cmm_uq.analysis.diagnosis.diagnosis import VERDICTS
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, plural, say
 from cmm_uq.certificate.document import Document, Facts, Paragraph, Section, working_page
 from cmm_uq.certificate.origin import program
@@ -17,7 +18,7 @@ from cmm_uq.certificate.wording import Headline, Summary, titles
 from cmm_uq.laboratory.proving import judgement as judged
 from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH
 from cmm_uq.laboratory.proving.cases import ALLOWED, KINDS, STRONGEST, WEAKEST, micrometres
-from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, REFUSED, VERDICTS, Rate
+from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, REFUSED, Rate
 
 # Purpose, cases, strengths, noise, seal
 METHOD: tuple[Text, ...] = (

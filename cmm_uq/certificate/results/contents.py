@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Statement
-from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, OmittedEffect
+from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, OmittedEffect
+from cmm_uq.analysis.diagnosis.empirical import EmpiricalFunction
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode
 from cmm_uq.analysis.diagnosis.power import ALLOWED
@@ -126,6 +128,7 @@ def diagnosis_data(found: JobDiagnosis) -> dict[str, Any]:
         "improvement": improvement_data(d.improvement),
         "next_plan": next_data(found.next_plan, found.diagnosis.after.artefact),
         "unseen": unseen_data(found.unseen),
+        **_beyond_effects(d),
         "rivals": [{"explanation": name, "probability": p} for name, p in d.rivals],
         **costs_data(found),
         **({"compared_on": d.compared} if d.compared < int(d.before.used.sum()) else {}),
@@ -134,6 +137,42 @@ def diagnosis_data(found: JobDiagnosis) -> dict[str, Any]:
                          for name, (a, b) in changes.figures.items()},
             "conformity": [{"before": _statement(a), "after": _statement(b)} for a, b in changes.statements],
         },
+    }  # fmt: skip
+
+
+def _beyond_effects(d: Diagnosis) -> dict[str, Any]:
+    """What repeats share, the best known effect and the functions that were fitted, each where it is."""
+    repeats, best, empirical = d.repeats, d.best_known, d.empirical
+    found: dict[str, Any] = {}
+    if repeats is not None and repeats.p_value < d.alpha:
+        found["repeats"] = asdict(repeats)
+    if best is not None:
+        found["best_known"] = {
+            "effect": best.effect, "probability": best.probability, "odds_of_function": best.odds_of_function,
+            "improvement": improvement_data(best.improvement),
+        }  # fmt: skip
+    if empirical is not None:
+        functions = [_function_data(one) for one in empirical.functions]
+        found["empirical"] = {
+            "predicts": empirical.predicts,
+            **improvement_data(empirical.improvement),
+            "functions": functions,
+        }
+    return found
+
+
+def _function_data(one: EmpiricalFunction) -> dict[str, Any]:
+    x, y, u = one.curve
+    form = one.form
+    return {
+        "of": one.term.of, "along": one.term.along, "proportional_to": one.term.lever,
+        "scale": one.term.along is not None and one.term.along == one.term.lever, "name": one.term.title,
+        "probability": one.probability, "also": list(one.also), "amplitude_um": one.amplitude_um,
+        "forms": [{"form": name, "probability": p} for name, p in one.forms],
+        "form": None if form is None else {
+            "name": form.name, "probability": form.probability, "parameters": _quantities(form.parameters)
+        },
+        "curve": {"at": x.tolist(), "error_um": y.tolist(), "u_um": u.tolist()}, "effect": one.stated,
     }  # fmt: skip
 
 

@@ -178,7 +178,7 @@ def not_converged(sampled: Posterior | Chains) -> list[Text]:
 
 def _mismatch(result: Result) -> list[Text]:
     diagnosis = result.diagnosed.diagnosis
-    if diagnosis.verdict == "consistent":
+    if diagnosis.agrees:
         return []
     said = [VERDICTS[diagnosis.verdict]]
     if diagnosis.effects:

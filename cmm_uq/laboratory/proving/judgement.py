@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
+from cmm_uq.analysis.diagnosis.diagnosis import VERDICTS
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.tables.plan import ProveFacts
@@ -148,8 +149,8 @@ def _quantiles(values: Floats, weight: Floats) -> tuple[float, float, float]:
     return float(low), float(middle), float(high)
 
 
-CONSISTENT, EXPLAINED, PARTIAL, UNEXPLAINED = "consistent", "explained", "partial", "unexplained"
-VERDICTS = (CONSISTENT, EXPLAINED, PARTIAL, UNEXPLAINED)
+CONSISTENT, UNDETERMINED, EXPLAINED, PARTIAL, EMPIRICAL, UNEXPLAINED = VERDICTS
+AGREES, BEYOND = (CONSISTENT, UNDETERMINED), (PARTIAL, EMPIRICAL, UNEXPLAINED)
 REFUSED = "refused"
 ANSWER = frozenset({"number", "verdict", "effects", "groups", "named", "heldout_um"})  # keys of what is no refusal
 # which 95 % intervals are counted: of effects that were found; of those that the job names, by what was hidden
@@ -199,8 +200,8 @@ def judge(
         sort = NAMED if case.kind == NOTHING else NAMED_BESIDE if apart else NAMED_GROUPED
         sort = sort if whole or case.kind == NOTHING else NAMED_MISSED
         intervals.append((sort, *_inside(record["named"], named)))
-    fitting = {NOTHING: (CONSISTENT,), ONE: (EXPLAINED,), TWO: (EXPLAINED,), OUTSIDE: (PARTIAL, UNEXPLAINED)}
-    right = verdict in fitting.get(case.kind, (EXPLAINED, PARTIAL, UNEXPLAINED)) and (whole or case.kind == NOTHING)
+    fitting = {NOTHING: AGREES, ONE: (EXPLAINED,), TWO: (EXPLAINED,), OUTSIDE: BEYOND}
+    right = verdict in fitting.get(case.kind, (EXPLAINED, *BEYOND)) and (whole or case.kind == NOTHING)
     before, after = record["heldout_um"] if record["effects"] else (None, None)
     return JudgedCase(
         case, verdict, tuple(sorted(reached)), tuple(sorted(alone)), tuple(wrong),
@@ -240,7 +241,7 @@ class ProofJudgement:
     @cached_property
     def false_alarms(self) -> Rate:
         """Cases that hide nothing and of which something else than *consistent* is said."""
-        return _rate(self.of_kind(NOTHING), lambda one: one.verdict != CONSISTENT)
+        return _rate(self.of_kind(NOTHING), lambda one: one.verdict not in AGREES)
 
     @cached_property
     def found(self) -> Rate:
@@ -273,7 +274,7 @@ class ProofJudgement:
     @cached_property
     def recognised(self) -> Rate:
         """Of detected causes outside the catalogue, those that are taken for no effect of it."""
-        return _rate([one for one in self.of_kind(OUTSIDE) if one.verdict != CONSISTENT], lambda one: one.right)
+        return _rate([one for one in self.of_kind(OUTSIDE) if one.verdict not in AGREES], lambda one: one.right)
 
     @cached_property
     def machine_blamed(self) -> Rate:

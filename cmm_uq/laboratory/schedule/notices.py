@@ -34,6 +34,9 @@ _OF_OUTCOME: Mapping[str, Event] = {"fail": "fail", "conditional fail": "fail", 
 _OF_VERDICT: Mapping[str, Text] = {
     "explained": say("the recording contradicts its model, and the diagnosis names what was left out"),
     "partial": say("the recording contradicts its model, and the diagnosis names only part of what was left out"),
+    "empirical": say(
+        "the recording contradicts its model, and a function that was fitted predicts it, but no known effect"
+    ),
     "unexplained": say("the recording contradicts its model, and no known effect accounts for it"),
 }
 _CONTRADICTS = say("the recording contradicts its model")
@@ -75,7 +78,7 @@ def of_results(results: Mapping[str, Any], inputs: str, where: str) -> list[Noti
                 text = say("{standard}: {decision}", standard=standard, decision=said)
             told.setdefault(_OF_OUTCOME.get(one.outcome, "undecided"), []).append(text)
     verdict = str((results.get("diagnosis") or {}).get("verdict") or "consistent")
-    if verdict != "consistent":
+    if verdict not in ("consistent", "undetermined"):
         told.setdefault("mismatch", []).append(_OF_VERDICT.get(verdict, _CONTRADICTS))
     return [
         Notice(event, str(name), say("{event}: {of}", event=Verbatim(event), of=of),

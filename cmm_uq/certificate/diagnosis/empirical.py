@@ -1,0 +1,146 @@
+"""What no known effect accounts for, in words: fitted functions, the effect that comes nearest, and what repeats share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
+from cmm_uq.analysis.diagnosis.empirical import ODDS, EmpiricalFunction
+from cmm_uq.analysis.diagnosis.held_out import Improvement
+from cmm_uq.analysis.diagnosis.location import region_of
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, number, say
+from cmm_uq.certificate.diagnosis.sections import region_words
+from cmm_uq.certificate.document import Facts, Paragraph, Plot, Section, Table, section
+from cmm_uq.certificate.plots.volume import profile_plot
+from cmm_uq.certificate.wording import probability
+from cmm_uq.jobs.columns import labelled
+from cmm_uq.maths.uncertainty.quantity import Quantity, alike, rounded, significant
+
+EMPIRICAL = "empirical.toml"  # file that states the functions as effects of a job's own
+
+FORMS: Mapping[str, Text] = {
+    "smooth": say("a smooth curve"), "step": say("a step"), "ramp": say("a ramp"), "dent": say("a dent"),
+    "bow": say("a bow"), "cubic": say("a cubic"), "saturating": say("one that levels off"),
+    "exponential": say("an exponential"), "sine": say("a sine"), "sawtooth": say("a sawtooth"),
+    "dead_zone": say("a dead zone"), "product": say("a product"), "bowl": say("a bowl"),
+}  # fmt: skip
+_PARAMETERS: Mapping[str, Text] = {
+    "at": say("at"), "width": say("width"), "start": say("from"), "period": say("period"), "reach": say("reach"),
+}  # fmt: skip
+
+
+def function_words(found: EmpiricalFunction) -> Text:
+    """One function: what it is of, its form where that is told, and its size."""
+    if found.form is None:
+        each = [
+            say("{form} {probability}", form=FORMS[form], probability=probability(p / found.probability))
+            for form, p in found.forms
+        ]
+        return say("{what:capital}: up to {size} µm; its form is not told: {forms}.", what=found.term.title,
+                   size=significant(found.amplitude_um), forms=commas(each))  # fmt: skip
+    sizes = [
+        say("{name} {value}", name=_PARAMETERS[name], value=_with_unit(one))
+        for name, one in found.form.parameters.items() if name in _PARAMETERS
+    ]  # fmt: skip
+    told = say("{form} of {size}", form=FORMS[found.form.name], size=_with_unit(found.form.parameters["size_um"]))
+    return say("{what:capital}: {form}, probability {probability}.", what=found.term.title,
+               form=commas([told, *sizes]), probability=probability(found.form.probability))  # fmt: skip
+
+
+def _with_unit(one: Quantity) -> Text:
+    value, U = rounded(one.value, one.expanded)
+    return say("{value} ± {U} {unit}", value=value, U=U, unit=one.unit)
+
+
+def nearest_words(d: Diagnosis) -> Text:
+    """The known effect that comes nearest, what it would bring and what contradicts it; nothing where it is asserted."""
+    best = d.best_known
+    if best is None or any(item.effect == best.effect for item in d.effects):
+        return NOTHING
+    before, later = alike(best.improvement.heldout_rms_before_um, best.improvement.heldout_rms_after_um)
+    told: Text = say(
+        "The known effect that comes nearest is {title:small}, probability {probability}: by itself it takes held-out "
+        "{unseen} from {before} to {after}\u00a0µm.",
+        title=best.title, probability=probability(best.probability), unseen=best.improvement.unseen, before=before,
+        after=later,
+    )  # fmt: skip
+    if best.odds_of_function > ODDS:
+        against = say("A curve of no form makes these readings more than {odds:.0f} times as probable.", odds=ODDS)
+        if best.odds_of_function < 1e4:
+            against = say(
+                "A curve of no form makes these readings {odds:.0f} times as probable.", odds=best.odds_of_function
+            )
+        told = after(told, against)
+    return after(told, say("If it is that: {what}.", what=best.points_to))
+
+
+def empirical_words(d: Diagnosis) -> list[Text]:
+    """The functions that held-out set-ups bear out, a sentence each."""
+    found = d.empirical
+    return [function_words(one) for one in found.functions] if found is not None and found.predicts else []
+
+
+def stated_functions(d: Diagnosis) -> str:
+    """The functions that held-out set-ups bear out, as effects of a job's own; empty where none can be stated."""
+    found = d.empirical
+    return (
+        "\n".join(one.stated for one in found.functions if one.stated) if found is not None and found.predicts else ""
+    )
+
+
+def repeats_words(d: Diagnosis) -> Text:
+    """What repeats of a quantity share, beside their scatter, where that is more than noise leaves."""
+    one = d.repeats
+    if one is None or one.p_value >= d.alpha:
+        return NOTHING
+    told = say(
+        "What all repeats of a set-up share is {shared} µm; they scatter by {own} µm (F test, p = {p}).",
+        shared=significant(one.shared_um), own=significant(one.repeatability_um), p=number(one.p_value, ".1g"),
+    )  # fmt: skip
+    return after(told, say(
+        "It is noise of each set-up, or an error that this plan does not tell from it: the same set-ups, placed anew, tell."
+    ))  # fmt: skip
+
+
+def empirical_section(d: Diagnosis, improved: Callable[[Improvement], Table]) -> Section:
+    """The fitted functions, what they bring on held-out set-ups, their curves, and the known effect that comes nearest."""
+    title, found = say("What no known effect accounts for"), d.empirical
+    nearest = nearest_words(d)
+    if found is None or not found.predicts:
+        return section(title, Paragraph(nearest) if nearest else None)
+    rows = [(say("Function"), function_words(one)) for one in found.functions]
+    rows += [(say("It could as well be"), alternatives(one.also)) for one in found.functions if one.also]
+    if stated_functions(d):
+        rows.append((say("To use it"), say(
+            "Stated as an effect of the laboratory's own, as results.json has it and a diagnosis writes it to {file}, and named "
+            "in [model] effects, it is estimated anew, corrected, and part of every uncertainty. Its form is then held.",
+            file=Verbatim(EMPIRICAL),
+        )))  # fmt: skip
+    told = Paragraph(say(
+        "Empirical: fitted to this recording, not known beforehand; it holds where was measured. The function is chosen anew "
+        "wherever {unseen} are held out: all are averaged as the others weigh them.", unseen=found.improvement.unseen,
+    ))  # fmt: skip
+    curves = [plot for one in found.functions if (plot := _curve(one)) is not None]
+    return section(
+        title, told, Facts(tuple(rows)), improved(found.improvement), *curves, Paragraph(nearest) if nearest else None
+    )
+
+
+def _curve(found: EmpiricalFunction) -> Plot | None:
+    x, y, u = found.curve
+    if len(x) < 2 or not np.any(u):
+        return None
+    label = say("Error / µm")
+    if found.term.along:
+        label = say("Error along {along} / µm", along=Verbatim(found.term.along.upper()))
+    region = region_of(x, y)
+    caption = say(
+        "{what:capital}, with U (k = 2), averaged over the functions that are probable; below, each observation over the "
+        "range of its points.", what=found.term.title,
+    )  # fmt: skip
+    shown = say("A function of up to {size:.3g} µm, largest {region}.", size=found.amplitude_um,
+                region=region_words(found.term.of, *region))  # fmt: skip
+    return profile_plot((x, y, 2 * u), found.data, region, x_label=labelled(found.term.of), y_label=label,
+                        caption=caption, alternative=shown)  # fmt: skip
