@@ -14,15 +14,13 @@ import scipy
 
 from cmm_uq.analysis.diagnosis import joint as jointly
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key
-from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, effect_of
-from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import log_prior
+from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, with_effects, withhold
-from cmm_uq.analysis.diagnosis.empirical import EmpiricalModel, empirical_model
+from cmm_uq.analysis.diagnosis.empirical.model import BestKnown, EmpiricalModel, best_known, empirical_model
 from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement, thin_out
 from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, WithheldEffect, joint_posterior, period_modes
 from cmm_uq.analysis.diagnosis.location import Place, locate
-from cmm_uq.analysis.diagnosis.noise import has_heavy_tails, probability_by_name
-from cmm_uq.analysis.diagnosis.repeats import RepeatComparison, against_repeats
+from cmm_uq.analysis.diagnosis.noise import RepeatComparison, against_repeats, has_heavy_tails, probability_by_name
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
@@ -219,18 +217,6 @@ class NoiseDiagnosis:
     contradicts_stated: bool
 
 
-@dataclass(frozen=True)
-class BestKnown:
-    """The known effect that by itself explains most."""
-
-    effect: str
-    title: Text
-    probability: float  # among all combinations
-    odds_of_function: float  # of the best nonparametric term over it, each alone, without what is known beforehand
-    improvement: Improvement
-    points_to: Text
-
-
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """See the module's docstring."""
@@ -296,24 +282,6 @@ def diagnose(
         int(some.used.sum()), found, withheld, average_models(found, joint, model, seed), empirical, repeats,
         best_known(found, model) if wrong else None,
     )  # fmt: skip
-
-
-def best_known(result: SearchResult, before: RecordingModel) -> BestKnown | None:
-    """The effect of the catalogue that by itself makes the recording most probable, asserted or not."""
-    first, prior = result.first, log_prior(result.first.explanations)
-    known = [i for i, e in enumerate(first.explanations) if e.kind == EFFECT and np.isfinite(first.log_odds[i])]
-    if not known:
-        return None
-    best = max(known, key=lambda i: float(first.log_odds[i] + prior[i]))
-    functions = [i for i, e in enumerate(first.explanations) if e.kind == UNKNOWN]
-    odds = float(np.exp(min(max(first.log_odds[functions], default=-np.inf) - first.log_odds[best], 700.0)))
-    versions = [first.comparison.beside((), (best,))[best][1]]
-    model = with_effects(first, versions, frozenset({best}))
-    model = replace(model, artefact=before.artefact, used=before.used)
-    effect = effect_of(first.explanations[best])
-    combinations = result.combinations
-    probability = 0.0 if combinations is None else combinations.of(best)
-    return BestKnown(effect.name, effect.title, probability, odds, improvement(before, model), effect.points_to)
 
 
 def _asserted(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
-from cmm_uq.analysis.diagnosis.empirical import ODDS, EmpiricalFunction
+from cmm_uq.analysis.diagnosis.empirical.model import ODDS, EmpiricalFunction
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import region_of
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, number, say
@@ -21,14 +21,27 @@ from cmm_uq.maths.uncertainty.quantity import Quantity, alike, rounded, signific
 EMPIRICAL = "empirical.toml"  # file that states the functions as effects of a job's own
 
 FORMS: Mapping[str, Text] = {
-    "smooth": say("a smooth curve"), "step": say("a step"), "ramp": say("a ramp"), "dent": say("a dent"),
-    "bow": say("a bow"), "cubic": say("a cubic"), "saturating": say("one that levels off"),
-    "exponential": say("an exponential"), "sine": say("a sine"), "sawtooth": say("a sawtooth"),
-    "dead_zone": say("a dead zone"), "product": say("a product"), "bowl": say("a bowl"),
-}  # fmt: skip
+    "smooth": say("a smooth curve"),
+    "step": say("a step"),
+    "ramp": say("a ramp"),
+    "dent": say("a dent"),
+    "bow": say("a bow"),
+    "cubic": say("a cubic"),
+    "saturating": say("one that levels off"),
+    "exponential": say("an exponential"),
+    "sine": say("a sine"),
+    "sawtooth": say("a sawtooth"),
+    "dead_zone": say("a dead zone"),
+    "product": say("a product"),
+    "bowl": say("a bowl"),
+}
 _PARAMETERS: Mapping[str, Text] = {
-    "at": say("at"), "width": say("width"), "start": say("from"), "period": say("period"), "reach": say("reach"),
-}  # fmt: skip
+    "at": say("at"),
+    "width": say("width"),
+    "start": say("from"),
+    "period": say("period"),
+    "reach": say("reach"),
+}
 
 
 def function_words(found: EmpiricalFunction) -> Text:
@@ -38,15 +51,24 @@ def function_words(found: EmpiricalFunction) -> Text:
             say("{form} {probability}", form=FORMS[form], probability=probability(p / found.probability))
             for form, p in found.forms
         ]
-        return say("{what:capital}: up to {size} µm; its form is not told: {forms}.", what=found.term.title,
-                   size=significant(found.amplitude_um), forms=commas(each))  # fmt: skip
+        return say(
+            "{what:capital}: up to {size} µm; its form is not told: {forms}.",
+            what=found.term.title,
+            size=significant(found.amplitude_um),
+            forms=commas(each),
+        )
     sizes = [
         say("{name} {value}", name=_PARAMETERS[name], value=_with_unit(one))
-        for name, one in found.form.parameters.items() if name in _PARAMETERS
-    ]  # fmt: skip
+        for name, one in found.form.parameters.items()
+        if name in _PARAMETERS
+    ]
     told = say("{form} of {size}", form=FORMS[found.form.name], size=_with_unit(found.form.parameters["size_um"]))
-    return say("{what:capital}: {form}, probability {probability}.", what=found.term.title,
-               form=commas([told, *sizes]), probability=probability(found.form.probability))  # fmt: skip
+    return say(
+        "{what:capital}: {form}, probability {probability}.",
+        what=found.term.title,
+        form=commas([told, *sizes]),
+        probability=probability(found.form.probability),
+    )
 
 
 def _with_unit(one: Quantity) -> Text:
@@ -63,9 +85,12 @@ def nearest_words(d: Diagnosis) -> Text:
     told: Text = say(
         "The known effect that comes nearest is {title:small}, probability {probability}: by itself it takes held-out "
         "{unseen} from {before} to {after}\u00a0µm.",
-        title=best.title, probability=probability(best.probability), unseen=best.improvement.unseen, before=before,
+        title=best.title,
+        probability=probability(best.probability),
+        unseen=best.improvement.unseen,
+        before=before,
         after=later,
-    )  # fmt: skip
+    )
     if best.odds_of_function > ODDS:
         against = say("A curve of no form makes these readings more than {odds:.0f} times as probable.", odds=ODDS)
         if best.odds_of_function < 1e4:
@@ -97,11 +122,17 @@ def repeats_words(d: Diagnosis) -> Text:
         return NOTHING
     told = say(
         "What all repeats of a set-up share is {shared} µm; they scatter by {own} µm (F test, p = {p}).",
-        shared=significant(one.shared_um), own=significant(one.repeatability_um), p=number(one.p_value, ".1g"),
-    )  # fmt: skip
-    return after(told, say(
-        "It is noise of each set-up, or an error that this plan does not tell from it: the same set-ups, placed anew, tell."
-    ))  # fmt: skip
+        shared=significant(one.shared_um),
+        own=significant(one.repeatability_um),
+        p=number(one.p_value, ".1g"),
+    )
+    return after(
+        told,
+        say(
+            "It is noise of each set-up, or an error that this plan does not tell from it: the same set-ups, "
+            "placed anew, tell."
+        ),
+    )
 
 
 def empirical_section(d: Diagnosis, improved: Callable[[Improvement], Table]) -> Section:
@@ -113,15 +144,27 @@ def empirical_section(d: Diagnosis, improved: Callable[[Improvement], Table]) ->
     rows = [(say("Function"), function_words(one)) for one in found.functions]
     rows += [(say("It could as well be"), alternatives(one.also)) for one in found.functions if one.also]
     if stated_functions(d):
-        rows.append((say("To use it"), say(
-            "Stated as an effect of the laboratory's own, as results.json has it and a diagnosis writes it to {file}, and named "
-            "in [model] effects, it is estimated anew, corrected, and part of every uncertainty. Its form is then held.",
-            file=Verbatim(EMPIRICAL),
-        )))  # fmt: skip
-    told = Paragraph(say(
-        "Empirical: fitted to this recording, not known beforehand; it holds where was measured. The function is chosen anew "
-        "wherever {unseen} are held out: all are averaged as the others weigh them.", unseen=found.improvement.unseen,
-    ))  # fmt: skip
+        rows.append(
+            (
+                say("To use it"),
+                say(
+                    "Results.json states it as an effect of the laboratory's own, and a diagnosis writes it to {file}: "
+                    "in job.toml, "
+                    "and named in [model] effects, it is estimated anew, corrected, and part of every uncertainty. "
+                    "Its form is "
+                    "then held.",
+                    file=Verbatim(EMPIRICAL),
+                ),
+            )
+        )
+    told = Paragraph(
+        say(
+            "Empirical: fitted to this recording, not known beforehand; it holds where was measured. The function "
+            "is chosen anew "
+            "wherever {unseen} are held out: all are averaged as the others weigh them.",
+            unseen=found.improvement.unseen,
+        )
+    )
     curves = [plot for one in found.functions if (plot := _curve(one)) is not None]
     return section(
         title, told, Facts(tuple(rows)), improved(found.improvement), *curves, Paragraph(nearest) if nearest else None
@@ -138,9 +181,20 @@ def _curve(found: EmpiricalFunction) -> Plot | None:
     region = region_of(x, y)
     caption = say(
         "{what:capital}, with U (k = 2), averaged over the functions that are probable; below, each observation over the "
-        "range of its points.", what=found.term.title,
-    )  # fmt: skip
-    shown = say("A function of up to {size:.3g} µm, largest {region}.", size=found.amplitude_um,
-                region=region_words(found.term.of, *region))  # fmt: skip
-    return profile_plot((x, y, 2 * u), found.data, region, x_label=labelled(found.term.of), y_label=label,
-                        caption=caption, alternative=shown)  # fmt: skip
+        "range of its points.",
+        what=found.term.title,
+    )
+    shown = say(
+        "A function of up to {size:.3g} µm, largest {region}.",
+        size=found.amplitude_um,
+        region=region_words(found.term.of, *region),
+    )
+    return profile_plot(
+        (x, y, 2 * u),
+        found.data,
+        region,
+        x_label=labelled(found.term.of),
+        y_label=label,
+        caption=caption,
+        alternative=shown,
+    )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from cmm_uq.analysis.diagnosis.comparison.search import ASSERTED
-from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, OmittedEffect
+from cmm_uq.analysis.diagnosis.diagnosis import VERDICTS, Diagnosis, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
 from cmm_uq.analysis.screening.columns import Finding
@@ -21,10 +21,8 @@ from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 # What a verdict means for who is to act
-STANDING: Mapping[str, Standing] = {
-    "consistent": "good", "undetermined": "open", "explained": "open", "partial": "open", "empirical": "open",
-    "unexplained": "bad",
-}  # fmt: skip
+_STANDING: Mapping[str, Standing] = {"consistent": "good", "unexplained": "bad"}
+STANDING: Mapping[str, Standing] = {verdict: _STANDING.get(verdict, "open") for verdict in VERDICTS}
 
 # A verdict as the title of its overview
 VERDICT_TITLES: Mapping[str, Text] = {
@@ -35,7 +33,7 @@ VERDICT_TITLES: Mapping[str, Text] = {
     "empirical": say("Modelled, not named: no known effect accounts for it"),
     "unexplained": say("Unexplained: something is wrong that no known effect accounts for"),
 }
-VERDICTS: Mapping[str, Text] = {
+VERDICT_SENTENCES: Mapping[str, Text] = {
     "consistent": say("The recording agrees with the model that the job names."),
     "undetermined": say(
         "The recording agrees with the model that the job names as far as its set-ups tell; what repeats share is more than "
@@ -203,7 +201,7 @@ def _look_at(d: Diagnosis, item: OmittedEffect) -> Text:
 
 
 def verdict_of(result: JobDiagnosis) -> Text:
-    return (VERDICTS if result.simulated is None else AGAINST_SIMULATION)[result.diagnosis.verdict]
+    return (VERDICT_SENTENCES if result.simulated is None else AGAINST_SIMULATION)[result.diagnosis.verdict]
 
 
 def summary_lines(result: JobDiagnosis) -> list[Text]:

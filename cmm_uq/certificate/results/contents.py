@@ -11,7 +11,7 @@ import numpy as np
 from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Statement
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, OmittedEffect
-from cmm_uq.analysis.diagnosis.empirical import EmpiricalFunction
+from cmm_uq.analysis.diagnosis.empirical.model import EmpiricalFunction
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode
 from cmm_uq.analysis.diagnosis.power import ALLOWED
@@ -147,10 +147,8 @@ def _beyond_effects(d: Diagnosis) -> dict[str, Any]:
     if repeats is not None and repeats.p_value < d.alpha:
         found["repeats"] = asdict(repeats)
     if best is not None:
-        found["best_known"] = {
-            "effect": best.effect, "probability": best.probability, "odds_of_function": best.odds_of_function,
-            "improvement": improvement_data(best.improvement),
-        }  # fmt: skip
+        found["best_known"] = {name: getattr(best, name) for name in ("effect", "probability", "odds_of_function")}
+        found["best_known"]["improvement"] = improvement_data(best.improvement)
     if empirical is not None:
         functions = [_function_data(one) for one in empirical.functions]
         found["empirical"] = {
@@ -162,18 +160,22 @@ def _beyond_effects(d: Diagnosis) -> dict[str, Any]:
 
 
 def _function_data(one: EmpiricalFunction) -> dict[str, Any]:
-    x, y, u = one.curve
-    form = one.form
-    return {
-        "of": one.term.of, "along": one.term.along, "proportional_to": one.term.lever,
-        "scale": one.term.along is not None and one.term.along == one.term.lever, "name": one.term.title,
-        "probability": one.probability, "also": list(one.also), "amplitude_um": one.amplitude_um,
-        "forms": [{"form": name, "probability": p} for name, p in one.forms],
-        "form": None if form is None else {
-            "name": form.name, "probability": form.probability, "parameters": _quantities(form.parameters)
-        },
-        "curve": {"at": x.tolist(), "error_um": y.tolist(), "u_um": u.tolist()}, "effect": one.stated,
-    }  # fmt: skip
+    term, form = one.term, one.form
+    named = None
+    if form is not None:
+        named = {"name": form.name, "probability": form.probability, "parameters": _quantities(form.parameters)}
+    scale = term.along is not None and term.along == term.lever
+    found: dict[str, Any] = {
+        "of": term.of,
+        "along": term.along,
+        "proportional_to": term.lever,
+        "scale": scale,
+        "name": term.title,
+    }
+    found |= {"probability": one.probability, "also": list(one.also), "amplitude_um": one.amplitude_um}
+    curve = dict(zip(("at", "error_um", "u_um"), (values.tolist() for values in one.curve), strict=True))
+    forms = [{"form": name, "probability": p} for name, p in one.forms]
+    return found | {"forms": forms, "form": named, "curve": curve, "effect": one.stated}
 
 
 def false_alarms(alpha: float) -> dict[str, float]:

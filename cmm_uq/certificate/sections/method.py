@@ -5,7 +5,7 @@ from __future__ import annotations
 from cmm_uq.analysis.conformity.uncertainty import unknown_expansion
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, listed, number, say, sentences
-from cmm_uq.certificate.diagnosis.overview import VERDICTS
+from cmm_uq.certificate.diagnosis.overview import VERDICT_SENTENCES
 from cmm_uq.certificate.document import Facts, Paragraph, Section, section
 from cmm_uq.certificate.plots.corner import corner_plot
 from cmm_uq.certificate.result import RecordingNoise, Result
@@ -180,7 +180,7 @@ def _mismatch(result: Result) -> list[Text]:
     diagnosis = result.diagnosed.diagnosis
     if diagnosis.agrees:
         return []
-    said = [VERDICTS[diagnosis.verdict]]
+    said = [VERDICT_SENTENCES[diagnosis.verdict]]
     if diagnosis.effects:
         said.append(say("It shows: {named}.", named=listed([item.title for item in diagnosis.effects])))
     holds = say("The figures below hold for the named model; see the diagnosis.")

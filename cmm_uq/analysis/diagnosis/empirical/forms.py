@@ -23,7 +23,7 @@ Function = Callable[[Floats, Floats], Floats]
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class ClosedForm:
     """Functions of one covariate with a common name, K of them, each of r columns."""
 
     name: str
@@ -39,7 +39,7 @@ class Form:
         return found[:, :, None] if found.ndim == 2 else found
 
 
-def forms_of(covariate: Floats, *, time: bool = False) -> Iterator[Form]:
+def forms_of(covariate: Floats, *, time: bool = False) -> Iterator[ClosedForm]:
     """Every form of a covariate (n,): of a time one that settles or grows is called exponential, of a reading saturating."""
     low, span, distinct = float(covariate.min()), float(np.ptp(covariate)), np.unique(covariate)
     high, middle, half, gaps = low + span, low + 0.5 * span, 0.5 * span, np.diff(distinct)
@@ -48,18 +48,34 @@ def forms_of(covariate: Floats, *, time: bool = False) -> Iterator[Form]:
         parts = np.array_split(np.arange(len(gaps)), _STEPS)
         widest = np.array([part[np.argmax(gaps[part])] for part in parts])
         between, gaps = between[widest], np.maximum(gaps[widest], np.gradient(between[widest]))
-    yield Form("step", ("at",), between[:, None], gaps[:, None], lambda c, s: 0.5 * (1 + np.sign(c - s[:, 0])),
-               "(1 + sign(c - at))/2")  # fmt: skip
+    yield ClosedForm(
+        "step",
+        ("at",),
+        between[:, None],
+        gaps[:, None],
+        lambda c, s: 0.5 * (1 + np.sign(c - s[:, 0])),
+        "(1 + sign(c - at))/2",
+    )
     at = low + span * np.arange(1, _HINGES + 1) / (_HINGES + 1)
     yield _even("ramp", ("start",), at, lambda c, s: np.maximum(c - s[:, 0], 0) / span, f"max(c - start, 0)/{span!r}")
     at = low + span * (np.arange(_PLACES) + 0.5) / _PLACES
-    yield _even("dent", ("at", "width"), (at, span * np.array(_WIDTHS)),
-                lambda c, s: np.exp(-0.5 * ((c - s[:, 0]) / s[:, 1]) ** 2), "exp(-((c - at)/width)**2/2)")  # fmt: skip
+    yield _even(
+        "dent",
+        ("at", "width"),
+        (at, span * np.array(_WIDTHS)),
+        lambda c, s: np.exp(-0.5 * ((c - s[:, 0]) / s[:, 1]) ** 2),
+        "exp(-((c - at)/width)**2/2)",
+    )
     yield _even("bow", (), (), lambda c, s: ((c - middle) / half) ** 2, f"((c - {middle!r})/{half!r})**2")
     yield _even("cubic", (), (), lambda c, s: ((c - middle) / half) ** 3, f"((c - {middle!r})/{half!r})**3")
     at = low + span * (np.arange(_SATURATES) + 0.5) / _SATURATES
-    yield _even("saturating", ("at", "width"), (at, span * np.array(_SOFT)),
-                lambda c, s: np.tanh((c - s[:, 0]) / s[:, 1]), "tanh((c - at)/width)")  # fmt: skip
+    yield _even(
+        "saturating",
+        ("at", "width"),
+        (at, span * np.array(_SOFT)),
+        lambda c, s: np.tanh((c - s[:, 0]) / s[:, 1]),
+        "tanh((c - at)/width)",
+    )
     settles, reach = "exponential" if time else "saturating", span * np.array(_REACHES)
     yield _even(
         settles, ("reach",), reach, lambda c, s: 1 - np.exp(-(c - low) / s[:, 0]), f"1 - exp(-(c - {low!r})/reach)"
@@ -72,12 +88,16 @@ def forms_of(covariate: Floats, *, time: bool = False) -> Iterator[Form]:
     if len(period):
         grid, apart = _grid(period, np.arange(_PHASES) / _PHASES)
         grid[:, 1], apart[:, 1] = grid[:, 1] * grid[:, 0], apart[:, 1] * grid[:, 0]
-        yield Form("sawtooth", ("period", "at"), grid, apart, _teeth, "2/pi*atan(tan(pi*(c - at)/period))")
+        yield ClosedForm("sawtooth", ("period", "at"), grid, apart, _teeth, "2/pi*atan(tan(pi*(c - at)/period))")
     zero = 0.0 if low < 0 < high else middle
     width = half * np.arange(1, _DEAD + 1) / (_DEAD + 1)
-    yield _even("dead_zone", ("width",), width,
-                lambda c, s: np.sign(c - zero) * np.maximum(np.abs(c - zero) - s[:, 0], 0) / span,
-                f"sign(c - {zero!r})*max(abs(c - {zero!r}) - width, 0)/{span!r}")  # fmt: skip
+    yield _even(
+        "dead_zone",
+        ("width",),
+        width,
+        lambda c, s: np.sign(c - zero) * np.maximum(np.abs(c - zero) - s[:, 0], 0) / span,
+        f"sign(c - {zero!r})*max(abs(c - {zero!r}) - width, 0)/{span!r}",
+    )
 
 
 def _waves(c: Floats, s: Floats) -> Floats:
@@ -92,9 +112,9 @@ def _teeth(c: Floats, s: Floats) -> Floats:
 
 def _even(
     name: str, parameters: tuple[str, ...], nodes: Floats | tuple[Floats, ...], function: Function, formula: str
-) -> Form:
+) -> ClosedForm:
     grid, apart = _grid(*(nodes if isinstance(nodes, tuple) else (nodes,)))
-    return Form(name, parameters, grid, apart, function, formula)
+    return ClosedForm(name, parameters, grid, apart, function, formula)
 
 
 def _grid(*nodes: Floats) -> tuple[Floats, Floats]:

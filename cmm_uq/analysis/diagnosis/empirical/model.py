@@ -1,0 +1,268 @@
+"""What was located and no effect names, modelled: functions of what is recorded, averaged by their evidence, and their form.
+
+y = B·b + F·a + ε, with b free (the job's model, what was asserted, where the artefact stands), F the columns of one function
+and ε the noise that the comparison found most probable. Functions are smooth (Gaussian processes) or have a form of
+:mod:`~cmm_uq.analysis.diagnosis.empirical.forms`; sizes are spread evenly in their logarithm up to what physics allows, and
+σ is integrated over. Held-out set-ups are predicted by all functions as the other set-ups alone weigh them: the choice is
+made anew wherever it is judged. A further function is looked for beside the most probable one where it has odds of 20 : 1.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+
+from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, UNKNOWN_SD, effect_of
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import log_prior
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, with_effects
+from cmm_uq.analysis.diagnosis.empirical.evidence import (
+    IMPROBABLE,
+    FunctionFit,
+    FunctionVersion,
+    improvements,
+    residuals,
+)
+from cmm_uq.analysis.diagnosis.empirical.forms import SMOOTH
+from cmm_uq.analysis.diagnosis.empirical.functions import FunctionTerm, families_of
+from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement
+from cmm_uq.analysis.diagnosis.location import without_unseen
+from cmm_uq.base.messages import Text
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.machine.model import RecordingModel
+from cmm_uq.maths.uncertainty.quantity import Quantity
+
+ODDS = 20.0  # of a further function over none, and of a form over all else, from which it is told
+_MOST = 3  # functions together
+_TOLD, _ALSO = 0.01, 0.05  # probability from which a form, and another term, is told
+_KNOTS, _STRAIGHT = 13, 1e-3  # of a broken line for a smooth curve; least bend, over its size
+_PRIOR = 3.0  # what its size may be in another recording, over what was found
+
+
+@dataclass(frozen=True)
+class NamedForm:
+    """A form that has odds of 20 : 1 over every other function."""
+
+    name: str
+    probability: float
+    parameters: dict[str, Quantity]  # its size, and what shapes it
+
+
+@dataclass(frozen=True, eq=False)
+class EmpiricalFunction:
+    """A function that was fitted."""
+
+    term: FunctionTerm
+    probability: float  # that it is this term
+    forms: tuple[tuple[str, float], ...]  # that are probable for it, most probable first
+    form: NamedForm | None
+    also: tuple[Text, ...]  # other terms that are probable
+    amplitude_um: float  # largest value
+    # covariate, function and its standard uncertainty in µm, each (p,); empty of two covariates, and of directions
+    curve: tuple[Floats, Floats, Floats]
+    # lowest and highest of the covariate among the points of each observation, and what the model leaves of it, µm, each (m,)
+    data: tuple[Floats, Floats, Floats]
+    stated: str  # as ``[[effect]]`` of a job; empty where it moves no points
+
+
+@dataclass(frozen=True, eq=False)
+class EmpiricalModel:
+    """Functions that held-out set-ups bear out."""
+
+    functions: tuple[EmpiricalFunction, ...]
+    improvement: Improvement
+    predicts: bool  # whether the gain is larger than its standard error, and the held-out rms not
+
+
+@dataclass(frozen=True)
+class BestKnown:
+    """The known effect that by itself explains most."""
+
+    effect: str
+    title: Text
+    probability: float  # among all combinations
+    odds_of_function: float  # of the best nonparametric term over it, each alone, without what is known beforehand
+    improvement: Improvement
+    points_to: Text
+
+
+def empirical_model(result: SearchResult) -> EmpiricalModel | None:
+    """What functions of what is recorded make of the misfit; nothing where none has odds of 20 : 1."""
+    data = FunctionFit.of(result, families_of(result))
+    if not data.families or not data.degrees:
+        return None
+    beside, described = data, list[EmpiricalFunction]()
+    while len(described) < _MOST and beside.total - beside.nothing > np.log(ODDS):
+        described.append(_described(beside, result))
+        beside = beside.with_function(beside.versions(1)[0])
+    if not described:
+        return None
+    gains = improvements(result, data, len(described))
+    chosen = 0
+    for i, gain in enumerate(gains[1:], 1):  # a further function is kept where it predicts better than those before it
+        if gain.elpd_gain - gains[chosen].elpd_gain > gain.elpd_gain_se and (
+            gain.heldout_rms_after_um < gains[chosen].heldout_rms_after_um
+        ):
+            chosen = i
+    gain = gains[chosen]
+    better = gain.elpd_gain > gain.elpd_gain_se and gain.heldout_rms_after_um < gain.heldout_rms_before_um
+    return EmpiricalModel(tuple(described[: chosen + 1]), gain, better)
+
+
+def _described(data: FunctionFit, result: SearchResult) -> EmpiricalFunction:
+    by: dict[FunctionTerm, dict[str, float]] = {}
+    for family, (log, _) in zip(data.families, data.evidence, strict=True):
+        of_term = by.setdefault(family.term, {})
+        share = float(np.exp(scipy.special.logsumexp(log) - data.total))
+        of_term[family.form] = of_term.get(family.form, 0.0) + share
+    order = sorted(by, key=lambda one: -sum(by[one].values()))
+    term, probability = order[0], sum(by[order[0]].values())
+    forms = sorted(by[term].items(), key=lambda item: -item[1])
+    name, most = forms[0]
+    chosen = [i for i, family in enumerate(data.families) if family.term == term]
+    own = [i for i in chosen if data.families[i].form == name]
+    x, y, u = _function(data, chosen)
+    form, stated = None, ""
+    if name != SMOOTH and (most >= ODDS / (1 + ODDS) or not len(x)):
+        form, stated = _named(data, own, name, most)
+        form = form if most >= ODDS / (1 + ODDS) else None
+    elif len(x) and term.along is not None:
+        stated = _stated(term, [_broken_line(x, y)], [float(np.abs(y).max())])
+    also = tuple(other.title for other in order[1:4] if sum(by[other].values()) > _ALSO)
+    amplitude = float(np.abs(y).max()) if len(y) else _amplitude(data)
+    told = tuple((one, p) for one, p in forms if p > _TOLD)
+    return EmpiricalFunction(
+        term, probability, told, form, also, amplitude, (x, y, u), _seen(data, result, chosen[0]), stated
+    )
+
+
+def _seen(data: FunctionFit, result: SearchResult, family: int) -> tuple[Floats, Floats, Floats]:
+    covariate, model = data.families[family].covariate, result.first.model
+    rows = model.artefact.rows[model.used]
+    each = (
+        covariate[:, None] if len(covariate) == len(rows) else covariate[rows] if len(covariate) else np.zeros((0, 1))
+    )
+    left = next(residuals(data, 0)) * result.first.comparison.noise_scale / MICROMETRE
+    return each.min(axis=1, initial=np.inf), each.max(axis=1, initial=-np.inf), left[: len(each)]
+
+
+def _among(data: FunctionFit, chosen: Sequence[int]) -> list[tuple[FunctionVersion, float]]:
+    """Versions of some families that are probable, with their probability among these."""
+    logs = {i: data.evidence[i][0] for i in chosen}
+    total = scipy.special.logsumexp([scipy.special.logsumexp(log) for log in logs.values()])
+    found = [
+        (FunctionVersion(i, int(k), float(data.evidence[i][1][k, a])), float(np.exp(log[k, a] - total)))
+        for i, log in logs.items()
+        for k, a in np.argwhere(log - total > np.log(IMPROBABLE))
+    ]
+    every = sum(p for _, p in found)
+    return [(version, p / every) for version, p in found]
+
+
+def _function(data: FunctionFit, chosen: Sequence[int]) -> tuple[Floats, Floats, Floats]:
+    """The function of a term where its covariate is given, averaged over forms and sizes, and its standard uncertainty, µm."""
+    covariate = data.families[chosen[0]].covariate
+    x, order = np.unique(covariate, return_index=True)
+    if len(x) < 2:
+        return x[:0], x[:0], x[:0]
+    mean, square = np.zeros(len(x)), np.zeros(len(x))
+    for version, p in _among(data, chosen):
+        family = data.families[version.family]
+        left = data.rest(family.columns[:, version.index])
+        values = without_unseen(x, family.values[order, version.index], left)
+        a, covariance, _ = data.fitted(version)
+        own = values @ a
+        mean += p * own
+        square += p * (own**2 + np.einsum("pi,ij,pj->p", values, covariance, values))
+    return x, mean / MICROMETRE, np.sqrt(np.maximum(square - mean**2, 0.0)) / MICROMETRE
+
+
+def _amplitude(data: FunctionFit) -> float:
+    """Largest part of an observation, µm, that the most probable function takes."""
+    version = data.versions(1)[0]
+    columns = data.families[version.family].columns[:, version.index]
+    return float(np.abs(columns @ data.fitted(version)[0]).max()) / MICROMETRE
+
+
+def _named(data: FunctionFit, own: Sequence[int], name: str, probability: float) -> tuple[NamedForm, str]:
+    finer = [data.families[i].divided(_likely(data.evidence[i][0])) for i in own]
+    data = replace(data, families=finer)
+    versions = _among(data, range(len(finer)))
+    weight = np.array([p for _, p in versions])
+    each = [data.fitted(version)[:2] for version, _ in versions]
+    sizes = np.array([mean for mean, _ in each]) * UNKNOWN_SD / MICROMETRE  # (v, r)
+    spread = np.array([np.diag(covariance) for _, covariance in each]) * (UNKNOWN_SD / MICROMETRE) ** 2
+    mean = weight @ sizes
+    variance = weight @ (spread + (sizes - mean) ** 2)
+    size, along = float(np.linalg.norm(mean)), mean / max(float(np.linalg.norm(mean)), 1e-300)
+    parameters = {"size_um": _quantity(float(mean[0]) if len(mean) == 1 else size, float(along**2 @ variance), "µm")}
+    family = data.families[0]
+    nodes = [(data.families[version.family].shaped, version.index) for version, _ in versions]
+    shapes, apart = (
+        np.array([getattr(form, of)[index] if form else [] for form, index in nodes]) for of in ("shapes", "apart")
+    )
+    of = "mm" if family.term.of.endswith("_mm") else "s" if family.term.of == "time_s" else "1"
+    text = family.formula
+    values = weight @ shapes
+    for k, parameter in enumerate(family.parameters):
+        variance_of = weight @ ((shapes[:, k] - values[k]) ** 2 + apart[:, k] ** 2 / 12)
+        parameters[parameter] = _quantity(float(values[k]), float(variance_of), of)
+        text = re.sub(rf"\b{parameter}\b", f"{values[k]:.7g}", text)
+    stated = "" if family.term.along is None else _stated(family.term, text.split(";"), np.abs(mean).tolist())
+    return NamedForm(name, probability, parameters), stated
+
+
+def _likely(log: Floats) -> Ints:
+    """Functions (l,) of a family that are probable beside its best."""
+    each = log.max(axis=1)
+    return np.flatnonzero(each > each.max() + np.log(IMPROBABLE))
+
+
+def _quantity(value: float, variance: float, of: str) -> Quantity:
+    u = float(np.sqrt(max(variance, 0.0)))
+    return Quantity(value, u, (value - 1.96 * u, value + 1.96 * u), unit(of))
+
+
+def _broken_line(x: Floats, y: Floats) -> str:
+    """A curve of largest value one as a sum of hinges, between knots that lie evenly."""
+    knots = np.linspace(x[0], x[-1], min(_KNOTS, len(x)))
+    at = np.interp(knots, x, y) / max(float(np.abs(y).max()), 1e-300)
+    slopes = np.diff(at) / np.diff(knots)
+    bends = zip(knots[1:-1], np.diff(slopes), strict=True)
+    hinges = [f"{bend:+.4g}*max(c - {knot:.5g}, 0)" for knot, bend in bends if abs(bend) * np.ptp(x) > _STRAIGHT]
+    return f"{at[0]:.4g}{slopes[0]:+.4g}*(c - {knots[0]:.5g})" + "".join(hinges)
+
+
+def _stated(term: FunctionTerm, parts: Sequence[str], sizes: Sequence[float]) -> str:
+    """A function as a job states an effect of its own: a formula of its form, held, whose size is to be estimated."""
+    names = "kqrs"[: len(parts)]
+    each = [re.sub(r"\bc\b", term.variable, part) for part in parts]
+    formula = " + ".join(f"{name}*({part}){term.factor}" for name, part in zip(names, each, strict=True))
+    priors = [f'{{ unit = "µm", prior = {_PRIOR * max(size, 0.01):.2g} }}' for size in sizes]
+    parameters = ", ".join(f"{name} = {prior}" for name, prior in zip(names, priors, strict=True))
+    name = "_".join(
+        ("empirical", term.of.replace("_mm", "").replace(",", "_"), str(term.along), *filter(None, [term.lever]))
+    )
+    return f'[[effect]]\nname = "{name}"\nformula = "e_{term.along} = {formula}"\nparameters = {{ {parameters} }}\n'
+
+
+def best_known(result: SearchResult, before: RecordingModel) -> BestKnown | None:
+    """The effect of the catalogue that by itself makes the recording most probable, asserted or not."""
+    first, prior = result.first, log_prior(result.first.explanations)
+    known = [i for i, e in enumerate(first.explanations) if e.kind == EFFECT and np.isfinite(first.log_odds[i])]
+    if not known:
+        return None
+    best = max(known, key=lambda i: float(first.log_odds[i] + prior[i]))
+    functions = [i for i, e in enumerate(first.explanations) if e.kind == UNKNOWN]
+    odds = float(np.exp(min(max(first.log_odds[functions], default=-np.inf) - first.log_odds[best], 700.0)))
+    versions = [first.comparison.beside((), (best,))[best][1]]
+    model = with_effects(first, versions, frozenset({best}))
+    model = replace(model, artefact=before.artefact, used=before.used)
+    effect = effect_of(first.explanations[best])
+    combinations = result.combinations
+    probability = 0.0 if combinations is None else combinations.of(best)
+    return BestKnown(effect.name, effect.title, probability, odds, improvement(before, model), effect.points_to)

@@ -1,0 +1,140 @@
+"""Evidence and predictions in closed form against dense Gaussian computations of the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import linalg, special, stats
+
+from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES
+from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit, FunctionVersion, predictions, residuals
+from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily, FunctionTerm
+from cmm_uq.base.messages import Verbatim
+from cmm_uq.base.points import Floats
+
+M, P = 24, 3
+
+
+def family(columns: Floats, name: str, log_prior: float = 0.0) -> FunctionFamily:
+    term = FunctionTerm(name, Verbatim(name), "x")
+    return FunctionFamily(term, "smooth", columns, log_prior, np.zeros(0), np.zeros((0, *columns.shape[1:])))
+
+
+@pytest.fixture
+def fit() -> FunctionFit:
+    random = np.random.default_rng(11)
+    free = np.column_stack([np.ones(M), random.standard_normal((M, P - 1))])
+    block = np.repeat(np.arange(M // 3), 3)
+    covariance = np.eye(M) + 0.8 * (block[:, None] == block)
+    families = [
+        family(random.standard_normal((M, 4, 1)), "a", float(np.log(0.1))),
+        family(random.standard_normal((M, 2, 2)), "b", float(np.log(0.2))),
+    ]
+    y = (
+        free @ [0.3, -0.2, 0.1]
+        + 0.02 * families[0].columns[:, 2, 0]
+        + 0.004 * np.linalg.cholesky(covariance) @ random.standard_normal(M)
+    )
+    sigma = np.geomspace(1e-3, 0.1, 300)
+    return FunctionFit(y, free, covariance, families, sigma, np.full(300, -np.log(300)), 1e-3)
+
+
+def dense(y: Floats, free: Floats, covariance: Floats, sigma: Floats, log_sigma: Floats) -> float:
+    """Log of ∫ p(y | b, σ) p(σ) db dσ with b flat, but for what no covariance changes (restricted likelihood)."""
+    inverse = linalg.inv(covariance)
+    normal = free.T @ inverse @ free
+    left = y - free @ linalg.solve(normal, free.T @ inverse @ y)
+    square, degrees = float(left @ inverse @ left), len(y) - free.shape[1]
+    log = -0.5 * (np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(normal)[1])
+    return log + float(special.logsumexp(log_sigma - degrees * np.log(sigma) - 0.5 * square / sigma**2))
+
+
+def test_evidence_is_the_restricted_likelihood(fit: FunctionFit) -> None:
+    def of(version: FunctionVersion | None) -> float:
+        columns = np.zeros((M, 1))
+        if version is not None:
+            columns = version.amplitude * fit.families[version.family].columns[:, version.index]
+        return dense(fit.y, fit.free, fit.covariance + columns @ columns.T, fit.sigma, fit.log_sigma)
+
+    nothing = of(None)
+    for i, one in enumerate(fit.families):
+        log, sizes = fit.evidence[i]
+        for k in range(one.columns.shape[1]):
+            for a in (0, 3, AMPLITUDES - 1):
+                told = of(FunctionVersion(i, k, float(sizes[k, a]))) - nothing + one.log_prior - np.log(AMPLITUDES)
+                assert log[k, a] - fit.nothing == pytest.approx(told, abs=2e-2)  # of the grid of σ
+
+
+def test_the_true_function_is_the_most_probable(fit: FunctionFit) -> None:
+    best = fit.versions(1)[0]
+    assert (best.family, best.index) == (0, 2)
+    mean, covariance, _ = fit.fitted(best)
+    assert abs(mean[0] - 0.02) < 3 * np.sqrt(covariance[0, 0])
+
+
+def conditional(fit: FunctionFit, out: np.ndarray, added: Floats, sigma: float) -> tuple[Floats, Floats]:
+    """Mean and covariance of y[out] given the others, with b normal and very wide, by the dense joint covariance."""
+    wide = 1e8 * fit.free @ fit.free.T + fit.covariance + added
+    gain = linalg.solve(wide[np.ix_(~out, ~out)], wide[np.ix_(~out, out)], assume_a="pos").T
+    mean = gain @ fit.y[~out]
+    return mean, (wide[np.ix_(out, out)] - gain @ wide[np.ix_(~out, out)]) * sigma**2
+
+
+def test_without_functions_predictions_are_those_of_the_joint_normal_distribution(fit: FunctionFit) -> None:
+    out = np.zeros(M, dtype=bool)
+    out[[4, 5, 13]] = True
+    (before, _), lost = predictions(fit, out, 1)
+    fold = fit.at(~out)
+    sigma = np.sqrt(fold.left @ fold.left / fold.degrees)
+    mean, covariance = conditional(fit, out, np.zeros((M, M)), float(sigma))
+    assert lost == 0
+    told = stats.multivariate_normal(mean, covariance).logpdf(fit.y[out])
+    order = [*np.flatnonzero(~out), *np.flatnonzero(out)]
+    root = np.linalg.cholesky(fit.covariance[np.ix_(order, order)])
+    scale = np.log(np.diag(root)[-3:]).sum()  # densities are of white errors
+    assert before.log_density == pytest.approx(told + scale, abs=1e-4)
+
+
+def test_a_function_that_is_certain_predicts_as_a_column_of_the_model(fit: FunctionFit) -> None:
+    """With one version alone the average is that version: the joint normal distribution with its columns."""
+    out = np.zeros(M, dtype=bool)
+    out[[0, 7, 20]] = True
+    alone = replace(fit, families=[family(fit.families[0].columns[:, [2]], "a", 40.0)])
+    (_, after), _ = predictions(alone, out, 1)
+    fold = alone.at(~out)
+    versions = [v for v in fold.versions() if v.probability > 1e-3]
+    total, logs = sum(v.probability for v in versions), []
+    for version in versions:
+        column = version.amplitude * alone.families[0].columns[:, 0]
+        mean, covariance = conditional(alone, out, column @ column.T, fold.fitted(version)[2])
+        logs.append(
+            stats.multivariate_normal(mean, covariance).logpdf(alone.y[out]) + np.log(version.probability / total)
+        )
+    order = [*np.flatnonzero(~out), *np.flatnonzero(out)]
+    scale = np.log(np.diag(np.linalg.cholesky(alone.covariance[np.ix_(order, order)]))[-3:]).sum()
+    assert after.log_density == pytest.approx(float(special.logsumexp(logs)) + scale, abs=1e-3)
+    assert np.abs(after.errors).max() < 0.03
+
+
+def test_what_a_set_up_leaves_open_is_no_error(fit: FunctionFit) -> None:
+    """A free column of held-out observations alone takes one dimension, and whatever lies along it."""
+    out = np.zeros(M, dtype=bool)
+    out[[4, 5, 13]] = True
+    own = np.where(out, 1.0, 0.0)[:, None]
+    shifted = replace(fit, free=np.hstack([fit.free, own]), y=fit.y + 7.0 * out)
+    plain = replace(fit, free=np.hstack([fit.free, own]))
+    (before, _), lost = predictions(plain, out, 1)
+    (moved, _), _ = predictions(shifted, out, 1)
+    assert lost == 1
+    assert moved.errors == pytest.approx(before.errors, abs=1e-7)
+    assert moved.log_density == pytest.approx(before.log_density, abs=1e-5)
+
+
+def test_residuals_without_a_function_are_those_of_generalised_least_squares(fit: FunctionFit) -> None:
+    inverse = linalg.inv(fit.covariance)
+    told = fit.y - fit.free @ linalg.solve(fit.free.T @ inverse @ fit.free, fit.free.T @ inverse @ fit.y)
+    none, one = residuals(fit, 1)
+    assert none == pytest.approx(told, abs=1e-9)
+    assert np.linalg.norm(one) < 0.5 * np.linalg.norm(none)
