@@ -35,6 +35,7 @@ FORMS: Mapping[str, Text] = {
     "product": say("a product"),
     "bowl": say("a bowl"),
 }
+_MANY = 1e4  # odds from which only this is told
 _PARAMETERS: Mapping[str, Text] = {
     "at": say("at"),
     "width": say("width"),
@@ -47,10 +48,7 @@ _PARAMETERS: Mapping[str, Text] = {
 def function_words(found: EmpiricalFunction) -> Text:
     """One function: what it is of, its form where that is told, and its size."""
     if found.form is None:
-        each = [
-            say("{form} {probability}", form=FORMS[form], probability=probability(p / found.probability))
-            for form, p in found.forms
-        ]
+        each = [say("{form} {probability}", form=FORMS[form], probability=probability(p)) for form, p in found.forms]
         return say(
             "{what:capital}: up to {size} µm; its form is not told: {forms}.",
             what=found.term.title,
@@ -92,11 +90,11 @@ def nearest_words(d: Diagnosis) -> Text:
         after=later,
     )
     if best.odds_of_function > ODDS:
-        against = say("A curve of no form makes these readings more than {odds:.0f} times as probable.", odds=ODDS)
-        if best.odds_of_function < 1e4:
-            against = say(
-                "A curve of no form makes these readings {odds:.0f} times as probable.", odds=best.odds_of_function
-            )
+        against = say(
+            "A curve of no form makes these readings {odds:.0f} times as probable.", odds=best.odds_of_function
+        )
+        if best.odds_of_function > _MANY:
+            against = say("A curve of no form makes these readings more than {odds:.0f} times as probable.", odds=_MANY)
         told = after(told, against)
     return after(told, say("If it is that: {what}.", what=best.points_to))
 

@@ -39,7 +39,7 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 ODDS = 20.0  # of a further function over none, and of a form over all else, from which it is told
 _MOST = 3  # functions together
 _TOLD, _ALSO = 0.01, 0.05  # probability from which a form, and another term, is told
-_KNOTS, _STRAIGHT = 13, 1e-3  # of a broken line for a smooth curve; least bend, over its size
+_KNOTS, _STRAIGHT = 24, 0.01  # of a broken line for a smooth curve; part of its size that the line may be off
 _PRIOR = 3.0  # what its size may be in another recording, over what was found
 
 
@@ -228,13 +228,16 @@ def _quantity(value: float, variance: float, of: str) -> Quantity:
 
 
 def _broken_line(x: Floats, y: Floats) -> str:
-    """A curve of largest value one as a sum of hinges, between knots that lie evenly."""
-    knots = np.linspace(x[0], x[-1], min(_KNOTS, len(x)))
-    at = np.interp(knots, x, y) / max(float(np.abs(y).max()), 1e-300)
-    slopes = np.diff(at) / np.diff(knots)
-    bends = zip(knots[1:-1], np.diff(slopes), strict=True)
-    hinges = [f"{bend:+.4g}*max(c - {knot:.5g}, 0)" for knot, bend in bends if abs(bend) * np.ptp(x) > _STRAIGHT]
-    return f"{at[0]:.4g}{slopes[0]:+.4g}*(c - {knots[0]:.5g})" + "".join(hinges)
+    """A curve of largest value one as a sum of hinges, between knots where it is farthest from the line so far."""
+    y, knots = y / max(float(np.abs(y).max()), 1e-300), [0, len(x) - 1]
+    while len(knots) < _KNOTS:
+        away = np.abs(y - np.interp(x, x[knots], y[knots]))
+        if away.max() < _STRAIGHT:
+            break
+        knots = sorted({*knots, int(away.argmax())})
+    slopes = np.diff(y[knots]) / np.diff(x[knots])
+    hinges = [f"{bend:+.5g}*max(c - {knot:.7g}, 0)" for knot, bend in zip(x[knots[1:-1]], np.diff(slopes), strict=True)]
+    return f"{y[0]:.5g}{slopes[0]:+.5g}*(c - {x[0]:.7g})" + "".join(hinges)
 
 
 def _stated(term: FunctionTerm, parts: Sequence[str], sizes: Sequence[float]) -> str:
