@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from cmm_uq.analysis.conformity.accuracy import Consequences, Costs
 from cmm_uq.analysis.conformity.statement import Statement, by_standard, by_tolerance
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
+from cmm_uq.analysis.diagnosis.simulation import SimulationMistakes
 from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
 from cmm_uq.analysis.machine.regions import FactorRegions
 from cmm_uq.analysis.machine.state import of_machine
@@ -58,9 +59,8 @@ class SimulatedTwin:
         return {
             "files_sha256": dict(self.files), "program": self.program, "kind": "map" if self.maps else "prediction",
             "u_um": self.u_um, "u_common_um": self.u_common_um, "u_turned_um": self.u_turned_um,
-            "effects": list(self.contains),
-            "refitted": dict(corrections), "frame": {"shift_mm": list(self.shift_mm), "turn_deg": self.turn_deg},
-            "farthest_mm": self.farthest_mm, "rms_predicted_um": self.rms_predicted_um,
+            "effects": list(self.contains), "refitted": dict(corrections), "farthest_mm": self.farthest_mm,
+            "frame": {"shift_mm": list(self.shift_mm), "turn_deg": self.turn_deg}, "rms_predicted_um": self.rms_predicted_um,
         }  # fmt: skip
 
 
@@ -84,8 +84,7 @@ class StatedUncertainty:
 
     @classmethod
     def of(cls, job: Job, length_mm: float = 0.0) -> StatedUncertainty:
-        """Without a length at the longest travel of the machine."""
-        spans = np.ptp(job.points.machine.travel_mm, axis=1)
+        spans = np.ptp(job.points.machine.travel_mm, axis=1)  # without a length at the longest of them
         longest = float(np.nanmax(spans)) if np.isfinite(spans).any() else 0.0
         return cls(job.facts.laboratory.cmc, length_mm or longest)
 
@@ -171,6 +170,7 @@ class JobDiagnosis:
     simulated: SimulatedTwin | None = None
     unseen: tuple[SmallestEffect, ...] = ()  # smallest amplitude of each effect that would have shown
     next_plan: NextPlan | None = None  # the fewest set-ups that part or show more
+    mistakes: SimulationMistakes = field(default_factory=SimulationMistakes)  # the simulation's own
     costs: Costs | None = None  # what each explanation that remains makes of figures and decisions
 
 

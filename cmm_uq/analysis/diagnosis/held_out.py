@@ -13,7 +13,7 @@ from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.kind import Observed
-from cmm_uq.maths.inference.linear_model import Freedoms
+from cmm_uq.maths.inference.linear_model import Freedoms, LinearModel
 from cmm_uq.maths.inference.posterior import Density
 
 
@@ -121,10 +121,12 @@ def improvement(before: RecordingModel, after: RecordingModel) -> Improvement:
 
 
 def _held_out(model: RecordingModel, groups: NDArray[np.int64]) -> tuple[float, Floats]:
-    """Rms of predictions, µm, and log predictive density of each fold; what a set-up leaves open is no part of it."""
     estimate = model.estimate()
-    linear = estimate.linear
-    sigma = max(estimate.least_squares.sigma_of_residuals, model.least_noise, 1e-7)
+    return predictions(estimate.linear, max(estimate.least_squares.sigma_of_residuals, model.least_noise, 1e-7), groups)
+
+
+def predictions(linear: LinearModel, sigma: float, groups: NDArray[np.int64]) -> tuple[float, Floats]:
+    """Rms of predictions, µm, and log predictive density of each fold; what a set-up leaves open is no part of it."""
     errors, counts, densities = [], [], []
     every = np.hstack([linear.observed[:, None], linear.design]) / linear.noise_scale[:, None]
     placing, numbers = linear.freedoms.over(linear.noise_scale), np.unique(groups)

@@ -11,6 +11,7 @@ from cmm_uq.analysis.conformity.accuracy import consequences, costs
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, diagnose
 from cmm_uq.analysis.diagnosis.power import ALLOWED
+from cmm_uq.analysis.diagnosis.simulation import simulation_mistakes
 from cmm_uq.analysis.diagnosis.smallest import USUAL_LENGTH, SmallestEffect, smallest_effects
 from cmm_uq.analysis.planning.set_up import DetectionGoal, suggestions
 from cmm_uq.analysis.planning.setting import Planning
@@ -98,7 +99,8 @@ def diagnose_model(
     suggested = suggestions(plan, model.artefact.title)
     found = JobDiagnosis(job, findings, diagnosis, suggested, unseen=unseen, next_plan=plan)
     if against is not None:
-        return replace(found, simulated=against.simulated)
+        mistakes = simulation_mistakes(diagnosis.search, against.predicted, against.of, against.model)
+        return replace(found, simulated=against.simulated, mistakes=mistakes)
     outside = OutsideReadings.of(job.points, findings, artefact_at)
     corrected = consequences(job, diagnosis, artefact_at, kind.tested, seed, outside)
     each = costs(job, diagnosis, artefact_at, kind.tested, seed, outside)

@@ -25,8 +25,8 @@ from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import LAST_DIGIT, Artefact
 from cmm_uq.machine.model.kind import Kind, Observe
-from cmm_uq.machine.model.predicted_errors import SAME, PredictedErrors, maps_named, predicted_errors
-from cmm_uq.machine.model.recorded import NANOMETRE, display_step
+from cmm_uq.machine.model.predicted_errors import SAME, PredictedErrors, maps_named, predicted_errors, tables_otherwise
+from cmm_uq.machine.model.recorded import NANOMETRE, display_step, expansion
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.linear_model import RANK_TOLERANCE, Freedoms
 
@@ -184,6 +184,7 @@ class Against:
     observe : makes the artefact of points, with the uncertainty of what is predicted.
     stated_um : of a coordinate of the difference, where the job states it for the recording.
     simulated : for the page.
+    predicted : the errors that were taken off, of the points that follow.
     """
 
     model: RecordingModel
@@ -191,16 +192,27 @@ class Against:
     observe: Observe
     stated_um: float | None
     simulated: SimulatedTwin
+    predicted: PredictedErrors
+    of: Points
 
 
 def against_simulation(job: Job, facts: SimulationFacts) -> Against:
     """Join what the simulation leaves of a recording with the model of what it could lack."""
     recorded, findings = recorded_model(job)
-    artefact, where = recorded.artefact, job.recording_path
+    artefact, where, exact = recorded.artefact, job.recording_path, job.origin != MEASURED
     if facts.map:
         found = _of_maps(job, facts, artefact.points)
     elif job.prediction is not None:
-        found = predicted_errors(artefact, job.prediction, where, length_mm=facts.length_mm)
+        found = predicted_errors(
+            artefact,
+            job.prediction,
+            where,
+            length_mm=facts.length_mm,
+            exact=exact,
+            taken=_as_simulated(job, facts, artefact),
+        )
+        if facts.temperature_c is None:
+            found = replace(found, expansion=expansion(job.facts.artefact, artefact.points))
     else:
         unread = "the prediction was not read"
         raise CmmUqError(unread, where=f"job.toml {KEY} file", fix="Read the job with its recording")
@@ -209,7 +221,8 @@ def against_simulation(job: Job, facts: SimulationFacts) -> Against:
     observe = kind_of(job).observing("compared with a simulation")
     left = observe(job.facts.artefact, points, where=where)
     plain = replace(recorded, artefact=left, effects=named if facts.refit else ())
-    if plain.estimate().least_squares.sigma_of_residuals < _NO_NOISE:
+    same = plain.estimate().least_squares.sigma_of_residuals < _NO_NOISE
+    if same and not exact:
         alike = "prediction and recording differ by no noise at all: one of them is made of the other"
         place = f"job.toml {KEY}" if job.prediction is None else job.prediction.where
         fix = "Name the file that the simulation wrote, and the recording that the machine made"
@@ -240,7 +253,7 @@ def against_simulation(job: Job, facts: SimulationFacts) -> Against:
         contains if facts.refit else (), tuple(float(v) for v in found.frame.shift), float(np.degrees(found.frame.angle)),
         found.apart, _rms_um(shown),
     )  # fmt: skip
-    return Against(model, (*findings, *_odd(found)), weighed, together, simulated)
+    return Against(model, (*findings, *_odd(found, same=same)), weighed, together, simulated, found, artefact.points)
 
 
 def _rms_um(values: Floats) -> float:
@@ -248,18 +261,60 @@ def _rms_um(values: Floats) -> float:
 
 
 def _of_maps(job: Job, facts: SimulationFacts, points: Points) -> PredictedErrors:
-    from cmm_uq.machine.physics.compensation import compensate_points, machine_compensation
+    from cmm_uq.machine.physics.compensation import circumstances, compensate_points, machine_compensation
     from cmm_uq.machine.physics.map_interpolation import ErrorMaps
 
     where = f"job.toml {KEY} map"
-    compensation = machine_compensation(points, ErrorMaps(maps_named(job, facts.map, None, where)))
+    maps = maps_named(job, facts.map, None, where)
+    compensation = machine_compensation(points, ErrorMaps(maps))
     try:
         errors = points.xyz - compensate_points(points, compensation).xyz
     except CmmUqError as error:
         at = ", ".join(part for part in (job.recording_path, error.where) if part)
         raise CmmUqError(error.problem, where=at, fix=error.fix) from error
-    exact = np.zeros(len(points))
-    return PredictedErrors(errors, exact + facts.u_um * MICROMETRE, exact, SAME, 0.0, 0)
+    exact, when = np.zeros(len(points)), circumstances(points)
+    beyond = replace(compensation, beyond="extrapolate")
+    otherwise = {
+        name: (title, -replace(beyond, maps=ErrorMaps(read)).error(points.xyz, when)[0])
+        for name, (title, read) in tables_otherwise(maps).items()
+    }
+    return PredictedErrors(
+        errors,
+        exact + facts.u_um * MICROMETRE,
+        exact,
+        SAME,
+        0.0,
+        0,
+        tables=otherwise,
+        at=lambda readings: -beyond.error(readings - points.machine.origin_mm, when)[0],
+    )
+
+
+def _as_simulated(job: Job, facts: SimulationFacts, artefact: Artefact) -> Artefact:
+    """The artefact as warm as the simulation took it, and as it then expands."""
+    own, points, where = job.facts.artefact, artefact.points, f"job.toml {KEY}"
+    if facts.cte_per_k is None and facts.temperature_c is None:
+        return artefact
+    cte = own.cte_per_k if facts.cte_per_k is None else facts.cte_per_k
+    if facts.temperature_c is not None:
+        if not cte:
+            raise CmmUqError(
+                "temperature_c says nothing of an artefact whose expansion nobody states",
+                where=where,
+                fix="Give cte_per_k in [artefact], or leave it out",
+            )
+        points = replace(
+            points, columns={**points.columns, "temp_artefact_c": np.full(len(points), facts.temperature_c)}
+        )
+    elif "temp_artefact_c" not in points.columns:
+        raise CmmUqError(
+            "cte_per_k says nothing without a temperature of the artefact",
+            where=where,
+            fix="Give temperature_c, or record temp_artefact_c; or leave it out",
+        )
+    return kind_of(job).observing("compared with a simulation")(
+        own.model_copy(update={"cte_per_k": cte}), points, where=job.recording_path
+    )
 
 
 def _weighing(observe: Observe, points: Points, ratio: Floats, u_common: float) -> Observe:
@@ -282,8 +337,14 @@ def _weighing(observe: Observe, points: Points, ratio: Floats, u_common: float) 
     return made
 
 
-def _odd(found: PredictedErrors) -> list[Finding]:
+def _odd(found: PredictedErrors, *, same: bool) -> list[Finding]:
     told: list[Text] = []
+    if same:
+        told.append(
+            say(
+                "prediction and recording differ by no noise at all: one of them is made of the other, and says nothing of it"
+            )
+        )
     if found.unused:
         told.append(plural(
             found.unused,

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import reduce
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -209,6 +210,9 @@ def _narrow(alike: Floats) -> NDArray[np.bool_]:
 
 
 LEAST_POSITIONS = 4  # positions that the maps of a column must share
+_UNMOVED = (
+    5.0  # times that a third map of a scale is farther off than its temperature explains, for two others to be copies
+)
 _TURNED = 0.3  # part of the misfit that is left when a column with the wrong sign is turned
 
 
@@ -276,6 +280,7 @@ def columns_of(maps: Sequence[ErrorMap]) -> tuple[list[MapColumn], list[Finding]
                 column, odd = _looked_at([maps[k] for k in own], values[own], axis, component, shared)
                 columns += [] if column is None else [column]
                 findings += odd
+                findings += [] if column is None else _unmoved(column)
         if (count := len(shared)) < LEAST_POSITIONS:
             why = say(
                 "the maps share {count} positions of axis {carriage}: they are not compared. Map the same positions",
@@ -323,6 +328,29 @@ def roughness(column: MapColumn) -> float:
     differences = np.diff(column.values - column.values.mean(axis=0), 2, axis=1)
     freedom = 1 - 1 / len(column.values)
     return float(np.sqrt(np.mean(differences**2) / 6 / freedom)) or MICROMETRE / 100
+
+
+def _unmoved(column: MapColumn) -> Iterator[Finding]:
+    """Two maps of a scale that agree where by their temperatures, and by what a third map shows, they should not."""
+    values, warm = column.values, column.temperatures
+    for pair in combinations(range(len(values)), 2) if column.is_scale else ():
+        agree, apart = float(np.abs(np.diff(values[list(pair)], axis=0)).max()), abs(warm[pair[0]] - warm[pair[1]])
+        for third in sorted(set(range(len(values))) - set(pair)):
+            far = min(float(np.abs(values[k] - values[third]).max()) for k in pair)
+            gap = max(abs(warm[k] - warm[third]) for k in pair)
+            if apart and agree * max(1.0, gap / apart) * _UNMOVED < far:
+                why = say(
+                    "{title}: the maps at {one:g} and {other:g} °C agree to {agree:.2g} µm where that at {third:g} °C is "
+                    "{far:.2g} µm off, more than their temperatures explain. One may be a copy of another; say when and how "
+                    "warm each was taken",
+                    title=column.title,
+                    one=warm[pair[0]],
+                    other=warm[pair[1]],
+                    third=warm[third],
+                    agree=agree / MICROMETRE,
+                    far=far / MICROMETRE,
+                )
+                yield Finding("copied", (), (), why)
 
 
 def _stray(title: Text, position: float, error_map: ErrorMap, value: float, column: str) -> Finding:

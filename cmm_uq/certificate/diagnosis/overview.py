@@ -12,6 +12,7 @@ from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, day, lines, say, semicolons
 from cmm_uq.certificate.diagnosis.empirical import empirical_words, nearest_words, repeats_words
+from cmm_uq.certificate.diagnosis.mistakes import TITLE, mistaken, to_mend
 from cmm_uq.certificate.diagnosis.sections import by_columns, explanation, next_sentence, place_words, without_power
 from cmm_uq.certificate.document import Overview, Standing
 from cmm_uq.certificate.result import JobDiagnosis, SimulatedTwin
@@ -68,10 +69,14 @@ def overview_of(result: JobDiagnosis) -> Overview:
         (say("What to do"), _to_do(result)),
     )  # fmt: skip
     title, standing = VERDICT_TITLES[d.verdict], STANDING[d.verdict]
-    if without_power(result):
+    if result.mistakes.asserted:
+        title, standing = TITLE, "open"
+    elif without_power(result):
         title, standing = say("Consistent, as far as this recording can show"), "open"
-    if d.verdict == "explained" and (_otherwise(d) or any(_instead(d, item) for item in d.effects)):
+    elif d.verdict == "explained" and (_otherwise(d) or any(_instead(d, item) for item in d.effects)):
         title = say("Explained: more than one cause is possible")
+    if said := mistaken(result.mistakes):
+        rows = ((rows[0][0], lines((said, rows[0][1]))), *rows[1:])
     return Overview(title, standing, tuple(row for row in rows if row[1]))
 
 
@@ -166,7 +171,9 @@ def share_of(p_value: float) -> Text:
 
 def _to_do(result: JobDiagnosis) -> Text:
     d, further = result.diagnosis, result.next_plan is not None
-    told: list[Text] = []
+    told: list[Text] = [*to_mend(result.mistakes)]
+    if told:
+        return lines(told)
     if further and not d.agrees:
         told.append(say("First measure the set-ups that are told below, to part what this recording cannot."))
     told += [_look_at(d, item) for item in d.effects]

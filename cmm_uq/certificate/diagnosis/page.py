@@ -15,6 +15,7 @@ from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate import document as doc, wording
 from cmm_uq.certificate.diagnosis import overview as words
 from cmm_uq.certificate.diagnosis.empirical import empirical_section
+from cmm_uq.certificate.diagnosis.mistakes import mistakes_section
 from cmm_uq.certificate.diagnosis.sections import costs_section, next_section, unseen_section, where_section
 from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.origin import came_about, program
@@ -73,7 +74,9 @@ def diagnosis_sections(result: JobDiagnosis) -> tuple[Section, ...]:
 def _sections(result: JobDiagnosis) -> tuple[Section, ...]:
     d, simulated = result.diagnosis, result.simulated
     noise = words.noise_words(d, words.stated_um(result))
-    compared = () if simulated is None else (simulation_section(simulated, corrections(result, simulated)),)
+    compared: tuple[Section, ...] = ()
+    if simulated is not None:
+        compared = (simulation_section(simulated, corrections(result, simulated)), mistakes_section(result.mistakes))
     sections = (
         Section(say("What was left out"), _left_out(result)), where_section(d),
         empirical_section(d, _improved),

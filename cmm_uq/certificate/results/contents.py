@@ -20,6 +20,7 @@ from cmm_uq.analysis.planning.set_up import NextPlan
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.certificate.diagnosis.mistakes import mistakes_data
 from cmm_uq.certificate.diagnosis.overview import sentence
 from cmm_uq.certificate.origin import quantity_data, software
 from cmm_uq.certificate.result import JobDiagnosis, Result, SimulatedTwin
@@ -101,7 +102,10 @@ def diagnosis_data(found: JobDiagnosis) -> dict[str, Any]:
     """The ``diagnosis`` part."""
     d, changes, simulated = found.diagnosis, found.consequences, found.simulated
     return {
-        **({} if simulated is None else {"simulation": simulated.data(_by_effect(corrections(found, simulated)))}),
+        **({} if simulated is None else {
+            "simulation": simulated.data(_by_effect(corrections(found, simulated))),
+            "simulation_mistakes": mistakes_data(found.mistakes),
+        }),
         "verdict": d.verdict, "p_value": d.p_value, **false_alarms(d.alpha),
         "where": [
             {"covariate": place.covariate, "region": list(place.region), "p_value": place.p_value,

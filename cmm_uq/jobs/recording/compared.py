@@ -26,14 +26,14 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.content import text_of
 from cmm_uq.base.files.csv_table import Cells, cells_of, numbers
 from cmm_uq.base.files.limits import MAPS
-from cmm_uq.base.files.table import JobTable, Length, Names, Uncertainty, key
+from cmm_uq.base.files.table import AnyFloat, JobTable, Length, Names, Uncertainty, key
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, WHOLE, largest
 from cmm_uq.jobs.importing.format import Recognition
 from cmm_uq.jobs.importing.header import COVERAGE
 from cmm_uq.jobs.importing.recording import imported_references
-from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import LARGEST_CTE, ArtefactFacts
 from cmm_uq.jobs.tables.length_formula import factor_of
 from cmm_uq.jobs.tables.machine import ErrorMapFile
 
@@ -203,6 +203,10 @@ class SimulationFacts(JobTable):
     u_common_um: Uncertainty = key(0.0, "Standard uncertainty of the artefact's size that all predictions share.")
     length_mm: Length | None = None
     """Length of the artefact, as the simulation took it; otherwise that of [artefact]."""
+    cte_per_k: AnyFloat | None = None
+    """Coefficient of thermal expansion of the artefact, 1/K, as the simulation took it; otherwise that of [artefact]."""
+    temperature_c: AnyFloat | None = None
+    """Temperature of the artefact, as the simulation took it; otherwise `temp_artefact_c` as recorded."""
     unit: Literal["mm", "m", "cm", "um", "inch"] = key("mm", "Unit of predicted coordinates and lengths.")
     columns: Annotated[dict[str, str], Field(max_length=10)] = {}
     """Names of the file's columns, where they are others than the recording's."""
@@ -223,7 +227,9 @@ class SimulationFacts(JobTable):
             yield "refit = true says nothing of what: name the effects that the simulation contains"
         if any(given.covariance is not None for given in self.map):
             yield "a covariance belongs to a map under [machine], whose corrections are made with it: leave it out"
-        for name in ("length_mm", "unit", "columns"):
+        if abs(self.cte_per_k or 0.0) > LARGEST_CTE:
+            yield f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin"
+        for name in ("length_mm", "cte_per_k", "temperature_c", "unit", "columns"):
             if self.map and name in self.model_fields_set:
                 yield f"{name} belongs to a file of predictions, not to a map: leave it out"
 

@@ -40,6 +40,8 @@ class CertifiedValue:
         return self.key.endswith("_um")
 
 
+LARGEST_CTE = 1e-3  # 1/K, of any solid
+
 LENGTH_WORDS = ("length", "distance", "länge", "abstand", "longueur", "長さ", "距離")
 DIAMETER_WORDS = ("diameter", "durchmesser", "diamètre", "直径")
 # in English, German, French and Japanese
@@ -163,7 +165,7 @@ class ArtefactFacts(JobTable):
             yield "degrees_of_freedom is given without an uncertainty: give U_um or u_um too, or leave it out"
         if self.u_um is not None and self.length_mm is None and not self.with_references:
             yield "u_um is given without length_mm: give both, or neither for an uncalibrated artefact"
-        if abs(self.cte_per_k) > 1e-3:
+        if abs(self.cte_per_k) > LARGEST_CTE:
             yield f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin"
 
     def u_of(self, lengths_mm: Floats | float) -> Floats:

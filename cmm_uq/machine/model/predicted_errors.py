@@ -14,18 +14,21 @@ Known beforehand are also the error maps of a job's machine: what ``[machine] er
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.points import Floats, Ints, Points
-from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.units import ARCSECOND, MICROMETRE
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.compared import KEY, Prediction
 from cmm_uq.jobs.tables.machine import ErrorMapFile, SquarenessFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings
+from cmm_uq.machine.model.recorded import display_step
 from cmm_uq.machine.physics.error_map import ErrorMap, parse_map_file
 from cmm_uq.machine.physics.map_covariance import parse_covariance
 
@@ -75,28 +78,43 @@ class PredictedErrors:
     frame: Frame  # of the prediction
     apart: float  # largest distance of a predicted point from where it was recorded, mm; 0 of lengths
     unused: int  # rows of the prediction that the recording has no point for
+    of_lengths: bool = False  # whether only lengths are predicted
+    step: float = 0.0  # mm, of which all predicted figures are multiples; 0 where they are of none that matters
+    expansion: Floats | None = None  # (n,) size of the artefact at each point, as it was recorded, over that at 20 °C
+    at: Callable[[Floats], Floats] | None = None  # errors (n, 3) of the same points, had the scales read (n, 3) mm
+    # errors (n, 3) had tables of a map been read otherwise, in words and by name
+    tables: Mapping[str, tuple[Text, Floats]] = field(default_factory=dict)
 
 
 def predicted_errors(
-    artefact: Artefact, prediction: Prediction, where: str, *, length_mm: float | None = None
+    artefact: Artefact,
+    prediction: Prediction,
+    where: str,
+    *,
+    length_mm: float | None = None,
+    taken: Artefact | None = None,
+    exact: bool = False,
 ) -> PredictedErrors:
     """The errors that a prediction contains, at the points of a recording.
 
-    ``length_mm``: of the artefact, as the simulation took it; that of the artefact by default.
+    ``length_mm``: of the artefact, as the simulation took it; that of the artefact by default. ``taken``: the artefact as warm
+    as it took it; by default as it was recorded. ``exact``: whether a recording without any noise may be predicted.
     """
     rows, unused = _matched(artefact.points, prediction, where)
     sizes = _sizes(artefact, length_mm)
     if prediction.of_lengths:
-        errors, u = _of_lengths(artefact, prediction, rows, sizes)
-        return PredictedErrors(errors, u, np.zeros_like(u), SAME, 0.0, unused)
+        errors, u = _of_lengths(artefact, prediction, rows, sizes, taken or artefact, exact)
+        return PredictedErrors(
+            errors, u, np.zeros_like(u), SAME, 0.0, unused, True, display_step(prediction.length, 0.0)
+        )
     recorded = artefact.points.xyz
     frame = _frame(prediction, rows, recorded)
     predicted = frame.of(prediction.xyz[rows])
     apart = float(np.linalg.norm(predicted - recorded, axis=1).max())
     seen = artefact.project(recorded, (recorded - predicted)[:, :, None])
-    if np.abs(seen).max() < _SAME:
+    if not exact and np.abs(seen).max() < _SAME:
         raise _copied(prediction)
-    errors = predicted - artefact.fit(predicted, sizes)
+    errors = predicted - (taken or artefact).fit(predicted, sizes)
     _refuse_absurd(errors, prediction, rows)
     # uncertainty (n,), mm, of errors predicted for an artefact that lay in another direction by up to a degree or so
     placings = Placings.of(artefact.points.measurement)
@@ -105,7 +123,9 @@ def predicted_errors(
     own = np.linalg.norm(errors - placings.means(errors), axis=1)
     far = reach > _REACH * reach.max(initial=0.0)
     turned = np.asarray(2 * float((own[far] / reach[far]).max(initial=0.0)) * turned)
-    return PredictedErrors(errors, prediction.u[rows], turned, frame, apart, unused)
+    return PredictedErrors(
+        errors, prediction.u[rows], turned, frame, apart, unused, step=display_step(prediction.xyz, 0.0)
+    )
 
 
 def _sizes(artefact: Artefact, length_mm: float | None) -> Floats:
@@ -143,19 +163,21 @@ def _matched(points: Points, prediction: Prediction, where: str) -> tuple[Ints, 
     return rows, len(known) - len(set(wanted))
 
 
-def _of_lengths(artefact: Artefact, prediction: Prediction, rows: Ints, sizes: Floats) -> tuple[Floats, Floats]:
+def _of_lengths(
+    artefact: Artefact, prediction: Prediction, rows: Ints, sizes: Floats, taken: Artefact, exact: bool
+) -> tuple[Floats, Floats]:
     """Errors (n, 3) along each length, half at each end, and their uncertainty (n,)."""
     ends = artefact.rows
     if artefact.lengths() is None or ends.shape[1] != 2 or len(np.unique(ends)) < ends.size:
         raise CmmUqError(f"predicts lengths, and a recording of this {artefact.title.lower()} has more than lengths",
                          where=prediction.where, fix="Predict coordinates: measurement, point, x_mm, y_mm, z_mm")  # fmt: skip
     points = artefact.points
-    placed = artefact.fit(points.xyz, sizes)
+    placed = taken.fit(points.xyz, sizes)
     bars = placed[ends[:, 1]] - placed[ends[:, 0]]
     nominal = np.linalg.norm(bars, axis=1)
     predicted, u = prediction.length[rows[ends[:, 0]]], prediction.u[rows[ends[:, 0]]]
     recorded = np.linalg.norm(points.xyz[ends[:, 1]] - points.xyz[ends[:, 0]], axis=1)
-    if np.abs(recorded - predicted).max() < _SAME:
+    if not exact and np.abs(recorded - predicted).max() < _SAME:
         raise _copied(prediction)
     half = 0.5 * (predicted - nominal)[:, None] * bars / nominal[:, None]
     errors, each = np.zeros_like(points.xyz), np.zeros(len(points))
@@ -257,3 +279,47 @@ def maps_named(
         raise CmmUqError("has no squareness, and another map has: between them it would fall to zero", where=without[0],
                          fix=f"Give it squareness_arcsec in {where}")  # fmt: skip
     return maps
+
+
+_MICRORADIANS = 1e-6 / ARCSECOND  # of a rotation that was read as ″
+
+
+def tables_otherwise(maps: Sequence[ErrorMap]) -> dict[str, tuple[Text, list[ErrorMap]]]:
+    """The maps with tables read in each other's place, of other signs or in another unit, in words and by name."""
+
+    def read(change: Callable[[ErrorMap, int], Floats]) -> list[ErrorMap]:
+        """With other errors (m, 6) of each carriage."""
+        found = []
+        for m in maps:
+            x, y, z = (replace(axis, errors=change(m, i)) for i, axis in enumerate(m.axes))
+            found.append(replace(m, axes=(x, y, z)))
+        return found
+
+    def crossed(one: int, other: int, m: ErrorMap, i: int) -> Floats:
+        errors = m.axes[i].errors.copy()
+        if i in (one, other):
+            j = one + other - i
+            errors[:, j] = np.interp(m.axes[i].positions, m.axes[j].positions, m.axes[j].errors[:, i])
+        return errors
+
+    turned, square = np.repeat([1.0, -1.0], 3), [replace(m, squareness=-m.squareness) for m in maps]
+    in_rad = np.repeat([1.0, _MICRORADIANS], 3)
+    found: dict[str, tuple[Text, list[ErrorMap]]] = {
+        "rotations_sign": (
+            say("the map's rotations have the other sign"),
+            read(lambda m, i: m.axes[i].errors * turned),
+        ),
+        "rotations_unit": (
+            say("the map's rotations are in µrad, and were read as ″"),
+            read(lambda m, i: m.axes[i].errors * in_rad),
+        ),
+        "squareness_sign": (say("the map's squareness has the other sign"), square),
+    }
+    for one, other in ((0, 1), (1, 2), (0, 2)):
+        title = say(
+            "the map's straightness of {one} along {other} and of {other} along {one} are exchanged",
+            one=Verbatim(AXES[one].upper()),
+            other=Verbatim(AXES[other].upper()),
+        )
+        found[f"straightness_{AXES[one]}{AXES[other]}"] = title, read(partial(crossed, one, other))
+    return found

@@ -6,6 +6,7 @@ import hashlib
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -320,6 +321,58 @@ def test_the_recording_itself_is_no_prediction() -> None:
     assert "copy" in refused(RECORDED, RECORDED).problem
 
 
+def test_a_simulated_recording_may_be_predicted_exactly() -> None:
+    """Computed figures against computed figures: no fault, and it is said."""
+    exact = table(shown(TRUE, MACHINE))
+    of = job(exact, exact)
+    of = replace(of, facts=of.facts.model_copy(update={"job": of.facts.job.model_copy(update={"origin": "simulated"})}))
+    found = compared(of)
+    assert any("differ by no noise at all" in finding.why for finding in found.findings)
+    lengths = found.model.artefact.lengths()
+    assert lengths is not None
+    assert np.abs(lengths - LENGTH).max() < 1e-6
+    assert cmm_uq.diagnose(of).verdict == "consistent"
+
+
+def warm_recording() -> pd.DataFrame:
+    """The bar recorded at 25 °C: 400 mm of steel are 23 µm longer."""
+    middle = np.repeat(0.5 * (TRUE[::2] + TRUE[1::2]), 2, axis=0)
+    points = recorded(middle + (1 + 11.5e-6 * 5) * (TRUE - middle), MACHINE)
+    return points.assign(temp_artefact_c=25.0)
+
+
+@pytest.mark.parametrize(("simulated", "of_bar", "off_um"), [
+    ({}, {"cte_per_k": 11.5e-6}, 23.0), ({"temperature_c": 20.0}, {"cte_per_k": 11.5e-6}, 0.0),
+    ({"cte_per_k": 0.0}, {"cte_per_k": 11.5e-6}, 0.0), ({"temperature_c": 22.0}, {"cte_per_k": 11.5e-6}, 9.2),
+    ({"temperature_c": 25.0, "cte_per_k": 11.5e-6}, {}, 0.0), ({"cte_per_k": 11.5e-6}, {}, 0.0),
+])  # fmt: skip
+def test_a_bar_simulated_at_another_temperature_is_as_long_as_it_was_taken(
+    simulated: dict[str, float], of_bar: dict[str, float], off_um: float
+) -> None:
+    """Simulated at 20 °C, or of a bar that the job takes for no steel; the difference is that of its lengths."""
+    warm = warm_recording()
+    prediction = COMPLETE
+    if not of_bar:  # the simulation took it warm, the job knows of no expansion: it is 23 µm longer in both
+        middle = np.repeat(0.5 * (TRUE[::2] + TRUE[1::2]), 2, axis=0)
+        prediction = table(shown(middle + (1 + 11.5e-6 * 5) * (TRUE - middle), MACHINE))
+        warm = recorded(TRUE, MACHINE).assign(temp_artefact_c=25.0)
+    of = cmm_uq.job(
+        warm, machine={"name": "M", "travel_mm": {"x": [0, 900], "y": [0, 550], "z": [0, 500]}},
+        artefact={"kind": "ballbar", "length_mm": LENGTH, "u_um": 0.3, **of_bar}, effects=[],
+        files={"p.csv": prediction}, simulation={"file": "p.csv", **simulated},
+    )  # fmt: skip
+    lengths = compared(of).model.artefact.lengths()
+    assert lengths is not None
+    assert 1e3 * abs(float(np.mean(lengths)) - LENGTH) == pytest.approx(off_um, abs=1.0)
+
+
+@pytest.mark.parametrize(("simulation", "problem"), [
+    ({"temperature_c": 20.0}, "temperature_c says nothing"), ({"cte_per_k": 1e-5}, "cte_per_k says nothing"),
+])  # fmt: skip
+def test_a_temperature_that_nothing_follows_from_is_refused(simulation: dict[str, float], problem: str) -> None:
+    assert problem in refused(RECORDED, COMPLETE, **simulation).problem
+
+
 def test_a_recording_moved_as_a_whole_is_none_either() -> None:
     moved = turned(RECORDED, np.eye(3), np.array([0.5, 0.5, 0.5]))
     assert "copy" in refused(RECORDED, moved).problem
@@ -335,7 +388,8 @@ def test_a_recording_made_of_the_prediction_has_no_noise() -> None:
 @pytest.mark.parametrize(("simulation", "problem"), [
     ({}, "give either file"), ({"file": "a.csv", "map": "b.csv"}, "give either file"), ({"file": "a", "refit": True}, "refit"),
     ({"map": "b.csv", "unit": "inch"}, "belongs to a file"), ({"file": "a.csv", "unit": "feet"}, "unit"),
-    ({"file": "a.csv", "u_um": -1.0}, "u_um"),
+    ({"file": "a.csv", "u_um": -1.0}, "u_um"), ({"map": "b.csv", "temperature_c": 20.0}, "belongs to a file"),
+    ({"file": "a.csv", "cte_per_k": 11.5}, "no expansion coefficient"),
 ])  # fmt: skip
 def test_a_table_that_says_too_little_or_too_much_is_refused(simulation: dict[str, object], problem: str) -> None:
     with pytest.raises(CmmUqError) as caught:

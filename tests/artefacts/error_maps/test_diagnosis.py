@@ -170,6 +170,28 @@ def test_figures_that_stand_in_several_maps_were_measured_once() -> None:
     assert unmeasured.kind == "not measured"
 
 
+def three_scales(*ppm: float, temperatures: tuple[float, ...] = (20, 25, 30)) -> list[str]:
+    """What is said of maps of the scale of X, of so many ppm each."""
+    random = np.random.default_rng(4)
+    maps = []
+    for size, temperature in zip(ppm, temperatures, strict=True):
+        table = np.zeros((len(PLACE), 6))
+        table[:, 0] = COURSE + 1e-6 * size * PLACE + SIGMA * random.standard_normal(len(PLACE))
+        maps.append(machine_map(temperature, table))
+    return [finding.why for finding in columns_of(maps)[1] if finding.kind == "copied"]
+
+
+def test_two_maps_of_a_scale_that_agree_where_a_third_shows_that_it_expands_may_be_copies() -> None:
+    """100 ppm over 600 mm are 60 µm; five kelvin are to make half of what ten make."""
+    (said,) = three_scales(0, 1, 100)
+    assert "the maps at 20 and 25 °C agree to" in said
+    assert "where that at 30 °C is" in said
+    assert not three_scales(0, 50, 100)  # an expansion
+    assert not three_scales(0, 1, 2)  # none
+    assert not three_scales(0, 1, 100, temperatures=(20, 20.1, 30))  # the temperatures say why two agree
+    assert not three_scales(0, 0, 100, temperatures=(20, 20, 30))
+
+
 def test_a_stray_reading_is_reported_and_its_position_left_out() -> None:
     third = readings(3)
     third[10, 0] += 0.03

@@ -70,6 +70,10 @@ class CandidateComparison:
         """What the baseline leaves of columns (m, b)."""
         return columns - self.reached @ (self.reached.T @ columns)
 
+    def rest_of(self, change: Floats) -> Floats:
+        """The same of changes (m, b) of the observations, mm."""
+        return self.rest(change / self.noise_scale[:, None])
+
     @cached_property
     def left(self) -> Floats:
         """(m,) what the baseline leaves of the observations."""
