@@ -64,13 +64,14 @@ class Row:
 
 
 def write(
-    every: Sequence[Judged], before: Sequence[Judged], state: str, asked: dict[str, Any], docs: Path | None
-) -> None:
-    """Print the page, and write it into ``docs`` where that is given."""
+    every: Sequence[Judged], before: Sequence[Judged], state: str, asked: dict[str, Any], docs: Path | None,
+    further: Sequence[str] = (),
+) -> None:  # fmt: skip
+    """Print the page, with ``further`` tables, and write it into ``docs`` where that is given."""
     page = ["# A third concealed study", "", state, ""]
     for part in (_rows(every, before), _missed(every), _outside(every), _others(every), _verdicts(every), _nothing(every),
-                 _inside(every), _said(every)):  # fmt: skip
-        page += [*part, ""]
+                 _inside(every), _said(every), further):  # fmt: skip
+        page += [*part, ""] if part else []
     page.append(SAID.format(**asked))
     text = "\n".join(page) + "\n"
     print(text)

@@ -20,6 +20,7 @@ from benchmarks.third.cases import case
 from benchmarks.third.judging import Judged, Name, judged
 from benchmarks.third.page import write
 from benchmarks.third.running import run, truths
+from benchmarks.third.runs import table
 
 COUNTED = "counted.json"
 
@@ -33,6 +34,7 @@ def main() -> None:
     parser.add_argument("--resume", action="store_true", help="go on where a run was stopped")
     parser.add_argument("--tally", action="store_true", help="run nothing; count what is there")
     parser.add_argument("--before", type=Path, help="folder of another run to set beside this one")
+    parser.add_argument("--runs", type=Path, help="folder of reports of positioning runs, diagnosed in the end")
     parser.add_argument("--page", type=Path, help="write the page into this folder")
     chosen = parser.parse_args()
     chosen.folder.mkdir(parents=True, exist_ok=True)
@@ -66,7 +68,8 @@ def main() -> None:
     note = chosen.folder / "note.txt"
     if note.exists():
         state += "\n\n" + note.read_text(encoding="utf-8").strip()
-    write(counted, before, state, {"count": chosen.count, "seed": chosen.seed}, chosen.page)
+    further = table(chosen.runs, chosen.folder / "runs") if chosen.runs else []
+    write(counted, before, state, {"count": chosen.count, "seed": chosen.seed}, chosen.page, further)
 
 
 def tally(folder: Path) -> tuple[list[Judged], list[dict[str, Any]]]:
