@@ -209,9 +209,9 @@ def covariates(said: Record) -> set[str]:
 
 
 def held_out(said: Record) -> tuple[float, float]:
-    """Held-out rms before and after: of the empirical model, where there is one."""
+    """Held-out rms before and after: of the empirical model, where there is one that predicts what was held out."""
     of = said.get("empirical") or {}
-    of = of if of.get("heldout_rms_after_um") is not None else said["improvement"]
+    of = of if of.get("predicts", True) and of.get("heldout_rms_after_um") is not None else said["improvement"]
     return float(of["heldout_rms_before_um"]), float(of["heldout_rms_after_um"])
 
 

@@ -72,6 +72,9 @@ def test_the_true_form_is_right_another_wrong_and_none_withheld() -> None:
     empirical = judged(found, truth, said("empirical", function(found, None)), far)
     assert empirical.located
     assert empirical.form_said is None
+    denied = said("unexplained", function(found, None))
+    denied["empirical"] |= {"predicts": False, "heldout_rms_after_um": 6.0}
+    assert judged(found, truth, denied, far).taken == (0.25, 0.5)
 
 
 def test_an_effect_is_right_where_the_truth_is_in_its_group() -> None:
