@@ -6,19 +6,20 @@ their mixture, weighted by their probabilities and kept as draws, for an estimat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy
 
 from cmm_uq.analysis.diagnosis import joint as jointly
+from cmm_uq.analysis.diagnosis.asserted import OmittedEffect, indistinguishable, left_out
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key
 from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, with_effects, withhold
 from cmm_uq.analysis.diagnosis.empirical.model import BestKnown, EmpiricalModel, best_known, empirical_model
 from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement, thin_out
-from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, WithheldEffect, joint_posterior, period_modes
+from cmm_uq.analysis.diagnosis.joint import JointPosterior, WithheldEffect, joint_posterior
 from cmm_uq.analysis.diagnosis.location import Place, locate
 from cmm_uq.analysis.diagnosis.noise import RepeatComparison, against_repeats, has_heavy_tails, probability_by_name
 from cmm_uq.base.messages import Text
@@ -28,7 +29,7 @@ from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.recorded import of_last_digit
 from cmm_uq.maths.inference.ensembles import Progress
-from cmm_uq.maths.inference.linear_model import LinearModel, Unknown, solve, studentised
+from cmm_uq.maths.inference.linear_model import LinearModel, Unknown, studentised
 from cmm_uq.maths.inference.noise import Components
 from cmm_uq.maths.inference.posterior import Density, NoisyPosterior
 from cmm_uq.maths.uncertainty.quantity import Quantity, mixed
@@ -181,29 +182,8 @@ def _reported(model: RecordingModel, draws: Floats) -> dict[str, dict[str, Quant
 # nothing is found; it cannot be told from noise; a cause, or part of it, is found; a function is; nothing that predicts is
 VERDICTS = ("consistent", "undetermined", "explained", "partial", "empirical", "unexplained")
 FALSE_ALARMS = 0.01  # default rate at which a recording without any fault is found to have one
-_TOLD_APART = 0.95
-# Odds of another in the place of an effect from which both are named together: a set-up is suggested that gives 20 : 1
-_ODDS = 0.05
 _UNKNOWN = 0.5
 _NOISE_KIND = 0.9
-
-
-@dataclass(frozen=True)
-class OmittedEffect:
-    """An effect that the model left out."""
-
-    effect: str  # effect, title: its name, and in words
-    title: Text
-    probability: float  # among all candidates that could stand in its place, nothing and nonparametric terms included
-    parameters: Mapping[str, Quantity]  # reported parameters, from the joint posterior
-    explained: float  # part of the misfit's sum of squares that it takes away
-    together: float  # probability of it or one that these data cannot tell from it
-    points_to: Text  # what a technician should look at
-    # what these data cannot tell from it; with a probability below one half it is asserted as one of these
-    group: tuple[Text, ...] = ()
-    # other periods that fit, where it has one; all that fit, where none of them is settled
-    modes: tuple[Mode, ...] = ()
-    settled: bool = True  # whether its period, where it has one, is among the parameters
 
 
 @dataclass(frozen=True)
@@ -277,8 +257,8 @@ def diagnose(
     if wrong and not found.effects:
         verdict = "empirical" if empirical is not None and empirical.predicts else "unexplained"
     return Diagnosis(
-        verdict, first.p_value, alpha, locate(first, alpha, found.chosen), _left_out(found, joint, model),
-        _indistinguishable(found), rivals, noise, gain, model, after, joint.components, joint.posterior,
+        verdict, first.p_value, alpha, locate(first, alpha, found.chosen), left_out(found, joint, model),
+        indistinguishable(found), rivals, noise, gain, model, after, joint.components, joint.posterior,
         int(some.used.sum()), found, withheld, average_models(found, joint, model, seed), empirical, repeats,
         best_known(found, model) if wrong else None,
     )  # fmt: skip
@@ -313,71 +293,6 @@ def _of_all(result: SearchResult, model: RecordingModel) -> SearchResult:
     if not result.chosen or result.model.artefact is model.artefact:
         return result if result.chosen else replace(result, model=model)
     return replace(result, model=replace(result.model, artefact=model.artefact, used=model.used))
-
-
-def _left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel) -> tuple[OmittedEffect, ...]:
-    index = {str.__str__(result.first.explanations[i].name): i for i in result.chosen}
-    posterior = joint.posterior
-    column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
-    linear, first = result.model.estimate().linear, _squares(before.estimate().linear, ())
-    total = first - _squares(linear, ())
-    listed = []
-    for effect in (e for e in result.model.effects if e.name in result.effects):
-        modes = period_modes(result, index[effect.name])
-        known = not modes or jointly.period_settled(result, index[effect.name], modes)
-        probability, together, group = _probability(result, index[effect.name], known=known)
-        draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
-        shapes = joint.shapes.get(effect.name, np.zeros((len(draws), 0)))
-        if modes and known:  # what is reported of a period is reported of one
-            own = modes[0].holds(shapes[:, 0])
-            draws, shapes = (draws[own], shapes[own]) if own.any() else (draws, shapes)
-        reported = effect.to_reported(draws, shapes)
-        units = {parameter.name: parameter.unit for parameter in effect.reported}
-        share = (_squares(linear, [column[effect.name, c.name] for c in effect.coefficients]) - first + total) / first
-        if "phase_rad" in reported:  # unwrapped about its middle
-            turned = np.exp(1j * reported["phase_rad"])
-            middle = float(np.angle(np.mean(turned)))
-            reported["phase_rad"] = np.asarray(middle + np.angle(np.exp(1j * (reported["phase_rad"] - middle))))
-        parameters = {
-            name: Quantity.of_draws(values, units[name])
-            for name, values in reported.items()
-            if known or name not in {"phase_rad", *(shape.name for shape in effect.shape)}
-        }
-        explained = max(share, 0.0) if total > 0 else 0.0
-        listed.append(OmittedEffect(
-            effect.name, effect.title, probability, parameters, explained, together, effect.points_to, group,
-            modes[1:] if known else modes, known,
-        ))  # fmt: skip
-    return tuple(sorted(listed, key=lambda item: -item.probability))
-
-
-def _probability(result: SearchResult, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:
-    """Of an effect by itself, and with all that could stand in its place; and the names of those."""
-    combinations = result.combinations
-    if combinations is None:
-        return 0.0, 0.0, ()
-    group = jointly.group_of(combinations, result.chosen, index)
-    group |= frozenset() if known else combinations.imitating(index)
-    ordered = sorted((i for i in group if combinations.of(i) > 0), key=lambda i: -combinations.of(i))
-    names = tuple(combinations.explanations[i].name for i in ordered)
-    return combinations.of(index), combinations.of_any(group | {index}), names
-
-
-def _squares(linear: LinearModel, without: Sequence[int]) -> float:
-    kept = [i for i in range(len(linear.unknowns)) if i not in without]
-    return float(np.sum(solve(linear.only(kept)).residuals ** 2))
-
-
-def _indistinguishable(result: SearchResult) -> tuple[tuple[str, ...], ...]:
-    if result.combinations is None:
-        return ()
-    names, groups = [e.name for e in result.first.explanations], []
-    for i in sorted(result.chosen):
-        odds = result.combinations.instead(result.chosen, i)
-        rivals = sorted((r for r in odds if odds[r] > _ODDS), key=lambda r: -odds[r])
-        if rivals and result.combinations.of(i) < _TOLD_APART:
-            groups.append((names[i], *(names[r] for r in rivals)))
-    return tuple(groups)
 
 
 def _noise(result: SearchResult, joint: JointPosterior, stated: float | None) -> NoiseDiagnosis:

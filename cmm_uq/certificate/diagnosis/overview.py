@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
+from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
 from cmm_uq.analysis.diagnosis.comparison.search import ASSERTED
-from cmm_uq.analysis.diagnosis.diagnosis import VERDICTS, Diagnosis, OmittedEffect
+from cmm_uq.analysis.diagnosis.diagnosis import VERDICTS, Diagnosis
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
 from cmm_uq.analysis.screening.columns import Finding

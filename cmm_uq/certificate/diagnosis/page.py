@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.analysis.conformity.accuracy import TITLES, UNITS
-from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, OmittedEffect
+from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
+from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, names, number, say, sentences
 from cmm_uq.base.units import MICROMETRE, unit

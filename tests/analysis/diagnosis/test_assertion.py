@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.diagnosis import diagnosis, joint
+from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
 from cmm_uq.analysis.diagnosis.comparison import search
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.search import ModelComparison, SearchResult, effects_to_assert, substitute
-from cmm_uq.analysis.diagnosis.diagnosis import OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import HOLDS_ZERO, WithheldEffect, _holds_zero, _phase_known, group_of
 from cmm_uq.base.messages import say

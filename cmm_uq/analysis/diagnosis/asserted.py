@@ -1,0 +1,139 @@
+"""What is asserted of a recording: each effect with its size, its probability, and what could stand in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.analysis.diagnosis import joint as jointly
+from cmm_uq.analysis.diagnosis.comparison.equivalence import equivalent_sets
+from cmm_uq.analysis.diagnosis.comparison.explanations import effect_of
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
+from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, period_modes
+from cmm_uq.base.messages import Text
+from cmm_uq.machine.model import RecordingModel
+from cmm_uq.maths.inference.linear_model import LinearModel, solve
+from cmm_uq.maths.uncertainty.quantity import Quantity
+
+_TOLD_APART = 0.95
+# Odds of another in the place of an effect from which both are named together: a set-up is suggested that gives 20 : 1
+_ODDS = 0.05
+
+
+@dataclass(frozen=True)
+class AlternativeSet:
+    """Effects that together could stand in the place of others; see :class:`EquivalentSet`."""
+
+    instead_of: tuple[str, ...]
+    effects: tuple[str, ...]
+    titles: tuple[Text, ...]
+    sizes: tuple[float, ...]
+    odds: float
+    prior_odds: float
+
+
+@dataclass(frozen=True)
+class OmittedEffect:
+    """An effect that the model left out."""
+
+    effect: str  # effect, title: its name, and in words
+    title: Text
+    probability: float  # among all candidates that could stand in its place, nothing and nonparametric terms included
+    parameters: Mapping[str, Quantity]  # reported parameters, from the joint posterior
+    explained: float  # part of the misfit's sum of squares that it takes away
+    together: float  # probability of it or one that these data cannot tell from it
+    points_to: Text  # what a technician should look at
+    # what these data cannot tell from it; with a probability below one half it is asserted as one of these
+    group: tuple[Text, ...] = ()
+    # other periods that fit, where it has one; all that fit, where none of them is settled
+    modes: tuple[Mode, ...] = ()
+    settled: bool = True  # whether its period, where it has one, is among the parameters
+    alternatives: tuple[AlternativeSet, ...] = ()  # sets that the readings alone do not tell from it
+
+
+def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel) -> tuple[OmittedEffect, ...]:
+    index = {str.__str__(result.first.explanations[i].name): i for i in result.chosen}
+    posterior = joint.posterior
+    column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
+    linear, first = result.model.estimate().linear, _squares(before.estimate().linear, ())
+    total = first - _squares(linear, ())
+    listed, sets = [], _alternatives(result)
+    for effect in (e for e in result.model.effects if e.name in result.effects):
+        modes = period_modes(result, index[effect.name])
+        known = not modes or jointly.period_settled(result, index[effect.name], modes)
+        probability, together, group = _probability(result, index[effect.name], known=known)
+        stand_ins = tuple(one for one in sets if effect.name in one.instead_of)
+        if stand_ins:  # by the readings alone: what is known beforehand parts no class
+            probability = min(probability, together / (1 + sum(1 / one.odds for one in stand_ins)))
+        draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
+        shapes = joint.shapes.get(effect.name, np.zeros((len(draws), 0)))
+        if modes and known:  # what is reported of a period is reported of one
+            own = modes[0].holds(shapes[:, 0])
+            draws, shapes = (draws[own], shapes[own]) if own.any() else (draws, shapes)
+        reported = effect.to_reported(draws, shapes)
+        units = {parameter.name: parameter.unit for parameter in effect.reported}
+        share = (_squares(linear, [column[effect.name, c.name] for c in effect.coefficients]) - first + total) / first
+        if "phase_rad" in reported:  # unwrapped about its middle
+            turned = np.exp(1j * reported["phase_rad"])
+            middle = float(np.angle(np.mean(turned)))
+            reported["phase_rad"] = np.asarray(middle + np.angle(np.exp(1j * (reported["phase_rad"] - middle))))
+        parameters = {
+            name: Quantity.of_draws(values, units[name])
+            for name, values in reported.items()
+            if known or name not in {"phase_rad", *(shape.name for shape in effect.shape)}
+        }
+        explained = max(share, 0.0) if total > 0 else 0.0
+        listed.append(OmittedEffect(
+            effect.name, effect.title, probability, parameters, explained, together, effect.points_to, group,
+            modes[1:] if known else modes, known, stand_ins,
+        ))  # fmt: skip
+    return tuple(sorted(listed, key=lambda item: -item.probability))
+
+
+def _alternatives(result: SearchResult) -> tuple[AlternativeSet, ...]:
+    if result.combinations is None or not result.chosen:
+        return ()
+    every = result.first.explanations
+    names = [str.__str__(e.name) for e in every]
+    return tuple(
+        AlternativeSet(
+            tuple(names[i] for i in one.instead_of),
+            tuple(names[i] for i in one.members),
+            tuple(effect_of(every[i]).title for i in one.members),
+            one.sizes,
+            one.odds,
+            one.prior_odds,
+        )
+        for one in equivalent_sets(result.first.comparison, result.combinations, result.chosen, result.versions)
+    )
+
+
+def _probability(result: SearchResult, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:
+    """Of an effect by itself, and with all that could stand in its place; and the names of those."""
+    combinations = result.combinations
+    if combinations is None:
+        return 0.0, 0.0, ()
+    group = jointly.group_of(combinations, result.chosen, index)
+    group |= frozenset() if known else combinations.imitating(index)
+    ordered = sorted((i for i in group if combinations.of(i) > 0), key=lambda i: -combinations.of(i))
+    names = tuple(combinations.explanations[i].name for i in ordered)
+    return combinations.of(index), combinations.of_any(group | {index}), names
+
+
+def _squares(linear: LinearModel, without: Sequence[int]) -> float:
+    kept = [i for i in range(len(linear.unknowns)) if i not in without]
+    return float(np.sum(solve(linear.only(kept)).residuals ** 2))
+
+
+def indistinguishable(result: SearchResult) -> tuple[tuple[str, ...], ...]:
+    if result.combinations is None:
+        return ()
+    names, groups = [e.name for e in result.first.explanations], []
+    for i in sorted(result.chosen):
+        odds = result.combinations.instead(result.chosen, i)
+        rivals = sorted((r for r in odds if odds[r] > _ODDS), key=lambda r: -odds[r])
+        if rivals and result.combinations.of(i) < _TOLD_APART:
+            groups.append((names[i], *(names[r] for r in rivals)))
+    return tuple(groups)
