@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 from settings import SETTINGS
 
+from cmm_uq.analysis.diagnosis.asserted import indistinguishable
 from cmm_uq.analysis.diagnosis.comparison.search import search
-from cmm_uq.analysis.diagnosis.diagnosis import _indistinguishable
 from cmm_uq.analysis.diagnosis.power import powers, without_fault
 from cmm_uq.analysis.planning.candidates import (
     candidates,
@@ -75,7 +75,7 @@ def searched(setting, points, effect, amplitude, seed):
         found = search(replace(setting.model(points.at(xyz)), sigma=setting.sigma), setting.sigma, alpha=ALPHA, seed=0)
     except CmmUqError:  # what was found cannot be fitted: an alarm without a name
         return True, False, False
-    named = found.effects == (effect.name,) and not any(effect.name in group for group in _indistinguishable(found))
+    named = found.effects == (effect.name,) and not any(effect.name in group for group in indistinguishable(found))
     return found.first.p_value < ALPHA, named, True
 
 

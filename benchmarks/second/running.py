@@ -106,7 +106,7 @@ def diagnosed(job: Path, *, whole: bool = False) -> dict[str, Any]:
         "effects": {
             each["effect"]: {
                 "probability": each["probability"], "together": each.get("probability_together", each["probability"]),
-                "group": each.get("group", []),
+                "group": [*each.get("group", []), *(name for one in each.get("alternatives", []) for name in one["effects"])],
                 "periods": [p["value"] for p in (*each.get("periods_mm", ()), *each.get("other_periods_mm", ()))],
                 "parameters": {k: [q["value"], q["u"], *q["interval95"]] for k, q in each["parameters"].items()},
             }

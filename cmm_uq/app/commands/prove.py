@@ -304,7 +304,8 @@ def diagnosed_case(job: Job, design: Design, case: Case, setting: CaseSetting) -
              "together": _rounded(each.together), "parameters": _intervals(each.parameters)}
             for each in d.effects
         ],
-        "groups": [[str.__str__(name) for name in group] for group in d.indistinguishable],
+        "groups": [[str.__str__(name) for name in group] for group in d.indistinguishable]
+        + [[item.effect, *one.effects] for item in d.effects for one in item.alternatives],
         "named": _intervals(_named(d)),
         "heldout_um": [_rounded(d.improvement.heldout_rms_before_um), _rounded(d.improvement.heldout_rms_after_um)],
         "elpd_gain": [_rounded(d.improvement.elpd_gain), _rounded(d.improvement.elpd_gain_se)],

@@ -11,7 +11,20 @@ from cmm_uq.analysis.diagnosis.diagnosis import VERDICTS, Diagnosis
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
 from cmm_uq.analysis.screening.columns import Finding
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, day, lines, say, semicolons
+from cmm_uq.base.messages import (
+    NOTHING,
+    Text,
+    Verbatim,
+    after,
+    alternatives,
+    commas,
+    day,
+    lines,
+    listed,
+    number,
+    say,
+    semicolons,
+)
 from cmm_uq.certificate.diagnosis.empirical import empirical_words, nearest_words, repeats_words
 from cmm_uq.certificate.diagnosis.mistakes import TITLE, mistaken, to_mend
 from cmm_uq.certificate.diagnosis.sections import by_columns, explanation, next_sentence, place_words, without_power
@@ -74,7 +87,9 @@ def overview_of(result: JobDiagnosis) -> Overview:
         title, standing = TITLE, "open"
     elif without_power(result):
         title, standing = say("Consistent, as far as this recording can show"), "open"
-    elif d.verdict == "explained" and (_otherwise(d) or any(_instead(d, item) for item in d.effects)):
+    elif d.verdict == "explained" and (
+        _otherwise(d) or any(_instead(d, item) or item.alternatives for item in d.effects)
+    ):
         title = say("Explained: more than one cause is possible")
     if said := mistaken(result.mistakes):
         rows = ((rows[0][0], lines((said, rows[0][1]))), *rows[1:])
@@ -96,9 +111,9 @@ def _found(result: JobDiagnosis) -> Text:
     for item in d.effects:
         size = size_of(effect_of(item.effect, d.after.effects), item.parameters, factors=False)
         told = say("{title}: {size}.", title=item.title, size=size)
-        if others := _instead(d, item):
-            small = alternatives(say("{title:small}", title=title) for title in titles(others, d.after.effects))
-            told = say("{told} It could as well be: {others}.", told=told, others=small)
+        others: list[Text] = [say("{title:small}", title=title) for title in titles(_instead(d, item), d.after.effects)]
+        if others := [*others, *sets_instead(item)]:
+            told = say("{told} It could as well be: {others}.", told=told, others=alternatives(others))
         texts.append(after(told, contained(result.simulated, item.effect)))
     if d.verdict == "partial":
         texts += empirical_words(d) or [say("And more that no known effect accounts for.")]
@@ -199,6 +214,32 @@ def _to_do(result: JobDiagnosis) -> Text:
     return lines(dict.fromkeys(told))
 
 
+_SETS = 3  # sets that a sentence tells, the likeliest; results.json has all
+
+
+def sets_instead(item: OmittedEffect) -> list[Text]:
+    """Sets of effects that the readings alone do not tell from one, with the odds of what is known beforehand."""
+    told: list[Text] = []
+    for one in sorted(item.alternatives, key=lambda one: one.odds)[:_SETS]:
+        what = listed([say("{title:small}", title=title) for title in one.titles])
+        if len(one.instead_of) > 1:
+            rest = listed(
+                [say("{title:small}", title=effect_title(name)) for name in one.instead_of if name != item.effect]
+            )
+            what = say("{what} in its place and in that of {rest}", what=what, rest=rest)
+        elif len(one.titles) > 1:
+            what = say("{what} together", what=what)
+        odds = max(one.prior_odds, 1 / one.prior_odds)
+        digits = number(odds, ".0f" if odds > 10 else ".2g")
+        if one.prior_odds >= 1:
+            told.append(say("{what} (beforehand {odds} times less probable)", what=what, odds=digits))
+        else:
+            told.append(say("{what} (beforehand {odds} times more probable)", what=what, odds=digits))
+    if len(item.alternatives) > _SETS:
+        told.append(say("{more} more sets", more=len(item.alternatives) - _SETS))
+    return told
+
+
 def _look_at(d: Diagnosis, item: OmittedEffect) -> Text:
     """The cause to look at; of effects that cannot be told apart, that of each on a line."""
     others = [effect_of(name, d.after.effects) for name in _instead(d, item)]
@@ -248,7 +289,8 @@ def sure(item: OmittedEffect) -> Text:
     if item.probability < ASSERTED:
         share = say(
             "{share}, {together} that it is this or one that this recording cannot tell from it: {group}",
-            share=share, together=probability(item.together), group=commas(effect_title(name) for name in item.group),
+            share=share, together=probability(item.together),
+            group=commas((*(effect_title(name) for name in item.group), *sets_instead(item))),
         )  # fmt: skip
     elif item.together > item.probability + _SAME:
         share = say("{share} ({together} of it or one that cannot be told from it)",

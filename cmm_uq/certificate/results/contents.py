@@ -10,7 +10,7 @@ import numpy as np
 
 from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Statement
-from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
+from cmm_uq.analysis.diagnosis.asserted import AlternativeSet, OmittedEffect
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis
 from cmm_uq.analysis.diagnosis.empirical.model import EmpiricalFunction
 from cmm_uq.analysis.diagnosis.held_out import Improvement
@@ -267,8 +267,15 @@ def effect_data(item: OmittedEffect, gain: Improvement) -> dict[str, Any]:
         "effect": item.effect, "probability": item.probability, "probability_together": item.together,
         "group": list(item.group), "explained": item.explained, "parameters": _quantities(item.parameters),
         **({"other_periods_mm" if item.settled else "periods_mm": _periods(item.modes)} if item.modes else {}),
+        **({"alternatives": [_alternative_data(one) for one in item.alternatives]} if item.alternatives else {}),
         "words": sentence(item, gain),
     }  # fmt: skip
+
+
+def _alternative_data(one: AlternativeSet) -> dict[str, Any]:
+    return {name: getattr(one, name) for name in ("odds", "prior_odds")} | {
+        name: list(getattr(one, name)) for name in ("effects", "instead_of", "sizes")
+    }
 
 
 def improvement_data(gain: Improvement) -> dict[str, Any]:

@@ -1,0 +1,79 @@
+"""Sets that stand in the place of an effect: an exact construction, and the identity of a bar of unknown length."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from cmm_uq.analysis.diagnosis.comparison.equivalence import EquivalentSet, equivalent_sets
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search
+from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.base.points import Floats, Machine
+from cmm_uq.machine.model import Noise, RecordingModel
+from cmm_uq.machine.physics.catalogue import effects
+from tests.recordings import TRAVEL, bar_facts, bars
+
+
+def searched(effect: str, size: float, length: float | None = None) -> SearchResult:
+    """Thirty bars on a machine with one error, told of nothing; their length is certified or not."""
+    points = bars(np.random.default_rng(21), 30, 400.0, Machine("m", "XYZ", TRAVEL))
+    truth = RecordingModel(Ballbar(bar_facts(), points), effects((effect,)))
+    read = points.at(truth.simulate(np.array([size]), np.array([400.0]), Noise(1e-3), np.random.default_rng(22)))
+    facts = bar_facts(length, None if length is None else 0.1)
+    return search(RecordingModel(Ballbar(facts, read), ()), None, alpha=0.01, seed=1)
+
+
+def sets_of(found: SearchResult) -> dict[tuple[str, ...], EquivalentSet]:
+    assert found.combinations is not None
+    every = found.first.explanations
+    sets = equivalent_sets(found.first.comparison, found.combinations, found.chosen, found.versions)
+    return {tuple(sorted(str(every[i].name) for i in one.members)): one for one in sets}
+
+
+@pytest.fixture(scope="module")
+def stretched() -> SearchResult:
+    return searched("scale_x", 20.0)
+
+
+def test_a_scale_is_the_other_two_where_the_length_is_unknown(stretched: SearchResult) -> None:
+    """e of X alone is e of all three, which a length takes up, less that of Y and Z: equal sizes, the same likelihood."""
+    assert stretched.effects == ("scale_x",)
+    instead = sets_of(stretched)["scale_y", "scale_z"]
+    assert instead.odds == pytest.approx(1.0, abs=1e-3)
+    assert instead.sizes[0] == pytest.approx(instead.sizes[1], rel=1e-3)
+    assert instead.sizes[0] == pytest.approx(-20.0 / 300.0, rel=0.4)  # of a prior of 300 ppm
+    assert instead.prior_odds > 5
+
+
+def test_a_certified_length_parts_them() -> None:
+    found = searched("scale_x", 20.0, 400.0)
+    assert found.effects == ("scale_x",)
+    assert ("scale_y", "scale_z") not in sets_of(found)
+
+
+def test_every_set_fits_as_well_as_it_is_said_to(stretched: SearchResult) -> None:
+    """By least squares of the whole recording, set by set; and none of the smallest sets is missing."""
+    comparison, (index,) = stretched.first.comparison, stretched.chosen
+    scale, every = comparison.noise_scale[:, None], stretched.first.explanations
+
+    def squares(numbers: tuple[int, ...]) -> float:
+        columns = comparison.rest(np.hstack([every[i].members[0].columns for i in numbers]) / scale)
+        left: Floats = comparison.left - columns @ np.linalg.lstsq(columns, comparison.left, rcond=None)[0]
+        return float(left @ left)
+
+    own = squares((index,))
+    variance = own / (comparison.degrees_of_freedom - 1)
+    sets = sets_of(stretched)
+    for one in sets.values():
+        assert one.instead_of == (index,)
+        assert np.log(one.odds) == pytest.approx((squares(one.members) - own) / (2 * variance), abs=0.35)
+        for fewer in combinations(one.members, len(one.members) - 1):
+            assert not fewer or squares(fewer) - own > squares(one.members) - own - 1e-9
+
+
+def test_a_strong_squareness_stands_alone() -> None:
+    found = searched("squareness_xy", 60.0, 400.0)
+    assert found.effects == ("squareness_xy",)
+    assert not sets_of(found)
