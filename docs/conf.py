@@ -41,7 +41,7 @@ CONTENTS: dict[str, list[str]] = {
     ],
     "What it rests on": [
         "validation", "validation-parts", "parts-study", "coverage-study", "noise-ranks", "diagnosis-study",
-        "diagnosis-second-study", "mutation-study",
+        "diagnosis-second-study", "diagnosis-third-study", "mutation-study",
         "hostile-study", "tampering-study", "records/drift-study", "records/drift-kinds-study", "uncertainty/validation",
         "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks",
         "peers", "sources", "machine/source-errors", "uncertainty/harris-2004",
