@@ -100,6 +100,8 @@ def diagnose_model(
     found = JobDiagnosis(job, findings, diagnosis, suggested, unseen=unseen, next_plan=plan)
     if against is not None:
         mistakes = simulation_mistakes(diagnosis.search, against.predicted, against.of, against.model)
+        if mistakes.named:  # it explains what differs, whatever the machine alone could be blamed for
+            found = replace(found, diagnosis=replace(diagnosis, verdict="explained"))
         return replace(found, simulated=against.simulated, mistakes=mistakes)
     outside = OutsideReadings.of(job.points, findings, artefact_at)
     corrected = consequences(job, diagnosis, artefact_at, kind.tested, seed, outside)

@@ -92,7 +92,7 @@ def overview_of(result: JobDiagnosis) -> Overview:
     ):
         title = say("Explained: more than one cause is possible")
     if said := mistaken(result.mistakes):
-        rows = ((rows[0][0], lines((said, rows[0][1]))), *rows[1:])
+        rows = ((rows[0][0], lines(filter(None, (said, rows[0][1])))), *rows[1:])
     return Overview(title, standing, tuple(row for row in rows if row[1]))
 
 
@@ -104,6 +104,8 @@ def _found(result: JobDiagnosis) -> Text:
         if result.simulated is None:
             return say("Nothing beyond the effects that the job names: what they leave is noise.")
         return say("Nothing beyond the simulation: what it leaves is noise.")
+    if not d.effects and result.mistakes.named:
+        return NOTHING
     if not d.effects:
         beyond = empirical_words(d) or [say("A misfit that no known effect accounts for.")]
         return lines((*beyond, *withheld_words(d.withheld)))

@@ -207,7 +207,9 @@ def test_page_and_results_say_what_to_mend_before_the_machine(tmp_path: Path) ->
     job, name = farthest_exchanged()
     job.write(tmp_path / "job")
     files = write_diagnosis(tmp_path / "job", tmp_path / "out").files
-    results = json.loads(files["results.json"].read_bytes())["diagnosis"]["simulation_mistakes"]
+    diagnosis = json.loads(files["results.json"].read_bytes())["diagnosis"]
+    results = diagnosis["simulation_mistakes"]
+    assert diagnosis["verdict"] == "explained"  # and never consistent beside a mistake
     assert results["named"] == [name]
     assert results["told"][0]["what_to_do"] == "Number the prediction as the recording."
     page = files["diagnosis.html"].read_text(encoding="utf-8")
