@@ -62,6 +62,8 @@ def job_schema(
     stated = keys["effect"]["items"]["properties"]["name"]  # any other is one of the job's own
     own = {"type": "string", "pattern": stated["pattern"]}
     keys["model"]["properties"]["effects"]["items"] = {"anyOf": [known, own]}
+    named = {"properties": {"model": {"properties": {"effects": {"items": {"enum": list(effects)}}}}}}
+    found["allOf"] = [{"if": {"not": {"required": ["effect"]}}, "then": named}]
     keys["conformity"]["items"]["properties"]["standard"]["enum"] = list(standards)
     without = [name for name, table in tables.items() if not table.with_recording]
     found["required"] = [name for name in found["required"] if name != "recording"]

@@ -12,7 +12,7 @@ were, with the age of the certificate.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property
@@ -240,6 +240,31 @@ def unmodelled_errors(modelled: Iterable[str], detected: Mapping[str, float | No
         seen = np.inf if size is None else size / POWER_QUANTILE
         found.append(Unmodelled(effect, np.asarray(allowed * min(1.0, seen / allowed[0])), size))
     return tuple(found)
+
+
+def at_points(state: MachineState, columns: Container[str]) -> MachineState:
+    """The machine at points of a part that have these columns; an effect that goes by others is one that was not modelled.
+
+    A drift with the time of the calibration's day is none of another day, and cannot be drawn where no time is recorded.
+    """
+    lost = [effect for effect in state.effects if any(name not in columns for name in effect.columns)]
+    lost = [effect for effect in lost if not any(name.startswith(_SURROUNDINGS) for name in effect.columns)]
+    if not lost:
+        return state
+    owner = np.array([i for i, effect in enumerate(state.effects) for _ in effect.coefficients])
+    away = np.array([effect in lost for effect in state.effects])
+    kept = ~away[owner]
+    sizes = [state.draws[:, owner == i].std(axis=0) for i in np.flatnonzero(away)]
+    more = tuple(Unmodelled(effect, sd) for effect, sd in zip(lost, sizes, strict=True))
+    corrections = state.corrections[kept] if len(state.corrections) else state.corrections
+    return replace(
+        state,
+        effects=tuple(effect for effect in state.effects if effect not in lost),
+        draws=state.draws[:, kept],
+        drift=state.drift[kept],
+        corrections=corrections,
+        unmodelled=(*state.unmodelled, *more),
+    )
 
 
 def with_curves(state: MachineState) -> MachineState:

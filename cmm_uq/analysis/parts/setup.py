@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.analysis.machine.state import MachineState
+from cmm_uq.analysis.machine.state import MachineState, at_points
 from cmm_uq.analysis.parts import plan as plans
 from cmm_uq.analysis.parts.causes import surroundings as causes
 from cmm_uq.analysis.parts.causes.cause import LARGE, PartCause, PointScatter
@@ -123,7 +123,10 @@ def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: in
     if job.reported is not None and job.reported.rounding:
         further.append(causes.reproducibility(plan, job.reported.rounding, causes.ROUNDING, "last digit"))
     poses, repeats = poses_of(job, places, machine.machine), job.facts.probing.repeats
-    return MeasurementConditions(machine, poses, surroundings_of(job), forms_of(job), repeats, tuple(further))
+    surroundings = surroundings_of(job)
+    columns = placed(plan, poses[0], machine.machine, surroundings.since(machine.temperature_c).columns).columns
+    machine = at_points(machine, columns)
+    return MeasurementConditions(machine, poses, surroundings, forms_of(job), repeats, tuple(further))
 
 
 def poses_of(job: PartJob, count: int, machine: Machine) -> tuple[PartPose, ...]:

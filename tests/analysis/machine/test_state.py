@@ -7,7 +7,7 @@ from datetime import date
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.machine.state import StatedNoise, aged
+from cmm_uq.analysis.machine.state import StatedNoise, aged, at_points
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
@@ -108,3 +108,17 @@ def test_an_offset_of_a_set_up_is_as_its_draws_are() -> None:
     found = errors(PAIR, MeasurementConditions(machine(noise=noise), repeats=9))
     assert found.std() == pytest.approx(4e-3 * np.sqrt(2) / 2, rel=0.03)
     assert np.mean(np.abs(found) < 1e-9) == pytest.approx(0.75, abs=0.01)
+
+
+def test_what_goes_by_a_column_that_the_part_has_not_is_not_drawn_but_named() -> None:
+    """A drift with the time of the calibration's day: with times it takes part, without it is as if not modelled."""
+    draws = np.random.default_rng(2).standard_normal((5000, 2)) * [3.0, 2.0]
+    state = machine(["scale_x", "drift_x"], draws)
+    assert at_points(state, {"time_s"}) is state
+    left = at_points(state, ())
+    assert [effect.name for effect in left.effects] == ["scale_x"]
+    assert np.array_equal(left.draws, draws[:, :1])
+    assert [(one.effect.name, round(float(one.sd[0]), 1)) for one in left.unmodelled] == [("drift_x", 2.0)]
+    at = AtPose(PAIR, MeasurementConditions(left), POSE)
+    assert at.lacking == {"drift_x": "time_s"}
+    assert errors(PAIR, MeasurementConditions(left)).std() == pytest.approx(300 * 3e-6, rel=0.05)

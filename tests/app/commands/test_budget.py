@@ -211,7 +211,17 @@ def test_kinds_and_effects_of_other_packages_take_part(tmp_path: Path, monkeypat
     artefact = schema["properties"]["artefact"]["properties"]
     assert "tracker_length" in artefact["kind"]["enum"]
     assert artefact["u_um_per_m"]["description"].endswith("wavelength. Unit: µm/m. Kinds: tracker_length.")
-    assert "beam_twist" in schema["properties"]["model"]["properties"]["effects"]["items"]["enum"]
+    assert "beam_twist" in schema["properties"]["model"]["properties"]["effects"]["items"]["anyOf"][0]["enum"]
+
+
+def test_an_effect_of_its_own_is_what_only_a_job_that_states_one_may_name(
+    job: jsonschema.Draft7Validator, iota: Path
+) -> None:
+    data = told(iota)
+    data["model"]["effects"] = ["my_own"]
+    assert not job.is_valid(data)
+    data["effect"] = [{"name": "my_own", "formula": "e_x = k*x*y", "unit": "µm/m²", "prior": 5.0}]
+    assert job.is_valid(data)
 
 
 MODEL = """

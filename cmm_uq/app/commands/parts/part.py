@@ -125,7 +125,7 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
         for line, share, why in shares.told(name, virtual.named, MATTERS)
     )
     further, files = further_of(machine.job, unseen)
-    influence = prior_influence(virtual, machine.state, simulated.u, seed)
+    influence = prior_influence(virtual, circumstances.machine, simulated.u, seed)
 
     # values, limits, decisions (JCGM 106)
     stage("Decisions", 0.85)
