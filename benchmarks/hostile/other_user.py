@@ -85,6 +85,7 @@ LINES = (
     Line("new ballbar out/new --machine M --set job.date=2026-05-31", ("out",)),
     Line("import iota/ballbar.csv", ("iota",)),
     Line("check job", ("job",)),
+    Line("effects thermal --job job", ("job",)),
     Line(f"report job --out reports/mount {_OF}", ("job", "reports", "reports/mount"), 0, ("reports",)),
     Line("report job --out out/new --records none", ("out",)),
     Line("part part --trials 1000 --out out --records none", ("part", "out")),
