@@ -321,5 +321,5 @@ def tables_otherwise(maps: Sequence[ErrorMap]) -> dict[str, tuple[Text, list[Err
             one=Verbatim(AXES[one].upper()),
             other=Verbatim(AXES[other].upper()),
         )
-        found[f"straightness_{AXES[one]}{AXES[other]}"] = title, read(partial(crossed, one, other))
+        found[f"crossed_{AXES[one]}{AXES[other]}"] = title, read(partial(crossed, one, other))
     return found

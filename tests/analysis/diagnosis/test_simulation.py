@@ -130,12 +130,12 @@ def test_each_table_otherwise_is_another_map() -> None:
     assert otherwise["rotations_unit"].axes[2].errors[:, 3:] * 4.848137 == pytest.approx(z.errors[:, 3:], rel=1e-6)
     assert otherwise["rotations_unit"].axes[2].errors[:, :3] == pytest.approx(z.errors[:, :3])
     assert otherwise["squareness_sign"].squareness == pytest.approx([-1, -2, -3])
-    crossed = otherwise["straightness_xy"]
+    crossed = otherwise["crossed_xy"]
     assert crossed.axes[0].errors[:, 1] == pytest.approx(y.errors[:, 0])
     assert crossed.axes[1].errors[:, 0] == pytest.approx(x.errors[:, 1])
     assert crossed.axes[0].errors[:, [0, 2, 3, 4, 5]] == pytest.approx(x.errors[:, [0, 2, 3, 4, 5]])
-    assert otherwise["straightness_xz"].axes[2].errors[:, 0] == pytest.approx(x.errors[:, 2])
-    assert otherwise["straightness_yz"].axes[0].errors == pytest.approx(x.errors)
+    assert otherwise["crossed_xz"].axes[2].errors[:, 0] == pytest.approx(x.errors[:, 2])
+    assert otherwise["crossed_yz"].axes[0].errors == pytest.approx(x.errors)
 
 
 # ---- what is said
