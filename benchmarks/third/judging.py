@@ -144,6 +144,7 @@ def group_of(effect: Record, said: Record) -> set[str]:
     """All that is said to be one with an effect."""
     name = effect["effect"]
     listed = [text for key in ("group", "class", "classes", "members") for text in _texts(effect.get(key, ()))]
+    listed += [other for one in effect.get("alternatives", ()) for other in (*one["effects"], *one["instead_of"])]
     more = [each for group in said.get("indistinguishable", ()) if name in group for each in group]
     return {*listed, *more} - {name}
 

@@ -14,11 +14,15 @@ import pytest
 
 import cmm_uq
 from cmm_uq.analysis.diagnosis.diagnosis import ModelAverage, Rival
+from cmm_uq.analysis.diagnosis.empirical.functions import FunctionTerm
+from cmm_uq.analysis.diagnosis.empirical.model import BestKnown, EmpiricalFunction, EmpiricalModel, NamedForm
+from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.planning.set_up import DetectionChange, NextPlan, Separation
 from cmm_uq.app.commands.diagnose import diagnose_read
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.base.messages import say
+from cmm_uq.base.units import unit
 from cmm_uq.certificate.diagnosis.overview import overview_of, share_of
 from cmm_uq.certificate.diagnosis.page import diagnosis_document
 from cmm_uq.certificate.diagnosis.sections import next_sentence, place_words, region_words
@@ -27,6 +31,7 @@ from cmm_uq.certificate.render import render_html
 from cmm_uq.certificate.result import JobDiagnosis
 from cmm_uq.certificate.results.contents import next_data
 from cmm_uq.machine.physics.catalogue import EVERY, every
+from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.artefacts.constructions import plate
 from tests.artefacts.simulated import diagnosed
 from tests.certificate.saying import leaves
@@ -54,6 +59,44 @@ def explained(tmp_path_factory: pytest.TempPathFactory) -> JobDiagnosis:
     text = (folder / "job.toml").read_text("utf-8")
     (folder / "job.toml").write_text(text.replace('"squareness_xy", ', ""), encoding="utf-8")
     return diagnose_read(read_job(folder))
+
+
+def modelled(found: JobDiagnosis, form: NamedForm | None, *, predicts: bool = True) -> JobDiagnosis:
+    """The same as if no effect were found, and one function of X were fitted."""
+    d, x = found.diagnosis, np.linspace(0.0, 900.0, 19)
+    term = FunctionTerm("x_mm", say("error along Y as a function of X"), "y", variable="x")
+    one = EmpiricalFunction(
+        term, 0.99, (("step", 0.7), ("smooth", 0.29)), form, (), 10.0, (x, np.where(x > 500, 10.0, 0.0), 0 * x + 0.5),
+        (x, x, 0 * x), '[[effect]]\nname = "empirical_x_y"\n',
+    )  # fmt: skip
+    gain = Improvement(3.0, 1.0, 3.3, 1.2, 40.0, 8.0)
+    best = BestKnown("straightness_x_y", say("Straightness of X along Y"), 0.001, 5e5, gain, say("a bowed guideway"))
+    verdict = "empirical" if predicts else "unexplained"
+    changed = replace(d, verdict=verdict, effects=(), after=d.before, indistinguishable=(), best_known=best,
+                      empirical=EmpiricalModel((one,), gain, predicts))  # fmt: skip
+    return replace(found, diagnosis=changed, next_plan=None)
+
+
+STEP = NamedForm("step", 0.97, {"size_um": Quantity(10.0, 0.5, (9.0, 11.0), unit("µm")),
+                                "at": Quantity(520.0, 6.0, (508.0, 532.0), unit("mm"))})  # fmt: skip
+
+
+def test_a_function_is_told_by_its_form_only_where_that_is_known(explained: JobDiagnosis) -> None:
+    named, open_ = (rows(modelled(explained, form)) for form in (STEP, None))
+    told = "Error along Y as a function of X: a step of 10.0 ± 1.0 µm, at 520 ± 12 mm, probability 97 %."
+    assert named["Found"].replace("\u00a0", " ") == told
+    assert "its form is not told: a step 70 %, a smooth curve 29 %" in open_["Found"].replace("\u00a0", " ")
+    assert "predicted to 1.2 µm with it, to 3.3 µm without it" in named["How sure"].replace("\u00a0", " ")
+    assert "nearest is straightness of X along Y" in named["What to do"]
+    assert "more than 10000 times as probable" in named["What to do"]
+    page = diagnosis_document(modelled(explained, STEP))
+    assert any(str(section.title) == "What no known effect accounts for" for section in page.sections)
+
+
+def test_a_function_that_predicts_nothing_is_not_told(explained: JobDiagnosis) -> None:
+    found = rows(modelled(explained, STEP, predicts=False))
+    assert "A misfit that no known effect accounts for." in found["Found"]
+    assert "step" not in found["Found"]
 
 
 def rows(found: JobDiagnosis) -> dict[str, str]:

@@ -97,7 +97,10 @@ def empirical_model(result: SearchResult) -> EmpiricalModel | None:
         return None
     beside, described = data, list[EmpiricalFunction]()
     while len(described) < _MOST and beside.total - beside.nothing > np.log(ODDS):
-        described.append(_described(beside, result))
+        found = _described(beside, result)
+        if any(one.term == found.term for one in described):  # names of a job's effects differ
+            found = replace(found, stated=found.stated.replace('"\nformula', f'_{len(described) + 1}"\nformula', 1))
+        described.append(found)
         beside = beside.with_function(beside.versions(1)[0])
     if not described:
         return None
