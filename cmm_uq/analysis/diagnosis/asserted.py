@@ -65,8 +65,9 @@ def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel
         known = not modes or jointly.period_settled(result, index[effect.name], modes)
         probability, together, group = _probability(result, index[effect.name], known=known)
         stand_ins = tuple(one for one in sets if effect.name in one.instead_of)
-        if stand_ins:  # by the readings alone: what is known beforehand parts no class
-            probability = min(probability, together / (1 + sum(1 / one.odds for one in stand_ins)))
+        # that it is one effect and not two is no evidence: by the readings alone
+        fewer = [1 / one.odds for one in stand_ins if len(one.effects) != len(one.instead_of)]
+        probability = min(probability, together / (1 + sum(fewer))) if fewer else probability
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
         shapes = joint.shapes.get(effect.name, np.zeros((len(draws), 0)))
         if modes and known:  # what is reported of a period is reported of one

@@ -239,8 +239,7 @@ def diagnose(
     some = model if observe is None else thin_out(model, observe, seed)
     found, joint, withheld = _asserted(search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known)
     gain = improvement(model, found.model)
-    worse = gain.heldout_rms_after_um > gain.heldout_rms_before_um
-    if found.effects and (gain.elpd_gain <= gain.elpd_gain_se or worse):
+    if found.effects and (gain.elpd_gain <= gain.elpd_gain_se or gain.worse):
         withheld = (*withheld, *jointly.withhold_unpredicted(found, gain.unseen))
         found = _of_all(withhold(found, found.chosen), model)
         gain, joint = improvement(model, model), joint_posterior(found, seed, progress, known)

@@ -97,6 +97,7 @@ class Improvement:
     elpd_gain: float
     elpd_gain_se: float
     unseen: Text = say("set-ups")
+    worse: bool = False  # whether the squares of the errors grow by more than the standard error of that over the folds
 
 
 def held_out_groups(model: RecordingModel) -> tuple[Ints, Text]:
@@ -117,16 +118,18 @@ def improvement(before: RecordingModel, after: RecordingModel) -> Improvement:
     second = first if before.effects == after.effects else _held_out(after, groups)
     gain = second[1] - first[1]
     se = float(np.sqrt(len(gain)) * gain.std(ddof=1)) if len(gain) > 1 else 0.0
-    return Improvement(rms[0], rms[1], first[0], second[0], float(gain.sum()), se, unseen)
+    more = second[2] - first[2]
+    worse = len(more) > 1 and bool(more.sum() > np.sqrt(len(more)) * more.std(ddof=1))
+    return Improvement(rms[0], rms[1], first[0], second[0], float(gain.sum()), se, unseen, worse)
 
 
-def _held_out(model: RecordingModel, groups: NDArray[np.int64]) -> tuple[float, Floats]:
+def _held_out(model: RecordingModel, groups: NDArray[np.int64]) -> tuple[float, Floats, Floats]:
     estimate = model.estimate()
     return predictions(estimate.linear, max(estimate.least_squares.sigma_of_residuals, model.least_noise, 1e-7), groups)
 
 
-def predictions(linear: LinearModel, sigma: float, groups: NDArray[np.int64]) -> tuple[float, Floats]:
-    """Rms of predictions, µm, and log predictive density of each fold; what a set-up leaves open is no part of it."""
+def predictions(linear: LinearModel, sigma: float, groups: NDArray[np.int64]) -> tuple[float, Floats, Floats]:
+    """Rms of predictions, µm, log predictive density and squares, mm², of each fold, without what a set-up leaves open."""
     errors, counts, densities = [], [], []
     every = np.hstack([linear.observed[:, None], linear.design]) / linear.noise_scale[:, None]
     placing, numbers = linear.freedoms.over(linear.noise_scale), np.unique(groups)
@@ -147,7 +150,7 @@ def predictions(linear: LinearModel, sigma: float, groups: NDArray[np.int64]) ->
         rest = error / sigma - U @ seen
         density = float(-0.5 * (rest @ rest + np.sum(seen**2 / (1 + s**2)) + np.sum(np.log1p(s**2))))
         densities.append(density - counts[-1] * np.log(sigma * np.sqrt(2 * np.pi)))
-    return float(np.sqrt(sum(errors) / max(sum(counts), 1)) / MICROMETRE), np.array(densities)
+    return float(np.sqrt(sum(errors) / max(sum(counts), 1)) / MICROMETRE), np.array(densities), np.array(errors)
 
 
 def predicted(placing: Freedoms, every: Floats, out: NDArray[np.bool_]) -> tuple[Floats, Floats, int]:

@@ -163,7 +163,7 @@ def test_turning_the_plate_is_what_is_suggested() -> None:
 @pytest.mark.long
 def test_in_one_attitude_a_pattern_is_an_offset_of_each_hole_and_no_machines_error() -> None:
     found = diagnosed(recorded([AS_IT_LIES], own_pattern()))
-    assert found.verdict == "consistent"
+    assert found.verdict == "undetermined"
     assert found.noise.placing.value == pytest.approx(deformation_rms(own_pattern()), rel=0.2)
 
 

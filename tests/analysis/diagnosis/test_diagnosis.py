@@ -116,13 +116,15 @@ def test_a_hidden_periodic_error_is_found_with_its_period() -> None:
 
 
 @pytest.mark.long
-def test_an_effect_that_nobody_knows_is_called_unexplained_and_located() -> None:
+def test_an_effect_that_nobody_knows_is_located_and_modelled_without_a_name() -> None:
     points = recording({}, Noise(1e-3))
     error = np.zeros_like(points.xyz)
     error[:, 1] = 6e-3 * np.exp(-(((points.xyz[:, 0] - 600.0) / 70.0) ** 2))
     found = diagnosed(recording({}, Noise(1e-3), error=error))
-    assert found.verdict == "unexplained"
+    assert found.verdict == "empirical"
     assert not found.effects
+    assert found.empirical is not None
+    assert (found.empirical.functions[0].term.of, found.empirical.functions[0].term.along) == ("x_mm", "y")
     assert found.where[0].covariate == "x_mm"
     assert found.where[0].p_value < 1e-3
     low, high = found.where[0].region
@@ -157,7 +159,7 @@ def test_noise_that_is_twice_what_was_stated_is_noise_and_contradicts_it() -> No
 @pytest.mark.long
 def test_set_up_offsets_are_noise_of_the_placing() -> None:
     found = diagnosed(recording({}, Noise(1e-3, placing=1.5e-3)))
-    assert found.verdict == "consistent"
+    assert found.verdict == "undetermined"  # nothing is found, and repeats share more than they scatter by
     assert found.noise.placing.value == pytest.approx(1.5, rel=0.5)
 
 

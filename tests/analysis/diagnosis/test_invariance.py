@@ -21,7 +21,7 @@ NAMED = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squ
 
 
 @cache
-def recording(gap_um: float = 12.0) -> Points:
+def recording(gap_um: float = 24.0) -> Points:
     """Eight bars twice, with backlash of X."""
     random = np.random.default_rng(1)
     once = bars(random, 8, 400.0, Machine("m", "XYZ", TRAVEL))
