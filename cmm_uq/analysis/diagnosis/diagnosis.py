@@ -21,7 +21,8 @@ from cmm_uq.analysis.diagnosis.empirical.model import BestKnown, EmpiricalModel,
 from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement, thin_out
 from cmm_uq.analysis.diagnosis.joint import JointPosterior, WithheldEffect, joint_posterior
 from cmm_uq.analysis.diagnosis.location import Place, locate
-from cmm_uq.analysis.diagnosis.noise import RepeatComparison, against_repeats, has_heavy_tails, probability_by_name
+from cmm_uq.analysis.diagnosis.noise import has_heavy_tails, probability_by_name
+from cmm_uq.analysis.diagnosis.repeats import RepeatComparison, against_repeats
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
@@ -259,7 +260,7 @@ def diagnose(
         verdict, first.p_value, alpha, locate(first, alpha, found.chosen), left_out(found, joint, model),
         indistinguishable(found), rivals, noise, gain, model, after, joint.components, joint.posterior,
         int(some.used.sum()), found, withheld, average_models(found, joint, model, seed), empirical, repeats,
-        best_known(found, model) if wrong else None,
+        best_known(found) if wrong else None,
     )  # fmt: skip
 
 

@@ -119,7 +119,7 @@ def repeats_words(d: Diagnosis) -> Text:
     if one is None or one.p_value >= d.alpha:
         return NOTHING
     told = say(
-        "What all repeats of a set-up share is {shared} µm; they scatter by {own} µm (F test, p = {p}).",
+        "What readings of one quantity share is {shared} µm; they scatter by {own} µm (F test, p = {p}).",
         shared=significant(one.shared_um),
         own=significant(one.repeatability_um),
         p=number(one.p_value, ".1g"),
@@ -159,7 +159,8 @@ def empirical_section(d: Diagnosis, improved: Callable[[Improvement], Table]) ->
         say(
             "Empirical: fitted to this recording, not known beforehand; it holds where was measured. The function "
             "is chosen anew "
-            "wherever {unseen} are held out: all are averaged as the others weigh them.",
+            "wherever {unseen} are held out: all are averaged as the others weigh them, "
+            "under the noise that is found beside them.",
             unseen=found.improvement.unseen,
         )
     )

@@ -320,7 +320,7 @@ def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[Text, ..
     texts = (
         (noise.contradicts_stated and stated_um is not None,
          say("This contradicts the stated {stated_um:g} µm.", stated_um=stated_um or 0.0)),
-        (noise.placing.value > 0.3 * value and diagnosis.verdict != "empirical",
+        (noise.placing.value > 0.3 * value and diagnosis.verdict != "empirical" and not repeats_words(diagnosis),
          say("Each set-up is off by about {value:.2g} µm that its repeats share.", value=noise.placing.value)),
         (noise.correlated_in_time, say("Neighbouring readings are correlated in time.")),
         (noise.heavy_tails, say("The scatter has heavier tails than a normal distribution.")),

@@ -212,7 +212,7 @@ _MANY_DIRECTIONS, _SEEN = 12, 1e-6
 # Beginnings of columns that belong to a point's place, or have functions of their own
 _PLACED = ("approach_", "nx", "ny", "nz", "tip_", "reference_", "time_s")
 # mm: no jump is sought between readings nearer than this, which are one place read again; what parts these is their noise
-_SAME_PLACE = 0.1
+SAME_PLACE = 0.1
 _SUDDEN = ("time_s", "order")  # covariates of an observation at which an error may jump
 _KEPT = 1e-3
 _GRID = 60
@@ -235,7 +235,7 @@ def _of_readings(model: RecordingModel, points: Points, values: Floats) -> Itera
     for axis, readings in points.readings.items():
         if np.ptp(readings) < 1.0:
             continue
-        functions = list(_functions(readings, _SAME_PLACE))
+        functions = list(_functions(readings, SAME_PLACE))
         for j, direction in enumerate(AXES):
             members = tuple(Member(model.seen(_along(j, f), values), weight=w, values=f) for f, w in functions)
             along, of = Verbatim(direction.upper()), Verbatim(axis.upper())

@@ -15,6 +15,7 @@ from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily
 from cmm_uq.analysis.diagnosis.held_out import FOLDS, Improvement, held_out_groups
+from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
 
@@ -219,6 +220,30 @@ def _log_density(error: Floats, factor: Floats, sigma: float, lost: int) -> floa
 
 def improvements(result: SearchResult, data: FunctionFit, functions: int) -> list[Improvement]:
     """Before and after by one function, two …, on held-out set-ups, or points of few set-ups."""
+    held = _held_out(result, data, functions)
+    scale = result.first.comparison.noise_scale
+    rms = [float(np.sqrt(np.mean((left * scale) ** 2))) / MICROMETRE for left in residuals(data, functions)]
+    return [_compared(held, held, number, rms[0], rms[number]) for number in range(1, functions + 1)]
+
+
+def improvement_by(result: SearchResult, data: FunctionFit, columns: Floats) -> Improvement:
+    """The same of columns (m, k), over the noise scale, that may take any coefficient."""
+    more = replace(data, free=np.hstack([data.free, columns]))
+    scale = result.first.comparison.noise_scale
+    rms = [float(np.sqrt(np.mean((next(residuals(one, 0)) * scale) ** 2))) / MICROMETRE for one in (data, more)]
+    return _compared(_held_out(result, data, 0), _held_out(result, more, 0), 0, *rms)
+
+
+@dataclass(frozen=True, eq=False)
+class _HeldOut:
+    """Rms (f,) of held-out errors, µm, and log densities (folds, f), without a function, with one, and so on."""
+
+    rms: Floats
+    density: Floats
+    unseen: Text
+
+
+def _held_out(result: SearchResult, data: FunctionFit, functions: int) -> _HeldOut:
     groups, unseen = held_out_groups(result.first.model)
     scale, folds = result.first.comparison.noise_scale, min(len(np.unique(groups)), FOLDS)
     squares, count, logs = np.zeros(functions + 1), 0, list[list[float]]()
@@ -228,13 +253,14 @@ def improvements(result: SearchResult, data: FunctionFit, functions: int) -> lis
         squares += [float(np.sum((one.errors * scale[out]) ** 2)) for one in each]
         count += int(out.sum()) - lost
         logs.append([one.log_density for one in each])
-    density, held = np.array(logs), np.sqrt(squares / max(count, 1)) / MICROMETRE
-    rms = [float(np.sqrt(np.mean((left * scale) ** 2))) / MICROMETRE for left in residuals(data, functions)]
-    found = []
-    for gain, after, left in zip((density[:, 1:] - density[:, :1]).T, held[1:], rms[1:], strict=True):
-        se = float(np.sqrt(len(gain)) * gain.std(ddof=1)) if len(gain) > 1 else np.inf
-        found.append(Improvement(rms[0], left, float(held[0]), float(after), float(gain.sum()), se, unseen))
-    return found
+    return _HeldOut(np.sqrt(squares / max(count, 1)) / MICROMETRE, np.array(logs), unseen)
+
+
+def _compared(before: _HeldOut, after: _HeldOut, number: int, rms: float, rms_after: float) -> Improvement:
+    gain = after.density[:, number] - before.density[:, 0]
+    se = float(np.sqrt(len(gain)) * gain.std(ddof=1)) if len(gain) > 1 else np.inf
+    held = float(before.rms[0]), float(after.rms[number])
+    return Improvement(rms, rms_after, *held, float(gain.sum()), se, before.unseen)
 
 
 def residuals(data: FunctionFit, functions: int) -> Iterator[Floats]:

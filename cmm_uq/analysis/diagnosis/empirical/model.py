@@ -18,22 +18,22 @@ import scipy
 
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, UNKNOWN_SD, effect_of
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import log_prior
-from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, with_effects
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.empirical.evidence import (
     IMPROBABLE,
     FunctionFit,
     FunctionVersion,
+    improvement_by,
     improvements,
     residuals,
 )
 from cmm_uq.analysis.diagnosis.empirical.forms import SMOOTH
 from cmm_uq.analysis.diagnosis.empirical.functions import FunctionTerm, families_of
-from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement
+from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import without_unseen
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 ODDS = 20.0  # of a further function over none, and of a form over all else, from which it is told
@@ -256,7 +256,7 @@ def _stated(term: FunctionTerm, parts: Sequence[str], sizes: Sequence[float]) ->
     return f'[[effect]]\nname = "{name}"\nformula = "e_{term.along} = {formula}"\nparameters = {{ {parameters} }}\n'
 
 
-def best_known(result: SearchResult, before: RecordingModel) -> BestKnown | None:
+def best_known(result: SearchResult) -> BestKnown | None:
     """The effect of the catalogue that by itself makes the recording most probable, asserted or not."""
     first, prior = result.first, log_prior(result.first.explanations)
     known = [i for i, e in enumerate(first.explanations) if e.kind == EFFECT and np.isfinite(first.log_odds[i])]
@@ -265,10 +265,10 @@ def best_known(result: SearchResult, before: RecordingModel) -> BestKnown | None
     best = max(known, key=lambda i: float(first.log_odds[i] + prior[i]))
     functions = [i for i, e in enumerate(first.explanations) if e.kind == UNKNOWN]
     odds = float(np.exp(min(max(first.log_odds[functions], default=-np.inf) - first.log_odds[best], 700.0)))
-    versions = [first.comparison.beside((), (best,))[best][1]]
-    model = with_effects(first, versions, frozenset({best}))
-    model = replace(model, artefact=before.artefact, used=before.used)
-    effect = effect_of(first.explanations[best])
-    combinations = result.combinations
+    member = first.comparison.beside((), (best,))[best][1].member
+    columns = first.explanations[best].members[member].columns / first.comparison.noise_scale[:, None]
+    alone = replace(FunctionFit.of(result, ()), free=first.comparison.baseline)  # with nothing that was asserted
+    effect, combinations = effect_of(first.explanations[best]), result.combinations
     probability = 0.0 if combinations is None else combinations.of(best)
-    return BestKnown(effect.name, effect.title, probability, odds, improvement(before, model), effect.points_to)
+    gain = improvement_by(result, alone, columns)
+    return BestKnown(effect.name, effect.title, probability, odds, gain, effect.points_to)
