@@ -50,9 +50,6 @@ def schema_of(table: type[BaseModel], title: str = "") -> Schema:
     return ({"$schema": DRAFT, "title": title} if title else {}) | found
 
 
-_KNOWN_EFFECTS = "#/properties/model/properties/effects/items/anyOf/0"  # where they stand in the schema
-
-
 def job_schema(
     tables: Mapping[str, type[ArtefactFacts]], effects: Mapping[str, str], standards: Iterable[str]
 ) -> Schema:
@@ -65,7 +62,7 @@ def job_schema(
     stated = keys["effect"]["items"]["properties"]["name"]  # any other is one of the job's own
     own = {"type": "string", "pattern": stated["pattern"]}
     keys["model"]["properties"]["effects"]["items"] = {"anyOf": [known, own]}
-    named = {"properties": {"model": {"properties": {"effects": {"items": {"$ref": _KNOWN_EFFECTS}}}}}}
+    named = {"properties": {"model": {"properties": {"effects": {"items": {"enum": list(effects)}}}}}}
     found["allOf"] = [{"if": {"not": {"required": ["effect"]}}, "then": named}]
     keys["conformity"]["items"]["properties"]["standard"]["enum"] = list(standards)
     without = [name for name, table in tables.items() if not table.with_recording]

@@ -13,6 +13,11 @@ from typing import Any, Literal
 from cmm_uq.base.messages import NOTHING, Text, Verbatim
 from cmm_uq.base.units import UNITS, printed_unit
 
+# verdicts of a diagnosis: nothing is found; noise and an error are not told apart; a cause, or part of it, is found; a
+# function is, without a name; nothing that predicts is
+DIAGNOSES = ("consistent", "undetermined", "explained", "partial", "empirical", "unexplained")
+AGREES = ("consistent", "undetermined")  # nothing is found to be missing
+
 # outcomes of statements, the gravest first: findings in their order; incomplete is what would pass, were it whole
 GRAVEST = ("fail", "conditional fail", "remeasure", "undecided", "incomplete", "conditional pass", "pass")
 NONE = "none"  # in place of an outcome where nothing is stated

@@ -22,10 +22,11 @@ from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement, thin_ou
 from cmm_uq.analysis.diagnosis.joint import JointPosterior, WithheldEffect, joint_posterior
 from cmm_uq.analysis.diagnosis.location import Place, locate
 from cmm_uq.analysis.diagnosis.noise import has_heavy_tails, probability_by_name
-from cmm_uq.analysis.diagnosis.repeats import RepeatComparison, against_repeats
+from cmm_uq.analysis.diagnosis.verdict import RepeatComparison, against_repeats, exceeds, verdict_of
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.jobs.verdicts import AGREES
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.recorded import of_last_digit
@@ -180,8 +181,6 @@ def _reported(model: RecordingModel, draws: Floats) -> dict[str, dict[str, Quant
     return found
 
 
-# nothing is found; it cannot be told from noise; a cause, or part of it, is found; a function is; nothing that predicts is
-VERDICTS = ("consistent", "undetermined", "explained", "partial", "empirical", "unexplained")
 FALSE_ALARMS = 0.01  # default rate at which a recording without any fault is found to have one
 _UNKNOWN = 0.5
 _NOISE_KIND = 0.9
@@ -227,7 +226,7 @@ class Diagnosis:
     @property
     def agrees(self) -> bool:
         """Whether nothing is found to be missing."""
-        return self.verdict in ("consistent", "undetermined")
+        return self.verdict in AGREES
 
 
 def diagnose(
@@ -249,13 +248,12 @@ def diagnose(
     most = np.argsort(-first.probability)[:12]
     rivals = tuple((first.explanations[i].name, float(first.probability[i])) for i in most)
     repeats, wrong = against_repeats(found.model), first.p_value < alpha
-    above = repeats is not None and repeats.p_value < alpha
-    verdict = "undetermined" if above else "consistent"
-    if wrong and found.effects:
-        verdict = "partial" if found.rough or found.unexplained > _UNKNOWN or above else "explained"
-    empirical = empirical_model(found) if wrong and verdict != "explained" else None
-    if wrong and not found.effects:
-        verdict = "empirical" if empirical is not None and empirical.predicts else "unexplained"
+    doubtful = bool(found.rough) or found.unexplained > _UNKNOWN or exceeds(repeats, alpha)
+    empirical = empirical_model(found) if wrong and (doubtful or not found.effects) else None
+    modelled = empirical is not None and empirical.predicts
+    verdict = "undetermined" if exceeds(repeats, alpha) else "consistent"
+    if wrong:
+        verdict = verdict_of(named=bool(found.effects), doubtful=doubtful, modelled=modelled)
     return Diagnosis(
         verdict, first.p_value, alpha, locate(first, alpha, found.chosen), left_out(found, joint, model),
         indistinguishable(found), rivals, noise, gain, model, after, joint.components, joint.posterior,

@@ -33,12 +33,10 @@ from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.predicted_errors import PredictedErrors
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown, solve
 
-MISTAKEN = (
-    0.1  # probability, beforehand, that a simulation is mistaken in one of these ways; its families share it evenly
-)
-NAMED = float(
-    np.log(20.0)
-)  # log odds over all else from which a mistake is named, and over another that it is told from
+# Probability, beforehand, that a simulation is mistaken in one of these ways; its families share it evenly
+MISTAKEN = 0.1
+# Log odds over all else from which a mistake is named, and over another that it is told from
+NAMED = float(np.log(20.0))
 _TOLD = 0.05  # odds over the prediction as it is from which a mistake is told
 _MOST_TOLD = 6
 _KEPT = 8  # mistakes of a family whose evidence is reckoned with: those that leave least
@@ -56,9 +54,8 @@ class SimulationMistake:
     title: Text
     remedy: Text
     probability: float  # among all that was compared, the diagnosis's explanations of the prediction as it is included
-    odds_over_none: (
-        float | None
-    )  # over the prediction as it is, nothing missing; ``None`` where figures say it themselves
+    # over the prediction as it is, nothing missing; ``None`` where figures say it themselves
+    odds_over_none: float | None
     odds_over_physics: float | None  # over all that the diagnosis compared with it
     rms_um: float  # of the residuals without it
     heldout_rms_um: float  # of predictions of what was left out of the fit

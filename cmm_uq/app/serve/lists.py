@@ -12,6 +12,7 @@ from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, bad
 from cmm_uq.app.serve.trends import trends
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, listed, number, plural, say
+from cmm_uq.jobs.verdicts import DIAGNOSES
 from cmm_uq.laboratory.records import facts
 from cmm_uq.laboratory.records.facts import ArtefactRow
 from cmm_uq.laboratory.records.listing import CertificateFilter, chosen
@@ -91,9 +92,7 @@ def diagnoses_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     """Verdicts of certificates and of diagnoses on whether a recording agrees with its model."""
     request.only(("text", "verdict", "since", "until", "page"))
     verdict = request.one_of("verdict", (*p.VERDICTS, "all"))
-    verdicts = {"": ("undetermined", "explained", "partial", "empirical", "unexplained"), "all": tuple(p.VERDICTS)}.get(
-        verdict, (verdict,)
-    )
+    verdicts = {"": DIAGNOSES[1:], "all": tuple(p.VERDICTS)}.get(verdict, (verdict,))
     since, until, dates = _dates(request)
     choice = CertificateFilter(text=request.text("text"), command="", verdicts=verdicts, since=since, until=until)
     rows, total = v.paged(view.records, choice, request)

@@ -210,9 +210,8 @@ def _narrow(alike: Floats) -> NDArray[np.bool_]:
 
 
 LEAST_POSITIONS = 4  # positions that the maps of a column must share
-_UNMOVED = (
-    5.0  # times that a third map of a scale is farther off than its temperature explains, for two others to be copies
-)
+# Times that a third map of a scale is farther off than its temperature explains, for two others to be copies
+_UNMOVED = 5.0
 _TURNED = 0.3  # part of the misfit that is left when a column with the wrong sign is turned
 
 

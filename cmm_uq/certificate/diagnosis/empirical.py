@@ -10,6 +10,7 @@ from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.empirical.model import ODDS, EmpiricalFunction
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import region_of
+from cmm_uq.analysis.diagnosis.verdict import exceeds
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, number, say
 from cmm_uq.certificate.diagnosis.sections import region_words
 from cmm_uq.certificate.document import Facts, Paragraph, Plot, Section, Table, section
@@ -116,7 +117,7 @@ def stated_functions(d: Diagnosis) -> str:
 def repeats_words(d: Diagnosis) -> Text:
     """What repeats of a quantity share, beside their scatter, where that is more than noise leaves."""
     one = d.repeats
-    if one is None or one.p_value >= d.alpha:
+    if one is None or not exceeds(one, d.alpha):
         return NOTHING
     told = say(
         "What readings of one quantity share is {shared} µm; they scatter by {own} µm (F test, p = {p}).",

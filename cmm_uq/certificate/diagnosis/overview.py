@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
 from cmm_uq.analysis.diagnosis.comparison.search import ASSERTED
-from cmm_uq.analysis.diagnosis.diagnosis import VERDICTS, Diagnosis
+from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
 from cmm_uq.analysis.screening.columns import Finding
@@ -32,12 +32,13 @@ from cmm_uq.certificate.document import Overview, Standing
 from cmm_uq.certificate.result import JobDiagnosis, SimulatedTwin
 from cmm_uq.certificate.wording import Headline, Summary, effect_of, effect_title, probability, size_of, titles
 from cmm_uq.jobs.job import JobFile
+from cmm_uq.jobs.verdicts import DIAGNOSES
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 # What a verdict means for who is to act
 _STANDING: Mapping[str, Standing] = {"consistent": "good", "unexplained": "bad"}
-STANDING: Mapping[str, Standing] = {verdict: _STANDING.get(verdict, "open") for verdict in VERDICTS}
+STANDING: Mapping[str, Standing] = {verdict: _STANDING.get(verdict, "open") for verdict in DIAGNOSES}
 
 # A verdict as the title of its overview
 VERDICT_TITLES: Mapping[str, Text] = {

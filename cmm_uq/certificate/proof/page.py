@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.diagnosis.diagnosis import VERDICTS
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, plural, say
 from cmm_uq.certificate.document import Document, Facts, Paragraph, Section, working_page
 from cmm_uq.certificate.origin import program
@@ -15,6 +14,7 @@ from cmm_uq.certificate.proof.sections import DiagnosisProof, in_words, limits, 
 from cmm_uq.certificate.result import Outcome
 from cmm_uq.certificate.results.contents import head
 from cmm_uq.certificate.wording import Headline, Summary, titles
+from cmm_uq.jobs.verdicts import DIAGNOSES
 from cmm_uq.laboratory.proving import judgement as judged
 from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH
 from cmm_uq.laboratory.proving.cases import ALLOWED, KINDS, STRONGEST, WEAKEST, micrometres
@@ -209,7 +209,7 @@ def proof_results(proof: DiagnosisProof) -> dict[str, Any]:
         **head(proof.job, SCHEMA), "cases": len(judgement.cases), "seed": proof.seed, "alpha": proof.alpha,
         "truth_sha256": proof.sha256, "noise": micrometres(proof.design.noise),
         "verdicts": {
-            kind.replace(" ", "_"): {said: judgement.verdicts(kind).get(said, 0) for said in (*VERDICTS, REFUSED)}
+            kind.replace(" ", "_"): {said: judgement.verdicts(kind).get(said, 0) for said in (*DIAGNOSES, REFUSED)}
             for kind in KINDS
         },
         "rates": {name: _rate(getattr(judgement, name)) for name in RATES},

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.diagnosis.diagnosis import VERDICTS
 from cmm_uq.base.messages import DASH, NOTHING, Text, commas, names, number, say, semicolons
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
@@ -17,6 +16,7 @@ from cmm_uq.certificate.diagnosis.overview import VERDICT_WORDS
 from cmm_uq.certificate.document import Column, Facts, Paragraph, Plot, Section, Standing, section, table
 from cmm_uq.certificate.plots.style import ACCENT, BAND, INK, MUTED, bars, dots, drawn, picture
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.verdicts import DIAGNOSES
 from cmm_uq.laboratory.proving import cases, design as set_ups, judgement
 from cmm_uq.laboratory.proving.cases import canonical_json, micrometres, sha256_of
 from cmm_uq.laboratory.proving.design import Design, FaultReach, Reach, fault_reaches, reaches
@@ -168,10 +168,10 @@ def answers_section(proof: DiagnosisProof) -> Section:
     judged, rows = proof.judgement, []
     for kind, what in KIND_WORDS.items():
         said = judged.verdicts(kind)
-        answers = (number(said.get(verdict, 0)) for verdict in (*VERDICTS, judgement.REFUSED))
+        answers = (number(said.get(verdict, 0)) for verdict in (*DIAGNOSES, judgement.REFUSED))
         right = number(sum(one.right for one in judged.of_kind(kind)))
         rows.append((what, number(sum(said.values())), *answers, right))
-    answered = [Column(ANSWER_WORDS[verdict]) for verdict in (*VERDICTS, judgement.REFUSED)]
+    answered = [Column(ANSWER_WORDS[verdict]) for verdict in (*DIAGNOSES, judgement.REFUSED)]
     verdicts = table(say("Verdicts"), (say("Hidden"), Column(say("Cases")), *answered, Column(say("Right"))), rows, say(
         "Right: consistent of nothing; explained of effects that are all found and no other named; of a function, "
         "that no known effect accounts for it; of a fault of the artefact, that something is there and no effect of "

@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from cmm_uq.analysis.diagnosis.diagnosis import VERDICTS
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.tables.plan import ProveFacts
+from cmm_uq.jobs.verdicts import AGREES, DIAGNOSES
 from cmm_uq.laboratory.proving.cases import ARTEFACT, KINDS, NOTHING, ONE, OUTSIDE, TWO, Case
 
 LEVEL = 0.95
@@ -149,8 +149,8 @@ def _quantiles(values: Floats, weight: Floats) -> tuple[float, float, float]:
     return float(low), float(middle), float(high)
 
 
-CONSISTENT, UNDETERMINED, EXPLAINED, PARTIAL, EMPIRICAL, UNEXPLAINED = VERDICTS
-AGREES, BEYOND = (CONSISTENT, UNDETERMINED), (PARTIAL, EMPIRICAL, UNEXPLAINED)
+CONSISTENT, UNDETERMINED, EXPLAINED, PARTIAL, EMPIRICAL, UNEXPLAINED = DIAGNOSES
+BEYOND = (PARTIAL, EMPIRICAL, UNEXPLAINED)
 REFUSED = "refused"
 ANSWER = frozenset({"number", "verdict", "effects", "groups", "named", "heldout_um"})  # keys of what is no refusal
 # which 95 % intervals are counted: of effects that were found; of those that the job names, by what was hidden

@@ -22,7 +22,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, day, plural, say
 from cmm_uq.base.output.new_file import writing_to
 from cmm_uq.base.output.staging import replace_file
-from cmm_uq.jobs.verdicts import Verdicts
+from cmm_uq.jobs.verdicts import AGREES, Verdicts
 from cmm_uq.laboratory.schedule.state import AHEAD, PRIVATE, Dispatch, FolderState, turn
 
 Event = Literal["fail", "incomplete", "undecided", "mismatch", "drift", "due", "missed", "error"]
@@ -78,7 +78,7 @@ def of_results(results: Mapping[str, Any], inputs: str, where: str) -> list[Noti
                 text = say("{standard}: {decision}", standard=standard, decision=said)
             told.setdefault(_OF_OUTCOME.get(one.outcome, "undecided"), []).append(text)
     verdict = str((results.get("diagnosis") or {}).get("verdict") or "consistent")
-    if verdict not in ("consistent", "undetermined"):
+    if verdict not in AGREES:
         told.setdefault("mismatch", []).append(_OF_VERDICT.get(verdict, _CONTRADICTS))
     return [
         Notice(event, str(name), say("{event}: {of}", event=Verbatim(event), of=of),

@@ -22,7 +22,7 @@ from cmm_uq.app.commands.reading import job_of
 from cmm_uq.app.commands.report import REPORT, report_outcome
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output.new_file import new_file, refuse_taken
-from cmm_uq.jobs.verdicts import Verdicts
+from cmm_uq.jobs.verdicts import AGREES, Verdicts
 from cmm_uq.laboratory.records.content import values
 from cmm_uq.laboratory.records.facts import Heads
 from cmm_uq.laboratory.schedule.jobs import job_folders
@@ -71,7 +71,7 @@ def results_of(folder: Path) -> dict[str, Any] | None:
 
 def conforming(results: Mapping[str, Any]) -> bool:
     """Whether every statement of conformity is a pass, and the recording agrees with the model that the job names."""
-    return Verdicts.of_results(results).conforming and verdict(results) in ("consistent", "undetermined", "")
+    return Verdicts.of_results(results).conforming and verdict(results) in (*AGREES, "")
 
 
 def verdict(results: Mapping[str, Any]) -> str:

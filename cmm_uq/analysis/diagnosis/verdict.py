@@ -1,4 +1,4 @@
-"""What a model leaves of a recording, held against what its repeats scatter by: the noise that is independent of any model."""
+"""The verdict of a diagnosis, and what a model leaves held against what repeats scatter by, which no model makes smaller."""
 
 from __future__ import annotations
 
@@ -50,6 +50,18 @@ def against_repeats(model: RecordingModel) -> RepeatComparison | None:
             p_value = float(scipy.special.fdtrc(other, own, mean / scatter))
             return RepeatComparison(float(np.sqrt(scatter)) / MICROMETRE, shared / MICROMETRE, p_value)
     return None
+
+
+def exceeds(repeats: RepeatComparison | None, alpha: float) -> bool:
+    """Whether repeats share more than noise that is independent from reading to reading would leave."""
+    return repeats is not None and repeats.p_value < alpha
+
+
+def verdict_of(*, named: bool, doubtful: bool, modelled: bool) -> str:
+    """Of a recording that contradicts its model: effects are named, and whether in full; or a function predicts it."""
+    if named:
+        return "partial" if doubtful else "explained"
+    return "empirical" if modelled else "unexplained"
 
 
 def _means(columns: Floats, block: Ints) -> Floats:
