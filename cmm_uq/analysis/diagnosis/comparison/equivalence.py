@@ -35,7 +35,8 @@ class EquivalentSet:
     instead_of: tuple[int, ...]
     members: tuple[int, ...]
     sizes: tuple[float, ...]  # of the members then, in prior standard deviations
-    odds: float  # of what they stand for over them by the readings alone, each at its best: a ratio of likelihoods
+    # of what they stand for over them by the readings alone: what of it they cannot be, one where they can be all of it
+    odds: float
     prior_odds: float  # by what is known beforehand alone
 
 

@@ -43,7 +43,7 @@ def test_nodes_lie_as_far_apart_as_said() -> None:
         for k, _ in enumerate(form.parameters):
             nodes, index = np.unique(form.shapes[:, k], return_index=True)
             if len(nodes) > 2 and form.name not in ("step", "sawtooth"):
-                assert form.apart[index, k] == pytest.approx(np.abs(np.gradient(nodes)), rel=0.7)
+                assert form.apart[index, k] == pytest.approx(np.abs(np.gradient(nodes)), rel=1e-9)
 
 
 def test_a_sawtooth_has_two_periods_and_a_sine_one() -> None:
