@@ -189,7 +189,7 @@ RESULTS: Mapping[str, str] = {
     "diagnosis.effects[].alternatives[].effects": "A set of effects that the readings alone do not tell from it.",
     "diagnosis.effects[].alternatives[].instead_of": "What the set stands for: the effect, or it and another that was found.",
     "diagnosis.effects[].alternatives[].sizes": "Of the set's effects then, in prior standard deviations.",
-    "diagnosis.effects[].alternatives[].odds": "Likelihood ratio of the effect as found over the set: 1 where it can be all of it.",
+    "diagnosis.effects[].alternatives[].odds": "Likelihood ratio of the effect as found over the set; 1 where it can be all.",
     "diagnosis.effects[].alternatives[].prior_odds": "Odds of the effect over the set by what is known beforehand alone.",
     "diagnosis.effects[].KEY": "What more is said of it.",
     "diagnosis.withheld[].effect": "An effect that is probable and yet not asserted.",
