@@ -11,7 +11,7 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import SAME_PLACE
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.model import RecordingModel
-from cmm_uq.machine.model.noise import repeated_quantity
+from cmm_uq.machine.model.noise import number_in_reading, repeated_quantity
 from cmm_uq.maths.inference.linear_model import reached
 
 _FEWEST = 4  # degrees of freedom of the repeats, and of what they share, from which on the two are compared
@@ -72,11 +72,11 @@ def _means(columns: Floats, block: Ints) -> Floats:
 
 
 def _read_again(model: RecordingModel) -> Ints:
-    """Numbers (m,) that observations of one set-up share where all of their points are at the same places."""
+    """Numbers (m,) that observations of one set-up, seen alike, share where all of their points are at the same places."""
     artefact, rows = model.artefact, model.artefact.rows[model.used]
     places = artefact.points.machine_xyz[rows].reshape(len(rows), -1)
-    apart = 1e9 * artefact.measurement[model.used].astype(np.float64)  # set-ups are further apart than any places
-    tree = scipy.spatial.cKDTree(np.column_stack([places, apart]))
+    others = np.column_stack([artefact.measurement, number_in_reading(model)])[model.used]
+    tree = scipy.spatial.cKDTree(np.column_stack([places, 1e9 * others]))  # further apart than any places
     near = tree.query_pairs(SAME_PLACE, output_type="ndarray")
     graph = scipy.sparse.coo_array((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(rows), len(rows)))
     return np.asarray(scipy.sparse.csgraph.connected_components(graph, directed=False)[1], dtype=np.int64)

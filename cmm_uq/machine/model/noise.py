@@ -119,16 +119,21 @@ def machine_axes(rows: Ints, sensitivity: Floats) -> tuple[scipy.sparse.csr_arra
 
 def repeated_quantity(model: RecordingModel, chosen: np.ndarray) -> Ints:
     """Numbers (m,) that observations share when they repeat one quantity: the same points of one placing, seen alike."""
-    artefact = model.artefact
-    points = np.sort(artefact.points.point[artefact.rows], axis=1)
+    artefact, points = model.artefact, np.sort(model.artefact.points.point[model.artefact.rows], axis=1)
+    whole = np.column_stack([artefact.measurement, points, number_in_reading(model)])
+    return np.asarray(np.unique(whole[chosen], axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
+
+
+def number_in_reading(model: RecordingModel) -> Ints:
+    """Numbers (m,) of the observations of one reading of the same points, as along X, Y and Z: different quantities."""
+    artefact, points = model.artefact, np.sort(model.artefact.points.point[model.artefact.rows], axis=1)
     reading = np.column_stack([artefact.measurement, artefact.repeat, points])
     _, index = np.unique(reading, axis=0, return_inverse=True)
     order = np.argsort(index.ravel(), kind="stable")
     first = np.concatenate([[True], np.diff(index.ravel()[order]) > 0])
     place, number = np.arange(len(order)), np.empty(len(order), dtype=np.int64)
     number[order] = place - np.maximum.accumulate(np.where(first, place, 0))
-    _, found = np.unique(np.column_stack([artefact.measurement, points, number])[chosen], axis=0, return_inverse=True)
-    return np.asarray(found.ravel(), dtype=np.int64)
+    return number
 
 
 def _helmert(block: Ints) -> tuple[scipy.sparse.csr_array, Floats]:

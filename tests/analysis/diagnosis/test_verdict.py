@@ -13,6 +13,7 @@ from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
+from tests.artefacts.constructions import model, plate
 from tests.recordings import TRAVEL
 
 FACES = np.array([0.0, 60.0, 100.0, 180.0, 220.0, 280.0, 360.0, 400.0, 460.0, 520.0])
@@ -89,23 +90,30 @@ def test_without_repeats_there_is_nothing_to_compare() -> None:
     assert against_repeats(line(noise(1, 7))) is None
 
 
+def test_coordinates_of_one_point_are_no_repeats_of_each_other() -> None:
+    """A plate that is read once: X, Y and Z of a hole are at one place, and are three quantities."""
+    points = plate()
+    read = points.at(points.xyz + 1e-3 * np.random.default_rng(4).standard_normal(points.xyz.shape))
+    assert against_repeats(model(artefact_facts(kind="plate"), read, ())) is None
+
+
 def test_rows_in_another_order_change_nothing() -> None:
-    model = line(3e-3 * OFF + noise(2, 9), back=True)
-    points = model.artefact.points
+    plain_order = line(3e-3 * OFF + noise(2, 9), back=True)
+    points = plain_order.artefact.points
     order = np.random.default_rng(1).permutation(len(points))
     columns = {name: values[order] for name, values in points.columns.items()}
     of_rows = (values[order] for values in (points.xyz, points.measurement, points.point, points.repeat))
     mixed = Points(*of_rows, points.machine, columns)
     other = RecordingModel(StepGauge(artefact_facts(kind="step_gauge", length_mm=520.0), mixed), ())
-    plain, found = against_repeats(model), against_repeats(other)
+    plain, found = against_repeats(plain_order), against_repeats(other)
     assert plain is not None
     assert found is not None
     assert found.p_value == pytest.approx(plain.p_value, rel=1e-9)
 
 
 def test_a_pattern_read_there_and_back_in_one_set_up_is_never_consistent() -> None:
-    model = line(4e-3 * OFF + noise(2, 11), back=True, named=("scale_x",))
-    found = diagnose(model, stated_um=None, alpha=0.01, seed=1)
+    patterned = line(4e-3 * OFF + noise(2, 11), back=True, named=("scale_x",))
+    found = diagnose(patterned, stated_um=None, alpha=0.01, seed=1)
     assert isinstance(found.repeats, RepeatComparison)
     assert found.repeats.p_value < 0.01
     assert found.verdict not in ("consistent", "explained")
