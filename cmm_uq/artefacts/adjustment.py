@@ -6,10 +6,11 @@ These equations of US 4,437,151 are a second way to the six factors, beside the 
 are twice the scale errors, and e2, e3, e5 the squareness errors XY, ZX, YZ with the opposite sign. The patent solves normal
 equations, whose condition number is the square; here they are solved by an orthogonal factorisation.
 
-By claim 1 e the machine is adjusted. X stays where it is; Y is turned square to it, then Z square to both: about X first, from
-where it stands once Y is turned. The turns are those of the unit vectors along the axes. The signs follow from *true =
-indicated + e*: with e_x = −S·y the Y axis leans towards −X by S, and turning its guide by −S about Z sets it upright; Z has
-−Syz about X, but for a product of angles.
+By claim 1 e the machine is adjusted. Who turns a guide turns what rides on it too, so a guide is turned after that which it
+rides on: in the chain XYZ X stays where it is, Y is turned square to it, then Z square to both, about X first, from where it
+stands once Y is turned. The turns are those of the unit vectors along the axes. The signs follow from *true = indicated + e*:
+with e_x = −S·y the Y axis leans towards −X by S, and turning its guide by −S about Z sets it upright; Z has −Syz about X, but
+for a product of angles. Where the order is another the same holds of the axes in that order, mirrored if it is odd.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, plural, say, signed
-from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.points import AXES, Floats, Ints
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
 from cmm_uq.certificate.document import Block, Paragraph, Section, Table, figure_columns, text_columns
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.result import AtLeast, Result, as_evaluated
 from cmm_uq.certificate.wording import expanded
-from cmm_uq.machine.physics.effects.rigid_body import SCALE, SQUARENESS
+from cmm_uq.machine.physics.effects.rigid_body import SCALE, SQUARENESS, Squareness
 from cmm_uq.machine.physics.kinematics import KinematicChain, axis_directions
 from cmm_uq.maths.uncertainty.quantity import Quantity, rounded
 from cmm_uq.maths.uncertainty.type_a import coverage_factor
@@ -234,15 +235,22 @@ def lengths_of(result: Result, length: Floats, reference: float) -> Lengths:
     )  # fmt: skip
 
 
-# what takes away each of the six factors: what is turned (right-handed) or entered, and the axis whose guide or scale it is
-ADJUSTMENTS: dict[str, tuple[Text, str]] = {
-    SCALE["x"].name: (say("Scale of X: lengthen what it reads by"), "x"),
-    SCALE["y"].name: (say("Scale of Y: lengthen what it reads by"), "y"),
-    SCALE["z"].name: (say("Scale of Z: lengthen what it reads by"), "z"),
-    SQUARENESS["xy"].name: (say("Guide of Y: turn about +Z by"), "y"),
-    SQUARENESS["yz"].name: (say("Guide of Z: turn about +X by"), "z"),
-    SQUARENESS["zx"].name: (say("Guide of Z: turn about +Y by"), "z"),
-}
+def adjustments(chain: KinematicChain) -> dict[str, tuple[Text, str]]:
+    """What takes away each factor, in order: what is turned (right-handed) or entered, and the axis that it belongs to."""
+    names = {axis: Verbatim(axis.upper()) for axis in AXES}
+    enter = {SCALE[a].name: (say("Scale of {axis}: lengthen what it reads by", axis=names[a]), a) for a in AXES}
+    first, second, third = chain.from_frame
+    return enter | {
+        _between(*pair).name: (say("Guide of {axis}: turn about +{about} by", axis=names[guide], about=names[about]), guide)
+        for pair, guide, about in (
+            (first + second, second, third), (second + third, third, first), (third + first, third, second),
+        )
+    }  # fmt: skip
+
+
+def _between(a: str, b: str) -> Squareness:
+    return SQUARENESS[a + b if a + b in SQUARENESS else b + a]
+
 
 _NAMES = {effect.name: say("Scale error of {axis}", axis=Verbatim(axis.upper())) for axis, effect in SCALE.items()} | {
     effect.name: say("Angle {plane} − 90°", plane=Verbatim("–".join(plane.upper())))
@@ -273,28 +281,34 @@ class AdjustmentSetting:
         }  # fmt: skip
 
 
-def turns(squareness: Floats, z_rides_on_y: bool) -> Floats:
-    """Right-handed turns that make the axes square: of Y about +Z, then of Z about +X and about +Y.
+def turns(squareness: Floats, chain: KinematicChain) -> Floats:
+    """Right-handed turns that make the axes square, in the order of :func:`adjustments`; in the chain XYZ about +Z, +X, +Y.
 
     ``squareness`` (..., 3) Sxy, Syz, Szx, rad. Gives (..., 3) rad.
     """
-    axes = axis_directions(squareness)
+    first, second, third = chain.from_frame
+    pairs = [
+        list(SQUARENESS.values()).index(_between(*pair)) for pair in (first + second, second + third, third + first)
+    ]
+    axes = axis_directions(squareness[..., pairs])
     y, z = axes[..., 1, :], axes[..., 2, :]
     upright = np.arctan2(y[..., 0], y[..., 1])
     across, along = z[..., 0], z[..., 1]
-    if z_rides_on_y:
+    if chain.rides(third, on=second):
         c, s = np.cos(upright), np.sin(upright)
         across, along = c * across - s * along, s * across + c * along
     about_x = np.arctan2(along, z[..., 2])
     about_y = -np.arctan2(across, np.hypot(along, z[..., 2]))
-    return np.stack([upright, about_x, about_y], axis=-1)
+    hand = 1 if first + second + third in "xyzxy" else -1
+    return hand * np.stack([upright, about_x, about_y], axis=-1)
 
 
 def settings(result: Result) -> tuple[AdjustmentSetting, ...]:
     """What takes away each of the six factors that the recording determines."""
-    machine, turned = result.artefact.points.machine, _turns(result)
-    found = []
-    for effect, (what, axis) in ADJUSTMENTS.items():
+    machine = result.artefact.points.machine
+    chain, found = KinematicChain.of(machine.chain), []
+    turned = _turns(result, chain)
+    for effect, (what, axis) in adjustments(chain).items():
         if effect not in result.parameters or effect in result.free:
             continue
         name, quantity = next(iter(result.parameters[effect].items()))
@@ -306,13 +320,13 @@ def settings(result: Result) -> tuple[AdjustmentSetting, ...]:
     return tuple(found)
 
 
-def _turns(result: Result) -> dict[str, Quantity]:
+def _turns(result: Result, chain: KinematicChain) -> dict[str, Quantity]:
     """The three turns of the draws' axes, by the squareness that they take away; one that the job does not name is 0."""
     draws = {name: values for (name, _), (values, _) in result.model.reported(result.values).items()}
-    none, names = np.zeros(len(result.values)), [effect.name for effect in SQUARENESS.values()]
-    squareness = np.column_stack([draws.get(name, none) for name in names])
-    rides = KinematicChain.of(result.artefact.points.machine.chain).rides("z", on="y")
-    each = turns(ARCSECOND * squareness, rides).T / ARCSECOND
+    none = np.zeros(len(result.values))
+    squareness = np.column_stack([draws.get(effect.name, none) for effect in SQUARENESS.values()])
+    each = turns(ARCSECOND * squareness, chain).T / ARCSECOND
+    names = list(adjustments(chain))[3:]
     return {name: Quantity.of_draws(values, unit("″")) for name, values in zip(names, each, strict=True)}
 
 
@@ -332,11 +346,12 @@ def distances_data(result: Result, lengths: Lengths, second_way: SecondWay, **fu
 
 
 def section(result: Result, second_way: SecondWay, *remarks: Text) -> Section:
-    blocks = (*_adjustments(settings(result)), _second_way(result, second_way, remarks))
+    order = KinematicChain.of(result.artefact.points.machine.chain).from_frame
+    blocks = (*_adjustments(settings(result), order), _second_way(result, second_way, remarks))
     return Section(say("The adjustment that the machine needs"), blocks, opinion=True)
 
 
-def _adjustments(settings: tuple[AdjustmentSetting, ...]) -> tuple[Table, ...]:
+def _adjustments(settings: tuple[AdjustmentSetting, ...], order: str) -> tuple[Table, ...]:
     rows: list[tuple[Text, ...]] = []
     for setting in settings:
         over, sure = setting.over_travel, say("yes") if setting.beyond_doubt else NOTHING
@@ -348,9 +363,11 @@ def _adjustments(settings: tuple[AdjustmentSetting, ...]) -> tuple[Table, ...]:
         *text_columns(say("Adjustment")), *figure_columns(say("Value"), say("U")), *text_columns(say("Unit")),
         *figure_columns(say("Over the travel"), unit=unit("µm")), *text_columns(say("Beyond doubt")),
     )  # fmt: skip
+    first, second, third = map(Verbatim, order.upper())
     turning = say(
-        "X stays; Y is turned square to X, then Z to both, about X first. Turns are right-handed about the named axis."
-    )
+        "{first} stays; {second} is turned square to {first}, then {third} to both, about {first} first. Turns are "
+        "right-handed about the named axis.", first=first, second=second, third=third,
+    )  # fmt: skip
     doubt = say(
         "Beyond doubt: the 95 % interval does not contain zero. Over the travel: what the adjustment moves at its far end."
     )

@@ -2,46 +2,102 @@
 
 from __future__ import annotations
 
+import re
+from itertools import permutations
+
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.artefacts.adjustment import turns
+from cmm_uq.artefacts.adjustment import adjustments, turns
 from cmm_uq.artefacts.ballbar import results
 from cmm_uq.certificate.document import Paragraph
-from cmm_uq.machine.physics.kinematics import KinematicChain
+from cmm_uq.machine.physics.kinematics import KinematicChain, exact
 from tests.artefacts.reading import number
 from tests.artefacts.simulated import SQUARE, analysed, blocks, recovered, table
 
 ARCSEC = np.pi / 180 / 3600
-angles = st.floats(-2000.0, 2000.0)
+DEGREES = st.floats(-5.0, 5.0)
+CHAINS = [f"{a[:frame]}F{a[frame:]}" for a in map("".join, permutations("XYZ")) for frame in range(4)]
+SENTENCE = re.compile(r"Guide of ([XYZ]): turn about \+([XYZ]) by")
 
 
-@given(st.tuples(angles, angles, angles), st.booleans())
-def test_the_turns_make_the_axes_square(arcsec, rides: bool) -> None:
-    squareness = ARCSEC * np.array(arcsec)
-    xy, yz, zx = np.cos(np.pi / 2 + squareness)
-    x, y, z = np.linalg.cholesky(np.array([[1, xy, zx], [xy, 1, yz], [zx, yz, 1]]))
-    about_z, about_x, about_y = turns(squareness, rides)
-    guide_of_y = Rotation.from_rotvec([0, 0, about_z])
-    y = guide_of_y.apply(y)
-    z = guide_of_y.apply(z) if rides else z
-    z = Rotation.from_rotvec([0, about_y, 0]).apply(Rotation.from_rotvec([about_x, 0, 0]).apply(z))
-    np.testing.assert_allclose([x, y, z], np.eye(3), atol=1e-12)
+def carried_by(guide: str, chain: str) -> set[str]:
+    """A guide and what stands on it: on the probe's side of the frame what comes after it, on the workpiece's what before."""
+    below, _, above = chain.partition("F")
+    return set(above[above.index(guide) :] if guide in above else below[: below.index(guide) + 1])
+
+
+def guides_at(squareness) -> dict[str, np.ndarray]:
+    """Unit vectors that enclose 90° + S, by Cholesky."""
+    xy, yz, zx = np.cos(np.pi / 2 + np.asarray(squareness))
+    return dict(zip("XYZ", np.linalg.cholesky(np.array([[1, xy, zx], [xy, 1, yz], [zx, yz, 1]])), strict=True))
+
+
+def turned(guides: dict[str, np.ndarray], squareness, chain: str) -> dict[str, np.ndarray]:
+    """The machine after what its technician is told, in the order told: each turn takes along whatever stands on the guide.
+
+    The named axes are those of the machine when it is done: the axis that stays, and that in the plane of the second.
+    """
+    stays, second, third = KinematicChain.of(chain).from_frame.upper()
+    a = guides[stays]
+    b = guides[second] - (guides[second] @ a) * a
+    b /= np.linalg.norm(b)
+    c = np.cross(a, b) if stays + second + third in "XYZXY" else np.cross(b, a)
+    named = {stays: a, second: b, third: c}
+    told = [SENTENCE.fullmatch(str(what)) for what, _ in list(adjustments(KinematicChain.of(chain)).values())[3:]]
+    for sentence, angle in zip(told, turns(np.asarray(squareness), KinematicChain.of(chain)), strict=True):
+        guide, about = sentence.groups()
+        turn = Rotation.from_rotvec(angle * named[about])
+        guides = {axis: turn.apply(v) if axis in carried_by(guide, chain) else v for axis, v in guides.items()}
+    return guides
+
+
+@pytest.mark.parametrize("chain", CHAINS)
+@given(st.tuples(DEGREES, DEGREES, DEGREES))
+def test_the_turns_make_the_axes_of_every_chain_square(chain: str, degrees) -> None:
+    squareness = np.radians(degrees)
+    axes = np.array(list(turned(guides_at(squareness), squareness, chain).values()))
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(axes) > 0
+
+
+@pytest.mark.parametrize("chain", CHAINS)
+def test_an_adjusted_machine_of_every_chain_measures_without_error(chain: str) -> None:
+    """By the exact kinematics: the machine of −174″, 5 arcminutes and 3° reads every place as it is, but for its attitude."""
+    before = np.radians([-174 / 3600, 5 / 60, 3.0])
+    axes = turned(guides_at(before), before, chain)
+    after = np.array([np.arccos(axes[a] @ axes[b]) - np.pi / 2 for a, b in ("XY", "YZ", "ZX")])
+    readings = np.random.default_rng(1).uniform(-500, 500, (20, 3))
+    perfect = np.zeros((20, 3, 6))
+    np.testing.assert_allclose(exact(readings, perfect, after, chain=chain), 0, atol=1e-9)
+    assert np.abs(exact(readings, perfect, before, chain=chain)).max() > 10
+
+
+def test_what_carries_all_stays_where_it_is() -> None:
+    """Where X rides on Y, turning Y would turn both: X is turned, the other way round."""
+    assert [KinematicChain.of(chain).from_frame for chain in ("XYZ", "YXZ", "YFXZ", "XYFZ", "ZXY", "ZYXF")] == [
+        "xyz", "yxz", "xyz", "yxz", "zxy", "xyz",
+    ]  # fmt: skip
+    xy = ARCSEC * np.array([100.0, 0.0, 0.0])
+    np.testing.assert_allclose(turns(xy, KinematicChain.of("XYZ")) / ARCSEC, [-100, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(turns(xy, KinematicChain.of("YXZ")) / ARCSEC, [100, 0, 0], atol=1e-9)
+    told = [str(what) for what, _ in list(adjustments(KinematicChain.of("YXZ")).values())[3:]]
+    assert told == ["Guide of X: turn about +Z by", "Guide of Z: turn about +Y by", "Guide of Z: turn about +X by"]
 
 
 def test_small_angles_are_turned_back_by_themselves() -> None:
-    found = turns(ARCSEC * np.array([3.0, 2.0, 1.0]), True) / ARCSEC
+    found = turns(ARCSEC * np.array([3.0, 2.0, 1.0]), KinematicChain.of("XYZ")) / ARCSEC
     np.testing.assert_allclose(found, [-3.0, -2.0, 1.0], atol=1e-4)
 
 
 def test_a_product_of_angles_matters_where_z_stands_on_its_own() -> None:
     """1500″ twice: 1500″² is 10.9″ about X, which a ram that rides on the bridge does not show, but shows about Y."""
     squareness = ARCSEC * np.array([1500.0, 0.0, 1500.0])
-    assert turns(squareness, False)[1] / ARCSEC == pytest.approx(-10.9, abs=0.05)
-    assert turns(squareness, True)[1] / ARCSEC == pytest.approx(0, abs=0.1)
+    assert turns(squareness, KinematicChain.of("YFXZ"))[1] / ARCSEC == pytest.approx(-10.9, abs=0.05)
+    assert turns(squareness, KinematicChain.of("XYZ"))[1] / ARCSEC == pytest.approx(0, abs=0.1)
 
 
 @pytest.mark.parametrize(

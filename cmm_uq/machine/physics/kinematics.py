@@ -17,7 +17,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import permutations
+from itertools import combinations, permutations
 from typing import Literal
 
 import numpy as np
@@ -113,6 +113,15 @@ class KinematicChain:
         """Whether a carriage rides on another: what turns the guide of that one turns this one too."""
         place, below = (self.order.index(AXES.index(axis)) for axis in (carriage, on))
         return self.workpiece <= below < place or place < below < self.workpiece
+
+    @property
+    def from_frame(self) -> str:
+        """The axes, each after those that it rides on, and else in the order x, y, z."""
+        return min(
+            "".join(axes)
+            for axes in permutations(AXES)
+            if not any(self.rides(a, on=b) for a, b in combinations(axes, 2))
+        )
 
 
 @lru_cache(maxsize=64)
