@@ -1,10 +1,4 @@
-"""Positions a known distance apart: their lengths, the six factors by the distance equations, and what a technician turns.
-
-    d² = (1+e1)dX² + 2e2 dXdY + 2e3 dXdZ + (1+e4)dY² + 2e5 dYdZ + (1+e6)dZ²                     (100), (110)
-
-These equations of US 4,437,151 are a second way to the six factors, beside the measurement model: to first order e1, e4 and e6
-are twice the scale errors, and e2, e3, e5 the squareness errors XY, ZX, YZ with the opposite sign. The patent solves normal
-equations, whose condition number is the square; here they are solved by an orthogonal factorisation.
+"""Positions a known distance apart: their lengths, and what a technician turns.
 
 By claim 1 e the machine is adjusted. Who turns a guide turns what rides on it too, so a guide is turned after that which it
 rides on: in the chain XYZ X stays where it is, Y is turned square to it, then Z square to both, about X first, from where it
@@ -15,184 +9,24 @@ for a product of angles. Where the order is another the same holds of the axes i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, plural, say, signed
+from cmm_uq.artefacts.distance_equations import FACTORS, DistanceSolution
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.points import AXES, Floats, Ints
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
 from cmm_uq.certificate.document import Block, Paragraph, Section, Table, figure_columns, text_columns
 from cmm_uq.certificate.origin import quantity_data
-from cmm_uq.certificate.result import AtLeast, Result, as_evaluated
+from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import expanded
 from cmm_uq.machine.physics.effects.rigid_body import SCALE, SQUARENESS, Squareness
 from cmm_uq.machine.physics.kinematics import KinematicChain, axis_directions
 from cmm_uq.maths.uncertainty.quantity import Quantity, rounded
-from cmm_uq.maths.uncertainty.type_a import coverage_factor
-
-UNKNOWNS = 6
-
-# effects that the equations give, with their parameters
-FACTORS = tuple((effect.name, "ppm") for effect in SCALE.values()) + tuple(
-    (effect.name, "angle_arcsec") for effect in SQUARENESS.values()
-)
-
-# ratio of singular values of the equations for unit distances below which a factor hangs on set-up and noise
-POORLY_POSED = 1e-3
-
-PLACINGS: dict[Text, tuple[int, int, int]] = {
-    say("along X"): (1, 0, 0), say("along Y"): (0, 1, 0), say("along Z"): (0, 0, 1),
-    say("along a diagonal of X and Y"): (1, 1, 0), say("along the other diagonal of X and Y"): (1, -1, 0),
-    say("along a diagonal of Y and Z"): (0, 1, 1), say("along the other diagonal of Y and Z"): (0, 1, -1),
-    say("along a diagonal of Z and X"): (1, 0, 1), say("along the other diagonal of Z and X"): (1, 0, -1),
-}  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class DistanceSolution:
-    """What the distance equations say of a machine."""
-
-    e: Floats  # (6,) e1 … e6
-    covariance: Floats  # (6, 6) of them, from the residuals
-    residuals: Floats  # (m,) calibrated distance minus the one that e1 … e6 make of the readings, mm
-    residual_sd: float  # mm; 0 without degrees of freedom
-    relative_length_u: float = 0.0  # of the distance, where it is certified; 0 where it is taken as known
-    # (6,) what the way to the distances makes of the scales, ppm, and squarenesses, ″; it counts as a standard uncertainty
-    bias: Floats = field(default_factory=lambda: np.zeros(UNKNOWNS))
-    open_scales: bool = False  # whether nothing says the distance, so that scales are not determined
-
-    @property
-    def factors(self) -> Floats:
-        """(6,) scale errors of X, Y, Z, ppm, and squareness X–Y, Y–Z, Z–X, ″; see :func:`factors_of`."""
-        return factors_of(self.e)
-
-    def expanded(self, at_least: AtLeast = as_evaluated) -> tuple[tuple[float, float], ...] | None:
-        """U and k of each of the six factors for 95 %; ``None`` where the residuals have no degrees of freedom.
-
-        k is Student's t with the effective degrees of freedom (JCGM 100, G.4).
-        """
-        freedom, residual = len(self.residuals) - UNKNOWNS, self._u_of_residuals
-        if freedom < 1 or not np.all(residual > 0):
-            return None
-        factors = map(float, coverage_factor(freedom * (self.u / residual) ** 4, 0.95))
-        return tuple(
-            at_least(f"distance_equations.{effect}.{parameter}", k * u, k, unit("ppm" if parameter == "ppm" else "″"))
-            for (effect, parameter), k, u in zip(FACTORS, factors, self.u.tolist(), strict=True)
-        )
-
-    def as_data(self, at_least: AtLeast = as_evaluated) -> dict[str, Any]:
-        """For results.json: e1 … e6 with their covariance, the six factors and the angles that they give."""
-        values, angles = self.factors.tolist(), np.degrees(np.arccos(_cosines(self.e)))
-        stated = self.expanded(at_least) or [(None, None)] * UNKNOWNS
-        factors = {}
-        for (effect, parameter), *figures in zip(
-            FACTORS, values, self.u.tolist(), *zip(*stated, strict=True), strict=True
-        ):
-            open_ = self.open_scales and parameter == "ppm"
-            figures = [None] * len(figures) if open_ else figures
-            factors[effect] = {parameter: dict(zip(("value", "u", "U", "k"), figures, strict=True))}
-        return {
-            "e": self.e.tolist(), "e_covariance": self.covariance.tolist(), "factors": factors,
-            "angles_deg": dict(zip(SQUARENESS, angles.tolist(), strict=True)),
-            "residual_sd_um": self.residual_sd / MICROMETRE,
-        }  # fmt: skip
-
-    @property
-    def u(self) -> Floats:
-        """(6,) standard uncertainties of the three scales, ppm, and the three squarenesses, ″, distance and bias included."""
-        of_distance = self.relative_length_u / PPM * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-        return np.hypot(np.hypot(self._u_of_residuals, of_distance), self.bias)
-
-    @property
-    def _u_of_residuals(self) -> Floats:
-        """(6,) of these, from the residuals alone."""
-        step = 1e-6
-        steps = step * np.eye(UNKNOWNS)
-        jacobian = np.column_stack([(factors_of(self.e + d) - factors_of(self.e - d)) / (2 * step) for d in steps])
-        return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", jacobian, self.covariance, jacobian)), dtype=np.float64)
-
-
-def solve_distances(differences: Floats, distance: float | Floats) -> DistanceSolution:
-    """Solve equation 100 for e1 … e6 by least squares.
-
-    ``differences`` (m, 3) readings of one position minus those of the other, mm; ``distance`` the known distance, one
-    or (m,), mm.
-    """
-    differences = np.asarray(differences, dtype=np.float64)
-    d = np.broadcast_to(np.asarray(distance, dtype=np.float64), len(differences))
-    refuse_poor_placings(differences)
-    # divided by 2d, an equation is one of lengths: its noise is that of a length, the same for all
-    A = quadratic_terms(differences) / (2 * d)[:, None]
-    b = (d**2 - np.sum(differences**2, axis=1)) / (2 * d)
-    Q, R = np.linalg.qr(A)
-    e = np.asarray(np.linalg.solve(R, Q.T @ b), dtype=np.float64)
-    residuals = b - A @ e
-    freedom = len(b) - UNKNOWNS
-    sd = float(np.sqrt(residuals @ residuals / freedom)) if freedom else 0.0
-    inverse = np.linalg.inv(R)
-    return DistanceSolution(e, sd**2 * inverse @ inverse.T, residuals, sd)
-
-
-def quadratic_terms(differences: Floats) -> Floats:
-    """Coefficients (m, 6) of e1 … e6 in equation 100."""
-    x, y, z = differences.T
-    return np.column_stack([x * x, 2 * x * y, 2 * x * z, y * y, 2 * y * z, z * z])
-
-
-def missing_placings(differences: Floats) -> tuple[Text, ...]:
-    """Placings, in words and as few as possible, that determine what these (m, 3) leave open; none when they leave nothing."""
-    directions = differences / np.linalg.norm(differences, axis=1, keepdims=True)
-    candidates = np.array(list(PLACINGS.values()), dtype=np.float64)
-    candidates /= np.linalg.norm(candidates, axis=1, keepdims=True)
-    _, s, Vt = np.linalg.svd(quadratic_terms(directions), full_matrices=len(directions) < UNKNOWNS)
-    open_space = Vt[np.append(s, np.zeros(UNKNOWNS))[:UNKNOWNS] < POORLY_POSED * s[0]].T
-    wanted = []
-    while open_space.shape[1]:
-        seen = quadratic_terms(candidates) @ open_space
-        best = int(np.argmax(np.round(np.linalg.norm(seen, axis=1), 6)))
-        wanted.append(list(PLACINGS)[best])
-        open_space = open_space @ np.linalg.svd(seen[best : best + 1])[2][1:].T
-    return tuple(wanted)
-
-
-def refuse_poor_placings(differences: Floats) -> None:
-    """Refuse distances that do not determine all six factors."""
-    apart = np.linalg.norm(differences, axis=1)
-    if np.any(apart == 0):
-        raise CmmUqError(
-            say("distance {number} is zero: both positions are the same", number=int(np.argmin(apart)) + 1),
-            where="recording", fix=say("Record two different positions"),
-        )  # fmt: skip
-    wanted = missing_placings(differences)
-    if not wanted:
-        return
-    spread, count = np.linalg.svd(differences / apart[:, None], compute_uv=False), len(differences)
-    if len(differences) < UNKNOWNS:
-        problem = say("{count} distances are too few for the six factors of scale and squareness", count=count)
-    elif spread[1] < POORLY_POSED * spread[0]:
-        problem = say("all {count} distances are parallel, so they tell the scale in one direction only", count=count)
-    elif spread[2] < POORLY_POSED * spread[0]:
-        problem = say("all {count} distances lie in one plane, so they tell nothing of the axis across it", count=count)
-    else:
-        problem = say("the directions of the {count} distances leave a factor of scale or squareness open", count=count)
-    one = say("Add {count} placing: {wanted}", count=len(wanted), wanted=commas(wanted))
-    many = say("Add {count} placings: {wanted}", count=len(wanted), wanted=commas(wanted))
-    raise CmmUqError(problem, where="recording", fix=plural(len(wanted), one=one, many=many))
-
-
-def _cosines(e: Floats) -> Floats:
-    x, y, z = np.sqrt(1 + e[[0, 3, 5]])
-    return np.array([e[1] / (x * y), e[4] / (y * z), e[2] / (x * z)])
-
-
-def factors_of(e: Floats) -> Floats:
-    """(6,) of e1 … e6: SE = √(1+e) − 1 (102)–(104), ppm, and what angles between axes (105)–(107) have beyond 90°, ″."""
-    scales = (np.sqrt(1 + e[[0, 3, 5]]) - 1) / PPM
-    return np.concatenate([scales, (np.arccos(_cosines(e)) - np.pi / 2) / ARCSECOND])
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,14 +72,14 @@ def lengths_of(result: Result, length: Floats, reference: float) -> Lengths:
 def adjustments(chain: KinematicChain) -> dict[str, tuple[Text, str]]:
     """What takes away each factor, in order: what is turned (right-handed) or entered, and the axis that it belongs to."""
     names = {axis: Verbatim(axis.upper()) for axis in AXES}
-    enter = {SCALE[a].name: (say("Scale of {axis}: lengthen what it reads by", axis=names[a]), a) for a in AXES}
+    entered: dict[str, tuple[Text, str]] = {
+        SCALE[a].name: (say("Scale of {axis}: lengthen what it reads by", axis=names[a]), a) for a in AXES
+    }
     first, second, third = chain.from_frame
-    return enter | {
-        _between(*pair).name: (say("Guide of {axis}: turn about +{about} by", axis=names[guide], about=names[about]), guide)
-        for pair, guide, about in (
-            (first + second, second, third), (second + third, third, first), (third + first, third, second),
-        )
-    }  # fmt: skip
+    for still, guide, about in ((first, second, third), (second, third, first), (first, third, second)):
+        what = say("Guide of {axis}: turn about +{about} by", axis=names[guide], about=names[about])
+        entered[_between(still, guide).name] = what, guide
+    return entered
 
 
 def _between(a: str, b: str) -> Squareness:
@@ -287,10 +121,8 @@ def turns(squareness: Floats, chain: KinematicChain) -> Floats:
     ``squareness`` (..., 3) Sxy, Syz, Szx, rad. Gives (..., 3) rad.
     """
     first, second, third = chain.from_frame
-    pairs = [
-        list(SQUARENESS.values()).index(_between(*pair)) for pair in (first + second, second + third, third + first)
-    ]
-    axes = axis_directions(squareness[..., pairs])
+    planes = (_between(first, second), _between(second, third), _between(third, first))
+    axes = axis_directions(squareness[..., [list(SQUARENESS.values()).index(plane) for plane in planes]])
     y, z = axes[..., 1, :], axes[..., 2, :]
     upright = np.arctan2(y[..., 0], y[..., 1])
     across, along = z[..., 0], z[..., 1]
@@ -351,7 +183,7 @@ def section(result: Result, second_way: SecondWay, *remarks: Text) -> Section:
     return Section(say("The adjustment that the machine needs"), blocks, opinion=True)
 
 
-def _adjustments(settings: tuple[AdjustmentSetting, ...], order: str) -> tuple[Table, ...]:
+def _adjustments(settings: tuple[AdjustmentSetting, ...], order: Iterable[str]) -> tuple[Table, ...]:
     rows: list[tuple[Text, ...]] = []
     for setting in settings:
         over, sure = setting.over_travel, say("yes") if setting.beyond_doubt else NOTHING
@@ -363,11 +195,14 @@ def _adjustments(settings: tuple[AdjustmentSetting, ...], order: str) -> tuple[T
         *text_columns(say("Adjustment")), *figure_columns(say("Value"), say("U")), *text_columns(say("Unit")),
         *figure_columns(say("Over the travel"), unit=unit("µm")), *text_columns(say("Beyond doubt")),
     )  # fmt: skip
-    first, second, third = map(Verbatim, order.upper())
+    first, second, third = (Verbatim(axis.upper()) for axis in order)
     turning = say(
         "{first} stays; {second} is turned square to {first}, then {third} to both, about {first} first. Turns are "
-        "right-handed about the named axis.", first=first, second=second, third=third,
-    )  # fmt: skip
+        "right-handed about the named axis.",
+        first=first,
+        second=second,
+        third=third,
+    )
     doubt = say(
         "Beyond doubt: the 95 % interval does not contain zero. Over the travel: what the adjustment moves at its far end."
     )

@@ -23,7 +23,8 @@ from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, dire
 from cmm_uq.analysis.planning.setting import Planning, Setting, Volume
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, bar_misfit, common_length, no_references, rows_by
 from cmm_uq.artefacts import adjustment
-from cmm_uq.artefacts.adjustment import DistanceSolution, Lengths, lengths_of, solve_distances
+from cmm_uq.artefacts.adjustment import Lengths, lengths_of
+from cmm_uq.artefacts.distance_equations import DistanceSolution, solve_distances
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 from cmm_uq.base.points import Floats, Ints, Points

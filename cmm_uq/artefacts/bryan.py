@@ -16,7 +16,8 @@ from cmm_uq.analysis.planning.set_up import SetUp, direction_words, planned_leng
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start, Volume
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, ball_misfit, no_references
 from cmm_uq.artefacts import adjustment
-from cmm_uq.artefacts.adjustment import FACTORS, DistanceSolution, Lengths, lengths_of, solve_distances
+from cmm_uq.artefacts.adjustment import Lengths, lengths_of
+from cmm_uq.artefacts.distance_equations import FACTORS, DistanceSolution, solve_distances
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, number, say
 from cmm_uq.base.points import Floats, Points

@@ -41,7 +41,7 @@ def turned(guides: dict[str, np.ndarray], squareness, chain: str) -> dict[str, n
 
     The named axes are those of the machine when it is done: the axis that stays, and that in the plane of the second.
     """
-    stays, second, third = KinematicChain.of(chain).from_frame.upper()
+    stays, second, third = map(str.upper, KinematicChain.of(chain).from_frame)
     a = guides[stays]
     b = guides[second] - (guides[second] @ a) * a
     b /= np.linalg.norm(b)
@@ -78,7 +78,7 @@ def test_an_adjusted_machine_of_every_chain_measures_without_error(chain: str) -
 
 def test_what_carries_all_stays_where_it_is() -> None:
     """Where X rides on Y, turning Y would turn both: X is turned, the other way round."""
-    assert [KinematicChain.of(chain).from_frame for chain in ("XYZ", "YXZ", "YFXZ", "XYFZ", "ZXY", "ZYXF")] == [
+    assert ["".join(KinematicChain.of(chain).from_frame) for chain in ("XYZ", "YXZ", "YFXZ", "XYFZ", "ZXY", "ZYXF")] == [
         "xyz", "yxz", "xyz", "yxz", "zxy", "xyz",
     ]  # fmt: skip
     xy = ARCSEC * np.array([100.0, 0.0, 0.0])

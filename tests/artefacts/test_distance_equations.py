@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import linalg
 
-from cmm_uq.artefacts.adjustment import PLACINGS, missing_placings, quadratic_terms, solve_distances
+from cmm_uq.artefacts.distance_equations import PLACINGS, missing_placings, quadratic_terms, solve_distances
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, PPM

@@ -115,13 +115,9 @@ class KinematicChain:
         return self.workpiece <= below < place or place < below < self.workpiece
 
     @property
-    def from_frame(self) -> str:
+    def from_frame(self) -> tuple[str, ...]:
         """The axes, each after those that it rides on, and else in the order x, y, z."""
-        return min(
-            "".join(axes)
-            for axes in permutations(AXES)
-            if not any(self.rides(a, on=b) for a, b in combinations(axes, 2))
-        )
+        return min(p for p in permutations(AXES) if not any(self.rides(a, on=b) for a, b in combinations(p, 2)))
 
 
 @lru_cache(maxsize=64)
