@@ -34,6 +34,7 @@ EXAMPLES = {
     "sphere": "sphere-simulated",
     "plane": "plane-simulated",
     "digitizer": "digitizer-simulated",
+    "axis_runs": "axis-runs-simulated",
     "shift": "shift-simulated",
     "shift_plate": "shift-plate-simulated",
     "error_map": "iota-1102-maps",

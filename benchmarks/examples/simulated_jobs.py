@@ -201,6 +201,64 @@ def bryan() -> Simulated:
     )  # fmt: skip
 
 
+def axis_runs() -> Simulated:
+    """Position, straightnesses and rotations along three lines; five runs of position each way, one of all others.
+
+    The roll of Z, which a level cannot show, is not read.
+    """
+    parts: list[dict[str, Floats]] = []
+    for axis in range(3):
+        low, high = TRAVEL[axis]
+        there = np.linspace(low + 0.05 * (high - low), high - 0.05 * (high - low), 7)
+        for sense in range(5 if axis == 2 else 6):
+            repeats = 5 if sense == axis else 1
+            at, way = np.concatenate([there, there[::-1]]), np.repeat([1.0, -1.0], len(there))
+            n = repeats * len(at)
+            xyz, columns = np.tile(MIDDLE, (n, 1)), {}
+            xyz[:, axis] = np.tile(at, repeats)
+            for i, letter in enumerate("xyz"):
+                columns[f"approach_{letter}"] = np.tile(way, repeats) * (i == axis)
+                columns[f"read_{letter}"] = np.full(n, float(sense == i))
+                columns[f"turn_{letter}"] = np.full(n, float(sense == 3 + i))
+            numbers = {"measurement": np.full(n, 6 * axis + sense + 1), "point": np.tile(np.arange(1, len(at) + 1), repeats),
+                       "repeat": np.repeat(np.arange(1, repeats + 1), len(at))}  # fmt: skip
+            parts.append({"xyz": xyz, **numbers, "reading_um": np.zeros(n), "reading_arcsec": np.zeros(n), **columns})
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    xyz, *numbers = (whole.pop(name) for name in ("xyz", "measurement", "point", "repeat"))
+    truth = {
+        **SCALE, "hysteresis_x": 3.0, "hysteresis_y": -1.5, "straightness_x_y": 5.0, "straightness_y_z": -4.0,
+        "rotation_x_z": 6.0, "rotation_y_x": -4.0, "rotation_z_y": 5.0,
+    }  # fmt: skip
+    return Simulated(
+        "axis-runs-simulated", "Position, straightness and rotation of three axes by laser interferometer, there and back",
+        {"kind": "axis_runs", "name": "Laser interferometer", "u_um_per_m": 0.3, "optics_mm": [0.0, 0.0, -120.0]},
+        recording(xyz, *numbers, **whole), truth, list(truth), 0.2, columns=tuple(whole),
+        extra=CONFORMITY_OF_RUNS,
+    )  # fmt: skip
+
+
+CONFORMITY_OF_RUNS = """
+[test_uncertainty]
+u_alignment_um = 0.2
+u_repeat_um = 0.1
+
+[test_uncertainty.negligible]
+temperature = { by = "Laboratory", reason = "simulated at 20 °C" }
+
+[[conformity]]
+standard = "ISO 230-2:2014"
+characteristic = "A"
+limit_um = 20.0
+rule = "ISO 14253-1"
+
+[[conformity]]
+standard = "ISO 230-2:2014"
+characteristic = "B"
+limit_um = 2.5
+rule = "ISO 14253-1"
+"""
+
+
 def triangle() -> Simulated:
     """Seven placings of a triangle with sides of 500, 300 and 400 mm on a machine whose Y carriage carries the others."""
     artefact = {"kind": "triangle", "name": "Triangle of gauge blocks and cylinders", "cte_per_k": 11.5e-6,
@@ -256,7 +314,9 @@ def digitizer() -> Simulated:
     )  # fmt: skip
 
 
-EXAMPLES = (step_gauge, gauge_blocks, sphere, plate, plate_two_dates, bryan, triangle, plane, digitizer)
+EXAMPLES = (
+    step_gauge, gauge_blocks, sphere, plate, plate_two_dates, bryan, axis_runs, triangle, plane, digitizer,
+)  # fmt: skip
 
 
 def write(example: Simulated, folder: Path) -> None:
@@ -271,7 +331,8 @@ def write(example: Simulated, folder: Path) -> None:
             continue
         model = RecordingModel(artefact, effects(list(truth)))
         xyz = model.simulate(_coefficients(truth), sizes, Noise(coordinate=example.noise_um * 1e-3), random)
-        (place / name).write_text(_csv(example, xyz), encoding="utf-8", newline="\n")
+        read = artefact.recorded(example.points, xyz)
+        (place / name).write_text(_csv(example, read), encoding="utf-8", newline="\n")
     (place / "job.toml").write_text(_toml(example), encoding="utf-8", newline="\n")
 
 
@@ -285,14 +346,16 @@ def _coefficients(truth: Mapping[str, float | Sequence[float]]) -> Floats:
     return np.concatenate([np.zeros(0), *(np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in truth.values())])
 
 
-def _csv(example: Simulated, xyz: Floats) -> str:
-    points = example.points
+def _csv(example: Simulated, points: Points) -> str:
     rows = [",".join(["measurement", "point", "repeat", "x_mm", "y_mm", "z_mm", *example.columns])]
     for i in range(len(points)):
-        cells = [points.measurement[i], points.point[i], points.repeat[i], *(f"{value:.5f}" for value in xyz[i])]
-        cells += [f"{points.columns[name][i]:.10g}" for name in example.columns]
+        cells = [points.measurement[i], points.point[i], points.repeat[i], *(f"{value:.5f}" for value in points.xyz[i])]
+        cells += [f"{points.columns[name][i]:{_DIGITS.get(name, '.10g')}}" for name in example.columns]
         rows.append(",".join(map(str, cells)))
     return "\n".join(rows) + "\n"
+
+
+_DIGITS = {"reading_um": ".3f", "reading_arcsec": ".3f"}  # an instrument's display
 
 
 def _toml(example: Simulated) -> str:

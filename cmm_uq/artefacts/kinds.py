@@ -14,7 +14,7 @@ from cmm_uq.base.points import AXES, Machine, Points
 from cmm_uq.jobs.beginning import AT_20_C, SIX, Beginning, circumstances
 from cmm_uq.jobs.tables import artefact as tables
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertifiedValue, ReferencedFacts
-from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS, Kind
+from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS, POSITIONING, Kind
 from cmm_uq.machine.physics.error_map import COLUMNS
 
 _HERE = "cmm_uq.artefacts"
@@ -194,6 +194,61 @@ DIGITIZER = _kind("digitizer", ReferenceSphereFacts, "digitizer:DigitizerArtefac
 ), page="digitizer_page")  # fmt: skip
 
 
+READ, TURN = (tuple(f"{name}_{a}" for a in AXES) for name in ("read", "turn"))
+
+
+class AxisRunsFacts(ArtefactFacts):
+    """What reads along the runs: a laser interferometer, straightness or angular optics, a level, a straightedge."""
+
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
+
+    u_um_per_m: Uncertainty | None = None
+    """Standard uncertainty of a displacement along the travel, per metre: wavelength, alignment, stability; without it the
+    instrument's scale stays free."""
+    optics_mm: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
+    """Offset of the moving optics from the end of the ram, along x, y, z, by which rotations reach it; columns tip_x_mm,
+    tip_y_mm, tip_z_mm of the recording go before it."""
+    arm_mm: Length = key(100.0, "Arm over which a rotation is read: distance of two retroreflectors, base of a level.")
+    zero_each_repeat: bool = key(False, "Whether the instrument was set to zero before each repeat, and not once.")
+    air_corrected: bool = True
+    """Whether displacements are corrected for the refractive index of air already; else they are, from 20 °C, 1013.25 hPa and
+    50 % to `temp_air_c`, `pressure_hpa`, `humidity_pct`."""
+    dead_path_mm: Uncertainty = key(0.0, "Path in air between interferometer and zero, where air is not corrected for.")
+
+    @property
+    def traced(self) -> bool:
+        return self.u_um_per_m is not None
+
+
+_RUNS = f"{_HERE}.axis_runs"
+AXIS_RUNS = Kind(
+    "axis_runs",
+    AxisRunsFacts,
+    f"{_RUNS}.artefact:AxisRuns",
+    f"{_RUNS}.plan:SCREENING",
+    f"{_RUNS}.plan:PLANNING",
+    f"{_RUNS}.page:PAGE",
+    Beginning(
+        title="Runs along three axes by laser interferometer and angular optics (ISO 230-2)",
+        numbering="One measurement is one quantity along one line; its points are the targets, again on the way back.",
+        artefact={"name": "Laser interferometer", "u_um_per_m": 0.3},
+        effects=("scale_x", "scale_y", "scale_z", "hysteresis_x", "hysteresis_y", "hysteresis_z"),
+        plan={"repeats": 5},
+        columns={
+            "reading_um": "Displacement by the instrument less that of the target; 0 where a rotation is read.",
+            "reading_arcsec": "Rotation by the instrument, by the right hand; 0 where a displacement is read.",
+            **{f"read_{a}": f"Direction along which a displacement is read, its part along {a}." for a in AXES},
+            **{f"turn_{a}": f"Axis about which a rotation is read, its part along {a}." for a in AXES},
+        },
+        conformity={"standard": "ISO 230-2:2014", "limit_um": 10.0, "rule": "ISO 14253-1"},
+        test=circumstances(u_alignment_um=0.2, u_temperature_k=0.1, u_repeat_um=0.1),
+        further=dict.fromkeys((*APPROACHES, *(f"tip_{a}_mm" for a in AXES)), ""),
+        noise_um=0.3,
+    ),
+    tested=(POSITIONING,),
+)
+
+
 class KnownLength(JobTable):
     """A known length between two points of a shifted artefact."""
 
@@ -321,5 +376,5 @@ ERROR_MAP = Kind(
     instead="cmm-uq diagnose JOB compares them with each other",
 )  # fmt: skip
 BUILT_IN = {kind.name: kind for kind in (
-    BALLBAR, BRYAN, STEP_GAUGE, GAUGE_BLOCKS, PLATE, TRIANGLE, SPHERE, PLANE, SHIFT, ERROR_MAP, DIGITIZER,
+    BALLBAR, BRYAN, STEP_GAUGE, GAUGE_BLOCKS, PLATE, TRIANGLE, SPHERE, PLANE, SHIFT, ERROR_MAP, DIGITIZER, AXIS_RUNS,
 )}  # fmt: skip

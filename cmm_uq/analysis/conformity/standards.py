@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.analysis.conformity import decided, plans
+from cmm_uq.analysis.conformity import decided, plans, positioning
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings, repeats_of_gauge, supplemented
 from cmm_uq.analysis.conformity.plan_conditions import best_of, conditions
 from cmm_uq.analysis.conformity.plans import Condition
@@ -209,8 +209,36 @@ def _sphere(scope: str) -> tuple[Clause, ...]:
     return (first, *(one for one in _ISO_10360_5[1:] if one.name != "sphere_size"))
 
 
+_ISO_230_2 = (
+    Clause(
+        "scope",
+        say("scope"),
+        "Linear axes up to 2 m, both directions; of longer and of rotary axes the same formulas.",
+        "its publisher's abstract; 2 m: as commonly reported",
+    ),
+    Clause(
+        "targets_and_runs",
+        say("targets and runs"),
+        "Five runs in each direction; five targets a metre and five at least. "
+        "That they are not evenly spaced is not asked for.",
+        REPORTED,
+    ),
+    Clause(
+        "formulas", say("figures"), "A, E, R, B and M with twice the standard uncertainty estimators, n − 1.", REPORTED
+    ),
+    Clause(
+        "test_uncertainty",
+        say("test uncertainty"),
+        "Instrument, alignment, temperature and changes between readings, by "
+        "draws; the formulas of its annex are not used.",
+        CHOSEN,
+    ),
+    _RULE,
+)
+
 # Of each standard that is decided here, and of the documents that decisions and budgets go by
 CLAUSES: Mapping[str, tuple[Clause, ...]] = MappingProxyType({
+    "ISO 230-2:2014": _ISO_230_2,
     "ISO 10360-2:2009": _ISO_10360_2,
     "ASME B89.4.10360.2-2008": (
         Clause("additions", say("what it adds to ISO 10360-2"), "Not tested.", "its abstract: it incorporates the entire ISO "
@@ -294,6 +322,7 @@ _STANDARDS = (
     Standard("ASME B89.4.10360.2-2008", (_E0, _R0, _E150), (
         say("ASME B89.4.10360.2-2008 takes over ISO 10360-2; what it adds to it is not tested here."),
     ), "contacting"),
+    Standard("ISO 230-2:2014", positioning.CHARACTERISTICS),
     Standard("ISO 10360-2:2009", (_E0, _R0, _E150), sensing="contacting"),
     Standard("ISO 10360-5:2010", _of_sphere(("P_FTU",), ("P_STU",), plans.ISO_10360_5, _DIAMETER),
              _superseded("ISO 10360-5:2020"), "contacting"),

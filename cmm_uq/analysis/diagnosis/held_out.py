@@ -101,10 +101,10 @@ class Improvement:
 
 
 def held_out_groups(model: RecordingModel) -> tuple[Ints, Text]:
-    """What is left out together (m,), by its place: set-ups; or points, of few set-ups, which might leave too much open."""
+    """What is left out together (m,), by its place: set-ups; or points, of few set-ups or of curves that no other shows."""
     artefact, used = model.artefact, model.used
     group, unseen = artefact.measurement[used], say("set-ups")
-    if len(np.unique(group)) < FOLDS:
+    if artefact.curves or len(np.unique(group)) < FOLDS:
         group, unseen = np.column_stack([group, artefact.points.point[artefact.rows[:, 0]][used]]), say("points")
     return numbered_by_place(model, group), unseen
 

@@ -42,7 +42,9 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 DRAWS = 2000
 _ABSENT = 1e-4  # size of a family of errors that are not there
 _ERRORS, _LEAST = 4_000_000, 200  # errors of lengths that are drawn, and how often each at least
-_MOST = 100  # quantities of a recording, with their repeats: time grows with the cube of what they show
+# quantities of a recording, with their repeats: time grows with the cube of what they show; where each set-up reads a curve
+# that no other shows, none can be left out
+_MOST, _CURVES = 100, 400
 _EACH = 4  # points along each axis of a region
 _ANYWHERE = ("ppm", "″", "″/m")  # units of what means the same on a part of a travel; a bow is one of the whole travel
 _HALVES = ((0.0, 0.5), (0.5, 1.0))
@@ -86,7 +88,8 @@ class DrawnErrors:
     def of(cls, model: RecordingModel, observe: Observed, seed: int, draws: int = DRAWS) -> DrawnErrors:
         """Raises ``CmmUqError`` where the machine's travel is not stated, or the recording does not allow it."""
         count, random = int(model.used.sum()), np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(37,)))
-        thinned = thin_out(model, observe, seed, _MOST * count // max(_quantities(model), 1))
+        most = _CURVES if model.artefact.curves else _MOST
+        thinned = thin_out(model, observe, seed, most * count // max(_quantities(model), 1))
         others, statements = as_recorded_allows(thinned, other_errors(model))
         field = RecordedField.of(thinned, others)
         sizes = sample_sizes(field.field, draws, seed, effort=BRIEF)

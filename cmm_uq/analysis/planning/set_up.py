@@ -19,7 +19,7 @@ from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.physics.catalogue import every
 
 # columns of vectors that turn with the artefact
-VECTORS: Mapping[str, str] = {"approach": "approach_{}", "normal": "n{}"}
+VECTORS: Mapping[str, str] = {"approach": "approach_{}", "normal": "n{}", "read": "read_{}", "turn": "turn_{}"}
 _LEVEL, _NEGLIGIBLE = 1e-6, 0.02
 _MINUTE = 60.0
 

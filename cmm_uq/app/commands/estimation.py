@@ -26,10 +26,10 @@ from cmm_uq.certificate.result import LACK_OF_FIT, Contradiction, NoiseComponent
 from cmm_uq.machine.model import Estimate, RecordingModel
 from cmm_uq.machine.model.artefact_doubt import growth
 from cmm_uq.machine.model.measurement import ARTEFACT
-from cmm_uq.machine.model.noise import noise_of
+from cmm_uq.machine.model.noise import noise_of, repeated_quantity
 from cmm_uq.machine.model.recorded import of_last_digit
 from cmm_uq.maths.inference.draws import Draws, by_chain, by_ensemble, evenly, uncertainty_of_sum
-from cmm_uq.maths.inference.linear_model import Freedoms
+from cmm_uq.maths.inference.linear_model import Freedoms, LinearModel
 from cmm_uq.maths.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
 from cmm_uq.maths.inference.posterior import Cause, Doubt, NoisyPosterior, gain
 from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of
@@ -43,7 +43,8 @@ def without_outliers(model: RecordingModel) -> tuple[RecordingModel, list[Findin
     artefact, used = model.artefact, model.used.copy()
     chosen, estimate = np.flatnonzero(used), model.estimate()
     least = of_last_digit(artefact.points.xyz, estimate.least_squares.sigma_of_residuals)
-    outliers = gross_outliers(estimate.linear, artefact.measurement[chosen], least)
+    linear = _about_repeats(model, estimate.linear) if artefact.curves else estimate.linear
+    outliers = gross_outliers(linear, artefact.measurement[chosen], least)
     times_off = {int(chosen[index]): times for index, times in outliers}
     rows = {i: int(artefact.rows[i][0]) for i in times_off}
     outlying = np.array(sorted(set(rows.values())), dtype=np.int64)
@@ -69,6 +70,13 @@ def without_outliers(model: RecordingModel) -> tuple[RecordingModel, list[Findin
         off = [left.pop(j) for j in tuple(left) if rows[j] in together]
         findings.append(replace(finding("outlier", points, together, words(points, together, off)), set_aside=aside))
     return replace(model, used=used), findings
+
+
+def _about_repeats(model: RecordingModel, linear: LinearModel) -> LinearModel:
+    """The same observations with a value of its own for each quantity that is read again and again."""
+    quantity = repeated_quantity(model, model.used)
+    each = Freedoms(np.ones((len(quantity), 1)), quantity, int(quantity.max()) + 1)
+    return replace(linear, design=linear.design[:, :0], unknowns=(), placing=each)
 
 
 def with_noise(model: RecordingModel) -> tuple[RecordingModel, Estimate, float | None]:

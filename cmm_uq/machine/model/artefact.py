@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from cmm_uq.base.messages import NOTHING, Text, foreign, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import Unit, unit
 from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.maths.geometry.positioning import PositioningRuns
 from cmm_uq.maths.inference.linear_model import Freedoms
 from cmm_uq.maths.inference.posterior import Cause
 
@@ -89,6 +90,9 @@ class Artefact(ABC):
     measurement: Ints  # (m,) what each observation belongs to
     repeat: Ints  # (m,)
     rows: Ints  # (m, j) the points that each observation speaks of, as rows of the recording
+    # whether each set-up reads a curve of its own, of which a model names the simplest form: outliers show among repeats,
+    # and what is found predicts other points, not other set-ups
+    curves: ClassVar[bool] = False
 
     @property
     def set_up(self) -> Text:
@@ -136,6 +140,10 @@ class Artefact(ABC):
         whole = np.all(np.isin(np.flatnonzero(points.group == points.group[rows[0]]), rows))
         return run if whole else say("point {point} of {run}", point=int(points.point[rows[0]]), run=run)
 
+    def recorded(self, points: Points, xyz: Floats) -> Points:
+        """A recording ``points`` of it as it would be with the artefact's points indicated at ``xyz``, mm."""
+        return points.at(xyz)
+
     def unread(self) -> NDArray[np.bool_]:
         """Observations (m,) along a coordinate that stood still to the last digit: nobody read it, and it has no noise."""
         return np.zeros(len(self.noise_scale), dtype=bool)
@@ -147,6 +155,10 @@ class Artefact(ABC):
     def indications(self) -> Indications | None:
         """Errors of indication of calibrated lengths; ``None`` without a calibration."""
         return None
+
+    def positionings(self) -> Mapping[int, PositioningRuns]:
+        """Runs that position an axis, µm, by measurement; none of what is no such run."""
+        return {}
 
     def calibration(self) -> Cause | None:
         """What its certificate leaves open of several lengths beyond its sizes; ``None`` of an artefact of one length."""

@@ -19,8 +19,9 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact
 
 # what a standard may be decided on: of an artefact ``indications``; ``lengths`` of one bar in many positions, and figures of
-# their range; ``forms``
+# their range; ``forms``; ``positionings``
 LENGTHS, BARS, FORMS = "calibrated lengths", "lengths of one bar", "forms of test spheres"
+POSITIONING = "runs that position an axis"
 
 Facet = TypeVar("Facet")
 Observe = Callable[..., Artefact]  # ``(facts, points, *, where)``: the artefact that a job describes, as recorded

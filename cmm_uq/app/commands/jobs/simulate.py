@@ -77,7 +77,7 @@ def _simulated(job: Job, truth: Truth, seed: int | None, truth_path: str) -> Poi
         drawn = model.simulate(np.concatenate(coefficients), sizes, _noise(truth.noise), random)
     if not np.all(np.abs(drawn) <= LONGEST_MM):
         raise CmmUqError(f"the coordinates would go beyond {LONGEST_MM:g} mm", where=truth_path, fix=_FIX)
-    return points.at(drawn)
+    return artefact.recorded(points, drawn)
 
 
 @contextlib.contextmanager

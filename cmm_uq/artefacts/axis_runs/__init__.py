@@ -1,0 +1,1 @@
+"""Runs along axes, read by a laser interferometer, straightness or angular optics, a level or a straightedge."""

@@ -1,0 +1,225 @@
+"""Runs along axes: an instrument reads how far, or by how much it turned, at positions of the machine.
+
+A laser interferometer reads the displacement of its moving optics along its beam, straightness optics or a straightedge one
+across it; angular optics, a level or an autocollimator a rotation. A rotation is the difference of two displacements an arm
+apart, so that the machine's kinematics, with the offset of the optics from the ram (Abbe), say what every reading sees.
+The zero of a run is free, of a straightness its slope too. Positions are targets; the errors are in the readings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.artefacts.axis_runs.run import (
+    ACROSS,
+    ALONG,
+    END,
+    READINGS,
+    TARGET,
+    TURNING,
+    Run,
+    kinds_of,
+    refuse,
+    runs_of,
+    scatter,
+    senses_of,
+)
+from cmm_uq.artefacts.kinds import READ, TURN, AxisRunsFacts
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import say
+from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, unit
+from cmm_uq.machine.model.artefact import Artefact, Placings, Size
+from cmm_uq.machine.model.recorded import expansion
+from cmm_uq.machine.physics.effects.drives import index_change
+from cmm_uq.maths.geometry.positioning import PositioningRuns
+
+_FAR = {False: 2000.0, True: 3600.0}  # µm or ″ beyond which a reading is in another unit
+_LEAST_DOF = 10  # of the scatter of repeats, from which on it weighs the kinds of reading against each other
+_SAME_MM = 1e-6
+
+
+class AxisRuns(Artefact):
+    """One observation a reading.
+
+    ``facts`` what the job says of the instrument; ``points`` the recording, or the points of such an artefact, displaced. Its
+    own points are where the machine would stand if the instrument read nothing but targets; a reading of a rotation has a
+    second one, the other end of the arm.
+    """
+
+    kind = "axis_runs"
+    title = say("Runs along axes")
+    curves = True
+
+    def __init__(self, facts: AxisRunsFacts, points: Points, *, where: str | None = None) -> None:
+        self._facts = facts
+        if END not in points.columns:
+            points = self._with_ends(points, where)
+        self.points, self._ends = points, _ends_of(points)
+        end = points.columns[END] > 0
+        self.rows = np.flatnonzero(~end)[:, None]
+        own = points.select(~end)
+        self.runs = runs_of(own, where)
+        self.measurement, self.repeat = own.measurement, own.repeat
+        self._zeros = Placings.of(own.group if facts.zero_each_repeat else own.measurement)
+        self._kind = kinds_of(self.runs, len(own))
+        self._turned, self._ends = np.flatnonzero(self._kind == TURNING), self._ends[self._kind == TURNING]
+        self._sense, _ = senses_of(self.runs, len(own))
+        self._base, slope = np.zeros(len(own)), np.zeros((len(own), 1))
+        for run in self.runs:
+            if run.kind == ALONG:
+                self._base[run.rows] = run.positions * np.sign(run.sense @ run.travel)
+            elif run.kind == ACROSS:
+                slope[run.rows, 0] = run.positions / max(float(run.positions.max()), _SAME_MM) - 0.5
+        self._base *= expansion(facts, own)
+        ones, slopes = (self._zeros.columns(each).dense() for each in (np.ones((len(own), 1)), slope))
+        self._freedoms = np.hstack([ones, slopes[:, np.any(slopes != 0, axis=0)]])
+        self.readings = self._base - self._seen(points.xyz[:, :, None])[:, 0]
+        self.readings -= self._zeros.means(self.readings)
+        spans = [np.ptp(self._base[run.rows]) for run in self.runs if run.kind == ALONG]
+        self.sizes = self._instrument(float(max(spans))) if spans else ()
+        self.noise_scale = self._noise_scale()
+
+    def _with_ends(self, points: Points, where: str | None) -> Points:
+        """The artefact's own points of a recording."""
+        n, runs = len(points), runs_of(points, where)
+        kind, (sense, arm) = kinds_of(runs, n), senses_of(runs, n)
+        turned, target = np.flatnonzero(kind == TURNING), np.zeros(n)
+        for run in runs:
+            target[run.rows] = run.positions
+        shift = self._in_mm(points, kind, target, where)[:, None] * sense
+        optics = zip(AXES, self._facts.optics_mm, strict=True)
+        given = np.column_stack([points.columns.get(f"tip_{a}_mm", np.full(n, at)) for a, at in optics])
+        tip = np.vstack([given, (given + self._facts.arm_mm * arm)[turned]])
+        whole = points.select(np.concatenate([np.arange(n), turned]))
+        xyz = whole.xyz.copy()
+        xyz[:n][kind != TURNING] -= shift[kind != TURNING]
+        xyz[n:] -= shift[turned]
+        read = np.where((kind == TURNING)[:, None], 0.0, sense)
+        about = np.where((kind == TURNING)[:, None], np.cross(arm, sense), 0.0)
+        more = {END: (np.arange(len(whole)) >= n).astype(np.float64), TARGET: np.append(target, target[turned])}
+        for names, values in ((READ, read), (TURN, about)):
+            more |= dict(zip(names, np.vstack([values, values[turned]]).T, strict=True))
+        more |= {f"tip_{a}_mm": tip[:, i] for i, a in enumerate(AXES)}
+        columns = {name: values for name, values in whole.columns.items() if name not in READINGS.values()}
+        machine = replace(points.machine, tip_on_every_carriage=True)
+        return replace(whole, xyz=xyz, machine=machine, columns={**columns, **more})
+
+    def _in_mm(self, points: Points, kind: NDArray[Any], target: Floats, where: str | None) -> Floats:
+        """Readings (n,), mm; of a rotation times the arm."""
+        turning, found = kind == TURNING, np.zeros(len(points))
+        for turns, rows in ((False, ~turning), (True, turning)):
+            name = READINGS[turns]
+            if name not in points.columns and rows.any() and len(points.lines):
+                what = "rotations" if turns else "displacements"
+                raise CmmUqError(
+                    f"no column {name!r}, which readings of {what} need",
+                    where=where or "recording",
+                    fix=f"Add the column {name}, 0 in the rows of other readings",
+                )
+            values = points.columns.get(name, np.zeros(len(points)))
+            refuse(
+                points,
+                rows & (np.abs(values) > _FAR[turns]),
+                where,
+                f"{name} beyond what any machine errs by",
+                "Convert it: µm of a displacement less its target, ″ of a rotation (1 µm/m is 0.2063″)",
+            )
+            refuse(
+                points,
+                ~rows & (values != 0),
+                where,
+                f"{name} is not 0, and something else is read there",
+                f"Put it into {READINGS[not turns]}, or mend read_x … turn_z",
+            )
+            found[rows] = self._factor(turns=turns) * values[rows]
+        if not self._facts.air_corrected:
+            found -= np.where(kind == ALONG, index_change(points) * (target + self._facts.dead_path_mm), 0.0)
+        return found
+
+    def _factor(self, *, turns: bool) -> float:
+        """A reading's unit, mm."""
+        return ARCSECOND * self._facts.arm_mm if turns else MICROMETRE
+
+    def _instrument(self, span: float) -> tuple[Size, ...]:
+        stated = self._facts.u_um_per_m
+        sd = np.inf if stated is None else MICROMETRE * stated * span / METRE
+        title = say("Longest displacement by the instrument")
+        return (Size("length_mm", title, unit("mm"), span, sd, say("longest displacement")),)
+
+    def _noise_scale(self) -> Floats:
+        """Of a rotation that of two ends of an arm; where repeats show how the scatter of the kinds compares, as they show."""
+        scale, found = np.where(self._kind == TURNING, np.sqrt(2.0), 1.0), {}
+        for kind in (ALONG, ACROSS, TURNING):
+            squares, dof = 0.0, 0
+            for run in (each for each in self.runs if each.kind == kind):
+                own, count = scatter(run, self.readings[run.rows], self.repeat[run.rows])
+                squares, dof = squares + own, dof + count
+            if dof >= _LEAST_DOF and squares > 0:
+                found[kind] = float(np.sqrt(squares / dof))
+        if len(found) > 1:
+            first, own = next(iter(found.items()))
+            for kind, each in found.items():
+                scale[self._kind == kind] = each / own * scale[self._kind == first][0]
+        return scale
+
+    def _seen(self, displacement: Floats) -> Floats:
+        """What the instrument sees, (n, k), of displacements (n + ends, 3, k)."""
+        moved = displacement[self.rows[:, 0]].copy()
+        moved[self._turned] = displacement[self._ends] - moved[self._turned]
+        return np.asarray(np.einsum("ni,nik->nk", self._sense, moved))
+
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        target = self._base * (sizes[0] / self.sizes[0].nominal if self.sizes else 1.0)
+        gap = self.about_zero(target - self._seen(true_xyz[:, :, None])[:, 0])
+        placed, step, linear = true_xyz.copy(), gap[:, None] * self._sense, self._kind != TURNING
+        placed[self.rows[linear, 0]] += step[linear]
+        placed[self._ends] += step[self._turned]
+        return placed
+
+    def about_zero(self, values: Floats) -> Floats:
+        """Values (n,) less the zero of their run, of a straightness less a line."""
+        return np.asarray(values - self._freedoms @ np.linalg.lstsq(self._freedoms, values, rcond=None)[0])
+
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        return self._seen(displacement)
+
+    def size_change(self) -> Floats:
+        return self._base[:, None] / self.sizes[0].nominal if self.sizes else np.zeros((len(self.rows), 0))
+
+    def placing(self, xyz: Floats) -> Floats:
+        return self._freedoms
+
+    def recorded(self, points: Points, xyz: Floats) -> Points:
+        """The machine stands at its targets, and the instrument reads what it errs by."""
+        read, turning = self._seen((self.points.xyz - xyz)[:, :, None])[:, 0], self._kind == TURNING
+        columns = {}
+        for turns in (False, True):
+            if np.any(rows := turning == turns):
+                own = read / self._factor(turns=turns) + points.columns.get(READINGS[turns], 0.0)
+                columns[READINGS[turns]] = np.where(rows, own, 0.0)
+        return replace(points, columns={**points.columns, **columns})
+
+    def positioning(self, run: Run) -> PositioningRuns:
+        """Readings of a run by target, direction and repeat, µm or ″, for ISO 230-2."""
+        readings = self.readings[run.rows] / self._factor(turns=run.kind == TURNING)
+        at, repeat = run.positions + round(run.start, 2), self.repeat[run.rows]  # readings moved the start by µm
+        return PositioningRuns.of(at, run.directions, repeat, readings, straight=run.kind == ACROSS)
+
+    def positionings(self) -> Mapping[int, PositioningRuns]:
+        return {run.measurement: self.positioning(run) for run in self.runs if run.kind == ALONG}
+
+
+def _ends_of(points: Points) -> Ints:
+    """(n,) row of the other end of the arm of each reading, its own of one without; ends without their reading stay."""
+    whole = np.column_stack([points.measurement, points.point, points.repeat])
+    index = np.unique(whole, axis=0, return_inverse=True)[1].ravel()
+    end, of = points.columns[END] > 0, np.full(len(points), -1)
+    of[index[end]] = np.flatnonzero(end)
+    own = np.flatnonzero(~end)
+    return np.where(of[index[own]] < 0, own, of[index[own]])

@@ -1,0 +1,206 @@
+"""What a certificate shows of runs along axes: figures by ISO 230-2, targets, drift, and which errors no run shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, cast
+
+import numpy as np
+
+from cmm_uq.analysis.conformity.positioning import test_spread
+from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
+from cmm_uq.artefacts.axis_runs.run import ALONG, TURNING, Run
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, table, text_columns
+from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
+from cmm_uq.certificate.result import Page, Result
+from cmm_uq.machine.physics.kinematics import PARAMETRIC_ERRORS
+from cmm_uq.maths.geometry.positioning import DOWN, UP, MissingReadingError, PositioningRuns
+from cmm_uq.maths.uncertainty.quantity import alike, rounded
+
+COVERAGE = 2.0  # of U of the figures (ISO/TR 230-9)
+Spread = Mapping[str, float]
+
+
+def _evaluated(result: Result) -> list[tuple[Run, PositioningRuns | MissingReadingError, Spread]]:
+    artefact, under = cast("AxisRuns", result.artefact), result.job.circumstances
+    found: list[tuple[Run, PositioningRuns | MissingReadingError, Spread]] = []
+    for run in artefact.runs:
+        try:
+            evaluated = artefact.positioning(run)
+        except MissingReadingError as error:
+            found.append((run, error, {}))
+        else:
+            spread = test_spread(evaluated, artefact, under) if run.kind == ALONG else {}
+            found.append((run, evaluated, spread))
+    return found
+
+
+def missing_words(run: Run, error: MissingReadingError) -> Text:
+    """Why a run has no figures."""
+    way = {1.0: say("in the positive direction"), -1.0: say("in the negative direction")}.get(error.direction, NOTHING)
+    return say(
+        "measurement {number} is not evaluated: target {target:g} mm {way} has {count} readings in repeat {repeat}, not one",
+        number=run.measurement,
+        target=error.target,
+        way=way,
+        count=error.count,
+        repeat=error.repeat,
+    )
+
+
+def _unit(run: Run) -> Text:
+    return unit("″") if run.kind == TURNING else unit("µm")
+
+
+def results(result: Result) -> dict[str, Any]:
+    runs = []
+    for run, found, spread in _evaluated(result):
+        told: dict[str, Any] = {"measurement": run.measurement, "quantity": str(run.quantity), "unit": str(_unit(run))}
+        if isinstance(found, MissingReadingError):
+            runs.append({**told, "not_evaluated": str(missing_words(run, found))})
+            continue
+        by_way = [
+            {"mean": m.tolist(), "s": None if np.isnan(s).any() else s.tolist()}
+            for m, s in zip(found.mean, found.s, strict=True)
+        ]
+        told |= {"targets_mm": found.targets.tolist(), "directions": by_way, "reversal": found.reversal.tolist()}
+        told |= {"figures": dict(found.figures()), "U": {name: COVERAGE * u for name, u in spread.items()}}
+        runs.append({**told, "drift_of_repeats": found.drift.tolist()})
+    return {"runs": runs, "not_read": _not_read(result)}
+
+
+def _not_read(result: Result) -> list[str]:
+    """Parametric errors that no run reads, by their name in VDI/VDE 2617."""
+    read = {str(run.quantity) for run in cast("AxisRuns", result.artefact).runs}
+    return [error.vdi for error in PARAMETRIC_ERRORS if error.vdi not in read]
+
+
+def sections(result: Result) -> list[Section]:
+    every = _evaluated(result)
+    whole = [(run, found, spread) for run, found, spread in every if isinstance(found, PositioningRuns)]
+    blocks: list[Block | None] = [_both(whole), _each_way(whole)]
+    blocks += [
+        Paragraph(say("{why:capital}.", why=missing_words(run, found)))
+        for run, found, _ in every
+        if isinstance(found, MissingReadingError)
+    ]
+    blocks.append(
+        Paragraph(
+            say(
+                "No run reads {errors}: in what is said of all errors together these keep what physics allows of them.",
+                errors=commas(map(Verbatim, _not_read(result))),
+            )
+        )
+    )
+    blocks += [_readings(result), residual_volume(result, say("positions"))]
+    targets = Section(say("Target by target"), tuple(_targets(run, found) for run, found, _ in whole))
+    return [Section(say("Runs along the axes"), tuple(block for block in blocks if block is not None)), targets]
+
+
+def _cells(found: PositioningRuns, names: list[str], spread: Spread, scale: float) -> list[Text]:
+    figures = found.figures()
+    cells: list[Text] = []
+    for name in names:
+        if name not in figures:
+            cells.append(say("–"))
+        elif name in spread and spread[name] > 0:
+            value, expanded = rounded(figures[name], COVERAGE * spread[name])
+            cells.append(say("{value} ± {U}", value=value, U=expanded))
+        else:
+            cells.append(rounded(figures[name], scale)[0])
+    return cells
+
+
+def _table(
+    caption: Text, names: list[str], whole: list[tuple[Run, PositioningRuns, Spread]], notes: tuple[Text, ...]
+) -> Table | None:
+    rows = [
+        (number(run.measurement), run.quantity, number(found.repeats), _unit(run), *_cells(found, names, spread, 0.1))
+        for run, found, spread in whole
+    ]
+    figures = [Column(Verbatim(name)) for name in names]
+    heads = [
+        *text_columns(say("Measurement"), say("Quantity")),
+        Column(say("Repeats")),
+        *text_columns(say("Unit")),
+        *figures,
+    ]
+    return table(caption, heads, rows, *notes)
+
+
+def _both(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
+    return _table(
+        say("Both directions, by ISO 230-2:2014"),
+        ["A", "E", "R", "B", "mean B", "M"],
+        whole,
+        (
+            say(
+                "A accuracy, E systematic deviation, R repeatability, B reversal, M range of mean deviations. Straightnesses "
+                "less a straight line, and rotations, are evaluated by the same formulas (ISO 230-1)."
+            ),
+            say(
+                "± U (k = 2): test uncertainty as ISO/TR 230-9 has it, of the instrument's scale, alignment, temperature and "
+                "what changes between readings, as far as stated; the machine's own scatter is in the figures, not in U."
+            ),
+        ),
+    )
+
+
+def _each_way(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
+    names = [f"{figure}{arrow}" for figure in "AER" for arrow in "↑↓"]
+    return _table(say("Each direction by itself"), names, whole, ())
+
+
+def _targets(run: Run, found: PositioningRuns) -> Table:
+    own = _unit(run)
+    heads = [say("Mean ↑"), say("s ↑"), say("Mean ↓"), say("s ↓"), say("Reversal")]
+    columns = [found.mean[UP], found.s[UP]]
+    if found.both:
+        columns += [found.mean[DOWN], found.s[DOWN], found.reversal]
+    rows = tuple(
+        (number(target, ".4g"), *(say("–") if np.isnan(c[i]) else number(c[i], ".2f") for c in columns))
+        for i, target in enumerate(found.targets)
+    )
+    drift = number(float(np.abs(found.drift).max()), ".2g")
+    return Table(
+        say("Measurement {number}: {quantity}", number=run.measurement, quantity=run.quantity),
+        (Column(say("Target"), unit("mm")), *figure_columns(*heads[: len(columns)], unit=own)),
+        rows,
+        (say("The mean of a repeat differs from that of all by up to {drift} {unit}.", drift=drift, unit=own),),
+    )
+
+
+def _readings(result: Result) -> Block:
+    artefact = cast("AxisRuns", result.artefact)
+    off, residuals = artefact.about_zero(artefact.readings) / MICROMETRE, result.residuals / MICROMETRE
+    expanded = result.noise.expanded * artefact.noise_scale
+    low, high, low_after, high_after = alike(off.min(), off.max(), residuals.min(), residuals.max())
+    return length_plot(
+        artefact.measurement.astype(float),
+        off,
+        residuals,
+        expanded_before_um=expanded,
+        expanded_after_um=expanded,
+        reference=say("mean of the run"),
+        flagged=result.flagged,
+        position_label=say("Measurement"),
+        caption=say(
+            "Readings about the zero of their run, as recorded and after the fitted model, with U (k = {k}); of a rotation "
+            "times the arm.",
+            k=number(result.noise.coverage_factor, ".2f"),
+        ),
+        alternative=say(
+            "{count} readings: as recorded they lie {low} to {high} µm from their zero; after the fitted model {low_after} to "
+            "{high_after} µm remain.",
+            count=len(off),
+            low=low,
+            high=high,
+            low_after=low_after,
+            high_after=high_after,
+        ),
+    )
+
+
+PAGE = Page(sections, results)

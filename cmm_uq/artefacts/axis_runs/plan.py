@@ -1,0 +1,110 @@
+"""Runs along axes in a plan and in the screening: three axes through the middle of the volume, targets there and back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+
+from cmm_uq.analysis.planning import candidates
+from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, direction_words
+from cmm_uq.analysis.planning.setting import Planning, Setting, Volume
+from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, no_references, rows_by
+from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
+from cmm_uq.artefacts.axis_runs.run import READINGS
+from cmm_uq.artefacts.kinds import READ, TURN
+from cmm_uq.base.messages import Verbatim, say
+from cmm_uq.base.points import Floats, Points
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.machine.model.artefact import Artefact
+
+_SAME_MM = 1e-6
+
+
+def _misfit(xyz: Floats, _: Floats, __: float) -> Floats:
+    """Distance of each position from the line of its run, and from the targets that others were at as often."""
+    middle = np.median(xyz, axis=0)
+    travel = np.argmax(np.median(np.abs(xyz - middle), axis=0))
+    steps = xyz[np.argmax(xyz[:, travel])] - xyz[np.argmin(xyz[:, travel])]
+    best = np.full(len(xyz), np.inf)
+    for direction in (np.eye(3)[travel], steps / max(float(np.linalg.norm(steps)), _SAME_MM)):
+        off = (xyz - middle) - np.outer((xyz - middle) @ direction, direction)
+        off = np.linalg.norm(off - np.median(off, axis=0), axis=1)
+        if np.median(off) < np.median(best):
+            best = off
+    values, index, counts = np.unique(np.round(xyz[:, travel], 3), return_inverse=True, return_counts=True)
+    alone = (counts == 1)[index.ravel()] & (len(values) < 0.6 * len(xyz))
+    nearest = np.array([np.abs(np.delete(values, i) - v).min(initial=np.inf) for i, v in enumerate(values)])[
+        index.ravel()
+    ]
+    return np.asarray(np.maximum(best, np.where(alone & np.isfinite(nearest), nearest, 0.0)))
+
+
+def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
+    """Runs along straight lines."""
+    rows = rows_by(points.measurement)
+    extent = float(np.median([np.linalg.norm(np.ptp(points.xyz[each], axis=0)) for each in rows]))
+    return ArtefactShape(rows, _misfit, np.nan, extent, reference=no_references(points)) if extent else None
+
+
+SCREENING = Screening(shape_of, targets=True)
+STEPS = 10  # between targets along each axis, where the plan does not say
+
+
+def positioning(setting: Setting) -> tuple[SetUp, ...]:
+    """Position along three lines through the middle of the volume (ISO 230-2)."""
+    return tuple(_run(setting, axis, axis, turns=False) for axis in np.eye(3))
+
+
+def all_errors(setting: Setting) -> tuple[SetUp, ...]:
+    """The same lines: position, two straightnesses and three rotations of each."""
+    return tuple(
+        _run(setting, axis, sense, turns=turns) for axis in np.eye(3) for turns in (False, True) for sense in np.eye(3)
+    )
+
+
+def _run(setting: Setting, axis: Floats, sense: Floats, *, turns: bool) -> SetUp:
+    candidates.check_allowed(setting, axis)
+    attitude, words, letter = attitude_along(axis), direction_words(axis), Verbatim("XYZ"[int(np.argmax(sense))])
+    what = say("{words}, displacement read along {axis}", words=words, axis=letter)
+    if turns:
+        what = say("{words}, rotation read about {axis}", words=words, axis=letter)
+    pattern = run_pattern(setting, setting.volume.chord(axis), attitude.T @ sense, turns=turns)
+    return setting.volume.set_up(pattern, attitude, candidates.MIDDLE, what)
+
+
+def run_pattern(setting: Setting, length: float, sense: Floats, *, turns: bool) -> Pattern:
+    """Targets along the first axis, there and back."""
+    plan = setting.plan
+    pitch = plan.pitch_mm or (plan.length_mm or length) / STEPS
+    out = pitch * np.arange(int(min(plan.length_mm or length, length) / pitch + 1e-9) + 1)
+    at = np.concatenate([out, out[::-1]]) if plan.both_ways is not False else out
+    n = len(at)
+    body, travel = np.zeros((n, 3)), np.zeros((n, 3))
+    body[:, 0], travel[:, 0] = at - 0.5 * out[-1], np.where(np.arange(n) < len(out), 1.0, -1.0)
+    still, own = np.zeros((n, 3)), np.tile(sense, (n, 1))
+    vectors = {"approach": travel, "read": still if turns else own, "turn": own if turns else still}
+    columns = {name: np.zeros(n) for name in READINGS.values()}
+    return Pattern(body, np.arange(1, n + 1), np.ones(n, dtype=np.int64), columns, vectors).repeated(plan.repeats)
+
+
+def _shape(setting: Setting) -> Pattern:
+    length = setting.plan.length_mm or float(setting.volume.size.min())
+    return run_pattern(setting, length, np.eye(3)[0], turns=False)
+
+
+def elsewhere(artefact: Artefact, volume: Volume, count: int) -> tuple[SetUp, ...]:
+    """The targets of a recorded run, displacements read along other lines."""
+    run = cast("AxisRuns", artefact).runs[0]
+    own = artefact.points.select(artefact.rows[run.rows, 0])
+    along = {name: np.full(len(own), part) for name, part in zip(READ, run.travel, strict=True)}
+    still = dict.fromkeys(TURN, np.zeros(len(own)))
+    first = replace(own, columns={**own.columns, **along, **still}).select(own.repeat == own.repeat.min())
+    pattern, attitude, _ = Pattern.of_recording(first)
+    return _RELOCATED.like(pattern, attitude, volume, count)
+
+
+_RELOCATED = candidates.RelocatedCandidates(candidates.along_lines)
+_PLACES = candidates.VolumeCandidates(candidates.along_lines, _shape, _RELOCATED)
+PLANNING = Planning({"positioning": positioning, "all errors": all_errors}, _PLACES.candidates, elsewhere)

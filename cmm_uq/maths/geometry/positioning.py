@@ -1,0 +1,124 @@
+"""Positioning of an axis by ISO 230-2:2014: from readings at targets, in both directions, to A, E, R, B and M.
+
+With x_ij the deviation (actual less target) of repeat j at target i, of n repeats: mean x̄_i of each direction, estimator s_i
+of its standard uncertainty (n − 1), B_i = x̄_i↑ − x̄_i↓, and
+
+    R_i↑ = 4·s_i↑,  R_i = max(2s_i↑ + 2s_i↓ + |B_i|, R_i↑, R_i↓),  R = max R_i,  B = max |B_i|,
+    E = max x̄_i − min x̄_i over both directions,  M the same of (x̄_i↑ + x̄_i↓)/2,
+    A = max(x̄_i + 2s_i) − min(x̄_i − 2s_i) over both directions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.base.points import Floats, Ints
+
+UP, DOWN = 0, 1
+_SAME_MM = 1e-3  # targets nearer than this are one
+
+
+@dataclass(frozen=True, eq=False)
+class PositioningRuns:
+    targets: Floats  # (t,) ascending
+    x: Floats  # (d, t, n) deviations by direction, target and repeat; d = 1 where all came from one side
+
+    @classmethod
+    def of(
+        cls, positions: Floats, directions: Floats, repeats: Ints, readings: Floats, *, straight: bool = False
+    ) -> PositioningRuns:
+        """Of readings (k,) in any order; ``straight``: less a common straight line.
+
+        Raises ``MissingReadingError`` where one is missing, or is there twice.
+        """
+        order = np.sort(positions)
+        edges = order[np.concatenate([[True], np.diff(order) > _SAME_MM])]
+        target = np.searchsorted(edges, positions + _SAME_MM, side="right") - 1
+        sides = np.unique(directions)[::-1]
+        side, repeat = np.searchsorted(-sides, -directions), np.unique(repeats, return_inverse=True)[1].ravel()
+        shape = (len(sides), len(edges), int(repeat.max()) + 1)
+        x, count = np.full(shape, np.nan), np.zeros(shape, dtype=np.int64)
+        np.add.at(count, (side, target, repeat), 1)
+        if np.any(count != 1):
+            d, t, n = (int(v[0]) for v in np.nonzero(count != 1))
+            raise MissingReadingError(sides[d], edges[t], int(np.unique(repeats)[n]), int(count[d, t, n]))
+        if straight:
+            readings = readings - np.polyval(np.polyfit(positions, readings, 1), positions)
+        x[side, target, repeat] = readings
+        return cls(edges, x)
+
+    @property
+    def both(self) -> bool:
+        return len(self.x) == 2
+
+    @property
+    def repeats(self) -> int:
+        return int(self.x.shape[2])
+
+    @property
+    def mean(self) -> Floats:
+        """(d, t) x̄_i."""
+        return np.asarray(self.x.mean(axis=2))
+
+    @property
+    def s(self) -> Floats:
+        """(d, t) s_i; ``nan`` of a single repeat."""
+        return np.asarray(self.x.std(axis=2, ddof=1)) if self.repeats > 1 else np.full(self.x.shape[:2], np.nan)
+
+    @property
+    def reversal(self) -> Floats:
+        """(t,) B_i; empty where all came from one side."""
+        return self.mean[UP] - self.mean[DOWN] if self.both else np.zeros(0)
+
+    @property
+    def drift(self) -> Floats:
+        """(n,) mean of each repeat over all targets and directions, less the mean of all."""
+        each = self.x.mean(axis=(0, 1))
+        return np.asarray(each - each.mean())
+
+    def figures(self) -> Mapping[str, float]:
+        return {name: float(value) for name, value in zip(self.names(), _figures(self.x[None])[0], strict=True)}
+
+    def names(self) -> tuple[str, ...]:
+        arrows = ("↑", "↓") if self.both else ("↑",)
+        found = (
+            [f"{name}{arrow}" for name in "ERA" for arrow in arrows] if self.repeats > 1 else [f"E{a}" for a in arrows]
+        )
+        if self.both:
+            found += [*("BEM" if self.repeats == 1 else "BRMEA"), "mean B"]
+        return tuple(found)
+
+    def spread(self, changes: Floats) -> Mapping[str, float]:
+        """Standard deviation of each figure under changes (N, d, t, n) of the readings."""
+        found = _figures(self.x + changes)
+        return dict(zip(self.names(), found.std(axis=0).tolist(), strict=True))
+
+
+class MissingReadingError(ValueError):
+    """Of a direction, target and repeat that no reading, or more than one, belongs to."""
+
+    def __init__(self, direction: float, target: float, repeat: int, count: int) -> None:
+        super().__init__(f"target {target:g} mm has {count} readings in direction {direction:+g} of repeat {repeat}")
+        self.direction, self.target, self.repeat, self.count = direction, target, repeat, count
+
+
+def _figures(x: Floats) -> Floats:
+    """(N, figures) of deviations (N, d, t, n), in the order of :meth:`PositioningRuns.names`."""
+    mean, many = x.mean(axis=3), x.shape[3] > 1
+    s = x.std(axis=3, ddof=1) if many else np.zeros_like(mean)
+    found = [np.ptp(mean, axis=2)]
+    if many:
+        found += [4 * s.max(axis=2), (mean + 2 * s).max(axis=2) - (mean - 2 * s).min(axis=2)]
+    if x.shape[1] == 2:
+        b = mean[:, UP] - mean[:, DOWN]
+        R = np.maximum(2 * s.sum(axis=1) + np.abs(b), 4 * s.max(axis=1)).max(axis=1)
+        M = np.ptp(mean.mean(axis=1), axis=1)
+        E = mean.max(axis=(1, 2)) - mean.min(axis=(1, 2))
+        A = (mean + 2 * s).max(axis=(1, 2)) - (mean - 2 * s).min(axis=(1, 2))
+        B = np.abs(b).max(axis=1)
+        both = [B, R, M, E, A] if many else [B, E, M]
+        found += [each[:, None] for each in (*both, b.mean(axis=1))]
+    return np.hstack(found)
