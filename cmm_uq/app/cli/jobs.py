@@ -226,10 +226,13 @@ def compensate(
         None, "Cloud of a digitizer to correct instead: .csv, .parquet, .npy or a folder of them.", "FILE",
         "the job's recording"),
     new_map: bool = option(False, "Write instead an error map of all errors that the job's recording shows."),
+    controller: str = option(
+        "", "Write instead tables of runs that position axes, for a controller: linuxcnc, sinumerik, twincat, or a file that "
+        "is a jinja2 template of your own.", "FORM", "not written"),
     end: Ending = opt.FORCED,
 ) -> None:  # fmt: skip
-    """Correct a recording by its machine's error maps, as a job folder of its own, or make such a map of one."""
-    from cmm_uq.app.commands.jobs import compensate as corrected
+    """Correct a recording by its machine's error maps, as a job folder of its own, or make a map or tables of one."""
+    from cmm_uq.app.commands.jobs import compensate as corrected, controller as tables
     from cmm_uq.machine.physics.map_interpolation import Beyond
 
     beyond: Beyond = "extrapolate" if extrapolate else "refuse"
@@ -241,6 +244,13 @@ def compensate(
             files, found = corrected.write_new_map(job, out, force=end.force, stage=stage)
         what = f"An error map of all errors that the recording of {job} shows"
         conclude_derived(files, what, end, is_job=False, remarks=corrected.worth_of(found))
+        return
+    if controller:
+        if cloud is not None or map_text is not None or extrapolate:
+            problem = "--controller makes tables, and goes with none of --cloud, --map-text and --extrapolate"
+            raise CmmUqError(problem, fix="Leave out one of them")
+        files, said = tables.write_tables(job, out, controller, force=end.force)
+        conclude_derived(files, f"Tables of the axes of {job} for a controller", end, is_job=False, remarks=said)
         return
     if cloud is None:
         files = corrected.write_compensated(job, out, beyond=beyond, map_text_c=map_text, force=end.force)

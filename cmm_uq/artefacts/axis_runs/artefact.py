@@ -20,8 +20,10 @@ from cmm_uq.artefacts.axis_runs.run import (
     ALONG,
     END,
     READINGS,
+    START,
     TARGET,
     TURNING,
+    ZERO,
     Run,
     kinds_of,
     refuse,
@@ -66,7 +68,7 @@ class AxisRuns(Artefact):
         own = points.select(~end)
         self.runs = runs_of(own, where)
         self.measurement, self.repeat = own.measurement, own.repeat
-        self._zeros = Placings.of(own.group if facts.zero_each_repeat else own.measurement)
+        self._zeros = self._zeros_of(own)
         self._kind = kinds_of(self.runs, len(own))
         self._turned, self._ends = np.flatnonzero(self._kind == TURNING), self._ends[self._kind == TURNING]
         self._sense, _ = senses_of(self.runs, len(own))
@@ -80,7 +82,7 @@ class AxisRuns(Artefact):
         ones, slopes = (self._zeros.columns(each).dense() for each in (np.ones((len(own), 1)), slope))
         self._freedoms = np.hstack([ones, slopes[:, np.any(slopes != 0, axis=0)]])
         self.readings = self._base - self._seen(points.xyz[:, :, None])[:, 0]
-        self.readings -= self._zeros.means(self.readings)
+        self.readings += own.columns[ZERO] - self._zeros.means(self.readings)
         spans = [np.ptp(self._base[run.rows]) for run in self.runs if run.kind == ALONG]
         self.sizes = self._instrument(float(max(spans))) if spans else ()
         self.noise_scale = self._noise_scale()
@@ -90,9 +92,12 @@ class AxisRuns(Artefact):
         n, runs = len(points), runs_of(points, where)
         kind, (sense, arm) = kinds_of(runs, n), senses_of(runs, n)
         turned, target = np.flatnonzero(kind == TURNING), np.zeros(n)
+        start = np.zeros(n)
         for run in runs:
-            target[run.rows] = run.positions
-        shift = self._in_mm(points, kind, target, where)[:, None] * sense
+            target[run.rows], start[run.rows] = run.positions, run.start
+        readings = self._in_mm(points, kind, target, where)
+        zero = self._zeros_of(points).means(readings)
+        shift = (readings - zero)[:, None] * sense
         optics = zip(AXES, self._facts.optics_mm, strict=True)
         given = np.column_stack([points.columns.get(f"tip_{a}_mm", np.full(n, at)) for a, at in optics])
         tip = np.vstack([given, (given + self._facts.arm_mm * arm)[turned]])
@@ -103,12 +108,17 @@ class AxisRuns(Artefact):
         read = np.where((kind == TURNING)[:, None], 0.0, sense)
         about = np.where((kind == TURNING)[:, None], np.cross(arm, sense), 0.0)
         more = {END: (np.arange(len(whole)) >= n).astype(np.float64), TARGET: np.append(target, target[turned])}
+        more |= {START: np.append(start, start[turned]), ZERO: np.append(zero, zero[turned])}
         for names, values in ((READ, read), (TURN, about)):
             more |= dict(zip(names, np.vstack([values, values[turned]]).T, strict=True))
         more |= {f"tip_{a}_mm": tip[:, i] for i, a in enumerate(AXES)}
         columns = {name: values for name, values in whole.columns.items() if name not in READINGS.values()}
         machine = replace(points.machine, tip_on_every_carriage=True)
         return replace(whole, xyz=xyz, machine=machine, columns={**columns, **more})
+
+    def _zeros_of(self, points: Points) -> Placings:
+        """Which readings have one zero."""
+        return Placings.of(points.group if self._facts.zero_each_repeat else points.measurement)
 
     def _in_mm(self, points: Points, kind: NDArray[Any], target: Floats, where: str | None) -> Floats:
         """Readings (n,), mm; of a rotation times the arm."""
@@ -206,10 +216,13 @@ class AxisRuns(Artefact):
         return replace(points, columns={**points.columns, **columns})
 
     def positioning(self, run: Run) -> PositioningRuns:
-        """Readings of a run by target, direction and repeat, µm or ″, for ISO 230-2."""
+        """Readings of a run by target, direction and repeat, µm or ″, for ISO 230-2; of a position actual less target."""
         readings = self.readings[run.rows] / self._factor(turns=run.kind == TURNING)
-        at, repeat = run.positions + round(run.start, 2), self.repeat[run.rows]  # readings moved the start by µm
-        return PositioningRuns.of(at, run.directions, repeat, readings, straight=run.kind == ACROSS)
+        if run.kind == ALONG:
+            readings = readings * np.sign(run.sense @ run.travel)
+        at, repeat = run.positions + run.start, self.repeat[run.rows]
+        found = PositioningRuns.of(at, run.directions, repeat, readings, straight=run.kind == ACROSS)
+        return replace(found, axis=run.axis) if run.kind == ALONG else found
 
     def positionings(self) -> Mapping[int, PositioningRuns]:
         return {run.measurement: self.positioning(run) for run in self.runs if run.kind == ALONG}

@@ -18,8 +18,9 @@ from cmm_uq.machine.model.recorded import place
 
 ALONG, ACROSS, TURNING = "along", "across", "turning"
 READINGS = {False: "reading_um", True: "reading_arcsec"}  # by whether a rotation is read
-# columns of the artefact's own points: whether one is the other end of an arm, and the target along the run from its first, mm
-END, TARGET = "arm_end", "target_mm"
+# columns of the artefact's own points: whether one is the other end of an arm; the target along the run from its first, and
+# where that is; the mean of the readings of one zero; mm
+END, TARGET, START, ZERO = "arm_end", "target_mm", "start_mm", "zero_mm"
 _UNIT, _SAME_MM = 0.01, 1e-6
 _ALONG, _ACROSS = 0.999, 0.05  # cosines between what is read and the travel
 
@@ -38,11 +39,17 @@ class Run:
     directions: Floats  # (k,) −1 or +1, in which each position was approached; 0 where nobody says
 
     @property
+    def axis(self) -> str:
+        """The carriage that moves; empty where several do."""
+        moved = np.flatnonzero(np.abs(self.travel) > _ALONG)
+        return AXES[moved[0]] if len(moved) else ""
+
+    @property
     def quantity(self) -> Text:
         """Name in VDI/VDE 2617 of the parametric error that it shows, as ``xtx``; its direction where it shows several."""
-        moved, read = (np.flatnonzero(np.abs(each) > _ALONG) for each in (self.travel, self.sense))
-        if len(moved) and len(read):
-            return Verbatim(f"{AXES[moved[0]]}{'r' if self.kind == TURNING else 't'}{AXES[read[0]]}")
+        read = np.flatnonzero(np.abs(self.sense) > _ALONG)
+        if self.axis and len(read):
+            return Verbatim(f"{self.axis}{'r' if self.kind == TURNING else 't'}{AXES[read[0]]}")
         return direction_words(self.travel)
 
 
@@ -149,7 +156,7 @@ def runs_of(points: Points, where: str | None) -> tuple[Run, ...]:
                 "Mend read_x, read_y, read_z, or the positions",
             )
         along = points.xyz[rows] @ travel
-        start = float(along.min())
+        start = float(points.columns[START][rows[0]]) if START in points.columns else float(along.min())
         positions = points.columns[TARGET][rows] if TARGET in points.columns else along - start
         targets = np.unique(np.round(positions / _SAME_MM))
         if kind == ACROSS and len(targets) < 3:

@@ -18,13 +18,14 @@ import numpy as np
 from cmm_uq.base.points import Floats, Ints
 
 UP, DOWN = 0, 1
-_SAME_MM = 1e-3  # targets nearer than this are one
+_SAME_MM = 1e-2  # targets nearer than this are one
 
 
 @dataclass(frozen=True, eq=False)
 class PositioningRuns:
     targets: Floats  # (t,) ascending
     x: Floats  # (d, t, n) deviations by direction, target and repeat; d = 1 where all came from one side
+    axis: str = ""  # that is positioned; empty along a diagonal, or where something else is read
 
     @classmethod
     def of(
