@@ -10,7 +10,7 @@ import numpy as np
 from cmm_uq.analysis.diagnosis import joint as jointly
 from cmm_uq.analysis.diagnosis.comparison.equivalence import equivalent_sets
 from cmm_uq.analysis.diagnosis.comparison.explanations import effect_of
-from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
+from cmm_uq.analysis.diagnosis.comparison.search import ASSERTED, SearchResult
 from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, period_modes
 from cmm_uq.base.messages import Text
 from cmm_uq.machine.model import RecordingModel
@@ -67,7 +67,8 @@ def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel
         stand_ins = tuple(one for one in sets if effect.name in one.instead_of)
         # that it is one effect and not two is no evidence: by the readings alone
         fewer = [1 / one.odds for one in stand_ins if len(one.effects) != len(one.instead_of)]
-        probability = min(probability, together / (1 + sum(fewer))) if fewer else probability
+        by_readings = min(probability, together / (1 + sum(fewer))) if fewer else probability
+        group = group if probability < ASSERTED or by_readings == probability else ()
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
         shapes = joint.shapes.get(effect.name, np.zeros((len(draws), 0)))
         if modes and known:  # what is reported of a period is reported of one
@@ -87,7 +88,7 @@ def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel
         }
         explained = max(share, 0.0) if total > 0 else 0.0
         listed.append(OmittedEffect(
-            effect.name, effect.title, probability, parameters, explained, together, effect.points_to, group,
+            effect.name, effect.title, by_readings, parameters, explained, together, effect.points_to, group,
             modes[1:] if known else modes, known, stand_ins,
         ))  # fmt: skip
     return tuple(sorted(listed, key=lambda item: -item.probability))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cmm_uq.analysis.diagnosis.simulation import SimulationMistake, SimulationMistakes
 from cmm_uq.base.messages import NOTHING, Text, alternatives, lines, say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Column, Paragraph, Section, section, table
+from cmm_uq.certificate.result import SimulatedTwin
 from cmm_uq.certificate.wording import probability
 from cmm_uq.maths.uncertainty.quantity import alike
 
@@ -97,3 +98,25 @@ def _data(one: SimulationMistake, named: Sequence[str]) -> dict[str, Any]:
         "elpd_gain_se": one.elpd_gain_se,
         "estimate": value,
     }
+
+
+AGAINST_SIMULATION: Mapping[str, Text] = {
+    "consistent": say("The recording agrees with the simulation."),
+    "undetermined": say(
+        "The recording agrees with the simulation as far as its set-ups tell; what repeats share is more than they scatter by."
+    ),
+    "explained": say("The recording does not agree with the simulation; what differs is found."),
+    "partial": say("Something that differs is found, but structure remains that no known effect accounts for."),
+    "empirical": say(
+        "The recording does not agree with the simulation; a function that was fitted predicts what differs, and no known "
+        "effect accounts for it."
+    ),
+    "unexplained": say("The recording does not agree with the simulation, and no known effect accounts for it."),
+}
+
+
+def contained(simulated: SimulatedTwin | None, effect: str) -> Text:
+    """To follow the sentence on an effect that the simulation contains: what was found is what it lacks of it."""
+    if simulated is None or effect not in simulated.contains:
+        return NOTHING
+    return say("The simulation contains it: this is by how much the machine's differs.")

@@ -10,6 +10,7 @@ from cmm_uq.analysis.diagnosis.comparison.search import ASSERTED
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
+from cmm_uq.analysis.planning.set_up import odds_words
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.messages import (
     NOTHING,
@@ -21,15 +22,14 @@ from cmm_uq.base.messages import (
     day,
     lines,
     listed,
-    number,
     say,
     semicolons,
 )
 from cmm_uq.certificate.diagnosis.empirical import empirical_words, nearest_words, repeats_words
-from cmm_uq.certificate.diagnosis.mistakes import TITLE, mistaken, to_mend
+from cmm_uq.certificate.diagnosis.mistakes import AGAINST_SIMULATION, TITLE, contained, mistaken, to_mend
 from cmm_uq.certificate.diagnosis.sections import by_columns, explanation, next_sentence, place_words, without_power
 from cmm_uq.certificate.document import Overview, Standing
-from cmm_uq.certificate.result import JobDiagnosis, SimulatedTwin
+from cmm_uq.certificate.result import JobDiagnosis
 from cmm_uq.certificate.wording import Headline, Summary, effect_of, effect_title, probability, size_of, titles
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.jobs.verdicts import DIAGNOSES
@@ -89,7 +89,7 @@ def overview_of(result: JobDiagnosis) -> Overview:
     elif without_power(result):
         title, standing = say("Consistent, as far as this recording can show"), "open"
     elif d.verdict == "explained" and (
-        _otherwise(d) or any(_instead(d, item) or item.alternatives for item in d.effects)
+        _otherwise(d) or any(instead(d, item) or item.alternatives for item in d.effects)
     ):
         title = say("Explained: more than one cause is possible")
     if said := mistaken(result.mistakes):
@@ -114,9 +114,8 @@ def _found(result: JobDiagnosis) -> Text:
     for item in d.effects:
         size = size_of(effect_of(item.effect, d.after.effects), item.parameters, factors=False)
         told = say("{title}: {size}.", title=item.title, size=size)
-        others: list[Text] = [say("{title:small}", title=title) for title in titles(_instead(d, item), d.after.effects)]
-        if others := [*others, *sets_instead(item)]:
-            told = say("{told} It could as well be: {others}.", told=told, others=alternatives(others))
+        if others := others_of(d, item):
+            told = say("{told} {others}", told=told, others=_as_well(others))
         texts.append(after(told, contained(result.simulated, item.effect)))
     if d.verdict == "partial":
         texts += empirical_words(d) or [say("And more that no known effect accounts for.")]
@@ -124,7 +123,25 @@ def _found(result: JobDiagnosis) -> Text:
     return lines(texts)
 
 
-def _instead(d: Diagnosis, item: OmittedEffect) -> list[str]:
+def _as_well(others: Sequence[Text]) -> Text:
+    if len(others) <= INLINE:
+        return say("It could as well be: {others}.", others=alternatives(others))
+    return say("It could as well be one of {count} others; a table below has them.", count=len(others))
+
+
+def others_of(d: Diagnosis, item: OmittedEffect) -> list[Text]:
+    """What this recording cannot tell from an effect: single ones, then sets with what is known of them beforehand."""
+    single = titles(besides(d, item), d.after.effects)
+    return [*(say("{title:small}", title=title) for title in single), *sets_instead(item)]
+
+
+def besides(d: Diagnosis, item: OmittedEffect) -> list[str]:
+    """Single effects that this recording cannot tell from one, but those among its sets."""
+    sets = {one.effects for one in item.alternatives if one.instead_of == (item.effect,)}
+    return [name for name in instead(d, item) if (name,) not in sets]
+
+
+def instead(d: Diagnosis, item: OmittedEffect) -> list[str]:
     """What this recording cannot tell from an effect; of an improbable one the whole group, as one of which it is asserted."""
     group = item.group if item.probability < ASSERTED else ()
     twins = (name for twins in d.indistinguishable if twins[0] == item.effect for name in twins[1:])
@@ -195,7 +212,7 @@ def _to_do(result: JobDiagnosis) -> Text:
         return lines(told)
     if further and not d.agrees:
         told.append(say("First measure the set-ups that are told below, to part what this recording cannot."))
-    told += [_look_at(d, item) for item in d.effects]
+    told += [line for item in d.effects for line in _look_at(d, item)]
     if d.verdict in ("partial", "unexplained"):
         look = say("Look at the pictures below and measure again: do not compensate by a model that does not fit.")
         told.append(look)
@@ -217,39 +234,31 @@ def _to_do(result: JobDiagnosis) -> Text:
     return lines(dict.fromkeys(told))
 
 
-_SETS = 3  # sets that a sentence tells, the likeliest; results.json has all
+INLINE = 3  # alternatives that a sentence tells; of more there is a table
 
 
 def sets_instead(item: OmittedEffect) -> list[Text]:
     """Sets of effects that the readings alone do not tell from one, with the odds of what is known beforehand."""
     told: list[Text] = []
-    for one in sorted(item.alternatives, key=lambda one: one.odds)[:_SETS]:
+    for one in sorted(item.alternatives, key=lambda one: one.odds):
         what = listed([say("{title:small}", title=title) for title in one.titles])
-        if len(one.instead_of) > 1:
-            rest = listed(
-                [say("{title:small}", title=effect_title(name)) for name in one.instead_of if name != item.effect]
-            )
-            what = say("{what} in its place and in that of {rest}", what=what, rest=rest)
+        if rest := [say("{title:small}", title=effect_title(n)) for n in one.instead_of if n != item.effect]:
+            what = say("{what} in its place and in that of {rest}", what=what, rest=listed(rest))
         elif len(one.titles) > 1:
             what = say("{what} together", what=what)
-        odds = max(one.prior_odds, 1 / one.prior_odds)
-        digits = number(odds, ".0f" if odds > 10 else ".2g")
-        if one.prior_odds >= 1:
-            told.append(say("{what} (beforehand {odds} times less probable)", what=what, odds=digits))
-        else:
-            told.append(say("{what} (beforehand {odds} times more probable)", what=what, odds=digits))
-    if len(item.alternatives) > _SETS:
-        told.append(say("{more} more sets", more=len(item.alternatives) - _SETS))
+        told.append(say("{what} (odds beforehand {odds} against it)", what=what, odds=odds_words(one.prior_odds)))
     return told
 
 
-def _look_at(d: Diagnosis, item: OmittedEffect) -> Text:
-    """The cause to look at; of effects that cannot be told apart, that of each on a line."""
-    others = [effect_of(name, d.after.effects) for name in _instead(d, item)]
+def _look_at(d: Diagnosis, item: OmittedEffect) -> list[Text]:
+    """The cause to look at; of effects that cannot be told apart, that of each on a line, where they are few."""
+    names = dict.fromkeys((*instead(d, item), *(name for one in item.alternatives for name in one.effects)))
+    others = [effect_of(name, d.after.effects) for name in names]
     causes = [(item.title, item.points_to), *((one.title, one.points_to) for one in others if one is not None)]
     if len(causes) == 1:
-        return say("{what:capital}.", what=item.points_to)
-    return lines(say("If it is {title:small}: {what}.", title=title, what=what) for title, what in causes)
+        return [say("{what:capital}.", what=item.points_to)]
+    few = causes if len(causes) <= INLINE + 1 else causes[:1]
+    return [say("If it is {title:small}: {what}.", title=title, what=what) for title, what in few]
 
 
 def verdict_of(result: JobDiagnosis) -> Text:
@@ -288,12 +297,12 @@ def sentence(item: OmittedEffect, gain: Improvement, effects: Iterable[Effect] =
 
 
 def sure(item: OmittedEffect) -> Text:
-    share = probability(item.probability)
+    share, group = probability(item.probability), (*map(effect_title, item.group), *sets_instead(item))
     if item.probability < ASSERTED:
         share = say(
             "{share}, {together} that it is this or one that this recording cannot tell from it: {group}",
             share=share, together=probability(item.together),
-            group=commas((*(effect_title(name) for name in item.group), *sets_instead(item))),
+            group=commas(group) if len(group) <= INLINE else say("{count} others", count=len(group)),
         )  # fmt: skip
     elif item.together > item.probability + _SAME:
         share = say("{share} ({together} of it or one that cannot be told from it)",
@@ -371,25 +380,3 @@ def _listed(modes: Sequence[Mode]) -> Text:
     return commas(
         [*periods, *([say("and {count} more", count=len(modes) - _PERIODS)] if len(modes) > _PERIODS else [])]
     )
-
-
-AGAINST_SIMULATION: Mapping[str, Text] = {
-    "consistent": say("The recording agrees with the simulation."),
-    "undetermined": say(
-        "The recording agrees with the simulation as far as its set-ups tell; what repeats share is more than they scatter by."
-    ),
-    "explained": say("The recording does not agree with the simulation; what differs is found."),
-    "partial": say("Something that differs is found, but structure remains that no known effect accounts for."),
-    "empirical": say(
-        "The recording does not agree with the simulation; a function that was fitted predicts what differs, and no known "
-        "effect accounts for it."
-    ),
-    "unexplained": say("The recording does not agree with the simulation, and no known effect accounts for it."),
-}
-
-
-def contained(simulated: SimulatedTwin | None, effect: str) -> Text:
-    """To follow the sentence on an effect that the simulation contains: what was found is what it lacks of it."""
-    if simulated is None or effect not in simulated.contains:
-        return NOTHING
-    return say("The simulation contains it: this is by how much the machine's differs.")

@@ -11,12 +11,25 @@ from cmm_uq.analysis.conformity.accuracy import TITLES, UNITS
 from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.held_out import Improvement
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, names, number, say, sentences
+from cmm_uq.analysis.planning.set_up import odds_words
+from cmm_uq.base.messages import (
+    NOTHING,
+    Text,
+    Verbatim,
+    commas,
+    day,
+    names,
+    number,
+    say,
+    semicolons,
+    sentences,
+    together,
+)  # fmt: skip
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate import document as doc, wording
 from cmm_uq.certificate.diagnosis import overview as words
 from cmm_uq.certificate.diagnosis.empirical import empirical_section
-from cmm_uq.certificate.diagnosis.mistakes import mistakes_section
+from cmm_uq.certificate.diagnosis.mistakes import contained, mistakes_section
 from cmm_uq.certificate.diagnosis.sections import costs_section, next_section, unseen_section, where_section
 from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.origin import came_about, program
@@ -97,14 +110,38 @@ def _left_out(result: JobDiagnosis) -> tuple[doc.Block, ...]:
     groups = (wording.titles(group, d.after.effects) for group in d.indistinguishable)
     alike = (doc.Paragraph(words.ambiguous(group), tone="warning") for group in groups)
     withheld = map(doc.Paragraph, words.withheld_words(d.withheld))
-    return doc.Paragraph(words.verdict_of(result)), *(_effect(result, item) for item in d.effects), *withheld, *alike
+    effects, others = (_effect(result, item) for item in d.effects), _alternatives(d)
+    return doc.Paragraph(words.verdict_of(result)), *effects, *((others,) if others else ()), *withheld, *alike
+
+
+def _alternatives(d: Diagnosis) -> doc.Table | None:
+    """Everything that could stand in the place of what was found, the most probable first, and where to look for it."""
+    rows: dict[tuple[Text, Text], tuple[Text, ...]] = {}
+    for item in d.effects:
+        sets = sorted(item.alternatives, key=lambda one: one.odds * one.prior_odds)
+        single = (((item.effect,), (name,), NOTHING, NOTHING) for name in words.besides(d, item))
+        told = ((one.instead_of, one.effects, odds_words(one.odds), odds_words(one.prior_odds)) for one in sets)
+        for of, instead, *odds in (*single, *told):
+            found, other = (together(wording.titles(each, d.after.effects)) for each in (of, instead))
+            acting = (wording.effect_of(name, d.after.effects) for name in instead)
+            look = semicolons(dict.fromkeys(effect.points_to for effect in acting if effect is not None))
+            rows.setdefault((found, other), (found, other, *odds, look))
+    if len(rows) <= words.INLINE:
+        return None
+    heads = (say("Found"), say("It could as well be"), Column(say("Likelihood ratio")), Column(say("Odds beforehand")),
+             say("Look at"))  # fmt: skip
+    return table(say("What could stand in its place"), heads, rows.values(), say(
+        "Both of what was found over the other. The likelihood ratio is by the readings alone, with all as large beforehand "
+        "in what they show; the odds beforehand are by how often such causes act. Where there are none, the two were compared "
+        "with what is known beforehand only."
+    ))  # fmt: skip
 
 
 def _effect(result: JobDiagnosis, item: OmittedEffect) -> doc.Facts:
     d = result.diagnosis
     effect = wording.effect_of(item.effect, d.after.effects)
     size = say("{size:capital}.", size=wording.size_of(effect, item.parameters))
-    told = (size, words.other_periods(item), words.contained(result.simulated, item.effect))
+    told = (size, words.other_periods(item), contained(result.simulated, item.effect))
     return doc.Facts((
         (say("Effect"), item.title),
         (say("Size"), sentences(filter(None, told))),

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import cmm_uq
+from cmm_uq.analysis.diagnosis.asserted import AlternativeSet
 from cmm_uq.analysis.diagnosis.diagnosis import ModelAverage, Rival
 from cmm_uq.analysis.diagnosis.empirical.functions import FunctionTerm
 from cmm_uq.analysis.diagnosis.empirical.model import BestKnown, EmpiricalFunction, EmpiricalModel, NamedForm
@@ -105,6 +106,10 @@ def rows(found: JobDiagnosis) -> dict[str, str]:
 
 def plots(document: Document) -> list[Plot]:
     return [block for section in document.sections for block in section.blocks if isinstance(block, Plot)]
+
+
+def tables(document: Document) -> list[Table]:
+    return [block for section in document.sections for block in section.blocks if isinstance(block, Table)]
 
 
 @pytest.mark.long
@@ -297,3 +302,41 @@ def test_set_ups_that_would_part_nothing_are_no_advice(odds: tuple[float, ...], 
     )
     assert expected in told
     assert told.startswith("Measure next: ") == (max(odds) > 3)
+
+
+def test_more_alternatives_than_a_sentence_holds_are_a_table(explained: JobDiagnosis) -> None:
+    """Each with its likelihood ratio and odds, the more probable first, and where to look for it; none twice."""
+    d = explained.diagnosis
+    item = d.effects[0]
+    names = ("scale_x", "scale_y", "scale_z", "straightness_x_y", "rotation_x_x")
+    sets = tuple(
+        AlternativeSet((item.effect,), (name,), (every()[name].title,), (0.1,), odds, prior)
+        for name, odds, prior in zip(names, (1.0, 2.0, 3.0, 4.0, 5.0), (90.0, 4.0, 1.0, 10.0, 0.1), strict=True)
+    )
+    many = replace(explained, diagnosis=replace(d, effects=(replace(item, alternatives=sets),)))
+    told = rows(many)
+    assert "It could as well be one of 5 others; a table below has them." in told["Found"]
+    assert told["What to do"].count("If it is") == 1
+    (table,) = [
+        t for t in tables(diagnosis_document(many)) if str.__str__(t.caption) == "What could stand in its place"
+    ]
+    said = [[str.__str__(cell) for cell in row] for row in table.rows]
+    assert [row[1] for row in said] == [
+        "Rotation of carriage X about X", "Scale error of Z", "Scale error of Y", "Straightness of X along Y",
+        "Scale error of X",
+    ]  # fmt: skip
+    assert said[0][2:4] == ["5 : 1", "1 : 10"]
+    assert said[-1][2:] == [
+        "1 : 1",
+        "90 : 1",
+        "the scale or its compensation: check the linear compensation of this axis",
+    ]
+
+
+def test_three_alternatives_are_told_in_a_sentence(explained: JobDiagnosis) -> None:
+    item = explained.diagnosis.effects[0]
+    sets = (AlternativeSet((item.effect,), ("scale_y",), (every()["scale_y"].title,), (0.1,), 1.0, 60.0),)
+    few = replace(explained, diagnosis=replace(explained.diagnosis, effects=(replace(item, alternatives=sets),)))
+    assert "It could as well be: scale error of Y (odds beforehand 60 : 1 against it)." in rows(few)["Found"]
+    captions = [str.__str__(t.caption) for t in tables(diagnosis_document(few))]
+    assert "What could stand in its place" not in captions

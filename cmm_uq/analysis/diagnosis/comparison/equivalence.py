@@ -2,7 +2,9 @@
 
 On seven lines of a gauge a roll of X is −0.3 of the squareness X–Y and −0.6 of Z–X, to the last digit: that one effect is more
 probable beforehand than two is no evidence. Sets of one, two and three others are compared with the effect by what the
-readings say alone: all are as large beforehand as each other in what they show. Up to 20 : 1 they are one class.
+readings say alone: all are as large beforehand as each other in what they show. Up to 20 : 1 they are one class, where no
+number of repeats would part them, or what is known beforehand does not either. Of fifty effects some three imitate any
+weak one within its noise: that is chance, more readings end it, and it is no reason to doubt what is found.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ ODDS = 20.0
 _MOST, _TRIED = 3, 60  # effects of a set; sets whose evidence is computed
 _ALLOWED = 3.0  # prior standard deviations that an effect of a set may have
 _SEEN = 1e-9  # part of an effect's length that the baseline must leave of it
+_ALIKE = 1e-3  # part of an effect's squared length that a set leaves of it, up to which no number of repeats parts them
 _DISTINCT = 1e-6  # part of a member's squared length that the others of a set must leave
 
 
@@ -50,19 +53,21 @@ def equivalent_sets(
         list[EquivalentSet](),
     )
     for taken in (*((i,) for i in single), *subsets(single, 2)):
-        for members, sizes, lost in _instead(comparison, chosen, versions, taken):
+        for members, sizes, lost, part in _instead(comparison, chosen, versions, taken):
             if any(set(one.instead_of) <= set(taken) and set(one.members) <= set(members) for one in found):
                 continue
             after = (chosen - set(taken)) | set(members)
             beforehand = float(np.exp(np.clip(prior.log(chosen) - prior.log(after), -700, 700)))
-            found.append(EquivalentSet(taken, members, sizes, float(np.exp(lost)), beforehand))
+            one = EquivalentSet(taken, members, sizes, float(np.exp(lost)), beforehand)
+            if part <= _ALIKE or one.odds * one.prior_odds <= ODDS:
+                found.append(one)
     return tuple(found)
 
 
 def _instead(
     comparison: CandidateComparison, chosen: Key, versions: Sequence[Version], taken: tuple[int, ...]
-) -> list[tuple[tuple[int, ...], tuple[float, ...], float]]:
-    """Smallest sets in the place of some effects, their sizes, and what they lose of the log likelihood; least first."""
+) -> list[tuple[tuple[int, ...], tuple[float, ...], float, float]]:
+    """Smallest sets in the place of some effects, their sizes, what they lose of the log likelihood and of what is shown."""
     others = [i for i in sorted(comparison.visible) if i not in chosen and _single(comparison.explanations[i])]
     given = [v for v in versions if v.explanation in chosen and v.explanation not in taken]
     forms, lengths = _forms(comparison, given, np.array([*others, *taken], dtype=np.intp))
@@ -78,10 +83,10 @@ def _instead(
     tried = sorted(candidates, key=lambda one: one[0])[:_TRIED]
     names = [tuple(others[seen[k]] for k in each) for _, each, _ in tried]
     evidence = _evidence(comparison, given, [taken, *names])
-    found: list[tuple[tuple[int, ...], tuple[float, ...], float]] = []
+    found: list[tuple[tuple[int, ...], tuple[float, ...], float, float]] = []
     for (lost, _, sizes), members, log in zip(tried, names, evidence[1:], strict=True):
         if evidence[0] - log <= np.log(ODDS):
-            found.append((members, tuple(sizes.tolist()), lost))
+            found.append((members, tuple(sizes.tolist()), lost, 2 * lost * variance / size**2))
     return [one for one in found if not any(set(less[0]) < set(one[0]) for less in found)]
 
 

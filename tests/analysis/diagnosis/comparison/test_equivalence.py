@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.diagnosis.comparison.equivalence import EquivalentSet, equivalent_sets
+from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search
+from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
+from tests.artefacts.constructions import indicated, model, step_gauge
 from tests.recordings import TRAVEL, bar_facts, bars
 
 
@@ -81,3 +84,31 @@ def test_a_strong_squareness_stands_alone() -> None:
     found = searched("squareness_xy", 60.0, 400.0)
     assert found.effects == ("squareness_xy",)
     assert not sets_of(found)
+
+
+@pytest.mark.long
+def test_what_imitates_a_weak_effect_by_chance_is_not_told() -> None:
+    """Of all pairs whose least squares lose less than 20 : 1 and yet leave a hundredth of it; no identity is among them."""
+    facts = artefact_facts(kind="step_gauge", u_um=0.5)
+    read = indicated(facts, step_gauge(), ("squareness_xy",), (12.0,), sigma=2e-3, seed=4)
+    found = search(model(facts, read, (), None), None, alpha=0.01, seed=1)
+    assert found.effects == ("squareness_xy",)
+    comparison, (index,) = found.first.comparison, found.chosen
+    every, sets = found.first.explanations, sets_of(found)
+    known = [i for i in comparison.visible if i != index and every[i].kind == EFFECT and not every[i].members[0].shape]
+    known = [i for i in known if every[i].members[0].columns.shape[1] == 1]
+    forms = comparison.rest(
+        np.hstack([every[i].members[0].columns for i in (*known, index)]) / comparison.noise_scale[:, None]
+    )
+    own = forms[:, -1]
+    shows = own * (own @ comparison.left) / (own @ own)
+    left = comparison.left - shows
+    variance = float(left @ left) / (comparison.degrees_of_freedom - 1)
+    chance = []
+    for pair in combinations(range(len(known)), 2):
+        basis = np.linalg.qr(forms[:, pair])[0]
+        missed = shows - basis @ (basis.T @ shows)
+        if 2 * np.log(20.0) * variance > float(missed @ missed) > 1e-2 * float(shows @ shows):
+            chance.append(tuple(sorted(str(every[known[k]].name) for k in pair)))
+    assert chance
+    assert not {names for names in chance if names in sets and sets[names].odds * sets[names].prior_odds > 20}
