@@ -24,7 +24,7 @@ from cmm_uq.base.messages import (
     semicolons,
     sentences,
     together,
-)  # fmt: skip
+)
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate import document as doc, wording
 from cmm_uq.certificate.diagnosis import overview as words
@@ -128,13 +128,14 @@ def _alternatives(d: Diagnosis) -> doc.Table | None:
             rows.setdefault((found, other), (found, other, *odds, look))
     if len(rows) <= words.INLINE:
         return None
-    heads = (say("Found"), say("It could as well be"), Column(say("Likelihood ratio")), Column(say("Odds beforehand")),
-             say("Look at"))  # fmt: skip
-    return table(say("What could stand in its place"), heads, rows.values(), say(
+    ratio, prior = Column(say("Likelihood ratio")), Column(say("Odds beforehand"))
+    note = say(
         "Both of what was found over the other. The likelihood ratio is by the readings alone, with all as large beforehand "
         "in what they show; the odds beforehand are by how often such causes act. Where there are none, the two were compared "
         "with what is known beforehand only."
-    ))  # fmt: skip
+    )
+    heads = (say("Found"), say("It could as well be"), ratio, prior, say("Look at"))
+    return table(say("What could stand in its place"), heads, rows.values(), note)
 
 
 def _effect(result: JobDiagnosis, item: OmittedEffect) -> doc.Facts:
