@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json as json_text
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,10 +23,17 @@ if TYPE_CHECKING:
     from cmm_uq.jobs.importing.format import ImportKeys, Recognition
     from cmm_uq.jobs.job import Job
 
-_COLUMN = 'Column of the recording and of the file: x_mm="X actual", or its number: x_mm=3.'
+_COLUMN = (
+    'Column of the recording and of the file: x_mm="X actual", or its number: x_mm=3; of two points in a row: x_mm=3,6.'
+)
 COLUMN = option(None, _COLUMN, "NAME=COLUMN", "as recognised", "--column")
 _KEY = 'Any other key of an import: unit=inch, sheet="Run 2", decimal=",".'
 KEY = option(None, _KEY, "KEY=VALUE", "as recognised", "--key")
+
+
+LINE = option(
+    None, 'Where a line of lengths lies: "1=along X from 100,200,300", in mm.', "NAME=PLACE", "asked for", "--line"
+)
 
 
 def new(
@@ -40,6 +49,7 @@ def new(
               "a part from a QIF plan or a DMIS program.", "FILE", "simulated readings", "--from"),
     column: list[str] | None = COLUMN,
     key: list[str] | None = KEY,
+    line: list[str] | None = LINE,
     end: Ending = opt.BRIEF,
 ) -> None:  # fmt: skip
     """Begin a job: job.toml with every key explained, and a simulated recording to be replaced by your own.
@@ -61,10 +71,11 @@ def new(
         raise CmmUqError(what, where="--column", fix="Leave it out")
     tables = _tables(machine, serial, settings or [])
     if export is not None and kind != PART:
-        from cmm_uq.app.commands.jobs.exchange import read_export, write_job_of_export
+        from cmm_uq.app.commands.jobs.exchange import read_export, remembered_keys, write_job_of_export
 
-        keys = import_keys(column, key)
-        recognised = read_export(export, keys).recognised
+        keys, _ = remembered_keys(export, import_keys(column, key, line))
+        with in_options():
+            recognised = read_export(export, keys).recognised
         if not silent:
             show_recognised(recognised)
         files: Mapping[str, Path] = write_job_of_export(kind, export, target, tables, keys)
@@ -98,33 +109,102 @@ def import_export(
     file: Path = argument(..., "Export: CSV, .xlsx, .ods, PC-DMIS, Calypso, DMIS, QIF, I++.", "FILE"),
     column: list[str] | None = COLUMN,
     key: list[str] | None = KEY,
+    line: list[str] | None = LINE,
+    save_as: str = option(
+        "", "Remember the answers for exports with the same head.", "NAME", "not remembered", "--save-as"
+    ),
     out: Path | None = option(None, "Write it as a recording, such as recording.csv.", "FILE", "not written"),
     quiet: bool = opt.QUIET,
     json: bool = flag(False, "--json", "Print what is recognised as JSON."),
 ) -> None:
     """Show what is recognised of a laboratory's export; a job takes the same file with the same keys under [recording]."""
-    from cmm_uq.app.commands.jobs.exchange import read_export, write_recording
+    from cmm_uq.app.commands.jobs.exchange import (
+        in_words,
+        lines_asked,
+        read_export,
+        remember,
+        remembered_keys,
+        write_recording,
+    )
 
-    export = read_export(file, import_keys(column, key))
+    keys, known = remembered_keys(file, import_keys(column, key, line))
+    silent = quiet or json
+    if known and not silent:
+        say(f"As remembered in {known}")
+    try:
+        with in_options():
+            export = read_export(file, keys)
+    except CmmUqError as error:
+        asked = lines_asked(error)
+        if save_as and asked is not None:
+            remember(save_as, keys, asked[0].head)
+        if asked is not None and not silent:
+            show_proposed(*asked)
+        raise
+    if save_as:
+        remember(save_as, keys, export.recognised.head)
     if json:
         put(json_text.dumps(export.recognised.data, indent=2, ensure_ascii=False) + "\n")
     elif not quiet:
         show_recognised(export.recognised)
+        say(f"Read as: {in_words(export)}")
+        say("Another column: --column x_mm=3. The answers for the next export of this kind: --save-as NAME")
     if out is not None:
         write_recording(file, export, out)
         if not (quiet or json):
             say(str(out))
 
 
-def import_keys(columns: Iterable[str] | None, keys: Iterable[str] | None) -> ImportKeys:
+_KEYS = r'\b(unit|sheet|decimal|delimiter|encoding|points_per_measurement) = ("[^"]*"|\d+|N)'
+
+
+@contextmanager
+def in_options() -> Iterator[None]:
+    """What a message says to write into job.toml, as options of the command."""
+    try:
+        yield
+    except CmmUqError as error:
+        fix = re.sub(_KEYS, r"--key \1=\2", error.fix or "")
+        fix = re.sub(
+            r"\bcolumns = \{ (\w+) = \[(.*?)\] \}",
+            lambda of: " ".join(f"--column {of[1]}={one.strip()}" for one in of[2].split(", ")),
+            fix,
+        )
+        fix = re.sub(
+            r"\bcolumns = \{ (.*?) \}",
+            lambda of: " ".join(f"--column {one.replace(' = ', '=')}" for one in of[1].split(", ")),
+            fix,
+        )
+        error.fix = re.sub(r'\blines = \{ "(.*?)" = "(.*?)" \}', r'--line "\1=\2"', fix)
+        error.args = (str(error),)
+        raise
+
+
+def import_keys(
+    columns: Iterable[str] | None, keys: Iterable[str] | None, lines: Iterable[str] | None = None
+) -> ImportKeys:
     """Keys of an import that options say; one that is none, or has a value that it cannot have, is refused."""
     from pydantic import ValidationError
 
     from cmm_uq.jobs.importing.format import ImportKeys
 
-    data: dict[str, Any] = dict(map(_setting, keys or ()))
-    if columns:
-        data["columns"] = dict(map(_setting, columns))
+    data: dict[str, Any] = {}
+    for name, value in map(_setting, keys or ()):
+        if name in data:
+            raise CmmUqError(f"{name} is said twice", where="--key", fix="Say it once")
+        data[name] = value
+    several: dict[str, list[Any]] = {}
+    for name, value in map(_setting, columns or ()):
+        numbers = (
+            [int(part) for part in value.split(",")]
+            if isinstance(value, str) and re.fullmatch(r"\d+(,\s*\d+)+", value)
+            else [value]
+        )
+        several.setdefault(name, []).extend(numbers)
+    if several:
+        data["columns"] = {name: own if len(own) > 1 else own[0] for name, own in several.items()}
+    if lines:
+        data["lines"] = {line.rpartition("=")[0].strip() or "1": line.rpartition("=")[2] for line in lines}
     try:
         return ImportKeys.model_validate(data)
     except ValidationError as error:
@@ -144,6 +224,14 @@ def _setting(text: str) -> tuple[str, str | int]:
 
 def show_recognised(recognised: Recognition) -> None:
     show([(("Recognised", "bold"),), *screen_layout(verbose=True).table(recognised.rows), ()])
+
+
+def show_proposed(recognised: Recognition, example: str, names: Iterable[str]) -> None:
+    """How lengths were read, and the question where their lines lie, as options of the command."""
+    show_recognised(recognised)
+    lines = (f'--line "{name}=along X from 100,200,300"' for name in names)
+    say(f"Read as: {example}")
+    say(f"Where they lie: {' '.join(lines)}")
 
 
 def show_imported(job: Job, *, silent: bool) -> None:

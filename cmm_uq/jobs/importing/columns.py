@@ -9,16 +9,18 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import compress
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.csv_table import GIVE_OR_REMOVE, MEASURE
 from cmm_uq.base.files.limits import CELLS, COLUMNS, ROWS
-from cmm_uq.base.messages import Text, Verbatim, commas, names, number, say
+from cmm_uq.base.messages import Text, Verbatim, commas, names, number, say, semicolons
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
+from cmm_uq.jobs.importing.arranged import REMARK, SUMMARY, filled_down, is_summary, shown
 from cmm_uq.jobs.importing.encodings import decimal_sign, is_number, split_units, values_of
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Fact, ImportKeys, Sheet, WrittenUnit, length_named
 from cmm_uq.jobs.importing.header import NAME, Header, understood
@@ -52,7 +54,7 @@ def columns_of(
     sheet: Sheet, header: Header, keys: ImportKeys, where: str, *, reach_mm: float | None = None, points: bool = True
 ) -> Columns:
     """Columns of a recording, from a sheet; ``points``: whether measurements and points must be numbered."""
-    table = _Table(sheet, header, where)
+    table = ExportTable(sheet, header, where)
     plain = [name for name in header.columns if name != NAME and name not in NUMBERS]
     numeric = [i for name in plain for i in header.columns[name]]
     sign = sheet.decimal or decimal_sign(
@@ -76,7 +78,7 @@ def columns_of(
     return {**numbers, **values}, lines, sources, tuple(facts)
 
 
-class _Table:
+class ExportTable:
     """Rows of figures with their header: ``cells`` of each column, ``rows`` of the sheet, ``after`` them rows of text."""
 
     def __init__(self, sheet: Sheet, header: Header, where: str) -> None:
@@ -91,23 +93,56 @@ class _Table:
         others = (columns for name, columns in header.columns.items() if name not in (NAME, *NUMBERS))
         needed = [i for name in COORDINATES for i in header.columns.get(name, ())] or [i for own in others for i in own]
         self.rows: Sequence[int] = range(header.first, header.first + len(body))
-        self.after = 0
+        self.after, self.left_out = 0, list(sheet.left_out)
         self.cells: Sequence[Sequence[Cell]] = []
         if not set(map(len, body)) - {width}:
             self.cells = list(zip(*body, strict=True))
-        if not self.cells or any("" in self.cells[i] for i in needed):
-            self.rows, self.after = _usable(sheet, header, needed, where)
+        if not self.cells or any("" in self.cells[i] for i in needed) or any(map(is_summary, body)):
+            self.rows, self.after = self._usable(needed)
             if not self.rows:
                 fix = "Export the table with its figures"
                 raise CmmUqError("has a header and no rows of figures", where=self.start, fix=fix)
             body = [[*sheet.rows[i][:width], *[""] * (width - len(sheet.rows[i]))] for i in self.rows]
             self.cells = list(zip(*body, strict=True))
 
+    def _usable(self, needed: Sequence[int]) -> tuple[list[int], int]:
+        """Indices of the rows with figures, and the number of rows of text after them; what else is left out is told."""
+        sheet, width = self.sheet, len(self.header.headings)
+        usable: list[int] = []
+        text: list[int] = []
+        for i in range(self.header.first, len(sheet.rows)):
+            row = sheet.rows[i]
+            if not any(cell != "" for cell in row):
+                continue
+            if is_summary(row):
+                self.left_out.append(shown(sheet, i, SUMMARY))
+            elif all(place >= len(row) or row[place] == "" for place in needed):
+                text.append(i)
+            else:
+                _refuse_another_length(sheet, self.header, i, needed, self.where)
+                figures = [j for j in text if all(cell == "" or is_number(cell) for cell in sheet.rows[j])]
+                if figures:
+                    raise CmmUqError("has no coordinates, and figures follow", where=sheet.at(self.where, figures[0]),
+                                     fix="Remove the line, or complete it")  # fmt: skip
+                self.left_out += [shown(sheet, j, REMARK) for j in text]
+                text = []
+                usable.append(i)
+        suspects = []
+        if sheet.unended and len(usable) > 1 and all(len(sheet.rows[i]) == width for i in usable[:-1]):
+            suspects.append(usable[-1])
+        if not sheet.spreadsheet:
+            suspects += [i for i in text if all(cell == "" or is_number(cell) for cell in sheet.rows[i])]
+        for i in suspects:
+            if len(sheet.rows[i]) < width:
+                raise CmmUqError(f"the row ends after {len(sheet.rows[i])} of {width} cells: the file was cut off",
+                                 where=sheet.at(self.where, i), fix="Export it again")  # fmt: skip
+        return usable, len(text)
+
     def place(self, column: int, row: int) -> str:
         return self.sheet.at(self.where, self.rows[row], column, self.header.headings[column])
 
-    def written(self, name: str, sign: str) -> list[tuple[Floats, WrittenUnit | None, int]]:
-        """Values as written of each column of a name, with the unit that its cells or its heading name.
+    def written(self, name: str, sign: str, *, blank: bool = False) -> list[tuple[Floats, WrittenUnit | None, int]]:
+        """Values as written of each column of a name, with the unit that its cells or its heading name; NaN of blank cells.
 
         A column beside the coordinates that holds no number at all is left out.
         """
@@ -118,7 +153,11 @@ class _Table:
             if name not in COORDINATES and not any(cell != "" and is_number(cell) for cell in cells):
                 return []
             fix = MEASURE if name in COORDINATES else GIVE_OR_REMOVE
-            parts.append((values_of(cells, sign, at, fix), unit or self.header.units.get(i), i))
+            values = np.full(len(cells), np.nan)
+            filled = np.array([cell != "" or not blank for cell in cells])
+            rows = np.flatnonzero(filled)
+            values[filled] = values_of(list(compress(cells, filled)), sign, partial(_at_row, at, rows), fix)
+            parts.append((values, unit or self.header.units.get(i), i))
         return parts
 
     def named_units(self, written: Written) -> dict[str, WrittenUnit]:
@@ -132,7 +171,7 @@ class _Table:
                 heading, problem, fix = self.header.headings[i], "", ""
                 if sort and unit is None and i in self.header.odd_units:
                     problem = f"the unit {self.header.odd_units[i]!r} of {heading!r} is not known"
-                    fix = "Name the column and its unit: columns, unit"
+                    fix = "Export it in mm, µm or inch"
                 elif unit == units.FAHRENHEIT:
                     problem, fix = f"{heading!r} is in °F", f"Export it in °C: {name} = (°F − 32) / 1.8"
                 elif sort and unit and unit.sort != sort[0]:
@@ -178,7 +217,7 @@ class _Table:
         columns, facts, points = {}, [], self.header.points
         for name in NUMBERS:
             for i in self.header.columns.get(name, ())[:1]:
-                values, named = numbered(self.cells[i], sign, partial(self.place, i))
+                values, named = numbered(filled_down(self.cells[i]), sign, partial(self.place, i))
                 columns[name] = np.repeat(values, points)
                 if named:
                     facts.append(Fact(f"{name}_names", say("Names in {column}", column=Verbatim(name)), named))
@@ -210,36 +249,25 @@ class _Table:
             facts.append(Fact("not_used", say("Columns not used"), text))
         if self.after:
             facts.append(Fact("after", say("Lines of text after the table"), number(self.after)))
-        return facts
+        return [*facts, *left_out_fact(self.left_out)]
 
 
-def _usable(sheet: Sheet, header: Header, needed: Sequence[int], where: str) -> tuple[list[int], int]:
-    """Indices of the rows with figures, and the number of rows of text after them."""
-    usable: list[int] = []
-    text: list[int] = []
-    width = len(header.headings)
-    for i in range(header.first, len(sheet.rows)):
-        row = sheet.rows[i]
-        if not any(cell != "" for cell in row):
-            continue
-        if all(place >= len(row) or row[place] == "" for place in needed):
-            text.append(i)
-            continue
-        _refuse_another_length(sheet, header, i, needed, where)
-        if text:
-            raise CmmUqError("has no coordinates, and figures follow", where=sheet.at(where, text[0]),
-                             fix="Remove the line, or complete it; two tables in one file are two exports")  # fmt: skip
-        usable.append(i)
-    suspects = []
-    if sheet.unended and len(usable) > 1 and all(len(sheet.rows[i]) == width for i in usable[:-1]):
-        suspects.append(usable[-1])
-    if not sheet.spreadsheet:
-        suspects += [i for i in text if all(cell == "" or is_number(cell) for cell in sheet.rows[i])]
-    for i in suspects:
-        if len(sheet.rows[i]) < width:
-            raise CmmUqError(f"the row ends after {len(sheet.rows[i])} of {width} cells: the file was cut off",
-                             where=sheet.at(where, i), fix="Export it again")  # fmt: skip
-    return usable, len(text)
+def _at_row(at: Callable[[int], str], rows: Ints, i: int) -> str:
+    return at(int(rows[i]))
+
+
+def left_out_fact(rows: Sequence[str]) -> list[Fact]:
+    """Rows that are left out, by their place and why."""
+    if not rows:
+        return []
+    shown, more = semicolons(list(map(Verbatim, rows[:_SHOWN]))), len(rows) - _SHOWN
+    return [
+        Fact(
+            "left_out",
+            say("Rows left out"),
+            say("{shown} and {more} more", shown=shown, more=more) if more > 0 else shown,
+        )
+    ]
 
 
 def _refuse_another_length(sheet: Sheet, header: Header, i: int, needed: Sequence[int], where: str) -> None:
@@ -262,7 +290,10 @@ _WORD = re.compile(r"([^\W\d_]*)[^\w]*_*\d+")
 _BY_LETTER = {"m": MEASUREMENT, "p": POINT, "b": POINT, "k": POINT, "r": REPEAT, "bar": MEASUREMENT, "stab": MEASUREMENT,
               "barre": MEASUREMENT, "barra": MEASUREMENT, "pos": MEASUREMENT, "line": MEASUREMENT}  # fmt: skip
 _NAMED = 6
-_FIX = 'Say points_per_measurement = 2 (or "all"), or which columns number them: columns = { measurement = "…", point = "…" }'
+_FIX = (
+    'Say how many rows in turn are one, points_per_measurement = N (or "all"), or which columns number them: '
+    'columns = { measurement = "…", point = "…" }'
+)
 
 
 def numbered(cells: Sequence[Cell], sign: str, at: Callable[[int], str]) -> tuple[Floats, Text | None]:
@@ -324,21 +355,29 @@ def _within(columns: Mapping[str, Floats]) -> Floats:
     return np.array(values, dtype=np.float64)
 
 
+def split_names(labels: Sequence[str]) -> tuple[list[str | None], Floats] | None:
+    """What the words of names say that their two or three numbers number, and the numbers (n, k); ``None`` of other names."""
+    form = _DIGITS.sub("0", labels[0])
+    parts = form.count("0")
+    if parts not in (2, 3) or any(_DIGITS.sub("0", label) != form for label in labels):
+        return None
+    known = [_BY_LETTER.get(word.casefold()) or understood(word).column for word in _WORD.findall(labels[0])]
+    return known, np.array([[float(digits) for digits in _DIGITS.findall(label)] for label in labels])
+
+
 def _of_names(labels: Sequence[str]) -> dict[str, Floats] | None:
     """Measurement, point (and repeat) from names that are alike but for two (or three) numbers.
 
     The word before a number says what it numbers; where none is known, they stand in this order.
     """
-    form = _DIGITS.sub("0", labels[0])
-    parts = form.count("0")
-    if parts not in (2, 3) or any(_DIGITS.sub("0", label) != form for label in labels):
+    split = split_names(labels)
+    if split is None:
         return None
-    columns = NUMBERS[:parts]
-    known = [_BY_LETTER.get(word.casefold()) or understood(word).column for word in _WORD.findall(labels[0])]
+    known, numbers = split
+    columns = NUMBERS[: len(known)]
     claimed = [column for column in known if column in columns]
     if len(set(claimed)) < len(claimed):
         return None
     left = iter([column for column in columns if column not in claimed])
     order = [column if column in columns else next(left) for column in known]
-    numbers = np.array([[float(digits) for digits in _DIGITS.findall(label)] for label in labels])
     return {column: numbers[:, order.index(column)] for column in columns}

@@ -220,7 +220,7 @@ def _plain(text: str, sign: str, row: int, at: Callable[[int], str]) -> str:
             text = text.translate(_WITHOUT[sign])
         elif other in text and number_problem(text.replace(other, ".")) is None:
             raise CmmUqError(f"{text!r} has its decimal sign as {other!r}, the others as {sign!r}", where=at(row),
-                             fix="Export the table again with one decimal sign, or say decimal")  # fmt: skip
+                             fix="Export the table again with one decimal sign")  # fmt: skip
     return text.replace(",", ".") if sign == "," else text
 
 

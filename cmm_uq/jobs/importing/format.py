@@ -135,11 +135,27 @@ class FileKeys(JobTable):
         return unit
 
 
+_TRIPLE = r"\s*([-+−]?[\d.]+)\s*,\s*([-+−]?[\d.]+)\s*,\s*([-+−]?[\d.]+)\s*"
+LINE_PLACE = re.compile(rf"(?:along\s+([-+−]?)([xyz])\s+from{_TRIPLE}|from{_TRIPLE}to{_TRIPLE})", re.IGNORECASE)
+
+
 class ImportKeys(FileKeys):
     """Of a recording in another format than the project's own."""
 
+    lines: Annotated[dict[str, str], Field(max_length=COLUMNS.most)] = {}
+    """Where the lines of a table of lengths lie, by their names in the file, in mm: `{ 1 = "along X from 100,200,300" }`, or
+    `"from 0,0,0 to 300,400,0"`, which gives a start and a direction."""
+
     points_per_measurement: Annotated[int, Field(ge=1, le=1_000_000)] | Literal["all"] | None = None
     """How many rows in turn are one measurement, where the file does not number them; `"all"` where they are one."""
+
+    @field_validator("lines")
+    @classmethod
+    def _places(cls, lines: dict[str, str]) -> dict[str, str]:
+        for name, place in lines.items():
+            if not LINE_PLACE.fullmatch(place.strip()):
+                raise ValueError(f'{place!r} says no place of line {name}: write "along X from 100,200,300"')
+        return lines
 
     @property
     def asked(self) -> bool:
@@ -176,6 +192,7 @@ class Sheet:
     unit: str | None = None  # of its lengths, where the format or the file says it
     decimal: str | None = None  # sign, where the format says it
     facts: tuple[Fact, ...] = ()  # recognised so far
+    left_out: tuple[str, ...] = ()  # rows that are no figures of the table, each with its place and why
 
     def at(self, where: str, row: int, column: int | None = None, heading: str = "") -> str:
         """Place of a row of the file, or of a cell below a heading, by their indices."""
@@ -215,6 +232,7 @@ class Recognition:
     facts: tuple[Fact, ...]
     columns: Mapping[str, str]
     points: int
+    head: tuple[str, ...] = ()  # texts of the row that names the columns
 
     @property
     def unused(self) -> tuple[str, ...]:

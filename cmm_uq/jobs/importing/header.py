@@ -1,7 +1,7 @@
 """Where the table of a sheet begins, and which of its columns is which of a recording's.
 
 Which columns a table must have: of a recording its coordinates, of an artefact's certificate its certified values. What
-laboratories call them is here in English, German, French, Italian and Spanish. A heading is a word for a column of a
+laboratories call them stands in words.toml. A heading is a word for a column of a
 recording, or a letter of an axis among words that leave it a coordinate; any word that is not known here makes it another
 column, which is left out and named as such.
 """
@@ -9,12 +9,15 @@ column, which is left out and named as such.
 from __future__ import annotations
 
 import re
+import tomllib
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache, lru_cache
+from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import AXES
 from cmm_uq.jobs.columns import COORDINATES, OPTIONAL, REQUIRED
 from cmm_uq.jobs.importing.encodings import is_number
 from cmm_uq.jobs.importing.format import ImportKeys, Sheet, WrittenUnit, sources_of, unit_named
@@ -22,60 +25,45 @@ from cmm_uq.jobs.importing.format import ImportKeys, Sheet, WrittenUnit, sources
 NAME = "name"  # of the point or feature, by which it may be numbered; no column of a recording
 
 
-def _set(words: str) -> frozenset[str]:
-    return frozenset(words.split())
+def plain_words(text: str) -> list[str]:
+    plain = unicodedata.normalize("NFKD", text.casefold())
+    return _WORDS.findall("".join(c for c in plain if not unicodedata.combining(c)))
 
 
-_PHRASES: Mapping[str, str] = {
-    NAME: "name|feature|feature name|featurename|featureid|label|element|elementname|merkmal|bezeichnung|id|identifier|nr|no"
-          "|number|nummer|numero|nome|nombre|nom|point name|punktname|point id|n|elemento|nombre del elemento|nom du point",
-    "measurement": "measurement|measurement number|messung|messungsnummer|mess|mesure|misura|misurazione|medicion|position"
-                   "|posicion|posizione|lage|aufstellung|stellung|setup|set up|placing|placement|bar position|stabstellung",
-    "point": "point|pt|pkt|punkt|punto|kugel|ball|sphere|boule|bille|sfera|esfera|bola|face|flache|faccia|cara|hole|bohrung"
-             "|trou|foro|agujero|point number|punktnummer",
-    "repeat": "repeat|repetition|rep|run|wiederholung|wdh|durchlauf|lauf|ripetizione|repeticion|prova|essai",
-    "reference_mm": "reference|reference length|reference value|certified|certified length|certified value|calibrated"
-                    "|calibrated length|calibrated value|referenz|referenzlange|kalibrierwert|kalibrierte lange"
-                    "|zertifizierte lange|longueur de reference|longueur certifiee|longueur etalonnee|valeur certifiee"
-                    "|riferimento|lunghezza di riferimento|lunghezza certificata|valore certificato|referencia"
-                    "|longitud de referencia|longitud certificada|valor certificado",
-    "reference_u_um": "standard uncertainty|standardunsicherheit|standardmessunsicherheit|incertitude type|incertezza tipo"
-                      "|incertidumbre tipica",
-    "reference_U_um": "expanded uncertainty|uncertainty|measurement uncertainty|messunsicherheit|erweiterte messunsicherheit"
-                      "|incertitude|incertitude elargie|incertezza|incertezza estesa|incertidumbre|incertidumbre expandida",
-    "time_s": "time|elapsed|elapsed time|zeit|temps|tempo|tiempo",
-    "temp_artefact_c": "temperature artefact|artefact temperature|part temperature|werkstucktemperatur|artefakttemperatur"
-                       "|temperature de la piece|temperature piece|temperatura pezzo|temperatura del pezzo|temperatura pieza"
-                       "|temperatura de la pieza",
-    "temp_air_c": "air temperature|temperature air|ambient temperature|lufttemperatur|raumtemperatur|temperature de l air"
-                  "|temperature ambiante|temperatura aria|temperatura dell aria|temperatura ambiente|temperatura del aire",
-    "pressure_hpa": "pressure|air pressure|druck|luftdruck|pression|pressione|presion",
-    "humidity_pct": "humidity|feuchte|luftfeuchte|humidite|umidita|humedad",
-    "radius_mm": "radius|rayon|raggio|radio",
-    "nx": "i|nx", "ny": "j|ny", "nz": "k|nz",
-}  # fmt: skip
-_COLUMNS = {phrase: column for column, phrases in _PHRASES.items() for phrase in phrases.split("|")}
+def numbered_words(text: str) -> tuple[tuple[str, ...], list[int]]:
+    """Words of a heading, and its numbers; a letter counts as one after a word for a point or ahead of an axis."""
+    named: list[str] = []
+    indices: list[int] = []
+    words = plain_words(text)
+    for word, after in zip(words, [*words, ""][1:], strict=True):
+        follows = after in AXES or (named and named[-1] in _POINT and not {*AXES}.isdisjoint(words))
+        letter = len(word) == 1 and word in "abcdefgh" and follows
+        if word.isdigit() or letter:
+            indices.append(int(word) if word.isdigit() else ord(word) - ord("a") + 1)
+        else:
+            named.append(word)
+    return tuple(named), indices
 
-# words beside the letter of an axis that leave it a coordinate
-_COORDINATE = _set(
-    "coordinate coordinates coord koordinate koord coordonnee coordinata coordenada value wert valeur valore valor axis achse "
-    "axe asse eje actual measured ist istwert gemessen messwert mesure mesuree misurato misurata medido medida position pos "
-    "center centre mitte mittelpunkt centro point punkt punto ball kugel sphere boule bille sfera esfera p pt act ax "
-    "kugelmitte"
-)
-_NOMINAL = _set(
-    "nominal nom soll sollwert theo theoretical theorique nominale teorico teorica target cad nennwert cible obiettivo"
-)
-_DEVIATION = _set("dev deviation abweichung abw ecart scostamento desviacion diff delta error err fehler tol")
-_CERTIFIED = _set(
-    "reference ref certified calibrated referenz kalibriert kalibrierwert zertifiziert certifie etalonne riferimento "
-    "certificato referencia certificado"
-)
-_APPROACH = _set("approach anfahrrichtung antastrichtung anfahren approche approccio aproximacion direction richtung")
-_TEMPERATURE = _set("temp temperature temperatur temperatura t scale massstab regle riga regla achse axis axe asse eje")
-_NORMAL = _set("normal normale normala vector vektor vecteur vettore n")
-_TIP = _set("tip taster stylus tastkopf palpeur tastatore palpador offset")
-_SMALL = _set("no nr n number nummer numero num")
+
+@cache
+def printed_words(table: str) -> Mapping[str, tuple[str, ...]]:
+    """Phrases of a table of ``words.toml`` by name."""
+    tables = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
+    return {name: tuple(phrase.strip() for phrase in text.split(",")) for name, text in tables[table].items()}
+
+
+@cache
+def words_of(table: str) -> Mapping[str, frozenset[str]]:
+    """The same as :func:`plain_words` makes them of a heading."""
+    return {
+        name: frozenset(" ".join(plain_words(one)) for one in words) for name, words in printed_words(table).items()
+    }
+
+
+_WORDS = re.compile(r"[^\W\d_]+|\d+")
+_COLUMNS = {phrase: column for column, phrases in words_of("columns").items() for phrase in phrases}
+_AXIS = words_of("axis")  # words beside the letter of an axis, those that leave it a coordinate among them
+_NOMINAL, _SMALL, _POINT = _AXIS["nominal"], _AXIS["small"], words_of("columns")["point"]
 _LONGEST = 120  # characters of a heading; longer text is none
 
 # coverage factor in a heading, as ``U (µm), k = 2``
@@ -87,7 +75,6 @@ _OWN = frozenset((*REQUIRED, *OPTIONAL))
 _IN_BRACKETS = re.compile(r"\s*[\[(<{]\s*([^\])>}]*?)\s*[\])>}]\s*$")
 _AFTER_SIGN = re.compile(r"\s*(?:/|\bin\b|,|:)\s*([^\s/,:]+)\s*$", re.IGNORECASE)
 _AT_THE_END = re.compile(r"[\s_]+([^\s_]+)\s*$")
-_WORDS = re.compile(r"[^\W\d_]+|\d+")
 
 
 @dataclass(frozen=True)
@@ -107,19 +94,17 @@ def understood(heading: str) -> Heading:
     if heading[:1] in _FIGURES or len(heading) > _LONGEST:
         return Heading()
     without = COVERAGE.sub(" ", heading)
-    text, unit, odd = _without_unit(without)
+    text, unit, odd = without_unit(without)
     if text.strip() in _SYMBOLS and (unit is not None or without != heading):
         return Heading(_SYMBOLS[text.strip()], None, unit, odd)
-    words = _words(text)
-    indices = [int(word) for word in words if word.isdigit()]
-    named = tuple(word for word in words if not word.isdigit())
+    named, indices = numbered_words(text)
     index = indices[0] if len(indices) == 1 else None
     if len(indices) > 1 or not named:
         return Heading(NAME, unit=unit) if text.strip() in ("#", "n°", "N°") else Heading(None, None, unit, odd)
     return Heading(_column(named), index, unit, odd)
 
 
-def _without_unit(heading: str) -> tuple[str, WrittenUnit | None, str]:
+def without_unit(heading: str) -> tuple[str, WrittenUnit | None, str]:
     if match := _IN_BRACKETS.search(heading):
         unit = unit_named(match[1])
         return heading[: match.start()], unit, "" if unit else match[1]
@@ -130,24 +115,19 @@ def _without_unit(heading: str) -> tuple[str, WrittenUnit | None, str]:
     return heading, None, ""
 
 
-def _words(text: str) -> list[str]:
-    plain = unicodedata.normalize("NFKD", text.casefold())
-    return _WORDS.findall("".join(c for c in plain if not unicodedata.combining(c)))
-
-
 def _column(words: tuple[str, ...]) -> str | None:
     axes = [word for word in words if word in ("x", "y", "z")]
     if len(axes) == 1:
         others = {*words} - {axes[0]}
         fitting = (column for known, column in _AXIS_COLUMNS if others <= known)
-        return None if others & (_NOMINAL | _DEVIATION) else next(fitting, "").format(axis=axes[0]) or None
+        return None if others & (_NOMINAL | _AXIS["deviation"]) else next(fitting, "").format(axis=axes[0]) or None
     return _COLUMNS.get(" ".join(words)) or _COLUMNS.get(" ".join(word for word in words if word not in _SMALL))
 
 
 _AXIS_COLUMNS = (
-    (_COORDINATE, "{axis}_mm"), (_COORDINATE | _CERTIFIED, "reference_{axis}_mm"),
-    (_COORDINATE | _APPROACH, "approach_{axis}"),
-    (_NORMAL, "n{axis}"), (_TEMPERATURE, "temp_{axis}_c"), (_TIP | _COORDINATE, "tip_{axis}_mm"),
+    (_AXIS["coordinate"], "{axis}_mm"), (_AXIS["coordinate"] | _AXIS["certified"], "reference_{axis}_mm"),
+    (_AXIS["coordinate"] | _AXIS["approach"], "approach_{axis}"), (_AXIS["normal"], "n{axis}"),
+    (_AXIS["temperature"], "temp_{axis}_c"), (_AXIS["tip"] | _AXIS["coordinate"], "tip_{axis}_mm"),
 )  # fmt: skip
 
 
@@ -185,20 +165,27 @@ class Header:
 def header_of(sheet: Sheet, keys: ImportKeys, where: str, wanted: Sequence[Sequence[str]]) -> Header | None:
     """The header of a sheet: the first row that names the wanted columns; ``None`` where no row does."""
     named = {name: sources_of(given) for name, given in keys.columns.items()}
-    by_number = bool(named) and all(isinstance(source, int) for sources in named.values() for source in sources)
-    if by_number and any(set(columns) <= set(keys.columns) for columns in wanted):
-        return _numbered(sheet, {name: tuple(int(i) - 1 for i in sources) for name, sources in named.items()})
+    if (numbered := by_number(keys)) and any(set(columns) <= set(keys.columns) for columns in wanted):
+        return first_figures(sheet, numbered)
     for row, cells in enumerate(sheet.rows[:LINES_BEFORE]):
         if len(cells) < 2 and not keys.columns:
             continue
         headings = [cell if isinstance(cell, str) else f"{cell:g}" for cell in cells]
-        found = _assigned(headings, named)
+        found = assigned(headings, named)
         if found is not None and any(set(columns) <= set(found) for columns in wanted):
-            return _with_units(sheet, row, headings, _unambiguous(found, headings, sheet.at(where, row)))
+            points = len({index for index, _ in found.get("x_mm", ())} - {None})
+            return with_units(sheet, row, headings, unambiguous(found, headings, sheet.at(where, row), points))
     return None
 
 
-def _numbered(sheet: Sheet, columns: Mapping[str, tuple[int, ...]]) -> Header | None:
+def by_number(keys: ImportKeys) -> dict[str, tuple[int, ...]]:
+    """Indices of the columns that a job names, where it names all by number."""
+    named = {name: sources_of(given) for name, given in keys.columns.items()}
+    numbers = {name: tuple(one - 1 for one in own if isinstance(one, int)) for name, own in named.items()}
+    return numbers if all(len(own) == len(numbers[name]) for name, own in named.items()) else {}
+
+
+def first_figures(sheet: Sheet, columns: Mapping[str, tuple[int, ...]]) -> Header | None:
     """A table whose columns are named by number: it begins with the first row of figures in all of them."""
     every = [i for own in columns.values() for i in own]
     needed = [i for name in COORDINATES for i in columns.get(name, ())] or every
@@ -212,21 +199,23 @@ Assigned = dict[str, list[tuple[int | None, int]]]
 """Of each column of a recording: index of the point in a row, and index of the column."""
 
 
-def _assigned(headings: Sequence[str], named: Mapping[str, Sequence[str | int]]) -> Assigned | None:
+def assigned(
+    headings: Sequence[str], named: Mapping[str, Sequence[str | int]], meaning_of: Callable[[str], Heading] = understood
+) -> Assigned | None:
     """What the headings of a row are; ``None`` where one that the job names is not among them."""
-    assigned: Assigned = {}
+    columns: Assigned = {}
     for name, sources in named.items():
         places = [_place(source, headings) for source in sources]
         if None in places:
             return None
         indices = range(1, len(places) + 1) if len(places) > 1 else [None]
-        assigned[name] = [(i, place) for i, place in zip(indices, places, strict=True) if place is not None]
-    taken = {place for own in assigned.values() for _, place in own}
+        columns[name] = [(i, place) for i, place in zip(indices, places, strict=True) if place is not None]
+    taken = {place for own in columns.values() for _, place in own}
     for i, heading in enumerate(headings):
-        meaning = understood(heading.strip()) if heading else Heading()
+        meaning = meaning_of(heading.strip()) if heading else Heading()
         if meaning.column and meaning.column not in named and i not in taken:
-            assigned.setdefault(meaning.column, []).append((meaning.index, i))
-    return assigned
+            columns.setdefault(meaning.column, []).append((meaning.index, i))
+    return columns
 
 
 def _place(source: str | int, headings: Sequence[str]) -> int | None:
@@ -239,11 +228,12 @@ def _place(source: str | int, headings: Sequence[str]) -> int | None:
     return None
 
 
-def _unambiguous(assigned: Assigned, headings: Sequence[str], place: str) -> dict[str, tuple[int, ...]]:
-    """One column each, or one for each point of a row."""
-    points = len({index for index, _ in assigned.get("x_mm", ())} - {None})
+def unambiguous(found: Assigned, headings: Sequence[str], place: str, points: int) -> dict[str, tuple[int, ...]]:
+    """One column each, or one for each point or run of a row."""
     columns: dict[str, tuple[int, ...]] = {}
-    for name, own in assigned.items():
+    for name, own in found.items():
+        if name == NAME and len(own) > 1:  # a running number beside names
+            own = [one for one in own if not {*plain_words(headings[one[1]])} <= _SMALL] or own
         indices = [index for index, _ in own]
         several = points > 1 and None not in indices and len(set(indices)) == len(indices)
         if len(own) > 1 and not several:
@@ -261,7 +251,7 @@ def _unambiguous(assigned: Assigned, headings: Sequence[str], place: str) -> dic
     return columns
 
 
-def _with_units(sheet: Sheet, row: int, headings: Sequence[str], columns: Mapping[str, tuple[int, ...]]) -> Header:
+def with_units(sheet: Sheet, row: int, headings: Sequence[str], columns: Mapping[str, tuple[int, ...]]) -> Header:
     """The header with its units, which may stand in a row of their own."""
     meanings = {i: understood(heading.strip()) for i, heading in enumerate(headings) if heading}
     units = {i: meaning.unit for i, meaning in meanings.items() if meaning.unit}
@@ -289,13 +279,13 @@ def no_header(sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Seq
     if not score:
         given = f" ({', '.join(map(repr, texts))})" if keys.columns else ""
         return CmmUqError(f"no line names the columns{given} of a table of points", where=where,
-                          fix="Name them by number: columns = { x_mm = 1, y_mm = 2, z_mm = 3 }, or export one")  # fmt: skip
+                          fix="Say which column is which: columns = { x_mm = …, y_mm = …, z_mm = … }")  # fmt: skip
     named = keys.columns.items()
     lacking = [name for name, given in named if any(_place(one, headings) is None for one in sources_of(given))]
     known = {understood(heading).column for heading in headings} | set(keys.columns)
     missing = [*lacking, *(name for name in wanted[0] if name not in known), wanted[0][0]][0]
     listed = ", ".join(map(repr, headings[:_SHOWN])) + (" …" if len(headings) > _SHOWN else "")
-    nominal = any(_NOMINAL & {*_words(_without_unit(heading)[0])} for heading in headings)
+    nominal = any(_NOMINAL & {*plain_words(without_unit(heading)[0])} for heading in headings)
     hint = " (nominal values are not taken for measured ones)" if nominal else ""
     return CmmUqError(f"no column is {missing} among {listed}{hint}", where=place,
                       fix=f'Say which: columns = {{ {missing} = "…" }}')  # fmt: skip

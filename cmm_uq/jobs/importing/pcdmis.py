@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
-from cmm_uq.jobs.importing.format import Fact, ImportKeys, Sheet, sheets_of
+from cmm_uq.jobs.importing.columns import split_names
+from cmm_uq.jobs.importing.format import Fact, ImportKeys, Row, Sheet, sheets_of
+from cmm_uq.jobs.importing.header import printed_words
 from cmm_uq.jobs.importing.reports import AXES, WITH_DIRECTION, ReportedPlace, TextReport, facts_of
 
-_HEADING = re.compile(r"^[ \t]*AX[ \t]+(?=.*\bMEAS\b)", re.MULTILINE)
-_LOCATED = re.compile(r"\s*(?P<what>[A-Z0-9 ]*?)\s*\bOF\s+(?P<sort>[A-Z]+)\s+(?P<of>\S+)", re.IGNORECASE)
-_UNITS = re.compile(r"UNITS\s*=\s*(\w+)", re.IGNORECASE)
-_DIMENSION = re.compile(r"^\s*(?:DIM\s|\S.*=\s.*UNITS\s*=)", re.IGNORECASE)
+_WORDS = {name: "|".join(map(re.escape, words)) for name, words in printed_words("report").items()}
+_HEADING = re.compile(
+    rf"^[ \t]*(?:{_WORDS['axis']})[ \t]+(?=.*(?<!\S)(?:{_WORDS['measured']})(?!\S))", re.MULTILINE | re.IGNORECASE
+)
+_LOCATED = re.compile(rf"\s*(?P<what>[\w ]*?)\s*\b(?:{_WORDS['of']})\s+(?P<sort>\w+)\s+(?P<of>\S+)", re.IGNORECASE)
+_UNITS = re.compile(rf"(?:{_WORDS['units']})\s*=\s*(\w+)", re.IGNORECASE)
+_DIMENSION = re.compile(rf"^\s*(?:DIM\s|\S.*=\s.*(?:{_WORDS['units']})\s*=)", re.IGNORECASE)
+_BELOW = {
+    word: english
+    for name, english in (("measured", "MEAS"), ("nominal", "NOMINAL"), ("deviation", "DEV"))
+    for word in printed_words("report")[name]
+}
 _FIGURES = re.compile(r"^\s*(?P<axis>[A-Z][A-Z0-9]?)\s+(?:(?:RFS|MMC|LMC)\s+)?[-+\d.]", re.IGNORECASE)
 _CONDITION = re.compile(r"^\s*[A-Z]+\s+(RFS|MMC|LMC)\s", re.IGNORECASE)
 _NUMBER = re.compile(r"(?<!\S)(?:[-+]?\d*[.,]?\d+|[-+]?\d+[^\s\d.,]{1,3}\d+'\d+(?:[.,]\d+)?\")(?!\S)")
@@ -30,7 +40,7 @@ class PcDmis(TextReport):
 
     name = "pc-dmis"
     title = say("PC-DMIS text report")
-    shows = (_HEADING, re.compile(r"^[ \t]*DIM\s|UNITS\s*=", re.MULTILINE))
+    shows = (_HEADING, re.compile(rf"^[ \t]*DIM\s|(?:{_WORDS['units']})\s*=", re.MULTILINE | re.IGNORECASE))
 
     def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
         every, others = _places(lines, where)
@@ -42,14 +52,26 @@ class PcDmis(TextReport):
             problem = f"{odd[0].dimension}, the place of {odd[0].feature}, has no {missing}"
             fix = "Report X, Y and Z of every feature; if it is the last one, the file was cut off"
             raise CmmUqError(problem, where=f"{where} line {odd[0].line}", fix=fix)
+        if not places and (rows := _lengths(lines, where)):
+            facts = facts_of(
+                encoding, "dimensions_not_used", say("Dimensions that are no place"), others + len(every) - len(rows)
+            )
+            unit = dimensions(lines, where)[0].unit or None
+            return [
+                replace(one, rows=[["name", "nominal", "measured"], *one.rows[1:]])
+                for one in sheets_of(rows, ["name", "nominal", "measured"], unit=unit, facts=facts)
+            ]
         if not places:
             problem = f"reports {others + len(every)} dimensions and no place of a feature by X, Y and Z"
             raise CmmUqError(problem, where=where, fix="Report the location of every ball or point with its X, Y and Z")
         units = {place.unit.upper(): place for place in places}
         if len(units) > 1:
             first, second = islice(units.values(), 2)
-            raise CmmUqError(f"{first.dimension} is in {first.unit} and {second.dimension} in {second.unit}",
-                             where=f"{where} line {second.line}", fix="Report all dimensions in one unit")  # fmt: skip
+            raise CmmUqError(
+                f"{first.dimension} is in {first.unit} and {second.dimension} in {second.unit}",
+                where=f"{where} line {second.line}",
+                fix="Report all dimensions in one unit",
+            )
         unused = others + len(every) - len(places)
         facts = facts_of(encoding, "dimensions_not_used", say("Dimensions that are no place"), unused)
         return sheets_of([place.row for place in places], WITH_DIRECTION[:4], unit=places[0].unit, facts=facts)
@@ -68,7 +90,7 @@ class Dimension:
 
     def measured(self, axis: str) -> str:
         """The figure below MEAS, which differs from that below NOMINAL by that below DEV where these are printed."""
-        return _measured(*self.rows[axis])
+        return _below(*self.rows[axis])["MEAS"]
 
     def at_material_condition(self, axis: str) -> bool:
         """Whether its tolerance grows with a size."""
@@ -84,7 +106,7 @@ class Dimension:
     def location_of(self) -> tuple[str, str] | None:
         """Sort and name of the feature whose location it is; ``None`` of another dimension."""
         of = _LOCATED.match(self.text)
-        if of is None or not self.unit or of["what"].strip().upper() not in ("LOCATION", ""):
+        if of is None or not self.unit or of["what"].strip().upper() not in (*printed_words("report")["located"], ""):
             return None
         return of["sort"], of["of"]
 
@@ -95,7 +117,7 @@ def dimensions(lines: Sequence[str], where: str) -> list[Dimension]:
     ends: dict[str, int] = {}
     for line, content in enumerate(lines, 1):
         if _HEADING.match(content):
-            ends = {word[0].upper(): word.end() for word in re.finditer(r"\S+", content)}
+            ends = {_BELOW.get(word[0].upper(), word[0].upper()): word.end() for word in re.finditer(r"\S+", content)}
         elif _DIMENSION.match(content):
             name, _, text = content.partition("=")
             found.append(Dimension(re.sub(r"^DIM\s+", "", name.strip()), text, line, {}))
@@ -115,7 +137,19 @@ def _places(lines: Sequence[str], where: str) -> tuple[list[ReportedPlace], int]
     return places, len(every) - len(places)
 
 
-def _measured(content: str, ends: dict[str, int], place: str) -> str:
+def _lengths(lines: Sequence[str], where: str) -> list[Row]:
+    """Distances whose names number their line and their length, as ``LINE1_L2_RUN3``, with what is nominal and measured."""
+    every = [one for one in dimensions(lines, where) if "M" in one.rows]
+    if len(every) < 2 or split_names([one.name for one in every]) is None:
+        return []
+    below = [_below(*one.rows["M"]) for one in every]
+    return [
+        ("", [one.name, own.get("NOMINAL", ""), own["MEAS"]], one.line) for one, own in zip(every, below, strict=True)
+    ]
+
+
+def _below(content: str, ends: dict[str, int], place: str) -> dict[str, str]:
+    """Figures by the word of the heading that they stand below."""
     if not ends:
         raise CmmUqError("figures stand ahead of any heading line AX … MEAS", where=place, fix="Print the report again")
     below: dict[str, str] = {}
@@ -124,9 +158,12 @@ def _measured(content: str, ends: dict[str, int], place: str) -> str:
     if "MEAS" not in below:
         raise CmmUqError("no measured value stands below MEAS", where=place, fix="Print the report again")
     if {"NOMINAL", "DEV"} <= set(ends) and not _agree(below, toleranced=_CONDITION.match(content) is not None):
-        raise CmmUqError(f"MEAS {below['MEAS']} is not NOMINAL and DEV together: the line is damaged", where=place,
-                         fix="Print the report again")  # fmt: skip
-    return below["MEAS"]
+        raise CmmUqError(
+            f"MEAS {below['MEAS']} is not NOMINAL and DEV together: the line is damaged",
+            where=place,
+            fix="Print the report again",
+        )
+    return below
 
 
 def _agree(below: dict[str, str], *, toleranced: bool) -> bool:

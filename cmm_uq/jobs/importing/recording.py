@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import compress
 from pathlib import PurePath
 
@@ -21,9 +22,14 @@ from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.messages import Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest
-from cmm_uq.jobs.importing.columns import columns_of
+from cmm_uq.jobs.importing.arranged import figures_follow, with_one_head
+from cmm_uq.jobs.importing.columns import columns_of, left_out_fact
+from cmm_uq.jobs.importing.encodings import is_number
 from cmm_uq.jobs.importing.format import Fact, FileKeys, ImportKeys, Recognition, Sheet, format_of, length_named
-from cmm_uq.jobs.importing.header import POINTS, REFERENCES, Header, header_of, no_header
+from cmm_uq.jobs.importing.header import LINES_BEFORE, POINTS, REFERENCES, Header, header_of, no_header, understood
+from cmm_uq.jobs.importing.length_tables import tables_of
+from cmm_uq.jobs.importing.lengths import MeasuredLengths, lengths_of, placed
+from cmm_uq.jobs.importing.remembered import head_of
 
 # lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled
 SHORTEST_NORMAL, LONGEST_NORMAL = 1e-3, 1e3
@@ -32,7 +38,8 @@ _OTHER_UNITS = re.compile(
     r"_(m|cm|um|µm|mm|nm|in|inch|mil|k|f|c|min|ms|h|s|pa|kpa|hpa|mbar|mmhg|rad|deg|arcsec|pct|percent)$"
 )
 _UNIT_LINE = re.compile(
-    r"\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;]+\s*([^\s;]+)",
+    r"(?:\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;]+|単位\s*[:：=]?"
+    r"|\b(?:dimensions|lengths|values|angaben|ma(?:ß|ss)e|werte|cotes|valeurs|misure|valori|medidas)\s+(?:in|en)\b)\s*([^\s;,]+)",
     re.IGNORECASE,
 )
 
@@ -146,6 +153,20 @@ class ImportedTable:
     recognised: Recognition
 
 
+class UnplacedError(CmmUqError):
+    """MeasuredLengths were read whole, and nothing says where they lie; ``recognised``: how they were read."""
+
+    def __init__(self, error: CmmUqError, recognised: Recognition, lengths: Sequence[MeasuredLengths]) -> None:
+        super().__init__(error.problem, where=error.where, fix=error.fix)
+        self.recognised, self.lengths = recognised, lengths
+
+
+def _raw_head(sheets: Sequence[Sheet], sheet: Sheet, line: int) -> tuple[str, ...]:
+    """Texts of the row of a file that names columns."""
+    same = (one for one in sheets if one.name == sheet.name)
+    return next((tuple(head_of(one.rows[one.lines.index(line)])) for one in same if line in one.lines), ())
+
+
 def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | None = None) -> ImportedTable:
     """A recording in any format that is known."""
     table = _imported(content, where, keys, POINTS, reach_mm)
@@ -181,29 +202,64 @@ def _imported(
         raise CmmUqError(f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file", where=where,
                          fix="Split it")  # fmt: skip
     form = format_of(content, where)
-    sheet, header = _chosen(form.read(content, where, keys), keys, where, wanted)
-    for row in sheet.rows[: header.row] if sheet.unit is None else ():  # ``Units: mm`` in a line before the table
-        match = _UNIT_LINE.search(";".join(map(str, row)))
-        if match and (unit := length_named(match[1].strip("[]().,;"))):
-            sheet = replace(sheet, unit=unit.name)
-            break
+    sheets = [_with_unit(sheet) for sheet in form.read(content, where, keys)]
+    found = _chosen(sheets, keys, where, wanted)
+    file = PurePath(where).name
+    sheet, header = found[0] if isinstance(found, list) else found
+    head = _raw_head(sheets, sheet, sheet.lines[header.row]) if header.row < header.first else ()
+    if isinstance(found, list):
+        return _lengths(found, keys, where, reach_mm, Recognition(file, form.name, form.title, (), {}, 0, head))
     values, lines, sources, facts = columns_of(sheet, header, keys, where, reach_mm=reach_mm, points=wanted is POINTS)
     named = (Fact("sheet", say("Sheet"), Verbatim(sheet.name)),) if sheet.name else ()
-    facts, file = (*named, *sheet.facts, *facts), PurePath(where).name
-    return ImportedTable(values, lines, Recognition(file, form.name, form.title, facts, sources, len(lines)))
+    facts = (*named, *sheet.facts, *facts)
+    return ImportedTable(values, lines, Recognition(file, form.name, form.title, facts, sources, len(lines), head))
+
+
+def _lengths(
+    tables: Sequence[tuple[Sheet, Header]], keys: ImportKeys, where: str, reach_mm: float | None, begun: Recognition
+) -> ImportedTable:
+    """Both ends of each length of tables of lengths."""
+    every = [lengths_of(sheet, header, keys, where, reach_mm) for sheet, header in tables]
+    if len(every) > 1 and all(len({*one.names}) == 1 for one in every):  # a sheet a line
+        every = [
+            replace(one, names=[sheet.name] * len(one.names)) for one, (sheet, _) in zip(every, tables, strict=True)
+        ]
+    first, count = every[0], sum(len(one.names) for one in every)
+    facts = [*tables[0][0].facts, *first.facts, *left_out_fact([row for one in every for row in one.left_out])]
+    if tables[0][0].name:
+        facts.insert(0, Fact("sheet", say("Sheet"), commas(names([sheet.name for sheet, _ in tables]))))
+    recognised = replace(begun, facts=tuple(facts), columns=first.sources, points=2 * count)
+    try:
+        columns, of_lines, lines = placed(every, keys, where)
+    except CmmUqError as error:
+        raise UnplacedError(error, recognised, every) from None
+    return ImportedTable(columns, np.array(lines), replace(recognised, facts=(*facts, *of_lines)))
+
+
+def _with_unit(sheet: Sheet) -> Sheet:
+    """With the unit that a line ahead of its table says, as ``Units: mm``."""
+    for row in sheet.rows[:LINES_BEFORE] if sheet.unit is None and not sheet.listed else ():
+        if sum(cell != "" and is_number(cell) for cell in row) > 1:
+            break
+        match = _UNIT_LINE.search(";".join(map(str, row)))
+        if match and (unit := length_named(match[1].strip("[]().,;"))):
+            return replace(sheet, unit=unit.name)
+    return sheet
 
 
 def _chosen(
     sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Sequence[Sequence[str]]
-) -> tuple[Sheet, Header]:
-    """The sheet with the table, and its header."""
+) -> tuple[Sheet, Header] | list[tuple[Sheet, Header]]:
+    """The sheet with the table, and its header; of tables of lengths all."""
     if keys.sheet is not None:
         known = [sheet.name for sheet in sheets if sheet.name]
         sheets = [sheet for sheet in sheets if sheet.name.casefold() == keys.sheet.casefold()]
         if not sheets:
             fix = suggestion(keys.sheet, known) if known else "Leave sheet out: the file has only one table"
             raise CmmUqError(f"has no sheet {keys.sheet!r}", where=where, fix=fix)
-    tables = [(sheet, header) for sheet in sheets if (header := header_of(sheet, keys, where, wanted)) is not None]
+    tables = [table for sheet in sheets if (table := _table(sheet, keys, where, wanted)) is not None]
+    if not tables and wanted is POINTS and (lengths := tables_of(sheets, keys, where)):
+        return lengths
     if not tables:
         raise no_header(sheets, keys, where, wanted)
     if len(tables) > 1:
@@ -211,6 +267,27 @@ def _chosen(
         raise CmmUqError(f"holds {len(tables)} tables of points: {listed}", where=where,
                          fix=f'Say which: sheet = "{tables[0][0].name}"')  # fmt: skip
     return tables[0]
+
+
+def _table(sheet: Sheet, keys: ImportKeys, where: str, wanted: Sequence[Sequence[str]]) -> tuple[Sheet, Header] | None:
+    """A sheet with its header, which may be one of several rows: two columns of one name may stand below different heads."""
+    find = partial(header_of, keys=keys, where=where, wanted=wanted)
+    problem: CmmUqError | None = None
+    header = None
+    try:
+        header = find(sheet)
+    except CmmUqError as error:
+        problem = error
+    plain = sheet.listed or wanted is not POINTS
+    if (
+        not plain
+        and (header is None or not figures_follow(sheet, header))
+        and (found := with_one_head(sheet, find, understood))
+    ):
+        return found[:2]
+    if problem is not None:
+        raise problem
+    return None if header is None else (sheet, header)
 
 
 def read_recording_file(
@@ -235,3 +312,16 @@ def header(content: bytes) -> list[str]:
     text = content[:16_384].decode("utf-8-sig", errors="replace")
     line = next((line for line in map(str.strip, text.splitlines()) if line and not line.startswith("#")), "")
     return [name.strip().strip('"') for name in line.split(",")]
+
+
+def example(read: ImportedTable | Sequence[MeasuredLengths]) -> str:
+    """What was read first, in words: ``line 1, run 1: 120 mm measured as 120.0012 mm, +1.2 µm``."""
+    if isinstance(read, ImportedTable):
+        first = {name: values[0] for name, values in read.columns.items()}
+        numbers = " ".join(f"{name} {first[name]:g}," for name in WHOLE if name in first)
+        return f"{numbers} {', '.join(f'{name[0]} {first[name]:.4f} mm' for name in COORDINATES)}"
+    one = read[0]
+    nominal = one.reference[0]
+    of = "" if nominal is None else f"{nominal:.4f} mm measured as "
+    error = "" if nominal is None else f", {1000 * (one.measured[0] - nominal):+.4g} µm"
+    return f"line {one.names[0]}, run {one.repeat[0]}: {of}{one.measured[0]:.4f} mm{error}"

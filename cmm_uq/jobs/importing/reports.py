@@ -81,7 +81,7 @@ class Calypso(TextReport):
             if len(rows) <= 3:
                 raise CmmUqError("is the head of a Calypso table (hdr.txt), which has no measured value", where=where,
                                  fix="Name the file that ends in _chr.txt and was written with it")  # fmt: skip
-            fix = "Name the file ending in _chr.txt, or columns = { x_mm = 9, y_mm = 10, z_mm = 11 }"
+            fix = "Name the file ending in _chr.txt, or say which columns hold x, y, z: columns"
             raise CmmUqError("is a Calypso table whose columns are not known here (fet.txt?)", where=where, fix=fix)
         places, units, others = _characteristics(rows, where)
         if not places or len(places) > ROWS.most:

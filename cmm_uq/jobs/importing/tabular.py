@@ -27,6 +27,7 @@ from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.jobs.importing.encodings import HOSTILE_FIX, decoded, head_text, local
 from cmm_uq.jobs.importing.format import DELIMITERS, Cell, Fact, Format, ImportKeys, Sheet
 from cmm_uq.jobs.importing.header import LINES_BEFORE, REFERENCES, header_of, understood
+from cmm_uq.jobs.importing.length_tables import of_lengths
 
 _SEVERAL = "  "  # two blanks or more between cells, so that single ones may stand in headings
 _TITLES: dict[str, Text] = {
@@ -34,6 +35,7 @@ _TITLES: dict[str, Text] = {
     _SEVERAL: say("two blanks or more"),
 }  # fmt: skip
 _BLANKS = {" ": re.compile(r"\s+"), _SEVERAL: re.compile(r"\s{2,}|\t")}
+_KNOWN = 2  # headings that are understood, by which another separator than single blanks is taken
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 Rows = tuple[list[list[str]], list[int]]  # cells of every line, and their lines
 
@@ -63,10 +65,17 @@ def _delimiter(text: str, where: str, keys: ImportKeys) -> str:
     for candidate in _TITLES:
         rows, lines = _rows(text, candidate, where, LINES_BEFORE)
         if candidate in text or candidate in _BLANKS:
-            if header_of(Sheet("", rows, lines), keys, where, REFERENCES) is not None:
+            try:
+                if header_of(Sheet("", rows, lines), keys, where, REFERENCES) is not None:
+                    return candidate
+            except CmmUqError:  # two columns of one name
                 return candidate
-            known = (sum(understood(cell).column is not None for cell in row) for row in rows)
+            known = (
+                max(sum(of(cell).column is not None for cell in row) for of in (understood, of_lengths)) for row in rows
+            )
             scores[candidate] = max(known, default=0)
+    if max(score for candidate, score in scores.items() if candidate != " ") >= _KNOWN:
+        scores.pop(" ", None)  # a heading of several words has more of them, cut apart
     return max(scores, key=lambda candidate: scores[candidate])
 
 

@@ -105,7 +105,7 @@ def test_an_ambiguity_ends_with_the_key_that_settles_it_and_exit_code_2(tmp_path
     refused = run("import", export)
     assert refused.returncode == 2
     assert refused.stdout == ""
-    assert 'Say decimal = "," or decimal = "."' in refused.stderr
+    assert 'Say --key decimal="," or --key decimal="."' in refused.stderr
     assert run("import", export, "--key", "decimal=,").returncode == 0
     unknown = run("import", export, "--key", "dezimal=,")
     assert unknown.returncode == 2

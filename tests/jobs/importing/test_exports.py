@@ -71,7 +71,7 @@ DAMAGES = [
     ("comma.csv", put("Operator", "X [mm]"), r"columns 'X \[mm\]' and 'X \[mm\]' could all be x_mm.*columns = \{ x_mm = 3 \}"),
     ("comma.csv", put("500.022500000", ""), r"line 3, column X \[mm\]: no value. Measure the point again, or leave"),
     ("comma.csv", put("Measurement", "Kennung"), r"nothing says which points belong to one.*points_per_measurement"),
-    ("comma.csv", put("2,1,300", "Mean,,\r\n2,1,300"), r"line 4: has no coordinates, and figures follow"),
+    ("comma.csv", put("2,1,300", "9,9,,,\r\n2,1,300"), r"line 4: has no coordinates, and figures follow"),
     ("semicolon.csv", put("500,0225", "500.0225"),
      r"has a decimal comma, and '500\.0225\d*' \(.*line 5, column X \[mm\]\) has a decimal point"),
     ("semicolon.csv", cut(0.55), r"semicolon\.csv line 5"),

@@ -19,13 +19,34 @@ from cmm_uq.base.points import Machine
 from cmm_uq.certificate.results.qif_file import qif
 from cmm_uq.jobs.columns import WHOLE
 from cmm_uq.jobs.dcc import Certificate, read
-from cmm_uq.jobs.importing.format import ImportKeys
-from cmm_uq.jobs.importing.recording import ImportedTable, imported, points_of
+from cmm_uq.jobs.importing.format import ImportKeys, Recognition
+from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, example, imported, points_of
+from cmm_uq.jobs.importing.remembered import as_file, folder, matching, path_of
 from cmm_uq.jobs.reports import ReportResults, read_results
 from cmm_uq.jobs.source import RESULTS
 
 _FIRST = ("measurement", "point", "repeat", "x_mm", "y_mm", "z_mm")
 _MARK = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*")
+
+
+def remembered_keys(path: Path, keys: ImportKeys) -> tuple[ImportKeys, Path | None]:
+    """Keys for an export: those that are said, else those remembered of its format, with the file that they stand in."""
+    if keys.model_copy(update={"lines": {}}).asked or not folder().is_dir():
+        return keys, None
+    found = matching(content_of(path, TABLE_BYTES, "Check its name"), str(path))
+    return (keys, None) if found is None else (found[1].model_copy(update={"lines": keys.lines}), found[0])
+
+
+def remember(name: str, keys: ImportKeys, head: tuple[str, ...]) -> Path:
+    """Keep the answers to an export by name, for all with the same head."""
+    if not head:
+        raise CmmUqError(
+            "has no head by which another of its format would be known", where="--save-as", fix="Leave it out"
+        )
+    path = path_of(name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_new(path, as_file(keys, head))
+    return path
 
 
 @naming_package()
@@ -34,6 +55,19 @@ def read_export(path: Path, keys: ImportKeys | None = None) -> ImportedTable:
     found = imported(content, str(path), keys or ImportKeys())
     points_of(found.columns, found.lines.tolist(), str(path), Machine())  # refused as a job refuses it
     return found
+
+
+def lines_asked(error: CmmUqError) -> tuple[Recognition, str, list[str]] | None:
+    """How lengths were read of which nothing says where they lie: the reading, its first in words, the lines by name."""
+    if not isinstance(error, UnplacedError):
+        return None
+    every = [name for one in error.lengths for name in one.names]
+    return error.recognised, example(error.lengths), list(dict.fromkeys(every))
+
+
+def in_words(export: ImportedTable) -> str:
+    """The first of what was read."""
+    return example(export)
 
 
 def own_format(found: ImportedTable) -> bytes:

@@ -1,0 +1,132 @@
+"""A sheet as people arrange it, as a table: a head of several rows as one, rows that are no figures left out by name.
+
+An upper head stands over the columns up to the next one, units may stand in a row of their own, a label may stand in the first
+row of those that it is of. What is left out is told with its place and why: a summary (mean, max, MPE), a remark, a head again
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.jobs.columns import COORDINATES
+from cmm_uq.jobs.importing.encodings import is_number
+from cmm_uq.jobs.importing.format import Cell, Sheet, unit_named
+from cmm_uq.jobs.importing.header import LINES_BEFORE, Header, Heading, plain_words, without_unit, words_of
+
+_DEEPEST = 4  # rows of a head
+_SHOWN = 40  # characters of a row that is left out
+SUMMARY, REMARK, AGAIN = "a summary", "a remark", "the head again"
+BASES, FIGURES = (
+    ("reference_mm", "nominal_mm"),
+    ("length_mm", "deviation_um", "deviation_mm", "run"),
+)  # of a table of lengths
+
+
+def text_of(cell: Cell) -> str:
+    return cell if isinstance(cell, str) else f"{cell:g}"
+
+
+def with_one_head(
+    sheet: Sheet, find: Callable[[Sheet], Header | None], meaning_of: Callable[[str], Heading]
+) -> tuple[Sheet, Header, int] | None:
+    """A sheet that begins with its head as one row, its header, and how many rows of the sheet stand ahead of figures.
+
+    ``find``: the header of a sheet by its first row.
+    """
+    problem: CmmUqError | None = None
+    for last, below in enumerate(sheet.rows[1 : LINES_BEFORE + 1]):
+        if not any(cell != "" and is_number(cell) for cell in below):
+            continue
+        for top in range(last, max(last - _DEEPEST, -1), -1):
+            head = _combined(sheet.rows[top : last + 1], meaning_of)
+            if not any(head):
+                break
+            probe = replace(sheet, rows=[head, below], lines=sheet.lines[last : last + 2])
+            try:
+                header = find(probe)
+            except CmmUqError as error:
+                problem = problem or error
+                continue
+            if header is not None and figures_follow(probe, header):
+                whole = replace(sheet, rows=[head, *sheet.rows[last + 1 :]], lines=sheet.lines[last:])
+                return whole, header, last + 1
+    if problem is not None:
+        raise problem
+    return None
+
+
+def figures_follow(sheet: Sheet, header: Header) -> bool:
+    """Whether the rows after a header begin with a figure in each coordinate, or in the nominal length and one of its runs."""
+    of = {
+        name: [i for one in names for i in header.columns.get(one, ())]
+        for name, names in (("all", (*COORDINATES, *BASES)), ("any", FIGURES))
+    }
+    for row in sheet.rows[header.first : header.first + _DEEPEST]:
+        cells = {name: [row[i] if i < len(row) else "" for i in columns] for name, columns in of.items()}
+        if any(cell != "" for own in cells.values() for cell in own):
+            number = {name: [cell != "" and is_number(cell) for cell in own] for name, own in cells.items()}
+            return all(number["all"]) and (any(number["any"]) or COORDINATES[0] in header.columns)
+    return False
+
+
+def _combined(rows: Sequence[Sequence[Cell]], meaning_of: Callable[[str], Heading]) -> list[str]:
+    """Headings of a head of several rows."""
+    width = max(map(len, rows))
+    texts = [[*map(text_of, row), *[""] * (width - len(row))] for row in rows]
+    if len(rows) == 1:
+        return texts[0]
+    for depth, row in enumerate(texts[:-1]):
+        for i in range(1, width):
+            if not row[i] and any(below[i] for below in texts[depth + 1 :]):
+                row[i] = row[i - 1]
+    headings = []
+    for column in zip(*texts, strict=True):
+        parts, unit = [], ""
+        for part in filter(None, column):
+            if unit_named(part.strip("[]()<>{} ")):
+                unit = part.strip("[]()<>{} ")
+                continue
+            bare, own, _ = without_unit(part)
+            unit = own.name if own else unit
+            parts.append(bare if own else part)
+        parts = list(dict.fromkeys(parts))
+        full, last = " ".join(parts), parts[-1] if parts else ""
+        if meaning_of(full).column is None and meaning_of(last).column not in (None, *COORDINATES):
+            full = last
+        headings.append(f"{full} [{unit}]" if unit and full else full)
+    return headings
+
+
+def is_summary(row: Sequence[Cell]) -> bool:
+    """Whether one of the first two cells with anything in them is a word for a figure of other rows."""
+    labels = [cell for cell in row if cell != ""][:2]
+    return any(isinstance(cell, str) and " ".join(plain_words(cell)) in words_of("rows")["summary"] for cell in labels)
+
+
+def shown(sheet: Sheet, i: int, why: str) -> str:
+    """A row that is left out, with its place and why."""
+    text = " ".join(text_of(cell) for cell in sheet.rows[i] if cell != "")
+    return f"{sheet.at('', i).removeprefix(': ').strip()}: {text[:_SHOWN]!r}, {why}"
+
+
+def filled_down(cells: Sequence[Cell], *, evenly: bool = False) -> Sequence[Cell]:
+    """Labels of all rows, where each stands in the first row of those that it is of; else the cells as they are.
+
+    ``evenly``: only where each is of as many rows.
+    """
+    places = [i for i, cell in enumerate(cells) if cell != ""]
+    if len(places) == len(cells) or not places or places[0] or any(cells[a] == cells[b] for a, b in pairwise(places)):
+        return cells
+    if evenly and len({b - a for a, b in pairwise([*places, len(cells)])}) > 1:
+        return cells
+    return list(_down(cells))
+
+
+def _down(cells: Sequence[Cell]) -> Iterator[Cell]:
+    last: Cell = ""
+    for cell in cells:
+        last = cell if cell != "" else last
+        yield last

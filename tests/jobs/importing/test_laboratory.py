@@ -1,0 +1,140 @@
+"""Exports as laboratories have them are read whole, to their last digit; what they leave open is asked, and never guessed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Machine
+from cmm_uq.jobs.importing.format import ImportKeys
+from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, example, imported, points_of
+from tests.jobs.importing import laboratory, unseen
+from tests.jobs.importing.laboratory import Export, text
+
+ASKED = {"lines_side_by_side": "could all be length_mm", "polyworks_rows": "nothing says which lengths lie on one line"}
+"""Of those that were written after the reading was built, what is refused with a question."""
+EVERY = {**laboratory.EXPORTS, **{name: made for name, made in unseen.EXPORTS.items() if name not in ASKED}}
+
+
+def read(content: bytes | str, name: str = "a.csv", **keys: object) -> ImportedTable:
+    raw = content.encode() if isinstance(content, str) else content
+    return imported(raw, name, ImportKeys.model_validate(keys))
+
+
+def answered(export: Export, name: str) -> ImportedTable:
+    """Read at the first try, but for where its lines lie: line i along the diagonal of x and y, from z = 100 i."""
+    if not export.lengths:
+        return read(export.content, name)
+    with pytest.raises(UnplacedError, match="nothing says where line"):
+        read(export.content, name)
+    names = dict.fromkeys(line for line, *_ in export.lengths)
+    return read(
+        export.content, name, lines={one: f"from 0,0,{100 * i} to 3,4,{100 * i}" for i, one in enumerate(names)}
+    )
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_an_export_is_read_as_it_was_written(name: str) -> None:
+    file, made = EVERY[name]
+    export = made()
+    table = answered(export, file)
+    points = points_of(table.columns, table.lines.tolist(), file, Machine())
+    if export.points:
+        numbers = zip(points.measurement.tolist(), points.point.tolist(), map(tuple, points.xyz.tolist()), strict=True)
+        assert list(numbers) == list(export.points)
+        return
+    names = list(dict.fromkeys(line for line, *_ in export.lengths))
+    first, second = points.xyz[points.point == 1], points.xyz[points.point == 2]
+    rows = points.point == 2
+    reference = points.columns.get("reference_mm", np.zeros(len(points)))[rows]
+    of = (names[round(z / 100)] for z in first[:, 2])
+    found = sorted(zip(of, np.round(reference, 5).tolist(), points.repeat[rows].tolist(),
+                       np.linalg.norm(second - first, axis=1).tolist(), strict=True))  # fmt: skip
+    expected = sorted((line, round(nominal, 5), run, length) for line, nominal, run, length in export.lengths)
+    assert [one[:3] for one in found] == [one[:3] for one in expected]
+    assert [one[3] for one in found] == pytest.approx([one[3] for one in expected], abs=1e-7)
+    assert (second - first) / np.linalg.norm(second - first, axis=1)[:, None] == pytest.approx(
+        np.tile([0.6, 0.8, 0.0], (len(first), 1))
+    )
+    assert len({*zip(points.measurement.tolist(), points.repeat.tolist(), strict=True)}) == len(first)
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_what_a_table_leaves_open_is_a_question(name: str) -> None:
+    file, made = unseen.EXPORTS[name]
+    with pytest.raises(CmmUqError, match=ASKED[name]):
+        read(made().content, file)
+
+
+LINE = {"lines": {"1": "along -Y from 10,20,30"}}
+
+
+def test_a_line_is_said_by_its_start_and_an_axis_or_by_two_places() -> None:
+    table = read("Nominal (mm);Measured (mm)\n100;100.002\n", **LINE)
+    assert table.columns["y_mm"].tolist() == [20.0, 20 - 100.002]
+    assert table.columns["reference_mm"].tolist() == [0.0, 100.0]
+    with pytest.raises(CmmUqError, match="begins where it ends"):
+        read("Nominal (mm);Measured (mm)\n100;100.002\n", lines={"1": "from 1,2,3 to 1,2,3"})
+    with pytest.raises(ValueError, match="says no place of line 1"):
+        read("", lines={"1": "somewhere"})
+    with pytest.raises(CmmUqError, match="has no line 'upper'"):
+        read("Nominal (mm);Measured (mm)\n100;100.002\n", lines={**LINE["lines"], "upper": "along X from 0,0,0"})
+
+
+@pytest.mark.parametrize(("table", "question"), [
+    ("Line;Nominal;Measured\n1;100;100.002\n1;250;250.003\n", "may be in mm or in inch"),
+    ("Line;Nominal (mm);Deviation\n1;100;2\n1;250;3\n", "nothing says the unit of 'Deviation': µm or mm"),
+    ("Line;Nominal (mm);Run 1;Run 2\n1;100;2;1\n1;250;3;1\n", "'Run 1', 'Run 2' may be lengths, or deviations in µm or mm"),
+    ("Line;Nominal (mm);Measured (mm)\n1;100;250.002\n", r"250\.002 mm is no measured length of 100 mm"),
+    ("Line;Nominal (mm);Measured (mm);Deviation (µm)\n1;100;100.002;7\n", "is not measured minus reference: one of the"),
+    ("Line;Nominal (mm);Measured (mm)\n1;100;100.001\n1;;250.002\n1;400;400.001\n", "no value"),
+    ("Line;Nominal (mm);Measured (mm);Repeat;Mean\n;100;100.002;1;3\n", "no line is named"),
+    ("Nominal (mm);Measured 1 (mm);Measured 2 (mm);Run\n100;100.002;100.001;1\n", "counts runs, and so do 2 columns"),
+])  # fmt: skip
+def test_what_could_be_read_two_ways_is_refused(table: str, question: str) -> None:
+    with pytest.raises(CmmUqError, match=question):
+        read(table, **LINE)
+
+
+def test_deviations_beside_lengths_may_have_either_sign_and_are_a_check_alone() -> None:
+    for sign in ("", "-"):
+        table = read(f"Line;Nominal (mm);Measured (mm);Deviation (µm)\n1;100;100.002;{sign}2.0\n", **LINE)
+        assert table.columns["y_mm"].tolist() == [20.0, 20 - 100.002]
+
+
+def test_a_correction_of_the_columns_is_followed() -> None:
+    """What the messages above say to write, by name, by number, with two columns of one name."""
+    table = "Line;Nominal (mm);Run 1;Run 2\n1;100;2;1\n1;250;3;1\n"
+    um = read(table, columns={"deviation_um": ["Run 1", "Run 2"]}, lines={"1": "along X from 0,0,0"})
+    mm = read(
+        table,
+        columns={"nominal_mm": 2, "line": 1, "deviation_mm": [3, 4]},
+        unit="mm",
+        lines={"1": "along X from 0,0,0"},
+    )
+    assert um.columns["x_mm"][1::2].tolist() == pytest.approx([100.002, 100.001, 250.003, 250.001])
+    assert mm.columns["x_mm"][1::2].tolist() == pytest.approx([102.0, 101.0, 253.0, 251.0])
+
+
+def test_every_row_and_column_that_is_left_out_is_named_with_why() -> None:
+    rows = [["Line", "Nominal (mm)", "Run 1 (mm)", "Run 2 (mm)", "MPE"], [1, 100, "100.001", "", 3],
+            ["Mean", "", "100.0", "", ""],
+            ["soaked anew"], [1, 250, "250.001", "250.002", 3]]  # fmt: skip
+    table = read(text(rows, ";"), **LINE)
+    facts = table.recognised.data
+    assert (
+        facts["left_out"]
+        == "line 3: 'Mean 100.0', a summary; line 4: 'soaked anew', a remark; line 2, column Run 2 (mm): nothing in the cell"
+    )
+    assert facts["not_used"] == "MPE"
+    assert len(table.lines) == 6
+
+
+def test_a_reading_is_shown_by_an_example_in_words() -> None:
+    file, made = laboratory.EXPORTS["deviations_with_units_row"]
+    with pytest.raises(UnplacedError) as raised:
+        read(made().content, file)
+    assert example(raised.value.lengths) == "line Position 1, run 1: 100.0000 mm measured as 99.9980 mm, -2 µm"
+    points = read("Measurement;Point;X [mm];Y [mm];Z [mm]\n1;1;120.00123;0;1\n")
+    assert example(points) == "measurement 1, point 1, x 120.0012 mm, y 0.0000 mm, z 1.0000 mm"

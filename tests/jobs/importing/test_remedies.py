@@ -1,0 +1,99 @@
+"""What a message of an import says to do helps: followed, the export is read, or asks the next question."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from cmm_uq.base.errors import CmmUqError
+from tests.app.cli.process import run
+
+EXPORTS = {
+    "unit": "Measurement;Point;X;Y;Z\n1;1;1;0;0\n1;2;2;0;0\n",
+    "thousands": "Measurement;Point;X [mm];Y [mm];Z [mm]\n1;1;1,234;2,345;3,456\n",
+    "two columns": "Measurement;Point;X [mm];X actual;Y [mm];Z [mm]\n1;1;1;1;0;0\n",
+    "no numbers": "X [mm];Y [mm];Z [mm]\n1;0;0\n2;0;0\n",
+    "one place": "Nominal (mm);Measured (mm)\n100;100.002\n",
+    "several lines": "Line;Nominal (mm);Measured (mm)\nA;100;100.002\nB;100;100.003\n",
+    "unit of deviations": "Line;Nominal (mm);Deviation\n1;100;2\n1;250;3\n",
+    "runs": "Line;Nominal (mm);Run 1;Run 2\n1;100;2;1\n1;250;3;1\n",
+    "another reference": "Line;Nominal (mm);Measured (mm);Deviation (µm)\n1;100.0000;100.0020;7.0\n",
+    "which lie together": "Object;Nominal (mm);Measured (mm)\nA;100;100.002\nA;250;250.001\nB;100;100.003\n",
+}
+"""By what each leaves open."""
+OPTION = re.compile(r'--(?:column|key|line) (?:"[^"]*"|[^\s",]+(?:"[^"]*")?)')
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", EXPORTS)
+def test_following_what_a_message_says_reads_the_export(name: str, tmp_path: Path) -> None:
+    (tmp_path / "export.csv").write_text(EXPORTS[name], encoding="utf-8")
+    options: list[str] = []
+    questions: list[str] = []
+    for _ in range(5):
+        ended = run("import", "export.csv", *options, cwd=tmp_path)
+        if ended.returncode == 0:
+            break
+        told = re.search(r"\. (?:Say|Name)[^.]*:?.*", ended.stderr.replace("…", "").replace("=N", "=2"), re.DOTALL)
+        assert told, ended.stderr
+        followed = re.findall(OPTION, told[0])
+        assert followed, ended.stderr
+        given = [option for option in followed if option.split("=")[0] == followed[0].split("=")[0]]
+        if followed[0].startswith("--key"):
+            given = given[:1]
+        assert given[0] not in questions, ended.stderr  # no question twice
+        questions.append(given[0])
+        options += [part for option in given for part in shlex.split(option)]
+    assert ended.returncode == 0, ended.stderr
+    assert questions
+
+
+def test_a_remedy_names_no_column_by_its_number_alone() -> None:
+    """1, 2, 3 for x, y, z reads numbers of points as coordinates where followed as it stands."""
+    source = "".join(
+        path.read_text(encoding="utf-8") for path in (Path(__file__).parents[3] / "cmm_uq/jobs/importing").glob("*.py")
+    )
+    assert not re.search(r"fix=.*x_mm = \d", source)
+
+
+def test_columns_that_are_said_twice_are_two_points_in_a_row_and_a_key_said_twice_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "export.csv").write_text("Bar;A;B;C;D;E;F\n1;1;2;3;400;2;3\n", encoding="utf-8")
+    options = ("--column", "measurement=1", "--key", "unit=mm", "--key", "delimiter=;")
+    columns = ("--column", "x_mm=2,5", "--column", "y_mm=3", "--column", "y_mm=6", "--column", "z_mm=4,7")
+    ended = run("import", "export.csv", *options, *columns, "--out", "recording.csv", cwd=tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    assert (tmp_path / "recording.csv").read_text().splitlines()[1:] == ["1,1,1.0,2.0,3.0", "1,2,400.0,2.0,3.0"]
+    twice = run("import", "export.csv", "--key", "unit=mm", "--key", "unit=inch", cwd=tmp_path)
+    assert twice.returncode == 2
+    assert "unit is said twice" in twice.stderr
+
+
+def test_an_answer_is_remembered_for_the_next_export_of_its_kind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CMM_UQ_FORMATS", str(tmp_path / "formats"))
+    head = "Line;Nominal (mm);Run 1;Run 2\n"
+    (tmp_path / "one.csv").write_text(f"{head}1;100;2;1\n", encoding="utf-8")
+    (tmp_path / "two.csv").write_text(f"{head}1;250;3;4\n", encoding="utf-8")
+    line, answer = (
+        ("--line", "along X from 0,0,0"),
+        ("--column", "deviation_um=Run 1", "--column", "deviation_um=Run 2"),
+    )
+    assert run("import", "one.csv", *line, cwd=tmp_path).returncode == 2
+    assert run("import", "one.csv", *line, *answer, "--save-as", "lab-step-gauge", cwd=tmp_path).returncode == 0
+    again = run("import", "two.csv", *line, "--out", "two-read.csv", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert "As remembered in" in again.stdout
+    assert (tmp_path / "two-read.csv").read_text().splitlines()[2].startswith("1,2,1,250.003,")
+    taken = run("import", "one.csv", *line, *answer, "--save-as", "lab-step-gauge", cwd=tmp_path)
+    assert (taken.returncode, "nothing is overwritten" in taken.stderr) == (3, True)
+
+
+def test_a_name_of_a_remembered_format_is_no_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    from cmm_uq.jobs.importing.remembered import path_of
+
+    with pytest.raises(CmmUqError, match="is no name"):
+        path_of("../elsewhere")
