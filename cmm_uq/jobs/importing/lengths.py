@@ -1,7 +1,7 @@
 """Tables of lengths, as tests after ISO 10360-2 and B89 are reported: nominal, several runs, deviations, without coordinates.
 
-A length on a known line becomes two points a length apart, the first at the line's start, and is a measurement of its own: its
-error is then that of one difference, with the scatter of both ends, as the estimator takes it. Where the lines lie no table
+A length on a known line becomes two points a length apart, the first at the line's start, and is a measurement of its own: the
+scatter of both ends stands at the second, so that it is right for their difference. Where the lines lie no table
 says: it is asked for. Deviations are measured minus reference; where a table has both, one must follow from the other.
 """
 
