@@ -175,6 +175,11 @@ class Points:
         first = float(self.columns["time_s"].min(initial=np.inf)) if "time_s" in self.columns else 0.0
         return first if _NO_START < abs(first) < np.inf else 0.0
 
+    @property
+    def own_columns(self) -> Mapping[str, Floats]:
+        """Columns of the recording: without those, named with an underscore, that an artefact keeps beside its points."""
+        return {name: values for name, values in self.columns.items() if not name.startswith("_")}
+
     @cached_property
     def hours(self) -> Floats:
         """Time since the start (n,), h; a ``CmmUqError`` where the recording has no time."""

@@ -159,7 +159,7 @@ def test_its_own_points_displaced_are_such_a_recording() -> None:
 
 def test_some_of_its_readings_are_such_a_recording() -> None:
     whole = AxisRuns(EXACT, joined(*six()))
-    ends = np.flatnonzero(whole.points.columns["arm_end"] > 0)
+    ends = np.flatnonzero(whole.points.columns["_arm_end"] > 0)
     kept = whole.points.repeat[whole.rows[:, 0]] == 1
     some = AxisRuns(EXACT, whole.points.select(np.sort(np.concatenate([whole.rows[kept, 0], ends]))))
     assert some.about_zero(some.readings) == pytest.approx(some.about_zero(whole.readings[kept]), abs=1e-12)

@@ -289,7 +289,7 @@ class NextPlan:
         """All of it as a recording at nominal coordinates, numbered on from what is recorded; without what fits told."""
         each = [replace(one, points=repeat_points(one.points, self.repeats)) for one in self.placings]
         points = join(each, first=self.first)
-        return replace(points, columns={k: v for k, v in points.columns.items() if k not in _OF_FITS})
+        return replace(points, columns={k: v for k, v in points.own_columns.items() if k not in _OF_FITS})
 
 
 @dataclass(frozen=True)

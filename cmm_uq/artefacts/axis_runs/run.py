@@ -20,7 +20,7 @@ ALONG, ACROSS, TURNING = "along", "across", "turning"
 READINGS = {False: "reading_um", True: "reading_arcsec"}  # by whether a rotation is read
 # columns of the artefact's own points: whether one is the other end of an arm; the target along the run from its first, and
 # where that is; the mean of the readings of one zero; mm
-END, TARGET, START, ZERO = "arm_end", "target_mm", "start_mm", "zero_mm"
+END, TARGET, START, ZERO = "_arm_end", "_target_mm", "_start_mm", "_zero_mm"
 _UNIT, _SAME_MM = 0.01, 1e-6
 _ALONG, _ACROSS = 0.999, 0.05  # cosines between what is read and the travel
 

@@ -93,9 +93,9 @@ class PositioningRuns:
         return tuple(found)
 
     def spread(self, changes: Floats) -> Mapping[str, float]:
-        """Standard deviation of each figure under changes (N, d, t, n) of the readings."""
-        found = _figures(self.x + changes)
-        return dict(zip(self.names(), found.std(axis=0).tolist(), strict=True))
+        """Root mean square change of each figure under changes (N, d, t, n) of the readings: scatter makes ranges larger."""
+        change = _figures(self.x + changes) - _figures(self.x[None])
+        return dict(zip(self.names(), np.sqrt(np.mean(change**2, axis=0)).tolist(), strict=True))
 
 
 class MissingReadingError(ValueError):

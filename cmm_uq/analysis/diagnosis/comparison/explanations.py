@@ -298,7 +298,7 @@ def _of_all_scales(model: RecordingModel, points: Points, values: Floats) -> Ite
     readings = points.carriages
     middle, span = 0.5 * (readings.min(axis=0) + readings.max(axis=0)), 0.5 * float(np.ptp(readings, axis=0).max())
     levers = [((readings - about) / span)[:, :, None] for about in (np.zeros(3), middle)]
-    for key, column in points.columns.items():
+    for key, column in points.own_columns.items():
         if key.startswith(_PLACED) or len(np.unique(column)) < 3:
             continue
         factors = [(lever, f) for lever in levers for f in smooth_functions(column)]
@@ -324,7 +324,7 @@ def _along(axis: int, factor: Floats) -> Floats:
 
 def covariates(model: RecordingModel) -> dict[str, Floats]:
     """Mean (m,) of every recorded column of each observation, and its place in the order of time where one is recorded."""
-    found = {name: mean_of(model, values) for name, values in model.artefact.points.columns.items()}
+    found = {name: mean_of(model, values) for name, values in model.artefact.points.own_columns.items()}
     if "time_s" in found:
         found["order"] = np.unique(found["time_s"], return_inverse=True)[1].ravel().astype(np.float64)
     kept: dict[str, Floats] = {}

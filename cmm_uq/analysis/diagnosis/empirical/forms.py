@@ -82,10 +82,10 @@ def forms_of(covariate: Floats, *, time: bool = False) -> Iterator[ClosedForm]:
     )
     yield _even(settles, ("reach",), reach, lambda c, s: np.exp((c - high) / s[:, 0]), f"exp((c - {high!r})/reach)")
     period = span / np.arange(_WHOLE, min(_SINES, 0.5 * len(distinct)), _BETWEEN)
-    if len(period):
+    if len(period) > 1:
         yield _even("sine", ("period",), period, _waves, "cos(2*pi*c/period);sin(2*pi*c/period)")
     period = span / np.arange(_SEVERAL, min(_TEETH, 0.25 * len(distinct)), _BETWEEN)
-    if len(period):
+    if len(period) > 1:
         grid, apart = _grid(period, np.arange(_PHASES) / _PHASES)
         grid[:, 1], apart[:, 1] = grid[:, 1] * grid[:, 0], apart[:, 1] * grid[:, 0]
         yield ClosedForm("sawtooth", ("period", "at"), grid, apart, _teeth, "2/pi*atan(tan(pi*(c - at)/period))")

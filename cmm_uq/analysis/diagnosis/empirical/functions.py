@@ -146,7 +146,7 @@ def _of_points(result: SearchResult) -> Iterator[FunctionFamily]:
 
 def _of_observations(result: SearchResult) -> Iterator[FunctionFamily]:
     model, scale = result.first.model, result.first.comparison.noise_scale
-    for key, column in model.artefact.points.columns.items():
+    for key, column in model.artefact.points.own_columns.items():
         mean = mean_of(model, column)
         if len(np.unique(mean)) > 2:
             title = say("error as a function of {name}", name=in_words(key))

@@ -58,3 +58,10 @@ def test_what_settles_is_called_after_what_it_is_of() -> None:
     names, timed = ({form.name for form in forms_of(COVARIATE, time=time)} for time in (False, True))
     assert "exponential" in timed - names
     assert not any(re.search(r"[A-Z ]", name) for name in names | timed)
+
+
+@pytest.mark.parametrize("count", range(3, 30))
+def test_however_few_values_a_covariate_has_its_forms_are_there(count: int) -> None:
+    """With nine values a saw had one period, which is next to no other."""
+    for form in forms_of(np.arange(float(count))):
+        assert len(form.shapes) >= 1

@@ -1,0 +1,210 @@
+"""How often intervals hold of runs along axes: figures of ISO 230-2, named errors, and the map of curves of no known form.
+
+    python -m benchmarks.artefacts.axis_runs_coverage figures|errors|map COUNT
+
+The machine is simulated here, by its kinematics written out for the chain XYZ, and shares no code with the package.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from scipy import stats
+
+from cmm_uq.analysis.conformity.positioning import test_spread
+from cmm_uq.app.commands.jobs.compensate import write_new_map
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.artefacts import artefact_of
+from cmm_uq.machine.model import RecordingModel
+from cmm_uq.machine.physics.catalogue import effects
+
+TRAVEL = np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]])
+MIDDLE, SECOND = TRAVEL.mean(axis=1), np.pi / 180 / 3600
+OPTICS = np.array([20.0, -10.0, -120.0])
+NAMES = [
+    *(f"scale_{a}" for a in "xyz"), *(f"hysteresis_{a}" for a in "xyz"),
+    *(f"straightness_{a}_{b}" for a in "xyz" for b in "xyz" if a != b), *(f"rotation_{a}_{b}" for a in "xyz" for b in "xyz"),
+]  # fmt: skip
+JOB = """[job]
+id = "axis-runs"
+date = 2026-01-01
+[machine]
+name = "of this study"
+travel_mm = {{ x = [0, 900], y = [0, 1200], z = [-600, 0] }}
+[artefact]
+kind = "axis_runs"
+u_um_per_m = {u}
+optics_mm = [20, -10, -120]
+[recording]
+file = "recording.csv"
+[test_uncertainty]
+u_alignment_um = 0.3
+u_repeat_um = 0.2
+[model]
+effects = [{names}]
+"""
+
+
+class Machine:
+    """Displacement and rotation of each carriage as functions of its place, µm and ″: [carriage][axis]."""
+
+    def __init__(self, random: np.random.Generator, *, smooth: bool) -> None:
+        self.scale, self.gap = random.normal(0, 10, 3), random.normal(0, 2, 3)
+        self.bow, self.turn = random.normal(0, 4, (3, 3)), random.normal(0, 6, (3, 3))
+        # bumps of some width anywhere: amplitude, place, width in parts of the travel, of displacements and rotations
+        shape = (3, 6, 6)
+        self.bumps = (
+            random.normal(0, 3, shape) * smooth,
+            random.uniform(0, 1, shape),
+            random.uniform(0.15, 0.6, shape),
+        )
+
+    def of(self, i: int, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        low, span = TRAVEL[i, 0], np.ptp(TRAVEL[i])
+        part = (at - low) / span
+        shift = self.bow[i] * (1 - (2 * part[:, None] - 1) ** 2)
+        shift[:, i] = self.scale[i] * at / 1000
+        turn = np.outer((at - low) / 1000, self.turn[i])
+        height, place, width = (each[i] for each in self.bumps)
+        bumps = np.sum(height * np.exp(-0.5 * ((part[:, None, None] - place) / width) ** 2), axis=2)
+        return shift + bumps[:, :3], turn + bumps[:, 3:]
+
+    def error(self, xyz: np.ndarray, tip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement of a tip and rotation of the ram, µm and ″: X carries Y and Z, Y carries Z."""
+        moved, turned = np.zeros(xyz.shape), np.zeros(xyz.shape)
+        for i in range(3):
+            shift, turn = self.of(i, xyz[:, i])
+            lever = tip + np.where(np.arange(3) > i, xyz, 0.0)
+            moved += shift + 1000 * SECOND * np.cross(turn, lever)
+            turned += turn
+        return moved, turned
+
+
+def recorded(
+    machine: Machine, random: np.random.Generator, folder: Path, runs: list[tuple[int, int]], *, u: float = 0.4,
+    sigma: float = 0.25, targets: int = 7, repeats: int = 3, names: list[str] | None = None,
+) -> Path:  # fmt: skip
+    """A job of runs, each an axis and what is read: 0 … 2 a displacement along it, 3 … 5 a rotation about it."""
+    rows, wrong = ["measurement,point,repeat,x_mm,y_mm,z_mm,reading_um,reading_arcsec," + ",".join(
+        f"{name}_{a}" for name in ("approach", "read", "turn") for a in "xyz"
+    )], random.normal(0, u)  # fmt: skip
+    for number, (axis, sense) in enumerate(runs, 1):
+        low, high = TRAVEL[axis]
+        there = np.linspace(low + 0.05 * (high - low), high - 0.05 * (high - low), targets)
+        at, way = np.concatenate([there, there[::-1]]), np.repeat([1.0, -1.0], targets)
+        xyz = np.tile(MIDDLE, (len(at), 1))
+        xyz[:, axis] = at
+        moved, turned = machine.error(xyz, OPTICS)
+        moved[:, axis] += 0.5 * machine.gap[axis] * way
+        zero, slope = random.normal(0, 20), random.normal(0, 5) if sense < 3 and sense != axis else 0.0
+        for repeat in range(1, repeats + 1):
+            read = (moved[:, sense] if sense < 3 else turned[:, sense - 3]) + zero + slope * at / 1000
+            read = read + (wrong * at / 1000 if sense == axis else 0.0) + sigma * random.normal(size=len(at))
+            for k, value in enumerate(read):
+                cells = [number, k + 1, repeat, *xyz[k], value if sense < 3 else 0.0, value if sense >= 3 else 0.0]
+                unit = [way[k] * (i == axis) for i in range(3)], [1.0 * (sense == i) for i in range(6)]
+                rows.append(",".join(f"{cell:.10g}" for cell in [*cells, *unit[0], *unit[1]]))
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "recording.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    quoted = ", ".join(f'"{name}"' for name in names or NAMES)
+    (folder / "job.toml").write_text(JOB.format(u=u, names=quoted), encoding="utf-8")
+    return folder
+
+
+def artefact(folder: Path):  # type: ignore[no-untyped-def]
+    job = read_job(folder)
+    return job, artefact_of(job.facts.artefact, job.points)
+
+
+def figures(count: int) -> None:
+    """U = 2 u of what a perfect instrument would have found on the same runs."""
+    held: dict[str, int] = {}
+    for seed in range(count):
+        random = np.random.default_rng([1, seed])
+        machine = Machine(random, smooth=True)
+        with tempfile.TemporaryDirectory() as name:
+            folder = recorded(machine, random, Path(name), [(0, 0)], sigma=0.3, repeats=5, u=0.0)
+            job, runs = artefact(folder)
+            true = runs.positionings()[1]
+            (folder / "job.toml").write_text(
+                (folder / "job.toml").read_text().replace("u_um_per_m = 0.0", "u_um_per_m = 0.4")
+            )
+            job, runs = artefact(folder)
+            part = (true.targets - true.targets[0]) / np.ptp(true.targets)
+            whole = random.normal(0, 0.4 * np.ptp(true.targets) / 1000) + random.normal(0, 0.3)
+            x = true.x + whole * part[None, :, None] + 0.2 * random.normal(size=true.x.shape)
+            read = type(true)(true.targets, x)
+            spread, found, at = test_spread(read, runs, job.circumstances), read.figures(), true.figures()
+            for figure, u in spread.items():
+                held[figure] = held.get(figure, 0) + (abs(found[figure] - at[figure]) <= 2 * u)
+    for figure, times in held.items():
+        print(f"| {figure} | {times} of {count} |")
+
+
+def errors(count: int) -> None:
+    """95 % intervals of least squares for the errors in the model's own forms, the instrument's scale wrong too."""
+    runs = [(axis, sense) for axis in range(3) for sense in range(6)]
+    held, kinds = dict.fromkeys(NAMES, 0), list(NAMES)
+    for seed in range(count):
+        random = np.random.default_rng([2, seed])
+        machine = Machine(random, smooth=False)
+        with tempfile.TemporaryDirectory() as name:
+            _, seen = artefact(recorded(machine, random, Path(name), runs, repeats=2, targets=6))
+        found = RecordingModel(seen, effects(NAMES)).estimate().least_squares
+        factor = float(stats.t.ppf(0.975, found.degrees_of_freedom))
+        true = [*machine.scale, *machine.gap, *(machine.bow[i, j] for i in range(3) for j in range(3) if i != j),
+                *machine.turn.ravel()]  # fmt: skip
+        for k, value in enumerate(true):
+            held[kinds[k]] += abs(found.value[k] - value) <= factor * np.sqrt(found.covariance[k, k])
+    for kind in ("scale", "hysteresis", "straightness", "rotation"):
+        own = [times for name, times in held.items() if name.startswith(kind)]
+        print(
+            f"| {kind} | {100 * sum(own) / (count * len(own)):.1f} % of {count * len(own)} | {min(own)} … {max(own)} |"
+        )
+
+
+def of_map(count: int) -> None:
+    """Displacements between targets along X by the map, with its covariance, of curves of no known form."""
+    held, total, before, after, u = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    places = np.linspace(0.1, 0.9, 9)
+    for seed in range(count):
+        random = np.random.default_rng([3, seed])
+        machine = Machine(random, smooth=True)
+        with tempfile.TemporaryDirectory() as name:
+            runs = [(0, 0), (0, 1), (0, 2), (0, 4), (0, 5)]
+            job = recorded(
+                machine, random, Path(name) / "job", runs, targets=9, repeats=2, names=["scale_x", "hysteresis_x"]
+            )
+            _, made = write_new_map(job, Path(name) / "map")
+        xyz = np.tile(MIDDLE, (len(places), 1))
+        xyz[:, 0] = places * 900.0
+        true, _ = machine.error(xyz, OPTICS)
+        known, covariance = made.error_map, made.error_map.covariance
+        root = covariance.root(known, xyz, tip=OPTICS)
+        table = np.column_stack(
+            [np.interp(xyz[:, 0], known.axes[0].positions, known.axes[0].errors[:, k]) for k in range(6)]
+        )
+        lever = OPTICS + np.where(np.arange(3) > 0, xyz, 0.0)
+        by_map = table[:, :3] + np.cross(table[:, 3:], lever)
+        free = np.column_stack([np.ones(len(places)), places])
+        for k in range(3):  # of a straightness less a line, of a position less its mean
+            out = np.eye(len(places)) - free[:, : 1 if k == 0 else 2] @ np.linalg.pinv(free[:, : 1 if k == 0 else 2])
+            off, sd = out @ (true[:, k] / 1000 - by_map[:, k]), np.linalg.norm(out @ root[:, k], axis=1)
+            held[k] += np.sum(np.abs(off) <= 1.96 * sd)
+            total[k] += len(places)
+            before[k] += np.sum((out @ true[:, k] / 1000) ** 2)
+            after[k] += np.sum(off**2)
+            u[k] += np.sum(sd**2)
+        print(seed, (held / total).round(3), flush=True)
+    for k, what in enumerate(("position of X", "straightness along Y", "straightness along Z")):
+        rms = [1000 * float(np.sqrt(each[k] / total[k])) for each in (before, after, u)]
+        print(
+            f"| {what} | {100 * held[k] / total[k]:.1f} % of {total[k]:.0f} | {rms[0]:.2f} | {rms[1]:.2f} | {rms[2]:.2f} |"
+        )
+
+
+if __name__ == "__main__":
+    {"figures": figures, "errors": errors, "map": of_map}[sys.argv[1]](int(sys.argv[2]))
