@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations, pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.screening.columns import Finding, at_lines, finding
@@ -16,6 +18,7 @@ from cmm_uq.base.messages import Text, Verbatim, plural, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.machine.model.artefact import Placings
 from cmm_uq.machine.model.kind import Observed
+from cmm_uq.machine.physics.kinematics import axis_directions
 
 MOST = 0.2  # part of the rows that may be left out; with more damage the recording is refused
 _PART, _STRAYS = 0.2, 0.05
@@ -23,6 +26,8 @@ _FEW, _MANY = 16, 60
 _MOST_BALLS = 400
 _SAME_PLACE, _TRAVEL_TOLERANCE = 10.0, 1.0  # mm
 _SEVERAL, _EDGES = 4, 0.05
+_MOST_LEAN, _FOR_ANGLES = 0.175, 10  # rad, 10°; set-ups or points from which on three angles are no mere adaptation
+_EXPLAINED = 0.25  # part of its misfit that a point has left which other axes explain
 _ABSURD = (1.0, 2e4)  # mm; a bar shorter or longer than this is in another unit
 
 
@@ -199,7 +204,7 @@ class DamageSearch:
     def _numbered_otherwise(self, rows: Ints) -> bool:
         if not self.shape.names[2:] or self.shape.names[0] == "nx" or len(rows) > _MOST_BALLS:
             return False
-        xyz, reference = self.points.xyz[rows], self.shape.reference[rows]
+        xyz, reference = (self.points.xyz @ self.shape.axes)[rows], self.shape.reference[rows]
         if np.median(self.shape.misfit_of(xyz, reference, self.shape.size)) <= self.shape.tolerance:
             return False
         pairs = np.triu_indices(len(xyz), 1)
@@ -223,6 +228,9 @@ def coordinate_findings(
         problem = f"the recorded bars are about {shape.extent:.3g} mm long: the coordinates look like {unit}, not mm"
         raise CmmUqError(problem, where=where, fix="Give x_mm, y_mm, z_mm in mm")
     search = DamageSearch(points, shape)
+    if search.bad.any() and (axes := _leaning_axes(points, shape, search.misfit)) is not None:
+        shape = replace(shape, axes=axes)
+        search = DamageSearch(points, shape)
     counted, bad = ~np.isin(points.measurement, list(set_aside)), int(search.bad.sum())
     missed = f"{bad} of {len(points)} points miss the artefact by up to {search.misfit.max():.3g} mm"
     if bad >= _SEVERAL:
@@ -237,6 +245,29 @@ def coordinate_findings(
         fix = "So much of a recording cannot be left out: mend it, or measure again"
         raise CmmUqError(problem, where=where, fix=fix)
     return found + _reversed_bars(points, shape)
+
+
+def _leaning_axes(points: Points, shape: ArtefactShape, misfit: Floats) -> Floats | None:
+    """Unit vectors of axes out of square on which most of what missed the artefact fits it; ``None`` where none do so.
+
+    Where most fits as it is, the angles are those of what fits: only so they foretell what does not.
+    """
+    missed, count = misfit > shape.tolerance, len(np.unique(points.group)) if shape.together else len(points)
+    few = missed.mean() <= MOST
+    if count < _FOR_ANGLES or not np.isfinite(misfit).all():
+        return None
+    every = np.ones(len(points), dtype=bool)
+
+    def left(angles: Floats, rows: NDArray[np.bool_]) -> Floats:
+        return replace(shape, axes=axis_directions(angles)).misfit(points.xyz, shape.reference)[rows]
+
+    most, fitted = np.full(3, _MOST_LEAN), (~missed if few else every,)
+    fit = partial(scipy.optimize.least_squares, left, np.zeros(3), bounds=(-most, most), x_scale=0.01, loss="cauchy")
+    angles = fit(args=fitted, f_scale=0.1 * shape.tolerance).x
+    after = left(angles, every)
+    explained = missed & (after < _EXPLAINED * misfit)
+    sound = not np.any(after[~missed] > shape.tolerance)
+    return axis_directions(angles) if sound and 2 * explained.sum() > (0 if few else missed.sum()) else None
 
 
 def _refuse_whole(search: DamageSearch, missed: str, where: str) -> None:

@@ -35,6 +35,7 @@ class ArtefactShape:
     together: bool = False  # whether a set-up is lost with one of its points
     names: tuple[str, ...] = ()  # columns of the references
     reference: Floats = field(default_factory=lambda: np.zeros((0, 0)))  # (n, j) what the recording says of each point
+    axes: Floats = field(default_factory=lambda: np.eye(3))  # (3, 3) unit vectors of the axes' motions, where they lean
 
     @property
     def is_bar(self) -> bool:
@@ -48,6 +49,7 @@ class ArtefactShape:
 
     def misfit(self, xyz: Floats, reference: Floats, placings: Iterable[int] | None = None) -> Floats:
         """Distance (n,), mm, of every point from where the artefact would have it; zero outside the set-ups asked for."""
+        xyz = xyz @ self.axes
         found, unknown = np.zeros(len(xyz)), self.misfit_of is bar_misfit and not np.isfinite(self.size)
         size = common_length(xyz, self.rows) if unknown else self.size
         for placing in range(len(self.rows)) if placings is None else placings:

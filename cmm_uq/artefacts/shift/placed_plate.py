@@ -16,6 +16,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 
 _ALIKE_MM, _ALIKE_RAD = 1.0, np.radians(1.0)  # placings nearer to each other than this are the same
+_STEP = 1e-5  # rad
 _MISPLACED = 1.0  # A ball farther than this from where the other placings have it is numbered wrongly or mistaken, mm
 _LINE = 0.02  # balls whose width is below this part of their length lie on a line
 _TILT = 0.05
@@ -163,13 +164,31 @@ def _check_plane(readings: Floats, placing: Ints, placings: Ints, axes: list[int
                              fix='A line calibrates one axis: axis = "x" and shifts_mm instead of plane')  # fmt: skip
 
 
+def _away(flat: Floats, placing: Ints, ball: Ints, found: tuple[Floats, Floats, Floats]) -> Floats:
+    balls, turned, moved = found
+    return np.asarray(flat - moved[placing] - np.einsum("nij,nj->ni", rotations(turned)[placing], balls[ball]))
+
+
+def _away_on_leaning_axes(flat: Floats, placing: Ints, ball: Ints) -> float:
+    """How far a ball lies away at most, mm, where the axes lean as suits all (Gauss–Newton in their angle)."""
+
+    def away(lean: float) -> Floats:
+        upright = flat @ np.array([[1.0, 0.0], [-np.sin(lean), np.cos(lean)]])
+        return _away(upright, placing, ball, _laid_over(upright, placing, ball, np.unique(placing), "")).ravel()
+
+    lean = 0.0
+    for _ in range(_ROUNDS // 5):
+        left = away(lean)
+        change = (away(lean + _STEP) - left) / _STEP
+        lean -= float(change @ left / (change @ change))
+    return float(np.linalg.norm(away(lean).reshape(-1, 2), axis=1).max())
+
+
 def _check_balls(
     flat: Floats, placing: Ints, ball: Ints, found: tuple[Floats, Floats, Floats], means: Means, where: str
 ) -> None:
-    balls, turned, moved = found
-    expected = moved[placing] + np.einsum("nij,nj->ni", rotations(turned)[placing], balls[ball])
-    away = np.linalg.norm(flat - expected, axis=1)
-    if away.max() > _MISPLACED:
+    away = np.linalg.norm(_away(flat, placing, ball, found), axis=1)
+    if away.max() > _MISPLACED and _away_on_leaning_axes(flat, placing, ball) > _MISPLACED:
         row = int(np.argmax(away))
         line = means.line[row]
         raise CmmUqError(

@@ -59,17 +59,29 @@ class PlaneEstimate(shared.Estimated):
 
     @cached_property
     def scales(self) -> tuple[Floats, Floats]:
-        """(N,) draws of the mean of e' of each axis over what was read."""
-        i, j = (self.coefficients.columns[:, k] + self._slope(k) for k in range(2))
+        """(N,) draws of the error of each axis over what was read, from end to end, along its own motion."""
+        i, j = (np.asarray(np.linalg.norm(motion, axis=0) - 1) for motion in self._motions)
         return i, j
 
     @cached_property
     def squareness(self) -> Floats:
         """(N,) draws of S, rad: the angle between the axes' end lines less 90°."""
+        i, j = self._motions
+        return np.asarray(-np.arcsin(np.sum(i * j, axis=0) / np.linalg.norm(i, axis=0) / np.linalg.norm(j, axis=0)))
+
+    @cached_property
+    def _motions(self) -> tuple[Floats, Floats]:
+        """(2, N) draws of where each axis moves, from end to end, for one mm read."""
+        i, j = (1 + self.coefficients.columns[:, k] + self._slope(k) for k in range(2))
+        return np.stack([i, self._slope(3)]), np.stack([self.lean - self._slope(3), j])
+
+    @cached_property
+    def lean(self) -> Floats:
+        """(N,) draws of how far the second axis moves along the first for one mm read, over what a right angle has."""
         c = self.coefficients.columns[:, 2] + self._slope(2) + self._slope(3)
         for index, lever in enumerate(self.model.lever, 4):
             c = c + (float(lever[0]) - float(lever[1])) * self._on(index)[1].mean(axis=1)
-        return np.asarray(-c)
+        return np.asarray(c)
 
     @cached_property
     def linearity(self) -> tuple[Curve, Curve]:
@@ -82,7 +94,7 @@ class PlaneEstimate(shared.Estimated):
         values = values + self.coefficients.columns[:, which : which + 1] * (x - x[0])
         values -= values[:, :1]
         if SCALE[AXES[self.plate.axes[which]]].name in self.free.names:
-            values -= self.scales[which][:, None] * (x - x[0])
+            values -= (values[:, -1:] / (x[-1] - x[0])) * (x - x[0])
         return Curve(x, values)
 
     @cached_property
@@ -288,7 +300,7 @@ def plane_correction_table(estimate: PlaneEstimate, machine: Machine) -> ErrorMa
         found[axis] = x, errors
     if SQUARENESS[estimate.plate.plane].name not in estimate.free.names:
         y, errors = found[axes[1]]
-        errors[:, axes[0]] -= estimate.squareness.mean() * (y - y[0])
+        errors[:, axes[0]] += estimate.lean.mean() * (y - y[0])
     return shared.error_map_of(found, machine)
 
 

@@ -349,3 +349,45 @@ def test_what_the_job_sets_aside_already_does_not_count_as_damage(ballbar_points
 def test_the_recording_of_another_bar_is_refused_in_the_words_of_the_bar(ballbar_points: Points) -> None:
     with pytest.raises(CmmUqError, match=r"by the certificate 410 mm"):
         screened(ballbar_points, bar_facts(410.0), needed=set(), set_aside=[], where="bar.csv")
+
+
+def on_axes(degrees: float, then: Spoil | None = None) -> Spoil:
+    """Readings of a machine whose axes lean by so much: each place is the sum of what was read, along unit vectors."""
+    xy, yz, zx = np.cos(np.pi / 2 + np.radians(degrees * np.array([1.0, -0.7, 0.5])))
+    axes = np.linalg.cholesky(np.array([[1, xy, zx], [xy, 1, yz], [zx, yz, 1]]))
+
+    def spoil(xyz: Floats) -> None:
+        xyz[:] = xyz @ np.linalg.inv(axes)
+        if then is not None:
+            then(xyz)
+
+    return spoil
+
+
+@pytest.mark.parametrize("example", SIZED)
+@pytest.mark.parametrize("degrees", [0.5, 0.7, 1.0, 3.0])
+def test_axes_out_of_square_damage_nothing(example: str, degrees: float) -> None:
+    assert damage(screen_of(example, on_axes(degrees))) == []
+
+
+@pytest.mark.parametrize("degrees", [0.5, 1.0, 3.0])
+def test_a_wrong_figure_is_found_on_axes_out_of_square(degrees: float) -> None:
+    points, _ = recording(REAL)
+    found = screen_of(REAL, on_axes(degrees, shift_y))
+    assert [points.lines[ROW] in f.lines for f in found.findings if f.measurements != (14, 18)] == [True]
+
+
+def shift_y(xyz: Floats) -> None:
+    xyz[ROW, 1] += 12.0
+
+
+def test_one_wrong_bar_is_not_taken_for_axes_out_of_square() -> None:
+    """The angles are those of the other bars, which do not foretell what is wrong with this one."""
+    points, _ = recording(REAL)
+    found = screen_of(REAL, shift_y)
+    assert [points.lines[ROW] in f.lines for f in found.findings if f.measurements != (14, 18)] == [True]
+
+
+def test_a_wrong_length_is_not_taken_for_axes_out_of_square() -> None:
+    with pytest.raises(CmmUqError):
+        screen_of("step-gauge-simulated", times(slice(None), 1.02))

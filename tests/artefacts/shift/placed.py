@@ -20,7 +20,7 @@ TURNED = (*SHIFTED, (240.0, 200.0, 0.0), (510.0, 170.0, 90.0), (500.0, 480.0, 18
 
 def read(
     parametric: Parametric, plane: str, chain: str, placings: Sequence[tuple[float, float, float]], noise: float = 0.0,
-    seed: int = 0, balls: Floats = GRID,
+    seed: int = 0, balls: Floats = GRID, kinematics: Callable[..., Floats] = first_order,
 ) -> Points:  # fmt: skip
     """Readings r with r + e(r) at the balls' true places, the third axis at 50 mm."""
     random = np.random.default_rng(seed)
@@ -31,9 +31,9 @@ def read(
         true = np.full((len(balls), 3), 50.0)
         true[:, axes] = balls @ np.array([[c, t], [-t, c]]) + [first, second]
         ideal = true
-        for _ in range(8):
+        for _ in range(8 if kinematics is first_order else 30):
             errors, squareness = parametric(ideal)
-            ideal = true - first_order(ideal, errors, squareness, chain=chain)
+            ideal = true - kinematics(ideal, errors, squareness, chain=chain)
         rows.append(ideal + random.normal(0, noise, ideal.shape) * np.isin(np.arange(3), axes))
         numbers += [(s, p) for p in range(1, len(balls) + 1)]
     measurement, point = np.array(numbers).T

@@ -14,7 +14,7 @@ from cmm_uq.artefacts.shift.plane_model import FreeInPlane, free_in_plane, plane
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.machine.physics.compensation import compensate_points, machine_compensation
-from cmm_uq.machine.physics.kinematics import first_order
+from cmm_uq.machine.physics.kinematics import exact, first_order
 from cmm_uq.machine.physics.map_interpolation import ErrorMaps
 from cmm_uq.maths.inference.ensembles import run_ensembles
 from tests.artefacts.shift.placed import GRID, SHIFTED, TURNED, bent, none, read
@@ -123,6 +123,24 @@ def test_compensated_by_the_table_the_machine_measures_the_plate_rightly(plane: 
         off = [distances_off(p.xyz[p.measurement == placing][:, axes]) for p in (elsewhere, compensated)]
         assert off[1] < 0.001
         assert off[1] < off[0] / 8
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("for_means")
+@pytest.mark.parametrize("degrees", [0.5, 1.0, 3.0])
+def test_axes_far_out_of_square_are_found_exactly(degrees: float) -> None:
+    """By the exact kinematics: the cosine of 3° is 1370 ppm along Y, which is no error of its scale."""
+
+    def leaning(readings: Floats) -> tuple[Floats, Floats]:
+        errors = np.zeros((len(readings), 3, 6))
+        errors[:, 0, 0], errors[:, 1, 1] = 20e-6 * readings[:, 0], -15e-6 * readings[:, 1]
+        return errors, np.radians([degrees, 0.0, 0.0])
+
+    points = read(leaning, "xy", "XYZ", TURNED, 0.1e-3, kinematics=exact)
+    found = estimate_plane(placed_plate(points, "xy"), DIAGONAL)
+    for draws, true in ((found.squareness, np.radians(degrees)), (found.scales[0], 20e-6), (found.scales[1], -15e-6)):
+        assert abs(draws.mean() - true) < 4 * draws.std()
+        assert draws.std() < 10e-6
 
 
 def distances_off(found: Floats) -> float:
