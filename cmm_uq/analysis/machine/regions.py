@@ -3,7 +3,8 @@
 A model of named errors states of each the mean over the set-ups that were recorded. A machine has other errors besides, and
 elsewhere the same figure would be another: the scale of X above the table is not that below the quill. Here the machine is the
 random field of :mod:`cmm_uq.machine.model.field`, drawn given the recording. What a factor is within a region is what least
-squares of the named errors, and of a displacement as a whole, find of all errors at points that fill it:
+squares of the named errors, of scales and squarenesses that are not named, and of a displacement as a whole, find of all
+errors at points that fill it:
 
     θ(R) = θ + P_R·B_R·c
 
@@ -240,10 +241,13 @@ def _moved(
         found = [about.columns(effect).reshape(3 * len(readings), -1) for effect in effects]
         return np.hstack([np.zeros((3 * len(readings), 0)), *found])
 
+    # a squareness that nobody named is none of the scales and rotations that were: what every machine has stands for itself
+    every, own = [one for one in others if one.everywhere and not one.of_artefact], {one.name for one in named}
+    beside = columns([one for one in every if one.name not in own])
     known, offsets = columns(named), readings - readings.mean(axis=0)
     turned = np.cross(np.eye(3)[:, None], offsets).transpose(1, 2, 0)
     rigid = np.concatenate([np.broadcast_to(np.eye(3), turned.shape), turned], axis=2).reshape(len(known), 6)
-    design = np.hstack([known, rigid])
+    design = np.hstack([known, rigid, beside])
     length = np.linalg.norm(design, axis=0)
     length[length == 0] = 1.0
     inverse = np.linalg.pinv(design / length, rcond=_RANK) / length[:, None]

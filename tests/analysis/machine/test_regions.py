@@ -57,6 +57,15 @@ def test_an_error_that_is_named_itself_is_not_told_of_another() -> None:
     np.testing.assert_allclose(ratio[:, 0], [0, 1, 0, 0, 0, 0], atol=1e-9)
 
 
+def test_a_squareness_that_nobody_named_is_no_scale_and_no_rotation() -> None:
+    """−S·y along x is not x and not −x·y; least squares of these two alone would take it for a yaw of 1.23·S per metre."""
+    named, everywhere = effects(["scale_x", "rotation_x_z"]), effects(["squareness_xy", "squareness_zx", "scale_y"])
+    ratio = room._moved(MACHINE, named, everywhere, WHOLE)
+    np.testing.assert_allclose(ratio, 0.0, atol=1e-9)
+    bow = room._moved(MACHINE, named, (*everywhere, *effects(["straightness_y_x"])), WHOLE)
+    assert np.all(np.isfinite(bow))
+
+
 def test_what_cannot_be_told_in_a_region_is_no_number() -> None:
     """The same error named twice."""
     twice = (*effects(["scale_x"]), *effects(["scale_x"]), *effects(["scale_z"]))
