@@ -36,7 +36,7 @@ name = "of this study"
 travel_mm = {{ x = [0, 900], y = [0, 1200], z = [-600, 0] }}
 [artefact]
 kind = "axis_runs"
-u_um_per_m = {u}
+u_scale_um_per_m = {u}
 optics_mm = [20, -10, -120]
 [recording]
 file = "recording.csv"
@@ -130,7 +130,7 @@ def figures(count: int) -> None:
             job, runs = artefact(folder)
             true = runs.positionings()[1]
             (folder / "job.toml").write_text(
-                (folder / "job.toml").read_text().replace("u_um_per_m = 0.0", "u_um_per_m = 0.4")
+                (folder / "job.toml").read_text().replace("u_scale_um_per_m = 0.0", "u_scale_um_per_m = 0.4")
             )
             job, runs = artefact(folder)
             part = (true.targets - true.targets[0]) / np.ptp(true.targets)

@@ -231,7 +231,7 @@ def axis_runs() -> Simulated:
     }  # fmt: skip
     return Simulated(
         "axis-runs-simulated", "Position, straightness and rotation of three axes by laser interferometer, there and back",
-        {"kind": "axis_runs", "name": "Laser interferometer", "u_um_per_m": 0.3, "optics_mm": [0.0, 0.0, -120.0]},
+        {"kind": "axis_runs", "name": "Laser interferometer", "u_scale_um_per_m": 0.3, "optics_mm": [0.0, 0.0, -120.0]},
         recording(xyz, *numbers, **whole), truth, list(truth), 0.2, columns=tuple(whole),
         extra=CONFORMITY_OF_RUNS,
     )  # fmt: skip

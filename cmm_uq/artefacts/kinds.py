@@ -202,7 +202,7 @@ class AxisRunsFacts(ArtefactFacts):
 
     certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
 
-    u_um_per_m: Uncertainty | None = None
+    u_scale_um_per_m: Uncertainty | None = None
     """Standard uncertainty of a displacement along the travel, per metre: wavelength, alignment, stability; without it the
     instrument's scale stays free."""
     optics_mm: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
@@ -217,7 +217,7 @@ class AxisRunsFacts(ArtefactFacts):
 
     @property
     def traced(self) -> bool:
-        return self.u_um_per_m is not None
+        return self.u_scale_um_per_m is not None
 
 
 _RUNS = f"{_HERE}.axis_runs"
@@ -231,9 +231,10 @@ AXIS_RUNS = Kind(
     Beginning(
         title="Runs along three axes by laser interferometer and angular optics (ISO 230-2)",
         numbering="One measurement is one quantity along one line; its points are the targets, again on the way back.",
-        artefact={"name": "Laser interferometer", "u_um_per_m": 0.3},
+        artefact={"name": "Laser interferometer", "u_scale_um_per_m": 0.3},
         effects=("scale_x", "scale_y", "scale_z", "hysteresis_x", "hysteresis_y", "hysteresis_z"),
         plan={"repeats": 5},
+        recorded=AT_20_C,
         columns={
             "reading_um": "Displacement by the instrument less that of the target; 0 where a rotation is read.",
             "reading_arcsec": "Rotation by the instrument, by the right hand; 0 where a displacement is read.",

@@ -81,6 +81,8 @@ def chosen_by(key: str, each: Mapping[str, Schema], word: str) -> Schema:
                 keys[name] = {**item, "x-for": [value]}
             else:
                 keys[name]["x-for"].append(value)
+                if item["description"] not in keys[name]["description"]:  # another package's key of the same name
+                    keys[name]["description"] += f" In {value}: {item['description']}"
                 _widen(keys[name], item)
     for item in keys.values():
         if len(item["x-for"]) < len(each):

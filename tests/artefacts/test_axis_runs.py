@@ -16,7 +16,7 @@ from cmm_uq.maths.uncertainty.air.refractivity import harris_2004
 from tests.artefacts.constructions import MACHINE, estimated, model
 from tests.recordings import TRAVEL
 
-EXACT = artefact_facts(kind="axis_runs", u_um_per_m=0.0)
+EXACT = artefact_facts(kind="axis_runs", u_scale_um_per_m=0.0)
 TARGETS = np.linspace(0.0, 900.0, 10)
 SECOND = np.pi / 180 / 3600
 # of carriage x, so small that what they change over their own size, some 2e-6 of them, is nothing: ppm, µm, ″/m about x, y, z
@@ -103,7 +103,7 @@ def test_the_offset_of_the_optics_is_no_scale_error() -> None:
 
 def test_optics_may_be_stated_once_for_all_runs() -> None:
     rows = read(run(1, X, tip=(0.0, 30.0, -80.0)))
-    stated = artefact_facts(kind="axis_runs", u_um_per_m=0.0, optics_mm=[0.0, 30.0, -80.0])
+    stated = artefact_facts(kind="axis_runs", u_scale_um_per_m=0.0, optics_mm=[0.0, 30.0, -80.0])
     points = joined(rows)
     without = {name: values for name, values in points.columns.items() if not name.startswith("tip_")}
     by_column, by_key = AxisRuns(EXACT, points), AxisRuns(stated, replace(points, columns=without))
@@ -172,7 +172,7 @@ def test_only_across_the_travel_a_slope_is_free() -> None:
     assert tilt[0] == pytest.approx(tilt[1], rel=1e-3)
     assert AxisRuns(EXACT, joined(run(1, Y))).placing(np.zeros((0, 3))).shape[1] == 2
     assert AxisRuns(EXACT, joined(run(1, X))).placing(np.zeros((0, 3))).shape[1] == 1
-    each = artefact_facts(kind="axis_runs", u_um_per_m=0.0, zero_each_repeat=True)
+    each = artefact_facts(kind="axis_runs", u_scale_um_per_m=0.0, zero_each_repeat=True)
     assert AxisRuns(each, joined(run(1, X, repeats=3))).placing(np.zeros((0, 3))).shape[1] == 3
 
 
@@ -180,18 +180,18 @@ def test_an_instrument_without_a_certificate_leaves_the_scale_free() -> None:
     points = joined(read(run(1, X)))
     found = estimated(artefact_facts(kind="axis_runs"), points, ["scale_x"])
     assert not found.determined[0]
-    known = estimated(artefact_facts(kind="axis_runs", u_um_per_m=0.7), points, ["scale_x"], sigma=1e-9)
+    known = estimated(artefact_facts(kind="axis_runs", u_scale_um_per_m=0.7), points, ["scale_x"], sigma=1e-9)
     assert np.sqrt(known.covariance[0, 0]) == pytest.approx(0.7, rel=1e-3)
 
 
 def test_a_scale_that_expands_and_air_that_was_not_corrected_for() -> None:
     n, air = 40, {"temp_air_c": 23.0, "pressure_hpa": 990.0, "humidity_pct": 30.0}
     columns = {name: np.full(n, value) for name, value in air.items()}
-    raw = artefact_facts(kind="axis_runs", u_um_per_m=0.0, air_corrected=False, dead_path_mm=100.0)
+    raw = artefact_facts(kind="axis_runs", u_scale_um_per_m=0.0, air_corrected=False, dead_path_mm=100.0)
     found = estimated(raw, joined({**run(1, X), **columns}), ["scale_x"]).value[0]
     index = harris_2004(23.0, 99000.0, 30.0, 450.0, 632.991) - harris_2004(20.0, 101325.0, 50.0, 450.0, 632.991)
     assert found == pytest.approx(-1e6 * float(index), rel=1e-4)
-    warm = artefact_facts(kind="axis_runs", u_um_per_m=0.0, cte_per_k=1e-5)
+    warm = artefact_facts(kind="axis_runs", u_scale_um_per_m=0.0, cte_per_k=1e-5)
     points = joined({**run(1, X), "temp_artefact_c": np.full(n, 22.0)})
     assert estimated(warm, points, ["scale_x"]).value[0] == pytest.approx(20.0, rel=1e-4)
 

@@ -15,8 +15,9 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
+from cmm_uq.certificate.document import Plot
 from cmm_uq.machine.physics.catalogue import effects
-from tests.artefacts.simulated import results
+from tests.artefacts.simulated import blocks, results
 from tests.conftest import ROOT
 from tests.maths.geometry.test_positioning import by_loops
 
@@ -136,3 +137,13 @@ def test_a_map_of_the_runs_corrects_the_machine_and_the_other_sign_spoils_it(tmp
     off, known = ((of(second) - of(first))[:, 0] * np.sign(second[:, 0] - first[:, 0]) for of in (true, by_map))
     left, before, other = (1e3 * float(np.sqrt(np.mean(each**2))) for each in (off - known, off, off + known))
     assert left < 0.4 * before < before < other
+
+
+def test_a_run_that_was_repeated_is_drawn_target_by_target() -> None:
+    pictures = {
+        b.caption: b.alternative for b in blocks(NAME) if isinstance(b, Plot) and "repeats, filled" in b.caption
+    }
+    assert [str(caption)[:13] for caption in pictures] == [f"Measurement {number}"[:13] for number in POSITIONS]
+    for number, told in zip(POSITIONS, pictures.values(), strict=True):
+        mean = deviations(number).mean(axis=2)
+        assert str(told) == f"Mean deviations from {mean.min():.2f} to {mean.max():.2f} µm."

@@ -69,7 +69,7 @@ def positioning(test: Test, *, figure: str) -> Statement:
             raise test.error(f"measurement {measurement} has no {figure}, which needs {needs}", "characteristic", fix)
         length = float(np.ptp(run.targets))
         u = test.at_least(spread.get(figure, 0.0), length)
-        test.refuse_without_uncertainty(u, "u_um_per_m")
+        test.refuse_without_uncertainty(u, "u_scale_um_per_m")
         items.append(
             test.decided(
                 figures[figure], u, test.limit_um(length), signed=False, measurement=measurement, length_mm=length
@@ -88,7 +88,7 @@ def positioning(test: Test, *, figure: str) -> Statement:
 
 
 def conditions(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
-    """Targets and runs of every axis that is there."""
+    """Targets and runs of every axis that is there; a repeat that is another to the last digit is a copy of it."""
     try:
         runs = artefact.positionings()
     except MissingReadingError:
@@ -106,6 +106,17 @@ def conditions(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
                     targets=count,
                 )
             )
+        alike = np.all(run.x[..., :, None] == run.x[..., None, :], axis=(0, 1)) & ~np.eye(run.repeats, dtype=bool)
+        if recorded and alike.any():
+            first, second = np.argwhere(alike)[0] + 1
+            few.append(
+                say(
+                    "measurement {number}: repeat {second} is repeat {first} to the last digit",
+                    number=number,
+                    second=int(second),
+                    first=int(first),
+                )
+            )
     return (Condition(what, tuple(few) if runs else (what,)),)
 
 
@@ -116,7 +127,7 @@ CHARACTERISTICS = tuple(
         partial(positioning, figure=name),
         conditions,
         lines=LINES,
-        unstated=lambda artefact: None if getattr(artefact, "u_um_per_m", None) else "u_um_per_m",
+        unstated=lambda artefact: None if getattr(artefact, "u_scale_um_per_m", None) else "u_scale_um_per_m",
     )
     for name in _TITLES
 )

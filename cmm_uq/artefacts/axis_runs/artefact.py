@@ -157,7 +157,7 @@ class AxisRuns(Artefact):
         return ARCSECOND * self._facts.arm_mm if turns else MICROMETRE
 
     def _instrument(self, span: float) -> tuple[Size, ...]:
-        stated = self._facts.u_um_per_m
+        stated = self._facts.u_scale_um_per_m
         sd = np.inf if stated is None else MICROMETRE * stated * span / METRE
         title = say("Longest displacement by the instrument")
         return (Size("length_mm", title, unit("mm"), span, sd, say("longest displacement")),)

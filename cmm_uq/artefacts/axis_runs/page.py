@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, cast
 
 import numpy as np
@@ -13,7 +13,7 @@ from cmm_uq.artefacts.axis_runs.run import ALONG, TURNING, Run
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, table, text_columns
-from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
+from cmm_uq.certificate.plots.residuals import length_plot, positioning_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.machine.physics.kinematics import PARAMETRIC_ERRORS
 from cmm_uq.maths.geometry.positioning import DOWN, UP, MissingReadingError, PositioningRuns
@@ -95,7 +95,9 @@ def sections(result: Result) -> list[Section]:
         )
     )
     blocks += [_readings(result), residual_volume(result, say("positions"))]
-    targets = Section(say("Target by target"), tuple(_targets(run, found) for run, found, _ in whole))
+    targets = Section(
+        say("Target by target"), tuple(block for run, found, _ in whole for block in _targets(run, found))
+    )
     return [Section(say("Runs along the axes"), tuple(block for block in blocks if block is not None)), targets]
 
 
@@ -153,23 +155,40 @@ def _each_way(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
     return _table(say("Each direction by itself"), names, whole, ())
 
 
-def _targets(run: Run, found: PositioningRuns) -> Table:
+def _targets(run: Run, found: PositioningRuns) -> Iterator[Block]:
+    """The picture of a run that was repeated, as ISO 230-2 draws it, and its targets as a table."""
     own = _unit(run)
     heads = [say("Mean ↑"), say("s ↑"), say("Mean ↓"), say("s ↓"), say("Reversal")]
     columns = [found.mean[UP], found.s[UP]]
     if found.both:
         columns += [found.mean[DOWN], found.s[DOWN], found.reversal]
     rows = tuple(
-        (number(target, ".4g"), *(say("–") if np.isnan(c[i]) else number(c[i], ".2f") for c in columns))
+        (number(target, ".4g"), *(say("–") if np.isnan(c[i]) else alike(c[i], decimals=2)[0] for c in columns))
         for i, target in enumerate(found.targets)
     )
-    drift = number(float(np.abs(found.drift).max()), ".2g")
-    return Table(
-        say("Measurement {number}: {quantity}", number=run.measurement, quantity=run.quantity),
-        (Column(say("Target"), unit("mm")), *figure_columns(*heads[: len(columns)], unit=own)),
-        rows,
-        (say("The mean of a repeat differs from that of all by up to {drift} {unit}.", drift=drift, unit=own),),
+    title = say("Measurement {number}: {quantity}", number=run.measurement, quantity=run.quantity)
+    columns_of = (Column(say("Target"), unit("mm")), *figure_columns(*heads[: len(columns)], unit=own))
+    if found.repeats == 1:
+        yield Table(title, columns_of, rows)
+        return
+    drift, low, high = (
+        number(float(np.abs(found.drift).max()), ".2g"),
+        *alike(found.mean.min(), found.mean.max(), decimals=2),
     )
+    yield positioning_plot(
+        found.targets,
+        found.mean,
+        found.s,
+        own,
+        caption=say(
+            "{title}: means of {repeats} repeats, filled in the positive direction, with ±2s.",
+            title=title,
+            repeats=found.repeats,
+        ),
+        alternative=say("Mean deviations from {low} to {high} {unit}.", low=low, high=high, unit=own),
+    )
+    drifts = say("The mean of a repeat differs from that of all by up to {drift} {unit}.", drift=drift, unit=own)
+    yield Table(title, columns_of, rows, (drifts,))
 
 
 def _readings(result: Result) -> Block:

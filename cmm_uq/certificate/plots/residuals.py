@@ -196,6 +196,24 @@ def curve_with_band(
         return style.drawn(figure, caption, alternative)
 
 
+def positioning_plot(
+    targets: ArrayLike, mean: Floats, s: Floats, unit: Text, *, caption: Text, alternative: Text
+) -> Plot:
+    """Mean deviations ``mean`` (d, t) at targets (t,), mm, of each direction, with two standard deviations ``s`` (d, t)."""
+    across = style.finite("target", targets, (None,))
+    with style.picture(62, left=0.105, right=0.975, bottom=0.16, top=0.92) as (figure, ax):
+        for way, (values, sd, colour) in enumerate(zip(mean, s, (ACCENT, MUTED), strict=False)):
+            half = 2 * style.finite("standard deviation", sd, across.shape)
+            style.band(ax, across, style.finite("mean", values, across.shape), half, colour, alpha=0.16)
+            ax.plot(across, values, color=colour, lw=1.1, ls="--" if way else "-")
+            style.dots(ax, across, values, 3.0, colour, hollow=way == 1)
+        ax.axhline(0, color=INK, lw=0.6, zorder=1)
+        ax.grid(axis="y")
+        ax.margins(x=0.02)
+        ax.set(xlabel=say("Target / mm"), ylabel=say("Deviation / {unit}", unit=unit))
+        return style.drawn(figure, caption, alternative)
+
+
 def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, alternative: Text) -> Plot:
     """Share of every source in the variance (0 … 1; negative where a correlation takes away), largest first."""
     share = style.finite("shares", shares, (len(sources),))

@@ -296,9 +296,9 @@ def crosses(ax: Axes, x: Floats, y: Floats, size: float, width: float) -> None:
     ax.plot(x, y, ls="", marker="x", ms=size, mec=DIVERGING[-1], mew=width, zorder=4)
 
 
-def band(ax: Axes, x: Floats, y: Floats, half: Floats, **style: Any) -> None:
+def band(ax: Axes, x: Floats, y: Floats, half: Floats, colour: str = ACCENT, **style: Any) -> None:
     """What lies within ``half`` of a curve."""
-    ax.fill(np.append(x, x[::-1]), np.append(y - half, (y + half)[::-1]), color=ACCENT, lw=0, **style)
+    ax.fill(np.append(x, x[::-1]), np.append(y - half, (y + half)[::-1]), color=colour, lw=0, **style)
 
 
 def named_rows(ax: Axes, rows: ArrayLike, names: Sequence[Text]) -> None:

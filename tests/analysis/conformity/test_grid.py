@@ -15,7 +15,7 @@ from cmm_uq.analysis.conformity.standards import BUILT_IN, statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.tables.conformity import ConformityFacts, FalseAccept, GuardBand, Prior, Rule
-from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
+from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS, POSITIONING
 from tests.analysis.conformity.tests_by_hand import TESTS, Hand, by_hand
 
 P95, P98 = float(stats.norm.ppf(0.95)), float(stats.norm.ppf(0.98))
@@ -57,7 +57,13 @@ def judged(hand: Hand, standard: str, characteristic: str, rule: str, room: floa
         standard=standard, characteristic=characteristic, limit_um=limit, rule=TURNS[rule][0], prior=FLAT
     )
     return statement(
-        wish, hand.artefact, hand.accuracy, "[[conformity]] 1", (BARS, FORMS, LENGTHS), None, hand.circumstances
+        wish,
+        hand.artefact,
+        hand.accuracy,
+        "[[conformity]] 1",
+        (BARS, FORMS, LENGTHS, POSITIONING),
+        None,
+        hand.circumstances,
     )
 
 
@@ -94,7 +100,8 @@ def test_without_an_uncertainty_only_simple_acceptance_decides(standard: str, ch
         pytest.skip("it falls back on the scatter of the recording; see test_standards.py")
     hand = by_hand(standard, characteristic, "no u")
     if rule != "simple":
-        with pytest.raises(CmmUqError, match=r"needs the uncertainty.*states no u_um|u_repeat_um|form_um above 0"):
+        states_none = r"needs the uncertainty.*states no u_um|u_repeat_um|form_um above 0|u_scale_um_per_m above 0"
+        with pytest.raises(CmmUqError, match=states_none):
             judged(hand, standard, characteristic, rule, 10.0)
         return
     for room in (10.0, 0.01, -0.01, -8.0):

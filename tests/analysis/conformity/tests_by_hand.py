@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 
 from cmm_uq.artefacts import artefact_facts
+from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.artefacts.sphere import SphereArtefact
@@ -18,6 +19,8 @@ from cmm_uq.jobs.tables.machine import ProbeFacts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.analysis.conformity.recorded import BAR_U, DIAGONALS, MACHINE, NEGLIGIBLE, SEVEN, STATED, bars, gauge, sphere
+from tests.artefacts.test_axis_runs import joined, run
+from tests.maths.geometry.test_positioning import by_loops
 from tests.recordings import bar_facts, with_columns
 
 X, Y, Z = np.eye(3)
@@ -170,6 +173,39 @@ def probed(*, size: bool, sensing: str | None = None) -> Callable[..., Hand]:
     return made
 
 
+POSITIONED = {"E": 6.0, "M": 3.0, "B": 6.0, "R": 10.0, "A": 10.0}
+"""µm: one mean of eighteen is 6 µm, all others 0, each of five readings with s = 1 µm (−1, −1, 0, 1, 1 in turn)."""
+
+
+def positioned(figure: str) -> Callable[..., Hand]:
+    """A run of X there and back; u is what 0.05 µm of each reading and 0.1 µm/m of the scale make of the figure."""
+
+    def made(how: str) -> Hand:
+        targets = np.linspace(0.0, 800.0, 4 if how == "incomplete" else 9)
+        turned = 0 if how == "copied" else 1  # in one order everywhere, two repeats and two more are the same
+        x = np.array([[np.roll([-1.0, -1.0, 0.0, 1.0, 1.0], turned * i) for i in range(len(targets))]] * 2)
+        x[0, -1] += 6.0
+        rows = run(1, X, at=targets, repeats=5, place=(100.0, -100.0))
+        rows["reading_um"] = np.concatenate([[*x[0, :, k], *x[1, ::-1, k]] for k in range(5)])
+        facts = artefact_facts(kind="axis_runs", u_scale_um_per_m=0.0 if how == "no u" else 0.1)
+        u = 0.1 if how == "no u" else spread_by_loops(tuple(x.ravel()), len(targets), figure)
+        stated = changing(0.0 if how == "no u" else 0.05)
+        return Hand(AxisRuns(facts, joined(rows)), stated, {}, POSITIONED[figure], u, False)
+
+    return made
+
+
+@cache
+def spread_by_loops(x: tuple[float, ...], targets: int, figure: str) -> float:
+    """Root mean square change of a figure, µm, under the draws of the program, figure by figure in loops."""
+    random = np.random.default_rng(np.random.SeedSequence(230, spawn_key=(2,)))
+    whole = np.array(x).reshape(2, targets, 5)
+    along = 0.08 * random.standard_normal((2000, 1, 1, 1)) * np.linspace(0, 1, targets)[None, None, :, None]
+    changes = along + 0.05 * random.standard_normal((2000, *whole.shape))
+    moved = [by_loops(whole + change)[figure] - by_loops(whole)[figure] for change in changes]
+    return float(np.sqrt(np.mean(np.square(moved))))
+
+
 E0 = lengths(SEVEN)
 TESTS: Mapping[tuple[str, str], Callable[[str], Hand]] = {
     ("ASME B89.4.1-1997", "volumetric performance"): volumetric,
@@ -189,6 +225,7 @@ TESTS: Mapping[tuple[str, str], Callable[[str], Hand]] = {
     ("ISO 10360-5:2020", "P_Size.Sph.1x25:SS:Tact"): probed(size=True, sensing="contacting"),
     ("ISO 10360-8:2013", "P_Form.Sph.1x25:Tr:ODS"): probed(size=False, sensing="optical"),
     ("ISO 10360-8:2013", "P_Size.Sph.1x25:Tr:ODS"): probed(size=True, sensing="optical"),
+    **{("ISO 230-2:2014", figure): positioned(figure) for figure in POSITIONED},
     ("VDI/VDE 2617", "E0"): E0,
     ("VDI/VDE 2617-2.1", "U3"): lengths(DIAGONALS),
     ("VDI/VDE 2617-2.1", "U1"): lengths([X, Y, Z]),
