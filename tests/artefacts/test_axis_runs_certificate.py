@@ -146,4 +146,4 @@ def test_a_run_that_was_repeated_is_drawn_target_by_target() -> None:
     assert [str(caption)[:13] for caption in pictures] == [f"Measurement {number}"[:13] for number in POSITIONS]
     for number, told in zip(POSITIONS, pictures.values(), strict=True):
         mean = deviations(number).mean(axis=2)
-        assert str(told) == f"Mean deviations from {mean.min():.2f} to {mean.max():.2f} µm."
+        assert str(told) == f"Mean deviations from {mean.min():.2f} to {mean.max():.2f} µm.".replace("-", "−")

@@ -10,7 +10,7 @@ import numpy as np
 from cmm_uq.analysis.conformity.positioning import test_spread
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.artefacts.axis_runs.run import ALONG, TURNING, Run
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, table, text_columns
 from cmm_uq.certificate.plots.residuals import length_plot, positioning_plot, residual_volume
@@ -163,7 +163,7 @@ def _targets(run: Run, found: PositioningRuns) -> Iterator[Block]:
     if found.both:
         columns += [found.mean[DOWN], found.s[DOWN], found.reversal]
     rows = tuple(
-        (number(target, ".4g"), *(say("–") if np.isnan(c[i]) else alike(c[i], decimals=2)[0] for c in columns))
+        (number(target, ".4g"), *(say("–") if np.isnan(c[i]) else signed(round(c[i], 2) + 0.0, ".2f") for c in columns))
         for i, target in enumerate(found.targets)
     )
     title = say("Measurement {number}: {quantity}", number=run.measurement, quantity=run.quantity)
@@ -173,7 +173,7 @@ def _targets(run: Run, found: PositioningRuns) -> Iterator[Block]:
         return
     drift, low, high = (
         number(float(np.abs(found.drift).max()), ".2g"),
-        *alike(found.mean.min(), found.mean.max(), decimals=2),
+        *(signed(m, ".2f") for m in (found.mean.min(), found.mean.max())),
     )
     yield positioning_plot(
         found.targets,
