@@ -229,7 +229,8 @@ def show_recognised(recognised: Recognition) -> None:
 def show_proposed(recognised: Recognition, example: str, names: Iterable[str]) -> None:
     """How lengths were read, and the question where their lines lie, as options of the command."""
     show_recognised(recognised)
-    lines = (f'--line "{name}=along X from 100,200,300"' for name in names)
+    named = ((name, name if name in {"X", "Y", "Z"} else "X") for name in names)
+    lines = (f'--line "{name}=along {axis} from 100,200,300"' for name, axis in named)
     say(f"Read as: {example}")
     say(f"Where they lie: {' '.join(lines)}")
 

@@ -279,9 +279,10 @@ def placed(
     wanted = list(dict.fromkeys(name for one in tables for name in one.names))
     starts = {name: _place(keys.lines[name]) for name in wanted if name in keys.lines}
     if lacking := [name for name in wanted if name not in starts]:
-        one, rest = lacking[0], f" and {len(lacking) - 1} more" if len(lacking) > 1 else ""
+        one, which = lacking[0], ", ".join(map(repr, lacking))
+        lie = f"lines {which} lie" if len(lacking) > 1 else f"line {one!r} lies"
         raise CmmUqError(
-            f"nothing says where line {one!r}{rest} lies, along which its lengths were measured",
+            f"nothing says where {lie}, along which lengths were measured",
             where=where,
             fix=f'Say it, with its start in mm: lines = {{ "{one}" = "along X from 100,200,300" }}',
         )
