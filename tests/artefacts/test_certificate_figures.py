@@ -119,6 +119,32 @@ def of_test_value(results: Results) -> list[Record]:
     return [[line | {"contribution": scale * line["contribution"]}] for line in lines if line["contribution"]]
 
 
+def decided_as(characteristic: str) -> Callable[[Results], list[Record]]:
+    def of(results: Results) -> list[Record]:
+        return decided({"conformity": [s for s in results["conformity"] if s["characteristic"] == characteristic]})
+
+    return of
+
+
+def runs(results: Results) -> list[Record]:
+    """Of each run its figures with U, and how often it was repeated."""
+    return [[run, len(run["drift_of_repeats"])] for run in results["runs"]]
+
+
+def targets(measurement: int) -> Callable[[Results], list[Record]]:
+    """Of each target of a run the mean and s of both directions, and the reversal."""
+
+    def of(results: Results) -> list[Record]:
+        (run,) = (one for one in results["runs"] if one["measurement"] == measurement)
+        ways = [values for way in run["directions"] for values in (way["mean"], way["s"]) if values is not None]
+        return list(zip(run["targets_mm"], *ways, run["reversal"], strict=True))
+
+    return of
+
+
+RUNS = [f"{axis}{kind}{about}" for axis in "xyz" for kind in "tr" for about in "xyz"][:-1]
+"""Of the simulated runs, in their order; nothing reads the roll of Z."""
+
 STATED = (
     "ASME B89.4.1-1997, volumetric performance",
     "ISO 10360-2:2009, E0",
@@ -160,6 +186,10 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Offset of the mount": offset,
     "The offset by other ways": offset_by_other_ways,
     "Every attitude": lambda r: [[pose] for pose in r["digitizer"]["poses"]],
+    "Both directions, by ISO 230-2:2014": runs,
+    "Each direction by itself": runs,
+    **{f"Measurement {i}: {name}": targets(i) for i, name in enumerate(RUNS, 1)},
+    **{f"All values decided by ISO 230-2:2014, {one}": decided_as(one) for one in "AB"},
     **{f"All values decided by {name}": decided for name in STATED},
     **{f"Contributions to the uncertainty of the test value named, {name}": of_test_value for name in STATED},
 }  # fmt: skip
@@ -186,7 +216,7 @@ def printed(table: Table, row: tuple[str, ...]) -> Iterator[tuple[Decimal, Decim
     for column, cell in zip(table.columns, row, strict=True):
         if cell in WORDS:
             continue
-        if not all(FIGURE.fullmatch(end) for end in cell.split(" to ", 1)):  # both ends of an interval, or one figure
+        if not all(FIGURE.fullmatch(end) for end in re.split(" to | ± ", cell)):  # an interval, a figure with U, or one
             assert not column.numeric, f"{table.caption}: {cell!r} is no figure"
             continue
         for text in NUMBER.findall(cell):

@@ -17,7 +17,7 @@ from cmm_uq.certificate.plots.residuals import length_plot, positioning_plot, re
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.machine.physics.kinematics import PARAMETRIC_ERRORS
 from cmm_uq.maths.geometry.positioning import DOWN, UP, MissingReadingError, PositioningRuns
-from cmm_uq.maths.uncertainty.quantity import alike, rounded
+from cmm_uq.maths.uncertainty.quantity import alike, nominal, rounded
 
 COVERAGE = 2.0  # of U of the figures (ISO/TR 230-9)
 Spread = Mapping[str, float]
@@ -48,6 +48,10 @@ def missing_words(run: Run, error: MissingReadingError) -> Text:
         count=error.count,
         repeat=error.repeat,
     )
+
+
+def _title(run: Run) -> Text:
+    return say("{measurement}: {quantity}", measurement=run.measurement, quantity=run.quantity)
 
 
 def _unit(run: Run) -> Text:
@@ -119,16 +123,11 @@ def _table(
     caption: Text, names: list[str], whole: list[tuple[Run, PositioningRuns, Spread]], notes: tuple[Text, ...]
 ) -> Table | None:
     rows = [
-        (number(run.measurement), run.quantity, number(found.repeats), _unit(run), *_cells(found, names, spread, 0.1))
+        (_title(run), number(found.repeats), _unit(run), *_cells(found, names, spread, 0.1))
         for run, found, spread in whole
     ]
     figures = [Column(Verbatim(name)) for name in names]
-    heads = [
-        *text_columns(say("Measurement"), say("Quantity")),
-        Column(say("Repeats")),
-        *text_columns(say("Unit")),
-        *figures,
-    ]
+    heads = [*text_columns(say("Run")), Column(say("Repeats")), *text_columns(say("Unit")), *figures]
     return table(caption, heads, rows, *notes)
 
 
@@ -163,7 +162,10 @@ def _targets(run: Run, found: PositioningRuns) -> Iterator[Block]:
     if found.both:
         columns += [found.mean[DOWN], found.s[DOWN], found.reversal]
     rows = tuple(
-        (number(target, ".4g"), *(say("–") if np.isnan(c[i]) else signed(round(c[i], 2) + 0.0, ".2f") for c in columns))
+        (
+            nominal(float(target)),
+            *(say("–") if np.isnan(c[i]) else signed(round(c[i], 2) + 0.0, ".2f") for c in columns),
+        )
         for i, target in enumerate(found.targets)
     )
     title = say("Measurement {number}: {quantity}", number=run.measurement, quantity=run.quantity)
