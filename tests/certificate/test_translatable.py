@@ -23,6 +23,7 @@ from cmm_uq.jobs.tables.artefact import Traceability
 from cmm_uq.jobs.tables.identification import Laboratory, ReplacedCertificate as Replaced
 from cmm_uq.jobs.tables.machine import MachineFacts
 from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.machine.physics.kinematics import PARAMETRIC_ERRORS
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES
 from cmm_uq.maths.uncertainty.models.model_file import ModelFile, read_model_file
 from cmm_uq.maths.uncertainty.models.ready import READY as MODELS
@@ -50,7 +51,8 @@ def known_to(folder: Path) -> str:
         " ".join((name, *(p.name for p in effect.reported), *effect.columns)) for name, effect in every().items()
     ]
     decided = [one.name for standard in BUILT_IN.values() for one in standard.characteristics]
-    return "\n".join([*own, *effects, *READY, *decided, *KEYS, NAME, SAMPLER])
+    symbols = [error.vdi for error in PARAMETRIC_ERRORS]
+    return "\n".join([*own, *effects, *READY, *decided, *symbols, *KEYS, NAME, SAMPLER])
 
 
 def documents(name: str) -> list[Document]:

@@ -50,10 +50,6 @@ def missing_words(run: Run, error: MissingReadingError) -> Text:
     )
 
 
-def _title(run: Run) -> Text:
-    return say("{measurement}: {quantity}", measurement=run.measurement, quantity=run.quantity)
-
-
 def _unit(run: Run) -> Text:
     return unit("″") if run.kind == TURNING else unit("µm")
 
@@ -123,11 +119,11 @@ def _table(
     caption: Text, names: list[str], whole: list[tuple[Run, PositioningRuns, Spread]], notes: tuple[Text, ...]
 ) -> Table | None:
     rows = [
-        (_title(run), number(found.repeats), _unit(run), *_cells(found, names, spread, 0.1))
+        (number(run.measurement), run.quantity, _unit(run), *_cells(found, names, spread, 0.1))
         for run, found, spread in whole
     ]
-    figures = [Column(Verbatim(name)) for name in names]
-    heads = [*text_columns(say("Run")), Column(say("Repeats")), *text_columns(say("Unit")), *figures]
+    figures = [Column(say("mean B") if name == "mean B" else Verbatim(name)) for name in names]
+    heads = [*text_columns(say("Measurement"), say("Quantity"), say("Unit")), *figures]
     return table(caption, heads, rows, *notes)
 
 
@@ -140,6 +136,9 @@ def _both(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
             say(
                 "A accuracy, E systematic deviation, R repeatability, B reversal, M range of mean deviations. Straightnesses "
                 "less a straight line, and rotations, are evaluated by the same formulas (ISO 230-1)."
+            ),
+            say(
+                "Quantities as VDI/VDE 2617 writes them: the carriage, t for a displacement or r for a rotation, and its axis."
             ),
             say(
                 "± U (k = 2): test uncertainty as ISO/TR 230-9 has it, of the instrument's scale, alignment, temperature and "
