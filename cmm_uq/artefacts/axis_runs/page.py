@@ -16,7 +16,7 @@ from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.certificate.plots.residuals import length_plot, positioning_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.machine.physics.kinematics import PARAMETRIC_ERRORS
-from cmm_uq.maths.geometry.positioning import DOWN, UP, MissingReadingError, PositioningRuns
+from cmm_uq.maths.geometry.positioning import MissingReadingError, PositioningRuns
 from cmm_uq.maths.uncertainty.quantity import alike, nominal, rounded
 
 COVERAGE = 2.0  # of U of the figures (ISO/TR 230-9)
@@ -156,10 +156,10 @@ def _each_way(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
 def _targets(run: Run, found: PositioningRuns) -> Iterator[Block]:
     """The picture of a run that was repeated, as ISO 230-2 draws it, and its targets as a table."""
     own = _unit(run)
-    heads = [say("Mean ↑"), say("s ↑"), say("Mean ↓"), say("s ↓"), say("Reversal")]
-    columns = [found.mean[UP], found.s[UP]]
-    if found.both:
-        columns += [found.mean[DOWN], found.s[DOWN], found.reversal]
+    ways = {"↑": (say("Mean ↑"), say("s ↑")), "↓": (say("Mean ↓"), say("s ↓"))}
+    heads = [*(head for arrow in found.arrows for head in ways[arrow]), say("Reversal")]
+    columns = [values for way in zip(found.mean, found.s, strict=True) for values in way]
+    columns += [found.reversal] if found.both else []
     rows = tuple(
         (
             nominal(float(target)),
@@ -180,6 +180,7 @@ def _targets(run: Run, found: PositioningRuns) -> Iterator[Block]:
         found.targets,
         found.mean,
         found.s,
+        found.arrows,
         own,
         caption=say(
             "{title}: means of {repeats} repeats, filled in the positive direction, with ±2s.",

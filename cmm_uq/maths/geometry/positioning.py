@@ -25,6 +25,7 @@ _SAME_MM = 1e-2  # targets nearer than this are one
 class PositioningRuns:
     targets: Floats  # (t,) ascending
     x: Floats  # (d, t, n) deviations by direction, target and repeat; d = 1 where all came from one side
+    arrows: str = "↑↓"  # of the directions; "↓" where all came from above
     axis: str = ""  # that is positioned; empty along a diagonal, or where something else is read
 
     @classmethod
@@ -49,7 +50,7 @@ class PositioningRuns:
         if straight:
             readings = readings - np.polyval(np.polyfit(positions, readings, 1), positions)
         x[side, target, repeat] = readings
-        return cls(edges, x)
+        return cls(edges, x, "↑↓" if len(sides) == 2 else "↓" if sides[0] < 0 else "↑")
 
     @property
     def both(self) -> bool:
@@ -84,7 +85,7 @@ class PositioningRuns:
         return {name: float(value) for name, value in zip(self.names(), _figures(self.x[None])[0], strict=True)}
 
     def names(self) -> tuple[str, ...]:
-        arrows = ("↑", "↓") if self.both else ("↑",)
+        arrows = self.arrows[: len(self.x)]
         found = (
             [f"{name}{arrow}" for name in "ERA" for arrow in arrows] if self.repeats > 1 else [f"E{a}" for a in arrows]
         )

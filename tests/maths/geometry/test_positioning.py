@@ -129,3 +129,12 @@ def test_a_missing_reading_is_named(left_out: int) -> None:
     d, t, n = (int(v[left_out]) for v in (each.ravel() for each in np.indices(x.shape)))
     assert (told.value.direction, told.value.target, told.value.repeat) == (1.0 - 2 * d, 10.0 * t, n + 1)
     assert told.value.count == 0
+
+
+def test_runs_that_all_came_from_above_are_named_so() -> None:
+    """The figures are those of the same readings from below, by another name."""
+    positions, repeats = np.tile([0.0, 100.0, 200.0], 3), np.repeat([1, 2, 3], 3)
+    readings = np.random.default_rng(5).normal(size=9)
+    below, above = (PositioningRuns.of(positions, np.full(9, way), repeats, readings).figures() for way in (1.0, -1.0))
+    assert list(above) == ["E↓", "R↓", "A↓"]
+    assert list(above.values()) == list(below.values())
