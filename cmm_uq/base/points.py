@@ -139,15 +139,17 @@ class Points:
     def copies(self) -> Mapping[int, int]:
         """Groups (see :attr:`group`) that repeat another to the last digit, with that other: the first by measurement, repeat.
 
-        The order of their points is no matter.
+        The order of their points is no matter. Columns named ``reading_…`` are what an instrument found there, and count.
         """
         same: dict[bytes, list[int]] = {}
-        order = np.lexsort(self.xyz.T)
-        alike = np.all(self.xyz[order[1:]] == self.xyz[order[:-1]], axis=1)
+        read = [values for name, values in sorted(self.columns.items()) if name.startswith("reading_")]
+        whole = np.column_stack([self.xyz, *read])
+        order = np.lexsort(whole.T)
+        alike = np.all(whole[order[1:]] == whole[order[:-1]], axis=1)
         again = np.concatenate([order[1:][alike], order[:-1][alike]])
         for group in np.unique(self.group[again]).tolist():
             rows = self.rows_of_groups[group]
-            figures = self.xyz[rows] + 0.0  # −0 is 0
+            figures = whole[rows] + 0.0  # −0 is 0
             same.setdefault(figures[np.lexsort(figures.T)].tobytes(), []).append(group)
         found: dict[int, int] = {}
         for groups in same.values():

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.screening.screening import repeated_figures
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.base.errors import CmmUqError
@@ -259,3 +260,16 @@ def test_a_missing_column_is_named(rows: dict[str, Floats], column: str) -> None
     less = {name: values for name, values in points.columns.items() if name != column}
     with pytest.raises(CmmUqError, match=f"no column '{column}'"):
         AxisRuns(EXACT, replace(points, columns=less))
+
+
+def test_a_run_that_is_another_to_the_last_digit_is_told_and_repeats_at_the_same_targets_are_none() -> None:
+    """Positions are targets, the same in every repeat: what was found there are the readings."""
+    one, two = read(run(1, X)), read(run(2, Y))
+    noise = np.random.default_rng(6).normal(0.0, 0.3, (2, len(one["reading_um"])))
+    for rows, more in zip((one, two), noise, strict=True):
+        rows["reading_um"] = rows["reading_um"] + more
+    assert not joined(one, two).copies
+    again = {**one, "measurement": np.full(len(one["measurement"]), 3)}
+    (found,) = repeated_figures(joined(one, two, again))
+    assert (found.kind, len(found.rows)) == ("repeated block", len(again["measurement"]))
+    assert sorted(joined(one, two, again).copies.items()) == [(4, 0), (5, 1)]

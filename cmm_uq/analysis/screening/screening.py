@@ -61,8 +61,7 @@ def screen_recording(
     made = partial(observe, facts, where=where)
     damaged = coordinate_findings(points, shape, made, set_aside, where) if shape else []
     balls = screening is not None and screening.balls
-    targets = screening is not None and screening.targets
-    odd = screen(points, needed=needed, set_aside=set_aside, where=where, balls=balls, targets=targets)
+    odd = screen(points, needed=needed, set_aside=set_aside, where=where, balls=balls)
     if shape and shape.together:
         damaged = [_reversal(found, points, needed) for found in damaged]
     lines = {line for found in damaged for line in found.lines}
@@ -80,13 +79,7 @@ def with_sound_sensors(points: Points, findings: Sequence[Finding]) -> Points:
 
 
 def screen(
-    points: Points,
-    *,
-    needed: Collection[str],
-    set_aside: Collection[int],
-    where: str,
-    balls: bool = False,
-    targets: bool = False,
+    points: Points, *, needed: Collection[str], set_aside: Collection[int], where: str, balls: bool = False
 ) -> tuple[Finding, ...]:
     """All that is odd in a recording without regard to its artefact's shape. ``where`` the recording's name, for messages."""
     impossible = impossible_values(points, balls=balls)
@@ -98,7 +91,7 @@ def screen(
         if found.kind in _REFUSED_WHOLE and about_whole_column(found, points):
             place = f"{where}{line}, column {found.column}"
             raise CmmUqError(found.why, where=place, fix="Mend the column, or remove it")
-    odd = (*impossible, *(() if targets else repeated_figures(points)))
+    odd = (*impossible, *repeated_figures(points))
     return tuple(replace(f, set_aside=_aside(f, set_aside)) for f in odd)
 
 

@@ -65,9 +65,6 @@ class Screening:
     # (facts, points): what its artefact asks of the points; None where the recording lacks what that needs
     shape_of: Callable[..., ArtefactShape | None]
     balls: bool = False  # whether its points are centres of balls or cylinders, each of several touches
-    targets: bool = (
-        False  # whether its coordinates are targets, the same in every run, and what was found stands beside them
-    )
 
 
 def bar_misfit(xyz: Floats, _: Floats, length: float) -> Floats:

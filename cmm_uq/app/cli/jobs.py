@@ -119,7 +119,7 @@ def import_export(
 ) -> None:
     """Show what is recognised of a laboratory's export; a job takes the same file with the same keys under [recording]."""
     from cmm_uq.app.commands.jobs.exchange import (
-        in_words,
+        example,
         lines_asked,
         read_export,
         remember,
@@ -147,7 +147,7 @@ def import_export(
         put(json_text.dumps(export.recognised.data, indent=2, ensure_ascii=False) + "\n")
     elif not quiet:
         show_recognised(export.recognised)
-        say(f"Read as: {in_words(export)}")
+        say(f"Read as: {example(export)}")
         say("Another column: --column x_mm=3. The answers for the next export of this kind: --save-as NAME")
     if out is not None:
         write_recording(file, export, out)

@@ -48,7 +48,7 @@ def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
     return ArtefactShape(rows, _misfit, np.nan, extent, reference=no_references(points)) if extent else None
 
 
-SCREENING = Screening(shape_of, targets=True)
+SCREENING = Screening(shape_of)
 STEPS = 10  # between targets along each axis, where the plan does not say
 
 

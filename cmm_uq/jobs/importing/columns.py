@@ -20,7 +20,7 @@ from cmm_uq.base.messages import Text, Verbatim, commas, names, number, say, sem
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
-from cmm_uq.jobs.importing.arranged import REMARK, SUMMARY, filled_down, is_summary, shown
+from cmm_uq.jobs.importing.arrangement import REMARK, SUMMARY, filled_down, is_summary, shown
 from cmm_uq.jobs.importing.encodings import decimal_sign, is_number, split_units, values_of
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Fact, ImportKeys, Sheet, WrittenUnit, length_named
 from cmm_uq.jobs.importing.header import NAME, Header, understood

@@ -7,8 +7,8 @@ from dataclasses import replace
 from functools import lru_cache
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing import arranged, header as head_words
-from cmm_uq.jobs.importing.arranged import BASES, FIGURES, text_of
+from cmm_uq.jobs.importing import arrangement, header as head_words
+from cmm_uq.jobs.importing.arrangement import BASES, FIGURES, text_of
 from cmm_uq.jobs.importing.encodings import is_number
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, Sheet, sources_of
 from cmm_uq.jobs.importing.header import NAME, Header
@@ -121,7 +121,7 @@ def tables_of(sheets: Sequence[Sheet], keys: ImportKeys, where: str) -> list[tup
         ) is not None:
             tables.append(_cleaned(sheet, header, [], "", where))
         elif (
-            found := arranged.with_one_head(sheet, lambda one: length_header(one, keys, where), of_lengths)
+            found := arrangement.with_one_head(sheet, lambda one: length_header(one, keys, where), of_lengths)
         ) is not None:
             one, header, ahead = found
             heads = [row for row in sheet.rows[:ahead] if row]
@@ -161,12 +161,12 @@ def _cleaned(
         row = [*sheet.rows[i], *[""] * (width - len(sheet.rows[i]))]
         numeric = [k for k in figures if row[k] != "" and is_number(row[k])]
         if [text_of(cell) for cell in sheet.rows[i]] in texts and not _is_title(row):
-            left_out[-1 if before and left_out else len(left_out) :] = [arranged.shown(sheet, i, arranged.AGAIN)]
+            left_out[-1 if before and left_out else len(left_out) :] = [arrangement.shown(sheet, i, arrangement.AGAIN)]
             if before and not title:  # the first block is named as the others are
                 rows = [[*row[:width], above] for row in rows]
             title = before or title
-        elif arranged.is_summary(row):
-            left_out.append(arranged.shown(sheet, i, arranged.SUMMARY))
+        elif arrangement.is_summary(row):
+            left_out.append(arrangement.shown(sheet, i, arrangement.SUMMARY))
         elif numeric and all(is_number(row[k]) if row[k] != "" else rows for k in base):
             rows.append([*row[:width], title])
             lines.append(sheet.lines[i])
@@ -181,13 +181,13 @@ def _cleaned(
                 title = " ".join(text_of(cell) for cell in row if cell != "")
                 before = ""
                 continue
-            left_out.append(arranged.shown(sheet, i, arranged.REMARK))
+            left_out.append(arrangement.shown(sheet, i, arrangement.REMARK))
             filled = [text_of(cell) for cell in row if cell != ""]
             before = filled[0] if len(filled) == 1 else ""
             continue
         before = ""
     for i in base:
-        for row, cell in zip(rows, arranged.filled_down([row[i] for row in rows], evenly=True), strict=True):
+        for row, cell in zip(rows, arrangement.filled_down([row[i] for row in rows], evenly=True), strict=True):
             row[i] = cell
     head: list[Cell] = [*header.headings, "Line" if title else ""]
     columns = dict(header.columns) | ({LINE: (width,)} if title and LINE not in header.columns else {})

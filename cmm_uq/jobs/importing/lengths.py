@@ -19,7 +19,7 @@ from cmm_uq.base.messages import Verbatim, commas, names, say, semicolons
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units, length_tables as of_table
-from cmm_uq.jobs.importing.arranged import BASES, FIGURES, filled_down, text_of
+from cmm_uq.jobs.importing.arrangement import BASES, FIGURES, filled_down, text_of
 from cmm_uq.jobs.importing.columns import SIGNS, ExportTable, split_names
 from cmm_uq.jobs.importing.encodings import decimal_sign, is_number, values_of
 from cmm_uq.jobs.importing.format import LENGTH, LINE_PLACE, UNITS, Cell, Fact, ImportKeys, Sheet, WrittenUnit
@@ -31,7 +31,7 @@ _FAR, _FAR_PART = 1.0, 0.002  # mm, and part of a length, by which no measured l
 
 @dataclass
 class MeasuredLengths:
-    """MeasuredLengths of a sheet: their lines by name, and of each its reference, run, value, deviation, line of the file."""
+    """Lengths of a sheet, of each its line by name, reference, run, measured value, mm, and line of the file."""
 
     names: list[str]
     reference: list[float | None]
@@ -305,8 +305,15 @@ def placed(
                 for column, value in zip(columns.values(), row, strict=True):
                     column.append(value)
                 lines.append(table.lines[i])
-    if any(reference is None for table in tables for reference in table.reference):
+    bare = [reference is None for table in tables for reference in table.reference]
+    if all(bare):
         columns.pop(REFERENCE)
+    elif any(bare):
+        raise CmmUqError(
+            "a length has no nominal length, and others have one",
+            where=f"{where} line {lines[2 * bare.index(True)]}",
+            fix="Give it for all, or read the sheets one by one: sheet",
+        )
     told = semicolons(
         [say("{name}: {place}", name=Verbatim(name), place=Verbatim(keys.lines[name])) for name in wanted]
     )

@@ -22,14 +22,14 @@ from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.messages import Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest
-from cmm_uq.jobs.importing.arranged import figures_follow, with_one_head
+from cmm_uq.jobs.importing.answers import head_of
+from cmm_uq.jobs.importing.arrangement import figures_follow, with_one_head
 from cmm_uq.jobs.importing.columns import columns_of, left_out_fact
 from cmm_uq.jobs.importing.encodings import is_number
 from cmm_uq.jobs.importing.format import Fact, FileKeys, ImportKeys, Recognition, Sheet, format_of, length_named
 from cmm_uq.jobs.importing.header import LINES_BEFORE, POINTS, REFERENCES, Header, header_of, no_header, understood
 from cmm_uq.jobs.importing.length_tables import tables_of
 from cmm_uq.jobs.importing.lengths import MeasuredLengths, lengths_of, placed
-from cmm_uq.jobs.importing.remembered import head_of
 
 # lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled
 SHORTEST_NORMAL, LONGEST_NORMAL = 1e-3, 1e3
@@ -154,7 +154,7 @@ class ImportedTable:
 
 
 class UnplacedError(CmmUqError):
-    """MeasuredLengths were read whole, and nothing says where they lie; ``recognised``: how they were read."""
+    """Lengths were read whole, and nothing says where they lie; ``recognised``: how they were read."""
 
     def __init__(self, error: CmmUqError, recognised: Recognition, lengths: Sequence[MeasuredLengths]) -> None:
         super().__init__(error.problem, where=error.where, fix=error.fix)

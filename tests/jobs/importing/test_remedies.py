@@ -93,7 +93,19 @@ def test_an_answer_is_remembered_for_the_next_export_of_its_kind(
 
 
 def test_a_name_of_a_remembered_format_is_no_path(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cmm_uq.jobs.importing.remembered import path_of
+    from cmm_uq.jobs.importing.answers import path_of
 
     with pytest.raises(CmmUqError, match="is no name"):
         path_of("../elsewhere")
+
+
+def test_an_answer_for_another_file_stands_in_no_one_s_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Answers of a UTF-16 export are tried on every later one, which is none."""
+    monkeypatch.setenv("CMM_UQ_FORMATS", str(tmp_path / "formats"))
+    (tmp_path / "wide.csv").write_text("Messung;Kugel;X;Y;Z\n1;1;0,5;0;0\n1;2;9,5;0;0\n", encoding="utf-16")
+    (tmp_path / "plain.csv").write_text("Messung;Kugel;X;Y;Z [mm]\n1;1;0.5;0;0\n1;2;9.5;0;0\n", encoding="utf-8")
+    keys = ("--key", "encoding=utf-16", "--key", "unit=mm")
+    assert run("import", "wide.csv", *keys, "--save-as", "wide", cwd=tmp_path).returncode == 0
+    ended = run("import", "plain.csv", cwd=tmp_path)
+    assert "UTF-16" not in ended.stderr
+    assert "As remembered" not in ended.stdout

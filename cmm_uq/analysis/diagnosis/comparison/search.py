@@ -15,6 +15,7 @@ from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fit, log_prior
 from cmm_uq.analysis.diagnosis.noise import noise_kinds, sigma_grid
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import SMALL_LEAN
@@ -106,7 +107,21 @@ def _search(model: RecordingModel, stated: float | None, alpha: float, seed: int
         first = replace(first, comparison=replace(first.comparison, explanations=explanations))
         combinations = explore(first.comparison, combinations, frozenset(shaped))
     combinations = replace(combinations, imitated=_imitated(first.comparison, combinations))
-    return _of(first, combinations, effects_to_assert(combinations), stated)
+    chosen = effects_to_assert(combinations)
+    result = _estimated(first, combinations, chosen, stated)
+    return result if result.chosen == chosen else replace(result, unexplained=1.0)
+
+
+def _estimated(first: ModelComparison, combinations: Combinations, chosen: Key, stated: float | None) -> SearchResult:
+    """The result with these effects; without the least probable where least squares of all gives sizes that no machine has."""
+    ordered = sorted(chosen, key=combinations.of)
+    for kept in (chosen, *(chosen - {i} for i in ordered)):
+        try:
+            return _of(first, combinations, kept, stated)
+        except CmmUqError:
+            if not chosen:
+                raise
+    return _estimated(first, combinations, chosen - {ordered[0]}, stated)
 
 
 def _of(first: ModelComparison, combinations: Combinations, chosen: Key, stated: float | None) -> SearchResult:

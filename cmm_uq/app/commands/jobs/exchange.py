@@ -19,9 +19,9 @@ from cmm_uq.base.points import Machine
 from cmm_uq.certificate.results.qif_file import qif
 from cmm_uq.jobs.columns import WHOLE
 from cmm_uq.jobs.dcc import Certificate, read
+from cmm_uq.jobs.importing.answers import as_file, folder, matching, path_of
 from cmm_uq.jobs.importing.format import ImportKeys, Recognition
-from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, example, imported, points_of
-from cmm_uq.jobs.importing.remembered import as_file, folder, matching, path_of
+from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, example as example, imported, points_of
 from cmm_uq.jobs.reports import ReportResults, read_results
 from cmm_uq.jobs.source import RESULTS
 
@@ -63,11 +63,6 @@ def lines_asked(error: CmmUqError) -> tuple[Recognition, str, list[str]] | None:
         return None
     every = [name for one in error.lengths for name in one.names]
     return error.recognised, example(error.lengths), list(dict.fromkeys(every))
-
-
-def in_words(export: ImportedTable) -> str:
-    """The first of what was read."""
-    return example(export)
 
 
 def own_format(found: ImportedTable) -> bytes:

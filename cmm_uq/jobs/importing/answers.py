@@ -14,7 +14,7 @@ from pathlib import Path
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import JOB_BYTES
-from cmm_uq.jobs.importing.arranged import text_of
+from cmm_uq.jobs.importing.arrangement import text_of
 from cmm_uq.jobs.importing.encodings import is_number
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, Sheet, format_of
 from cmm_uq.jobs.importing.header import LINES_BEFORE
@@ -52,7 +52,11 @@ def matching(content: bytes, where: str) -> tuple[Path, ImportKeys] | None:
             head, keys = list(kept["head"]), ImportKeys.model_validate(kept["keys"])
         except (ValueError, TypeError, KeyError):
             raise CmmUqError("is no remembered format", where=str(path), fix="Remove it, and save it again") from None
-        if head in _heads(format_of(content, where).read(content, where, keys)):
+        try:
+            sheets = format_of(content, where).read(content, where, keys)
+        except CmmUqError:  # a file that is not read with these keys is of another format
+            continue
+        if head in _heads(sheets):
             found.append((path, keys))
     if len({keys.model_dump_json() for _, keys in found}) > 1:
         both = " and ".join(path.stem for path, _ in found[:2])
