@@ -14,11 +14,13 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
-from cmm_uq.analysis.conformity.positioning import test_spread
+from cmm_uq.analysis.conformity.positioning import uncertainty_of_figures
 from cmm_uq.app.commands.jobs.compensate import write_new_map
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_of
+from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model import RecordingModel
+from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import effects
 
 TRAVEL = np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]])
@@ -114,7 +116,7 @@ def recorded(
     return folder
 
 
-def artefact(folder: Path):  # type: ignore[no-untyped-def]
+def artefact(folder: Path) -> tuple[Job, Artefact]:
     job = read_job(folder)
     return job, artefact_of(job.facts.artefact, job.points)
 
@@ -137,7 +139,7 @@ def figures(count: int) -> None:
             whole = random.normal(0, 0.4 * np.ptp(true.targets) / 1000) + random.normal(0, 0.3)
             x = true.x + whole * part[None, :, None] + 0.2 * random.normal(size=true.x.shape)
             read = type(true)(true.targets, x)
-            spread, found, at = test_spread(read, runs, job.circumstances), read.figures(), true.figures()
+            spread, found, at = uncertainty_of_figures(read, runs, job.circumstances), read.figures(), true.figures()
             for figure, u in spread.items():
                 held[figure] = held.get(figure, 0) + (abs(found[figure] - at[figure]) <= 2 * u)
     for figure, times in held.items():

@@ -33,7 +33,7 @@ _TITLES = {
 }
 
 
-def test_spread(runs: PositioningRuns, artefact: Artefact, under: Circumstances) -> dict[str, float]:
+def uncertainty_of_figures(runs: PositioningRuns, artefact: Artefact, under: Circumstances) -> dict[str, float]:
     """Standard uncertainty of each figure of a run, µm, by what is stated of the test; none where nothing is."""
     stated, size = under.uncertainty, artefact.sizes[0]
     longest = float(np.ptp(runs.targets))
@@ -49,9 +49,6 @@ def test_spread(runs: PositioningRuns, artefact: Artefact, under: Circumstances)
     return dict(runs.spread(changes))
 
 
-test_spread.__test__ = False  # type: ignore[attr-defined]
-
-
 def positioning(test: Test, *, figure: str) -> Statement:
     """The worst of all axes against the limit."""
     try:
@@ -62,7 +59,7 @@ def positioning(test: Test, *, figure: str) -> Statement:
     test.refuse_nothing_measured(bool(runs), "positioning in both directions")
     items = []
     for measurement, run in runs.items():
-        figures, spread = run.figures(), test_spread(run, test.artefact, test.circumstances)
+        figures, spread = run.figures(), uncertainty_of_figures(run, test.artefact, test.circumstances)
         if figure not in figures:
             needs = "both directions, twice" if figure in "AR" else "both directions"
             fix = "Record them, or leave the statement out"

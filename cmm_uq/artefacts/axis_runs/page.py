@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.positioning import test_spread
+from cmm_uq.analysis.conformity.positioning import uncertainty_of_figures
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.artefacts.axis_runs.run import ALONG, TURNING, Run
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say, signed
@@ -15,9 +15,10 @@ from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, table, text_columns
 from cmm_uq.certificate.plots.residuals import length_plot, positioning_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
+from cmm_uq.certificate.wording import deviating
 from cmm_uq.machine.physics.kinematics import PARAMETRIC_ERRORS
 from cmm_uq.maths.geometry.positioning import MissingReadingError, PositioningRuns
-from cmm_uq.maths.uncertainty.quantity import alike, nominal, rounded
+from cmm_uq.maths.uncertainty.quantity import nominal, rounded
 
 COVERAGE = 2.0  # of U of the figures (ISO/TR 230-9)
 Spread = Mapping[str, float]
@@ -32,7 +33,7 @@ def _evaluated(result: Result) -> list[tuple[Run, PositioningRuns | MissingReadi
         except MissingReadingError as error:
             found.append((run, error, {}))
         else:
-            spread = test_spread(evaluated, artefact, under) if run.kind == ALONG else {}
+            spread = uncertainty_of_figures(evaluated, artefact, under) if run.kind == ALONG else {}
             found.append((run, evaluated, spread))
     return found
 
@@ -197,7 +198,7 @@ def _readings(result: Result) -> Block:
     artefact = cast("AxisRuns", result.artefact)
     off, residuals = artefact.about_zero(artefact.readings) / MICROMETRE, result.residuals / MICROMETRE
     expanded = result.noise.expanded * artefact.noise_scale
-    low, high, low_after, high_after = alike(off.min(), off.max(), residuals.min(), residuals.max())
+    told = say("{count} readings: as recorded they deviate", count=len(off))
     return length_plot(
         artefact.measurement.astype(float),
         off,
@@ -212,15 +213,7 @@ def _readings(result: Result) -> Block:
             "times the arm.",
             k=number(result.noise.coverage_factor, ".2f"),
         ),
-        alternative=say(
-            "{count} readings: as recorded they lie {low} to {high} µm from their zero; after the fitted model {low_after} to "
-            "{high_after} µm remain.",
-            count=len(off),
-            low=low,
-            high=high,
-            low_after=low_after,
-            high_after=high_after,
-        ),
+        alternative=deviating(told, say("from their zero"), off, residuals),
     )
 
 

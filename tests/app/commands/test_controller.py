@@ -86,7 +86,8 @@ def test_what_the_tables_are_worth_is_tried_on_repeats_held_out(tmp_path: Path) 
     assert set(worth) == {"x", "y", "z"}
     for axis, each in worth.items():
         assert each["corrected"] < 0.3 < each["uncorrected"] < each["sign_reversed"], axis  # the noise is 0.2 µm
-    assert len(said) == 3
+    assert len(said) == 4
+    assert said[-1] == "The recording was simulated: these tables are of no machine"
 
 
 def test_a_template_is_given_both_signs(tmp_path: Path) -> None:
@@ -128,3 +129,24 @@ def test_a_missing_reading_and_another_kind_are_refused(tmp_path: Path) -> None:
         write_tables(job, tmp_path / "out", "linuxcnc")
     with pytest.raises(CmmUqError, match="cannot be made tables for a controller of"):
         write_tables(ROOT / "examples" / "bryan-simulated", tmp_path / "out", "linuxcnc")
+
+
+def test_of_two_runs_along_one_axis_none_is_chosen_silently(tmp_path: Path) -> None:
+    job = tmp_path / "job"
+    shutil.copytree(JOB, job)
+    head, *rows = (job / "recording.csv").read_text(encoding="utf-8").splitlines()
+    place = head.split(",").index("reading_um")
+    own = [row.split(",") for row in rows if row.startswith("1,")]
+    again = [
+        ["90", *row[1:place], f"{float(row[place]) + 0.01 * (k % 3):.4f}", *row[place + 1 :]]
+        for k, row in enumerate(own)
+    ]
+    (job / "recording.csv").write_text("\n".join([head, *rows, *map(",".join, again)]) + "\n", encoding="utf-8")
+    with pytest.raises(CmmUqError, match="measurement 90 is a second run along X") as told:
+        write_tables(job, tmp_path / "out", "linuxcnc")
+    assert "set_aside" in str(told.value.fix)
+    text = (job / "job.toml").read_text(encoding="utf-8")
+    (job / "job.toml").write_text(text.replace("[recording]", "[recording]\nset_aside = [90]"), encoding="utf-8")
+    write_tables(job, tmp_path / "out", "linuxcnc")
+    write_tables(JOB, tmp_path / "of one", "linuxcnc")
+    assert (tmp_path / "out" / "x.comp").read_text() == (tmp_path / "of one" / "x.comp").read_text()

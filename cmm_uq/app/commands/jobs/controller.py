@@ -26,6 +26,7 @@ from cmm_uq.base.points import AXES, Floats
 from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import sha256
+from cmm_uq.jobs.tables.identification import SIMULATED
 from cmm_uq.maths.geometry.positioning import DOWN, UP, MissingReadingError, PositioningRuns
 
 PROVENANCE = "controller.json"
@@ -168,11 +169,14 @@ def write_tables(job: Path, out: Path, form: str, *, force: bool = False) -> tup
         f"with the sign reversed by {each['sign_reversed']:.3g}"
         for axis, each in worth.items()
     ]
-    return written, said or ["One run of each axis is too few to hold one out: what the tables are worth was not tried"]
+    said = said or ["One run of each axis is too few to hold one out: what the tables are worth was not tried"]
+    if read.origin == SIMULATED:
+        said.append("The recording was simulated: these tables are of no machine")
+    return written, said
 
 
 def runs_of_axes(job: Job) -> dict[str, PositioningRuns]:
-    """The first complete run along each axis of the machine."""
+    """The run along each axis of the machine."""
     model, _ = recorded_model(job)
     try:
         every = model.artefact.positionings()
@@ -180,9 +184,14 @@ def runs_of_axes(job: Job) -> dict[str, PositioningRuns]:
         fix = "Record every target in every repeat of each direction, or leave the run out"
         raise CmmUqError(str(error), where=job.recording_path, fix=fix) from None
     found: dict[str, PositioningRuns] = {}
-    for one in every.values():
+    for number, one in every.items():
+        if not np.any(model.used[model.artefact.measurement == number]):  # set aside
+            continue
+        if one.axis in found:
+            what = f"measurement {number} is a second run along {one.axis.upper()}: a table is of one"
+            raise CmmUqError(what, where=job.recording_path, fix="Set the others aside: [recording] set_aside")
         if one.axis:
-            found.setdefault(one.axis, one)
+            found[one.axis] = one
     if not found:
         raise kind_of(job).refused("made tables for a controller of")
     return found
