@@ -145,6 +145,9 @@ def _both(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
                 "± U (k = 2): test uncertainty as ISO/TR 230-9 has it, of the instrument's scale, alignment, temperature and "
                 "what changes between readings, as far as stated; the machine's own scatter is in the figures, not in U."
             ),
+            say(
+                "Figures without U, as those of straightnesses and rotations: no test uncertainty is stated of what reads them."
+            ),
         ),
     )
 
