@@ -146,7 +146,8 @@ def _both(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
                 "what changes between readings, as far as stated; the machine's own scatter is in the figures, not in U."
             ),
             say(
-                "Figures without U, as those of straightnesses and rotations: no test uncertainty is stated of what reads them."
+                "Figures without U, as those of straightnesses and rotations: no test uncertainty is stated of what reads "
+                "them."
             ),
         ),
     )
