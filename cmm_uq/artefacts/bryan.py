@@ -7,17 +7,26 @@ other).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.analysis.planning.set_up import SetUp, direction_words, planned_length
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start, Volume
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, ball_misfit, no_references
 from cmm_uq.artefacts import adjustment
 from cmm_uq.artefacts.adjustment import Lengths, lengths_of
-from cmm_uq.artefacts.distance_equations import FACTORS, DistanceSolution, solve_distances
+from cmm_uq.artefacts.distance_equations import (
+    FACTORS,
+    POORLY_POSED,
+    UNKNOWNS,
+    DistanceSolution,
+    quadratic_terms,
+    solve_distances,
+)
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, number, say
 from cmm_uq.base.points import Floats, Points
@@ -26,9 +35,13 @@ from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import deviating, refusal
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model.artefact import Artefact, Placings
+from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings, ranges_of_repeats
 from cmm_uq.machine.model.placed import Radial
 from cmm_uq.machine.model.recorded import expansion, place
+from cmm_uq.maths.geometry import fit_sphere
+
+_STEPS, _CLOSE = 30, 1e-12
+_SCALES = np.array([0, 0, 0, 1, 0, 0, 1, 0, 1]) / np.sqrt(3.0)  # three scales alike, beside the centre
 
 
 class Bryan(Radial):
@@ -67,6 +80,63 @@ class Bryan(Radial):
         readings = self.points.xyz if xyz is None else xyz
         centre = self.centres(readings, self.sizes[0].nominal if certified else None)[0]
         return solve_distances(readings - centre, self.sizes[0].nominal * self.expansion), centre
+
+    def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
+        """As programs for such gauges print them; of the six corrected, too, where the positions determine these."""
+        rows = np.flatnonzero(counts)
+        xyz, expansion, size = self.points.xyz[rows], self.expansion[rows], self.sizes[0]
+        certified = size.nominal if size.certified else None
+        centre, radii, freedom = swept_about(xyz, expansion, certified, six=False)
+        length = np.full(len(rows), size.nominal)
+        found = {"repeatability": ranges_of_repeats(radii, rows[:, None], length, self.measurement[rows])}
+        if certified is not None:
+            found["error"] = ArtefactFigure(radii - certified, rows[:, None], length, np.full(len(rows), size.sd))
+
+        def whole(value: float) -> ArtefactFigure:
+            return ArtefactFigure(np.array([value]), rows[None], length[:1])
+
+        def spread(radii: Floats, freedom: int, what: str) -> dict[str, ArtefactFigure]:
+            about = radii - radii.mean()
+            return {f"span{what}": whole(float(np.ptp(radii))),
+                    f"standard deviation{what}": whole(float(np.sqrt(about @ about / freedom)))}  # fmt: skip
+
+        if freedom > 0:
+            found |= spread(radii, freedom, "")
+            corrected = swept_about(xyz, expansion, certified, six=True)
+            if corrected[2] > 0:
+                found |= spread(*corrected[1:], " corrected")
+                found["pivot offset"] = whole(float(np.linalg.norm(corrected[0] - centre)))
+        return {name: figure for name, figure in found.items() if figure is not None}
+
+
+def swept_about(xyz: Floats, expansion: Floats, length: float | None, *, six: bool) -> tuple[Floats, Floats, int]:
+    """Centre (3,) and radii (n,) at 20 °C, mm, by least squares about ``length`` or, where it is ``None``, about their mean.
+
+    With the six factors of equation 110 beside the centre, and radii after these, or without. Also the degrees of freedom of
+    the radii about their mean: none where the positions leave something open.
+    """
+    unknown = np.concatenate([fit_sphere(xyz).centre, np.zeros(UNKNOWNS)])
+    free = np.eye(3 + UNKNOWNS)[:, : None if six else 3]
+    if six and length is None:
+        free = free - _SCALES[:, None] * _SCALES  # nothing says a common part of the scales
+    for _ in range(_STEPS):
+        e1, e2, e3, e4, e5, e6 = unknown[3:]
+        away = xyz - unknown[:3]
+        turned = away @ (np.eye(3) + np.array([[e1, e2, e3], [e2, e4, e5], [e3, e5, e6]]))
+        distance = np.sqrt(np.einsum("ni,ni->n", turned, away))
+        radii, size = distance / expansion, float((distance / expansion).mean())
+        # the factors times the bar's length, so that all unknowns are of one size
+        slopes = np.column_stack([-turned, quadratic_terms(away) / (2 * size)]) @ free / (expansion * distance)[:, None]
+        about = size if length is None else length
+        slopes -= slopes.mean(axis=0) if length is None else 0.0
+        step, _, rank, _ = np.linalg.lstsq(slopes, about - radii, rcond=POORLY_POSED)
+        step = free @ step
+        step[3:] /= size
+        unknown += step
+        if np.abs(step[:3]).max() < _CLOSE * size:
+            break
+    wanted = int(np.linalg.matrix_rank(free))
+    return unknown[:3], radii, len(xyz) - 1 - wanted if rank == wanted else 0
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:

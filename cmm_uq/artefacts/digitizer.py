@@ -8,12 +8,13 @@ carriages turn q (eq. 35), so q is the stylus tip offset of each point.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.analysis.planning.set_up import SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start
@@ -25,7 +26,7 @@ from cmm_uq.base.messages import Text, Verbatim, number, say, signed
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model.artefact import Artefact, Placings, Size
+from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings, Size
 from cmm_uq.machine.model.placed import Radial
 from cmm_uq.machine.model.recorded import columns_needed, expansion, place
 from cmm_uq.machine.physics.digitizer import THREE_ATTITUDES, Alignment, MountOffset, align_on_sphere, mount_offset
@@ -133,6 +134,14 @@ class DigitizerArtefact(Artefact):
         moved = np.concatenate([self.attitude, -self._set_up], axis=2)
         shown = self.target.project(self._seen_at, moved)
         return np.hstack([shown[:, :3], self.target.size_change(), shown[:, 3:]])
+
+    def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
+        """Closure: how far each attitude by itself finds the sphere's centre from where all together have it."""
+        found = mount_offset(alignments(self.points.select(counts), None))
+        rows = [np.flatnonzero(counts & (self.poses.index == i)) for i in range(len(self.poses.numbers))]
+        kept = [np.resize(own, len(counts)) for own in rows if len(own)]
+        length = np.full(len(kept), float(np.linalg.norm(found.offset)))
+        return {"closure": ArtefactFigure(np.linalg.norm(found.residuals, axis=1), np.array(kept), length)}
 
     def centre(self, xyz: Floats, sizes: Floats) -> Floats:
         """(3,) centre of the sphere, mm, for true coordinates (n, 3) of the mount and these sizes."""

@@ -18,6 +18,16 @@ from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS, POSITIONING, Kind
 from cmm_uq.machine.physics.error_map import COLUMNS
 
 _HERE = "cmm_uq.artefacts"
+# figures that a laboratory may decide by its own rule
+ERRORS = "error", "mean error", "standard deviation of errors"
+SWEPT = (
+    "repeatability",
+    "span",
+    "standard deviation",
+    "span corrected",
+    "standard deviation corrected",
+    "pivot offset",
+)
 
 
 def _kind(name: str, table: type[ArtefactFacts], artefact: str, begin: Beginning, *tested: str, page: str = "") -> Kind:
@@ -41,7 +51,7 @@ BRYAN = _kind("bryan", ArtefactFacts, "bryan:Bryan", Beginning(
     title="Bryan gauge, a bar swept about a fixed ball",
     numbering="One measurement is one position of the swept ball, which is point 1; the fixed ball is not recorded.",
     artefact={"name": "Swept bar", "length_mm": 250.0, "u_um": 0.5}, plan={"repeats": 1},
-))  # fmt: skip
+), "error", *SWEPT)  # fmt: skip
 
 
 def _gauge(name: str, class_: str, effects: tuple[str, ...], further: tuple[str, ...], **others: Any) -> Kind:
@@ -53,7 +63,7 @@ def _gauge(name: str, class_: str, effects: tuple[str, ...], further: tuple[str,
     )  # fmt: skip
     observe, screen, plan = (f"{_HERE}.gauge_lines:{part}" for part in (class_, "SCREENING", name.upper()))
     page = f"{_HERE}.gauge_lines_page:PAGE"
-    return Kind(name, ReferencedFacts, observe, screen, plan, page, begin, tested=(LENGTHS,))
+    return Kind(name, ReferencedFacts, observe, screen, plan, page, begin, tested=(LENGTHS, *ERRORS))
 
 
 APPROACHES, NORMALS = tuple(f"approach_{a}" for a in AXES), ("nx", "ny", "nz")
@@ -107,7 +117,7 @@ TRIANGLE = _kind("triangle", TriangleFacts, "triangle:Triangle", Beginning(
     artefact={"name": "Triangle of gauge blocks and cylinders", "cte_per_k": 11.5e-6,
               "blocks_mm": [380.0, 280.0, 340.0], "u_blocks_um": 0.1, "cylinders_mm": [20.0] * 3, "u_cylinders_um": 0.1},
     plan={"repeats": 3}, further=dict.fromkeys((f"tip_{a}_mm" for a in AXES), ""), noise_um=0.3,
-), page="triangle_page")  # fmt: skip
+), *ERRORS, "angle error", "repeatability", page="triangle_page")  # fmt: skip
 
 
 class SphereFacts(ArtefactFacts):
@@ -137,6 +147,7 @@ class PlaneFacts(ArtefactFacts):
     ``acceptance_deg`` is the largest angle between the normal and the direction of approach at which that is believed.
     """
 
+    form_key: ClassVar[str | None] = "form_um"
     certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
 
     probe_offset_mm: Length | None = None
@@ -144,6 +155,7 @@ class PlaneFacts(ArtefactFacts):
     u_probe_offset_um: Uncertainty = key(0.0, "Standard uncertainty of the probe's effective radius.")
     acceptance_deg: Annotated[float, Field(ge=0.01, le=89.99)] = 60.0
     """Largest angle between the normal and the direction of approach at which the radius is believed."""
+    form_um: Uncertainty | None = key(None, "Flatness deviation of the surface by its certificate.")
 
 
 PLANE = _kind("plane", PlaneFacts, "plane:PlaneSurface", Beginning(
@@ -151,7 +163,7 @@ PLANE = _kind("plane", PlaneFacts, "plane:PlaneSurface", Beginning(
     numbering="One measurement is one place of the surface; point 0, where there is one, lies just before contact.",
     artefact={"name": "Surface plate"}, effects=("straightness_x_z", "straightness_y_z"),
     plan={"grid": [7, 7], "repeats": 2},
-))  # fmt: skip
+), "flatness")  # fmt: skip
 
 
 class ReferenceSphereFacts(ArtefactFacts):
@@ -191,7 +203,7 @@ DIGITIZER = _kind("digitizer", ReferenceSphereFacts, "digitizer:DigitizerArtefac
         "u_mm": "u of a scanned point in the digitizer's scan plane; left out where centres are recorded.",
         "v_mm": "v of a scanned point in the digitizer's scan plane, likewise.",
     },
-), page="digitizer_page")  # fmt: skip
+), "closure", page="digitizer_page")  # fmt: skip
 
 
 READ, TURN = (tuple(f"{name}_{a}" for a in AXES) for name in ("read", "turn"))

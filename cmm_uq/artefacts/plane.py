@@ -6,6 +6,7 @@ point just before contact: it tells on which side the probe was (US 4,866,643 cl
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -26,7 +27,7 @@ from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
-from cmm_uq.machine.model.artefact import Artefact, Placings, Size
+from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings, Size
 from cmm_uq.machine.model.recorded import place
 from cmm_uq.machine.physics.compensation import DirectionPointError, OffsetPlane, offset_plane
 from cmm_uq.maths.inference.linear_model import Freedoms
@@ -68,6 +69,7 @@ class PlaneSurface(Artefact):
         self.sizes: tuple[Size, ...] = ()
         self.offset = facts.probe_offset_mm
         self.u_offset = facts.u_probe_offset_um * MICROMETRE
+        self.form = (facts.form_um or 0.0) * MICROMETRE
         self.acceptance = float(np.radians(facts.acceptance_deg))
         self._refuse_no_plane(where)
         if self.offset is not None:
@@ -99,6 +101,19 @@ class PlaneSurface(Artefact):
     def unread(self) -> NDArray[np.bool_]:
         touched = self.points.xyz[self.rows[:, 0]]
         return self.placings.unread(touched, self._axes(touched)[:, :, :1])[:, 0]
+
+    def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
+        """Flatness of each measurement of four points of contact or more, over all of its repeats."""
+        off, contact = self.off_plane(), self.rows[:, 0]
+        each = [
+            np.flatnonzero((self.measurement == number) & counts[contact]) for number in self.placings.numbers.tolist()
+        ]
+        each = [own for own in each if len(own) > LEAST_POINTS]
+        if not each:
+            return {}
+        rows = np.array([np.resize(contact[own], len(contact)) for own in each])
+        extents = np.array([spread(self.points.xyz[contact[own]]) for own in each])
+        return {"flatness": ArtefactFigure(np.array([np.ptp(off[own]) for own in each]), rows, extents)}
 
     def probed(self, u_point: float) -> tuple[ProbedPlane, ...]:
         """Flatness of each plane, and the surface where the probe's offset is known.

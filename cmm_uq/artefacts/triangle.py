@@ -16,6 +16,7 @@ from types import MappingProxyType
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.analysis.planning import candidates as places
 from cmm_uq.analysis.planning.set_up import SetUp, split
@@ -26,7 +27,13 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Machine, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.machine.model.artefact import Size
+from cmm_uq.machine.model.artefact import (
+    ArtefactFigure,
+    Indications,
+    Size,
+    figures_of_errors,
+    ranges_of_repeats,
+)
 from cmm_uq.machine.model.artefact_doubt import by_certificate, faults
 from cmm_uq.machine.model.placed import Rigid
 from cmm_uq.machine.model.recorded import check_length, expansion, place
@@ -38,7 +45,7 @@ DIMENSIONS = ("block_12", "block_23", "block_31", "cylinder_1", "cylinder_2", "c
 # sides 1–2, 2–3, 3–1 for the six dimensions
 SIDES_OF_DIMENSIONS = np.array([[1, 0, 0, 0.5, 0.5, 0], [0, 1, 0, 0, 0.5, 0.5], [0, 0, 1, 0.5, 0, 0.5]])
 
-DRAWS = 100_000
+DRAWS, _STEP_MM = 100_000, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,6 +203,7 @@ class Triangle(Rigid):
 
     kind = "triangle"
     title = say("Triangle standard")
+    key_of_u = "u_blocks_um"
 
     def __init__(self, facts: TriangleFacts, points: Points, *, where: str | None = None) -> None:
         super().__init__(replace(points, machine=replace(points.machine, tip_on_every_carriage=True)))
@@ -219,6 +227,34 @@ class Triangle(Rigid):
     def shape(self, sizes: Floats) -> Floats:
         body = corners(SIDES_OF_DIMENSIONS @ sizes)[self._corner] * self.expansion[:, None]
         return np.asarray(body - self.placings.means(body), dtype=np.float64)
+
+    def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
+        """Sides by what is measured less what blocks and cylinders make them, and angles as arcs over their shorter side."""
+        groups = [rows[np.argsort(self._corner[rows])] for rows in self.points.rows_of_groups if counts[rows].all()]
+        if not groups:
+            return {}
+        of = np.array(groups)  # (q, 3)
+        ends, nominal, u = np.array([[0, 1], [1, 2], [2, 0]]), self.standard.figures(), self.standard.u
+        pairs = of[:, ends]
+        apart = np.linalg.norm(np.diff(self.points.xyz[pairs], axis=2)[:, :, 0], axis=2)
+        measured = figures_of(apart / self.expansion[pairs].mean(axis=2))
+        numbers = 3 * self.points.measurement[of] + np.arange(3)
+        lengths = np.tile(nominal.sides, len(of))
+        errors, rows = (measured.sides - nominal.sides).ravel(), pairs.reshape(-1, 2)
+        of_sides = np.sqrt(SIDES_OF_DIMENSIONS**2 @ u**2)
+        found = figures_of_errors(Indications(errors, lengths, np.tile(of_sides, len(of)), rows))
+        # the mean of all three sides has a third of each block and cylinder
+        mean = replace(found["mean error"], u=np.array([np.linalg.norm(SIDES_OF_DIMENSIONS.mean(axis=0) * u)]))
+        arms = np.minimum(nominal.sides, np.roll(nominal.sides, 1))  # of the angle at 1, 2, 3
+        steps = self.standard.dimensions + _STEP_MM * np.vstack([np.eye(6), -np.eye(6)])
+        moved = figures_of(steps @ SIDES_OF_DIMENSIONS.T).angles
+        of_angles = arms * np.linalg.norm((moved[:6] - moved[6:]).T / (2 * _STEP_MM) * u, axis=1)
+        arcs = ((measured.angles - nominal.angles) * arms).ravel()
+        turned = np.repeat(of, 3, axis=0)
+        angle = ArtefactFigure(arcs, turned, np.tile(arms, len(of)), np.tile(of_angles, len(of)))
+        repeated = ranges_of_repeats(errors, rows, lengths, numbers.ravel())
+        each = {**found, "mean error": mean, "angle error": angle}
+        return each if repeated is None else {**each, "repeatability": repeated}
 
     def own_faults(self) -> Iterable[Effect]:
         body = Body.of(self.points, corners(self.standard.sides)[self._corner])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Message, Text, commas, number, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.jobs.recording.beside import ShortGauge
-from cmm_uq.machine.model.artefact import Artefact, Forms, Indications
+from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Forms, Indications
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.maths.uncertainty.quantity import nominal, significant
 
@@ -83,6 +84,7 @@ class Around(Artefact):
     def __init__(self, inner: Artefact, points: Points | None = None) -> None:
         self.inner, self.points = inner, inner.points if points is None else points
         self.kind, self.title, self.sizes, self.rows = inner.kind, inner.title, inner.sizes, inner.rows
+        self.form, self.key_of_u = inner.form, inner.key_of_u  # type: ignore[misc]
         self.noise_scale, self.measurement, self.repeat = inner.noise_scale, inner.measurement, inner.repeat
 
     def indications(self) -> Indications | None:
@@ -93,6 +95,13 @@ class Around(Artefact):
 
     def forms(self) -> Forms | None:
         return self.inner.forms()
+
+    def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
+        if self.inner.indications() is not None:
+            return super().figures(counts)
+        placed = copy(self.inner)
+        placed.points = self.points
+        return placed.figures(counts)
 
     def lines_of(self, rows: Ints) -> tuple[Floats, Floats]:
         return self.inner.lines_of(rows)

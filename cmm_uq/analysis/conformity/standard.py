@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from typing import Literal
@@ -82,6 +82,13 @@ class Standard:
                 return each
         known = ", ".join(each.name for each in self.characteristics)
         raise ValueError(f"characteristic = {name!r} of {self.name} is not decided here: only {known}")
+
+    def instead(self, tested: Collection[str]) -> str:
+        """What to do where one of its characteristics is not decided on what a kind offers."""
+        others = ", ".join(one.name for one in self.characteristics if one.observed in tested)
+        if others:
+            return f"Name as characteristic one of: {others}"
+        return "Leave the statement out, or record the artefact that the standard asks for"
 
     def uncertainty_missing(
         self, wish: ConformityFacts, artefact: ArtefactFacts, stated: TestUncertainty

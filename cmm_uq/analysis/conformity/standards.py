@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.analysis.conformity import decided, plans, positioning
+from cmm_uq.analysis.conformity import decided, own_rule, plans, positioning
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings, repeats_of_gauge, supplemented
 from cmm_uq.analysis.conformity.plan_conditions import best_of, conditions
 from cmm_uq.analysis.conformity.plans import Condition
@@ -342,10 +342,11 @@ _STANDARDS = (
         _lengths(name, decided.on_lines(plans.VDI_2617_2_1[name].positions), partial(conditions, plans.VDI_2617_2_1[name]))
         for name in ("U3", "U1", "U2")
     ), sensing="contacting"),
+    own_rule.STANDARD,
 )  # fmt: skip
 
 BUILT_IN: Mapping[str, Standard] = MappingProxyType(  # by name
-    {standard.name: replace(standard, clauses=CLAUSES[standard.name]) for standard in _STANDARDS}
+    {standard.name: replace(standard, clauses=CLAUSES.get(standard.name, ())) for standard in _STANDARDS}
 )
 
 
@@ -376,8 +377,8 @@ def decidable(
         raise CmmUqError(f"no standard {facts.standard!r} is decided", where=where, fix=fix)
     characteristic = characteristic_of(standard, facts, key)
     if characteristic.observed not in tested:
-        raise CmmUqError(f"{facts.standard} is not decided on a {kind}", where=where,
-                         fix="Leave the statement out, or record the artefact that the standard asks for")  # fmt: skip
+        problem, fix = f"{facts.standard} is not decided on a {kind}", standard.instead(tested)
+        raise CmmUqError(problem, where=where, fix=fix)
     if None not in (standard.sensing, under.probe.sensing) and standard.sensing != under.probe.sensing:
         problem = f"{facts.standard} is for {standard.sensing} probes, and the recording was made with one that is not"
         fix = "State ISO 10360-8:2013 of optical probes, or leave the statement out"

@@ -49,9 +49,10 @@ def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Ci
             what = say("uncertainty: {line} is neither stated nor declared negligible", line=_NAMES[line])
             declared = f'{line} = {{ by = "…", reason = "…" }} in [test_uncertainty.negligible]'
             found.append(_lacks(what, f"{key}, or {declared}"))
-    probed = artefact.forms()
-    if "form" in lines and (probed is None or probed.certified <= 0):
-        what = say("uncertainty: the form deviation of the test sphere is not stated")
+    if "form" in lines and artefact.form <= 0:
+        ball = say("uncertainty: the form deviation of the test sphere is not stated")
+        plane = say("uncertainty: the form deviation of the surface is not stated")
+        what = plane if artefact.forms() is None else ball
         found.append(_lacks(what, "form_um in [artefact]"))
     return (*found, *(_thermal(artefact, under) if "expansion" in lines else ()))
 

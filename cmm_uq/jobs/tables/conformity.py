@@ -32,6 +32,7 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.identification import Capability, RequiredText
 from cmm_uq.jobs.tables.length_formula import FLATTEST, mpe_of
 from cmm_uq.jobs.tables.machine import ProbeFacts
+from cmm_uq.jobs.tables.plan import CompleteTest
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.recording.beside import ShortGauge
@@ -278,15 +279,15 @@ class ConformityFacts(JobTable):
 
     standard: str = required("Standard by which it is decided, with its edition.")
     characteristic: str | None = None
-    """Which of the standard's characteristics, where it has several: E0, R0, E150, P_FTU …; the first where it is
-    left out."""
+    """Which of the standard's characteristics, where it has several: E0, R0, E150, P_FTU …, or a figure of the laboratory's
+    own rule: span, error, flatness …; the first where it is left out."""
     limit_um: Limit | None = key(None, "Limit of the quantity.")
     mpe: Permissible | None = None
     """Maximum permissible error: `"3 + L/300"` (L in mm, the error in µm), or a table of `a_um`, `k`, `b_um`."""
     rule: Rule = key("ISO 14253-1", "Decision rule, by name or by its figure.")
     prior: Prior | None = None
     """What is known of such machines beforehand, for rules and risks that go by it (JCGM 106:2012, 7.2)."""
-
+    complete: CompleteTest | None = key(None, "What a complete test has at least, for a laboratory's own rule.")
     clauses: str | None = None
     """Form of the standard's clauses, filled in beside the laboratory's own copy (`cmm-uq standards NAME --form FILE`)."""
 

@@ -9,12 +9,35 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED
-from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Length, Names, Range, Uncertainty, Unit, at_least, key
+from cmm_uq.base.files.table import (
+    AnyFloat,
+    Column,
+    JobTable,
+    Length,
+    Names,
+    Range,
+    Uncertainty,
+    Unit,
+    at_least,
+    key,
+    required,
+)
 
 Criterion = Literal["separation", "D", "A", "worst"]
 Duration = Annotated[float, Field(ge=0, le=1e6)]  # minutes or seconds
 _SHORTEST = 1e-6  # length of a direction below which it is none
 Direction = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=3, max_length=3)]
+
+
+_Least = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+class CompleteTest(JobTable):
+    """``complete``: what a complete test has at least, by the laboratory's own rule; copies do not count."""
+
+    measurements: _Least = required("Measurements, each a position or placing of the artefact.")
+    repeats: _Least = required("Repeats of each measurement.")
+    points: _Least = required("Points of each repeat.")
 
 
 class FixtureFacts(JobTable):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Literal
 
@@ -50,6 +50,41 @@ class Forms:
     directions: Floats  # (n, 3) outward direction of each point from the middle of its feature
     size: Floats | None = None  # (q,) measured minus certified size at 20 °C, mm; ``None`` without a certificate
     centres: Floats | None = None  # (q, 3) middles of the features, mm; ``None`` where they say nothing
+
+
+@dataclass(frozen=True, eq=False)
+class ArtefactFigure:
+    """A figure that a laboratory may accept a machine by, of the whole recording or at m places of it."""
+
+    values: Floats  # (m,) mm
+    rows: Ints  # (m, j) the points that each rests on, as rows of the recording
+    lengths: Floats  # (m,) length that each belongs to, mm
+    # (m,) standard uncertainty by the certificate, mm; ``None``: it cancels, and what of the artefact changes remains
+    u: Floats | None = None
+
+
+def figures_of_errors(found: Indications) -> dict[str, ArtefactFigure]:
+    """Each error, their mean, and their standard deviation, n − 1, of which no correlation makes u larger than its rms."""
+    errors, u, count, all_rows = found.errors, found.u, len(found.errors), found.rows.reshape(1, -1)
+    each = {"error": ArtefactFigure(errors, found.rows, found.lengths, u)}
+    if count > 1:
+        length = np.array([found.lengths.mean()])
+        bound = np.sqrt(np.array([np.sum(u**2)]) / (count - 1))
+        each["mean error"] = ArtefactFigure(np.array([errors.mean()]), all_rows, length, np.array([u.mean()]))
+        spread = np.array([errors.std(ddof=1)])
+        each["standard deviation of errors"] = ArtefactFigure(spread, all_rows, length, bound)
+    return each
+
+
+def ranges_of_repeats(values: Floats, rows: Ints, lengths: Floats, of: Ints) -> ArtefactFigure | None:
+    """Range of the values (m,), each of points (m, j), that are repeats of one thing, numbered in ``of`` (m,)."""
+    together = [own for number in np.unique(of) if len(own := np.flatnonzero(of == number)) > 1]
+    if not together:
+        return None
+    longest = max(len(own) for own in together)
+    padded = np.array([np.resize(own, longest) for own in together])
+    ranges = np.ptp(values[padded], axis=1)
+    return ArtefactFigure(ranges, rows[padded].reshape(len(ranges), -1), lengths[padded[:, 0]])
 
 
 Role = Literal["dimension", "sought", "set-up"]
@@ -93,6 +128,8 @@ class Artefact(ABC):
     # whether each set-up reads a curve of its own, of which a model names the simplest form: outliers show among repeats,
     # and what is found predicts other points, not other set-ups
     curves: ClassVar[bool] = False
+    form: float = 0.0  # deviation of its own form by its certificate, mm; 0 where it is not stated
+    key_of_u: ClassVar[str] = "u_um"  # of ``[artefact]``, that says how uncertain its lengths are
 
     @property
     def set_up(self) -> Text:
@@ -155,6 +192,15 @@ class Artefact(ABC):
     def indications(self) -> Indications | None:
         """Errors of indication of calibrated lengths; ``None`` without a calibration."""
         return None
+
+    def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
+        """Figures by which a laboratory may accept a machine, by name, of the points (n,) that count."""
+        found = self.indications()
+        if found is None:
+            return {}
+        own = counts[found.rows].all(axis=1)
+        return figures_of_errors(replace(found, errors=found.errors[own], lengths=found.lengths[own], u=found.u[own],
+                                         rows=found.rows[own]))  # fmt: skip
 
     def positionings(self) -> Mapping[int, PositioningRuns]:
         """Runs that position an axis, µm, by measurement; none of what is no such run."""

@@ -11,6 +11,7 @@ import itertools
 import pytest
 from scipy import stats
 
+from cmm_uq.analysis.conformity import own_rule
 from cmm_uq.analysis.conformity.standards import BUILT_IN, statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.base.errors import CmmUqError
@@ -55,13 +56,13 @@ def judged(hand: Hand, standard: str, characteristic: str, rule: str, room: floa
     limit = abs(hand.value) + room * hand.u
     wish = ConformityFacts(
         standard=standard, characteristic=characteristic, limit_um=limit, rule=TURNS[rule][0], prior=FLAT
-    )
+    ).model_copy(update={"complete": hand.complete})
     return statement(
         wish,
         hand.artefact,
         hand.accuracy,
         "[[conformity]] 1",
-        (BARS, FORMS, LENGTHS, POSITIONING),
+        (BARS, FORMS, LENGTHS, POSITIONING, *own_rule.FIGURES),
         None,
         hand.circumstances,
     )
@@ -100,7 +101,9 @@ def test_without_an_uncertainty_only_simple_acceptance_decides(standard: str, ch
         pytest.skip("it falls back on the scatter of the recording; see test_standards.py")
     hand = by_hand(standard, characteristic, "no u")
     if rule != "simple":
-        states_none = r"needs the uncertainty.*states no u_um|u_repeat_um|form_um above 0|u_scale_um_per_m above 0"
+        states_none = (
+            r"needs the uncertainty.*states no (u_um|u_blocks_um|u_repeat_um|form_um|u_scale_um_per_m) above 0"
+        )
         with pytest.raises(CmmUqError, match=states_none):
             judged(hand, standard, characteristic, rule, 10.0)
         return

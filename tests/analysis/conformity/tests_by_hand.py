@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 
+from cmm_uq.analysis.conformity import own_rule
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.artefacts.ballbar import Ballbar
@@ -16,8 +17,10 @@ from cmm_uq.artefacts.sphere import SphereArtefact
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
 from cmm_uq.jobs.tables.machine import ProbeFacts
+from cmm_uq.jobs.tables.plan import CompleteTest
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.quantity import Quantity
+from tests.analysis.conformity.own_by_hand import OWN
 from tests.analysis.conformity.recorded import BAR_U, DIAGONALS, MACHINE, NEGLIGIBLE, SEVEN, STATED, bars, gauge, sphere
 from tests.artefacts.test_axis_runs import joined, run
 from tests.maths.geometry.test_positioning import by_loops
@@ -46,6 +49,7 @@ class Hand:
     artefact, circumstances, accuracy : of the test.
     value, u : of that value, µm.
     signed : whether its limit has two sides.
+    complete : what the laboratory says of a complete test, for its own rule.
     """
 
     artefact: Artefact
@@ -54,6 +58,7 @@ class Hand:
     value: float
     u: float
     signed: bool
+    complete: CompleteTest | None = None
 
 
 def lengths(
@@ -206,6 +211,16 @@ def spread_by_loops(x: tuple[float, ...], targets: int, figure: str) -> float:
     return float(np.sqrt(np.mean(np.square(moved))))
 
 
+def own(figure: str) -> Callable[[str], Hand]:
+    """A figure that the laboratory decides by its own rule."""
+
+    def made(how: str) -> Hand:
+        artefact, under, value, u, signed, complete = OWN[figure]("complete" if how == "one repeat out" else how)
+        return Hand(artefact, under, {}, value, u, signed, complete)
+
+    return made
+
+
 E0 = lengths(SEVEN)
 TESTS: Mapping[tuple[str, str], Callable[[str], Hand]] = {
     ("ASME B89.4.1-1997", "volumetric performance"): volumetric,
@@ -226,6 +241,7 @@ TESTS: Mapping[tuple[str, str], Callable[[str], Hand]] = {
     ("ISO 10360-8:2013", "P_Form.Sph.1x25:Tr:ODS"): probed(size=False, sensing="optical"),
     ("ISO 10360-8:2013", "P_Size.Sph.1x25:Tr:ODS"): probed(size=True, sensing="optical"),
     **{("ISO 230-2:2014", figure): positioned(figure) for figure in POSITIONED},
+    **{(own_rule.NAME, figure): own(figure) for figure in OWN},
     ("VDI/VDE 2617", "E0"): E0,
     ("VDI/VDE 2617-2.1", "U3"): lengths(DIAGONALS),
     ("VDI/VDE 2617-2.1", "U1"): lengths([X, Y, Z]),

@@ -1,0 +1,212 @@
+"""A laboratory's own rule: figures of an artefact that no standard decides, against the limits that the laboratory states.
+
+What stays uncertain is that of the artefact alone, as in the standards: its certificate and circumstances where something is
+compared with it, what of it changes between readings where it cancels, its own form. The machine's errors and scatter are
+what is tested. What a complete test consists of is the laboratory's too, and without it nothing passes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.analysis.conformity.plans import Condition
+from cmm_uq.analysis.conformity.standard import NOT_STATED, Characteristic, Standard, Test
+from cmm_uq.analysis.conformity.statement import Statement, least_favourable
+from cmm_uq.analysis.conformity.uncertainty import (
+    FORM_LINES,
+    LENGTH_LINES,
+    REPEAT_LINES,
+    Causes,
+    causes_of_lengths,
+    length_budget,
+    temperatures,
+    u_of_repeats,
+)
+from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.points import Points
+from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.machine.model.artefact import ArtefactFigure, Indications
+
+NAME = "laboratory's own rule"
+# each figure: what is compared, what is counted of it, and the lines of its uncertainty
+FIGURES: Mapping[str, tuple[Text, Text, tuple[str, ...]]] = {
+    "error": (say("error of length, worst against its limit"), say("lengths"), LENGTH_LINES),
+    "mean error": (say("mean error of all lengths"), say("means"), LENGTH_LINES),
+    "standard deviation of errors": (
+        say("standard deviation (n − 1) of the errors of all lengths"),
+        say("standard deviations"),
+        LENGTH_LINES,
+    ),
+    "angle error": (
+        say("error of an angle, as an arc over the shorter of its sides, worst against its limit"),
+        say("angles"),
+        LENGTH_LINES,
+    ),
+    "repeatability": (say("range of repeats in one place, worst against its limit"), say("ranges"), REPEAT_LINES),
+    "span": (say("span of the radii about the best centre"), say("spans"), REPEAT_LINES),
+    "standard deviation": (
+        say("standard deviation of the radii about their mean and the best centre"),
+        say("standard deviations"),
+        REPEAT_LINES,
+    ),
+    "span corrected": (
+        say("span of the radii that would remain with three scales and three squarenesses corrected"),
+        say("spans"),
+        REPEAT_LINES,
+    ),
+    "standard deviation corrected": (
+        say("standard deviation of the radii that would remain with three scales and three squarenesses corrected"),
+        say("standard deviations"),
+        REPEAT_LINES,
+    ),
+    "pivot offset": (
+        say("distance of the centre that is best without corrections from that which is best with them"),
+        say("distances"),
+        REPEAT_LINES,
+    ),
+    "flatness": (say("flatness, worst against its limit"), say("planes"), FORM_LINES),
+    "closure": (
+        say("distance of the sphere's centre in one attitude from that of all, worst against its limit"),
+        say("distances"),
+        REPEAT_LINES,
+    ),
+}
+SIGNED = ("error", "mean error", "angle error")
+_UNSTATED = {LENGTH_LINES: "u_um", REPEAT_LINES: "u_repeat_um", FORM_LINES: "form_um"}
+
+
+def decided(test: Test, *, name: str) -> Statement:
+    """One figure of the artefact, everywhere that it has a value."""
+    quantity, measured, lines = FIGURES[name]
+    figure = test.artefact.figures(_counting(test.recorded.points))
+    if name not in figure or not len(figure[name].values):
+        if lines == LENGTH_LINES:
+            test.indications()
+        problem = f"the readings do not determine the {name} of the {test.artefact.kind}"
+        fix = "Record more places in more directions, or repeats, or leave the statement out"
+        raise test.error(problem, "characteristic", fix)
+    found = figure[name]
+    causes = _causes(test, found, lines)
+    test.refuse_without_uncertainty(float(causes.u.min()), _key(test.artefact.key_of_u, lines))
+    points, aside = test.artefact.points, test.set_aside(found.rows)
+    of, repeats = points.measurement[found.rows], points.repeat[found.rows]
+    one, same = (np.all(values == values[:, :1], axis=1) for values in (of, repeats))
+    items = tuple(
+        test.decided(
+            float(found.values[i]) / MICROMETRE,
+            float(causes.u[i]),
+            test.limit_um(float(found.lengths[i])),
+            signed=name in SIGNED,
+            measurement=int(of[i, 0]) if one[i] else None,
+            repeat=int(repeats[i, 0]) if one[i] and same[i] else None,
+            length_mm=float(found.lengths[i]),
+            set_aside=bool(aside[i]),
+        )
+        for i in range(len(found.values))
+    )
+    worst = least_favourable(items)
+    budget, i = None, items.index(worst)
+    if lines == LENGTH_LINES and found.u is not None:
+        recorded = temperatures(_indications(found), test.artefact)
+        degrees = REFERENCE_TEMPERATURE if recorded is None else float(recorded[i])
+        budget = length_budget(float(found.lengths[i]), float(found.u[i]), degrees, test.circumstances)
+    remarks = [_SAID[lines] if worst.u_um > 0 else NOT_STATED]
+    return test.stated(quantity, measured, items, remarks, signed=name in SIGNED,
+                       causes=causes if len(items) > 1 else None, budget=budget)  # fmt: skip
+
+
+_SAID = {
+    LENGTH_LINES: say("u is the test uncertainty of the artefact (as ISO/TS 23165 has that of a length)."),
+    REPEAT_LINES: say(
+        "What the artefact's certificate leaves uncertain cancels; u is what of it changes between readings."
+    ),
+    FORM_LINES: say("u is half the form deviation of the surface, and what its calibration leaves uncertain."),
+}
+
+
+def _key(of_artefact: str, lines: tuple[str, ...]) -> str:
+    return of_artefact if lines == LENGTH_LINES else _UNSTATED[lines]
+
+
+def _causes(test: Test, found: ArtefactFigure, lines: tuple[str, ...]) -> Causes:
+    """What makes each value uncertain, not below the laboratory's capability."""
+    m, least = len(found.values), test.least_u(found.lengths)
+    if lines == LENGTH_LINES:
+        return causes_of_lengths(_indications(found), test.artefact, test.circumstances).at_least(least)
+    if lines == FORM_LINES:
+        u = float(np.hypot(test.artefact.form / MICROMETRE / 2, test.circumstances.uncertainty.u_form_um))
+        return Causes(np.full((m, 1), u), np.zeros(m), np.arange(m)).at_least(least)
+    changes = np.array([u_of_repeats(float(length), test.circumstances) for length in found.lengths])
+    return Causes(np.zeros((m, 0)), changes, np.arange(m)).at_least(least)
+
+
+def _indications(found: ArtefactFigure) -> Indications:
+    u = np.zeros(len(found.values)) if found.u is None else found.u
+    return Indications(found.values, found.lengths, u, found.rows)
+
+
+def _counting(points: Points) -> NDArray[np.bool_]:
+    return ~np.isin(points.group, list(points.copies))
+
+
+def enough(test: Test) -> tuple[Condition, ...]:
+    """What the laboratory says of a complete test, held against what was recorded and is no copy."""
+    asked, points = test.facts.complete, test.recorded.points
+    if asked is None:
+        what = say("what a complete test consists of, by the laboratory's own rule")
+        return (Condition(what, (what,), Verbatim("complete = { measurements, repeats, points } in [[conformity]]")),)
+    own = _counting(points)
+    runs: dict[int, list[int]] = {}
+    for group in np.unique(points.group[own]).tolist():
+        runs.setdefault(points.run_of(group)[0], []).append(len(np.unique(points.point[points.group == group])))
+    few = (
+        min((len(each) for each in runs.values()), default=0),
+        min((n for each in runs.values() for n in each), default=0),
+    )
+    found = []
+    for what, wanted, count in (
+        (say("measurements"), asked.measurements, len(runs)),
+        (say("repeats of each measurement"), asked.repeats, few[0]),
+        (say("points of each repeat"), asked.points, few[1]),
+    ):
+        asks = say("{wanted} {what} by the laboratory's own rule", wanted=wanted, what=what)
+        lacks = say("{what} ({least})", what=asks, least=count)
+        found.append(Condition(asks, () if count >= wanted else (lacks,)))
+    return tuple(found)
+
+
+def _unstated(lines: tuple[str, ...], artefact: ArtefactFacts) -> str | None:
+    """The key of ``[artefact]`` without which there is no uncertainty."""
+    if lines == FORM_LINES:
+        key = artefact.form_key
+        return key if key is not None and not getattr(artefact, key) else None
+    keys = [value.u_key for value in artefact.certified_values if value.u_key]
+    known = any(getattr(artefact, key, None) for key in keys)
+    return None if known or not keys or lines == REPEAT_LINES or not artefact.traced else keys[0]
+
+
+STANDARD = Standard(
+    NAME,
+    tuple(
+        Characteristic(
+            name,
+            name,
+            partial(decided, name=name),
+            unstated=partial(_unstated, lines),
+            asks=enough,
+            needs="u_repeat_um" if lines == REPEAT_LINES else None,
+            lines=lines,
+        )
+        for name, (_, _, lines) in FIGURES.items()
+    ),
+    (
+        say(
+            "No standard decides this figure: limit, rule and what a complete test consists of are the laboratory's own."
+        ),
+    ),
+)
