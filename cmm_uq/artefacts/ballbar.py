@@ -75,6 +75,13 @@ class Ballbar(Artefact):
     def set_up(self) -> Text:
         return say("Position of the bar")
 
+    def further_sections(self, result: Result) -> list[Section]:
+        """Of how the ends were found."""
+        return []
+
+    def further_results(self, result: Result) -> dict[str, Any]:
+        return {}
+
     def own_faults(self) -> Iterable[Effect]:
         return (temperature_of(self._facts, self.points),)
 
@@ -225,7 +232,8 @@ def _lengths(result: Result, bar: Ballbar) -> Lengths:
 def results(result: Result) -> dict[str, Any]:
     bar = cast("Ballbar", result.artefact)
     budget, second_way = budget_data(_budget(result, bar)), _second_way(result, bar)
-    return adjustment.distances_data(result, _lengths(result, bar), second_way, length_budget=budget)
+    data = adjustment.distances_data(result, _lengths(result, bar), second_way, length_budget=budget)
+    return {**data, **bar.further_results(result)}
 
 
 def _budget(result: Result, bar: Ballbar) -> Budget:
@@ -251,6 +259,8 @@ def _second_way(result: Result, bar: Ballbar) -> DistanceSolution | Text:
     size, ends, used = bar.sizes[0], bar.ends(), result.model.used
     if not size.certified:
         return say("The length of the bar is not certified.")
+    if any(one.role == "sought" for one in bar.sizes):
+        return say("The distance equations have no digitizer: they would take its offset in two attitudes for lengths.")
     try:
         found = solve_distances((ends[:, 1] - ends[:, 0])[used], (size.nominal * bar.expansion)[used])
         return replace(found, relative_length_u=hypot(size.sd / size.nominal, result.relative_doubt))
@@ -287,6 +297,7 @@ def sections(result: Result) -> list[Section]:
     return [
         Section(say("Lengths"), (plot, volume, _table(lengths, name))),
         Section(say("Budget of one length"), tuple(budget_blocks(say("the deviation of one length"), budget))),
+        *bar.further_sections(result),
         adjustment.section(result, _second_way(result, bar)),
     ]
 

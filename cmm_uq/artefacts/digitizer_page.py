@@ -22,6 +22,8 @@ from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.digitizer import three_alignment_offset
 from cmm_uq.maths.uncertainty.quantity import Quantity, alike, rounded
 
+MEANING = say("The mount lies at [U1 V1 W1] in the digitizer's frame u, v, w, whose origin is that of the scan plane.")
+
 _SAME_ATTITUDE = 0.01  # degrees within which an attitude is one of the source's three
 
 
@@ -38,12 +40,10 @@ class AttitudePose:
 
 
 @dataclass(frozen=True, eq=False)
-class DigitizerFigures:
-    result: Result
+class OffsetFigures:
+    """[U1 V1 W1] of whatever recording it was found from."""
 
-    @property
-    def digitizer(self) -> DigitizerArtefact:
-        return cast("DigitizerArtefact", self.result.artefact)
+    result: Result
 
     @property
     def offset(self) -> tuple[Quantity, ...]:
@@ -52,7 +52,8 @@ class DigitizerFigures:
     @cached_property
     def covariance(self) -> Floats:
         """(3, 3) of U1, V1, W1, mm²."""
-        columns = [i for i, u in enumerate(self.result.posterior.unknowns) if u.key[0] == ARTEFACT][:3]
+        sought = [(ARTEFACT, f"{name}_mm") for name in OFFSET]
+        columns = [i for i, u in enumerate(self.result.posterior.unknowns) if u.key in sought]
         return np.cov(self.result.values[:, columns], rowvar=False)
 
     @property
@@ -60,6 +61,37 @@ class DigitizerFigures:
         """(3, 3) of U1, V1, W1."""
         u = np.sqrt(np.diag(self.covariance))
         return np.asarray(self.covariance / np.outer(u, u))
+
+    def as_data(self) -> dict[str, Any]:
+        return {
+            "offset_mm": {name: quantity_data(one) for name, one in zip(OFFSET, self.offset, strict=True)},
+            "covariance_mm2": self.covariance.tolist(),
+            "correlation": self.correlation.tolist(),
+        }
+
+    def table(self, *further: Text) -> Table:
+        rows = []
+        for i, (name, quantity) in enumerate(zip(OFFSET, self.offset, strict=True)):
+            value, U, k = expanded(quantity)
+            rows.append((Verbatim(name), value, U, k, unit("mm"), *(signed(one, ".2f") for one in self.correlation[i])))
+        correlations = (say("Correlation with {name}", name=Verbatim(name)) for name in OFFSET)
+        columns = (
+            *text_columns(say("Component")), *figure_columns(say("Estimate"), say("U"), say("k")),
+            *text_columns(say("Unit")), *figure_columns(*correlations),
+        )  # fmt: skip
+        notes = (
+            MEANING,
+            say("U is the expanded uncertainty for a coverage probability of 95 %; k = U/u."),
+            *further,
+        )
+        return Table(say("Offset of the mount"), columns, tuple(rows), notes)
+
+
+@dataclass(frozen=True, eq=False)
+class DigitizerFigures(OffsetFigures):
+    @property
+    def digitizer(self) -> DigitizerArtefact:
+        return cast("DigitizerArtefact", self.result.artefact)
 
     @cached_property
     def sphere(self) -> tuple[float, ...]:
@@ -109,9 +141,7 @@ def results(result: Result) -> Mapping[str, Any]:
     direction, times = found.times
     return {
         "digitizer": {
-            "offset_mm": {name: quantity_data(one) for name, one in zip(OFFSET, found.offset, strict=True)},
-            "covariance_mm2": found.covariance.tolist(),
-            "correlation": found.correlation.tolist(),
+            **found.as_data(),
             "sphere_mm": list(found.sphere),
             "poses": [
                 {"pose": pose.measurement, **dict(zip(ANGLES, pose.angles_deg.tolist(), strict=True)),
@@ -126,9 +156,6 @@ def results(result: Result) -> Mapping[str, Any]:
     }  # fmt: skip
 
 
-MEANING = say("The mount lies at [U1 V1 W1] in the digitizer's frame u, v, w, whose origin is that of the scan plane.")
-
-
 def sections(result: Result) -> list[Section]:
     found = DigitizerFigures(result)
     return [
@@ -138,22 +165,8 @@ def sections(result: Result) -> list[Section]:
 
 
 def _offset(found: DigitizerFigures) -> Table:
-    rows = []
-    for i, (name, quantity) in enumerate(zip(OFFSET, found.offset, strict=True)):
-        value, U, k = expanded(quantity)
-        rows.append((Verbatim(name), value, U, k, unit("mm"), *(signed(one, ".2f") for one in found.correlation[i])))
-    correlations = (say("Correlation with {name}", name=Verbatim(name)) for name in OFFSET)
-    columns = (
-        *text_columns(say("Component")), *figure_columns(say("Estimate"), say("U"), say("k")),
-        *text_columns(say("Unit")), *figure_columns(*correlations),
-    )  # fmt: skip
     x, y, z = (signed(value, ".4f") for value in found.sphere)
-    notes = (
-        MEANING,
-        say("U is the expanded uncertainty for a coverage probability of 95 %; k = U/u."),
-        say("Centre of the reference sphere: ({x}, {y}, {z}) mm in the recorded frame.", x=x, y=y, z=z),
-    )
-    return Table(say("Offset of the mount"), columns, tuple(rows), notes)
+    return found.table(say("Centre of the reference sphere: ({x}, {y}, {z}) mm in the recorded frame.", x=x, y=y, z=z))
 
 
 def _assumed(digitizer: DigitizerArtefact) -> list[Block]:

@@ -39,13 +39,26 @@ def _kind(name: str, table: type[ArtefactFacts], artefact: str, begin: Beginning
     )
 
 
-BALLBAR = _kind("ballbar", ArtefactFacts, "ballbar:Ballbar", Beginning(
+class BallbarFacts(ArtefactFacts):
+    """Of a bar whose balls a laser digitizer scans: where that is mounted, and how round the balls are."""
+
+    carries_probe: ClassVar[bool] = True
+
+    offset_mm: Triple | None = None
+    """[U1, V1, W1] of the digitizer that scanned the balls, by its drawing or an earlier calibration; sought anew where the
+    two ends of the bars are seen in several attitudes."""
+    ball_form_um: Uncertainty = 0.0
+    """Largest less smallest diameter of the scanned balls, by their grade: 5.08 of grade 200."""
+
+
+BALLBAR = _kind("ballbar", BallbarFacts, "scanned_ballbar:observe", Beginning(
     title="Ballbar in twenty positions (ASME B89.4.1)",
     numbering="One measurement is one position of the bar; points 1 and 2 are the centres of its balls.",
     artefact={"name": "Ballbar", "length_mm": 400.0, "u_um": 0.5, "cte_per_k": 11.5e-6},
     conformity={"standard": "ASME B89.4.1-1997", "limit_um": 10.0, "rule": "ISO 14253-1"},
     test=circumstances(u_repeat_um=0.1), recorded=AT_20_C, plan={"repeats": 1},
-), BARS, LENGTHS)  # fmt: skip
+    further={"ball": "Which ball of its bar, 1 or 2, a point that a laser digitizer scanned is of."},
+), BARS, LENGTHS, page="ballbar")  # fmt: skip
 
 BRYAN = _kind("bryan", ArtefactFacts, "bryan:Bryan", Beginning(
     title="Bryan gauge, a bar swept about a fixed ball",

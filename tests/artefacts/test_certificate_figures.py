@@ -184,6 +184,7 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Placings, as found from the readings": lambda r: [[placing] for placing in r["placings"]],
     "The plate's own geometry": ball_places,
     "Offset of the mount": offset,
+    "Centres of the balls": lambda r: [[ball] for ball in r["balls"]],
     "The offset by other ways": offset_by_other_ways,
     "Every attitude": lambda r: [[pose] for pose in r["digitizer"]["poses"]],
     "Both directions, by ISO 230-2:2014": runs,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, foreign, say
-from cmm_uq.base.points import Floats, Ints, Points
+from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import Unit, unit
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.geometry.positioning import PositioningRuns
@@ -180,6 +180,11 @@ class Artefact(ABC):
     def recorded(self, points: Points, xyz: Floats) -> Points:
         """A recording ``points`` of it as it would be with the artefact's points indicated at ``xyz``, mm."""
         return points.at(xyz)
+
+    def tips(self) -> Mapping[str, Floats]:
+        """Offset of what measures from the mount, mm, at each point of the recording, where it is known: columns by name."""
+        names = (f"tip_{axis}_mm" for axis in AXES)
+        return {name: self.points.columns[name] for name in names if name in self.points.columns}
 
     def unread(self) -> NDArray[np.bool_]:
         """Observations (m,) along a coordinate that stood still to the last digit: nobody read it, and it has no noise."""

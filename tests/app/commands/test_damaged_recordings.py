@@ -82,14 +82,18 @@ def test_three_rows_are_too_few_for_any_artefact(example: str, tmp_path: Path) -
 
 
 @pytest.mark.long(but="plane-simulated")
-@pytest.mark.parametrize("example", [name for name in KINDS if not name.startswith(("iota", "bryan", "digitizer"))])
+@pytest.mark.parametrize(
+    "example", [name for name in KINDS if not name.startswith(("iota", "bryan", "digitizer", "optical"))]
+)
 def test_a_single_placing_is_diagnosed_by_its_points(example: str, tmp_path: Path) -> None:
     """No placing can be held out, so its points are, each with its repeats."""
     improvement = diagnose_read(read_job(job_with(example, one_place, tmp_path))).diagnosis.improvement
     assert np.isfinite([improvement.heldout_rms_before_um, improvement.heldout_rms_after_um]).all()
 
 
-@pytest.mark.parametrize("example", ["iota-1102-20C", "bryan-simulated", "digitizer-simulated"])
+@pytest.mark.parametrize(
+    "example", ["iota-1102-20C", "bryan-simulated", "digitizer-simulated", "optical-ballbar-simulated"]
+)
 def test_one_distance_or_attitude_determines_nothing(example: str, tmp_path: Path) -> None:
     job = job_with(example, one_place, tmp_path)
     with pytest.raises(CmmUqError):

@@ -261,8 +261,7 @@ def _with_probe(job: Job) -> Points:
     facts = job.facts.artefact
     if not facts.carries_probe or "tip_x_mm" in job.points.columns:
         return job.points
-    found = kind_of(job).observing("compensated")(facts, job.points, where=job.recording_path).points.columns
-    tips = {name: found[name] for name in (f"tip_{axis}_mm" for axis in AXES)}
+    tips = kind_of(job).observing("compensated")(facts, job.points, where=job.recording_path).tips()
     return replace(job.points, columns={**job.points.columns, **tips})
 
 
