@@ -1,0 +1,39 @@
+"""What a new job of a plate that is shifted and turned begins with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.base.points import AXES, Machine, Points
+from cmm_uq.jobs.beginning import Beginning
+
+SIDE, PITCH = 3, 150.0  # balls along a side of the plate, and their distance, mm
+
+# shift of the plate's middle along x and y, mm, and turn, °: enough to part the plate from the machine
+PLACINGS = ((0.0, 0.0, 0.0), (150.0, 0.0, 0.0), (0.0, 150.0, 0.0), (0.0, 0.0, 90.0))
+
+
+def placed_plate(machine: Machine) -> Points:
+    """A square plate of balls about the middle of the plane xy, in every placing."""
+    steps = PITCH * (np.arange(SIDE) - 0.5 * (SIDE - 1))
+    balls = np.column_stack([part.ravel() for part in np.meshgrid(steps, steps)])
+    middle = np.array([np.mean(machine.travel(axis)) for axis in AXES]) - machine.origin_mm
+    parts = []
+    for dx, dy, degrees in PLACINGS:
+        c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        flat = balls @ np.array([[c, s], [-s, c]]) + [dx - 25.0, dy - 25.0]
+        parts.append(np.column_stack([flat, np.zeros(len(flat))]) + middle)
+    count, n = len(balls), len(balls) * len(PLACINGS)
+    measurement, point = np.repeat(np.arange(n // count) + 1, count), np.tile(np.arange(count) + 1, n // count)
+    return Points(np.vstack(parts), measurement, point, np.ones(n, dtype=np.int64), machine)
+
+
+PLANE_SHIFTED = Beginning(
+    title="Self-calibration of a plane by shifting and turning an uncalibrated plate",
+    numbering="One measurement is one placing of the plate; its points are the balls.",
+    artefact={
+        "name": "Ball plate, uncalibrated but for its diagonal", "plane": "xy",
+        "known": {"from": 1, "to": SIDE**2, "length_mm": round(PITCH * (SIDE - 1) * 2**0.5, 4), "u_um": 0.5},
+    },
+    effects=(), points=placed_plate,
+)  # fmt: skip
