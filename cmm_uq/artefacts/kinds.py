@@ -327,7 +327,7 @@ SHIFT = Kind(
     begin_also={"shift_plate": f"{_HERE}.shift.beginning:PLANE_SHIFTED"},
     check=f"{_HERE}.shift.analysis:refuse_unfit", own=f"{_HERE}.shift.analysis:OWN",
     refusal="a shift job cannot be {}: its machine error is a free function, no list of effects",
-    instead="cmm-uq report JOB estimates it",
+    instead="cmm-uq report JOB estimates it", tested=("linearity",),
 )  # fmt: skip
 
 
