@@ -50,8 +50,9 @@ def recording(times: int, radius: float) -> Points:
     return Points(np.vstack(xyz), numbers, np.concatenate(point), np.ones_like(numbers), Machine("bridge"), columns)
 
 
-def posterior(model: RecordingModel, random: np.random.Generator, part: float = 1.0) -> Floats:
-    """Draws (N, 3) of the offset, by importance: sizes of the noise from their prior, ln σ about the residuals' scatter.
+def posterior(model: RecordingModel, random: np.random.Generator, part: float = 1.0, columns: int = 3) -> Floats:
+    """Draws (N, columns) of the first unknowns, here the offset, by importance: sizes of the noise from their prior, ln σ
+    about the residuals' scatter.
 
     ``part`` of the usual number of draws.
     """
@@ -66,7 +67,7 @@ def posterior(model: RecordingModel, random: np.random.Generator, part: float = 
     log_weight = marginal.log_density(latent) + 0.5 * np.sum(latent[:, 1:] ** 2, axis=1) - about.logpdf(latent[:, 0])
     weight = np.exp(log_weight - log_weight.max())
     chosen = random.choice(proposed, kept, p=weight / weight.sum())
-    return marginal.draw(noise.sizes(latent[chosen]), random)[:, :3]
+    return marginal.draw(noise.sizes(latent[chosen]), random)[:, :columns]
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,6 +35,7 @@ EXAMPLES = {
     "plane": "plane-simulated",
     "digitizer": "digitizer-simulated",
     "axis_runs": "axis-runs-simulated",
+    "multilateration": "multilateration-simulated",
     "shift": "shift-simulated",
     "shift_plate": "shift-plate-simulated",
     "error_map": "iota-1102-maps",

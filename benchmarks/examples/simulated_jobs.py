@@ -237,6 +237,34 @@ def axis_runs() -> Simulated:
     )  # fmt: skip
 
 
+def multilateration() -> Simulated:
+    """Four stations, two of them again with the reflector on other arms, which show the roll, pitch and yaw of Z."""
+    steps = [np.linspace(low + 45.0, high - 45.0, count) for (low, high), count in zip(TRAVEL, (4, 4, 3), strict=True)]
+    targets = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    low, beside, behind, raised = ((-150, -150, -700), (1050, -150, -700), (-150, 1350, -700), (1050, 1350, -250))
+    down, along_x, along_y = ((0, 0, -120), (150, 0, -300), (0, 150, -300))
+    set_ups = ((low, down), (beside, down), (behind, down), (raised, down), (low, along_x), (raised, along_y))
+    count, tips = len(targets), np.repeat(np.array([tip for _, tip in set_ups], dtype=np.float64), len(targets), axis=0)
+    xyz, measurement = np.tile(targets, (len(set_ups), 1)), np.repeat(np.arange(len(set_ups)) + 1, count)
+    away = xyz + tips - np.repeat([place for place, _ in set_ups], count, axis=0)
+    distance = np.linalg.norm(away, axis=1)
+    zero = distance.reshape(len(set_ups), -1).min(axis=1).round()  # of each station, its dead path
+    columns = {f"tip_{a}_mm": tips[:, i] for i, a in enumerate("xyz")} | {
+        "reading_mm": distance - np.repeat(zero, count)
+    }
+    curves = {"straightness_x_y": 5.0, "straightness_x_z": -3.0, "straightness_y_x": 2.0, "straightness_y_z": -4.0,
+              "straightness_z_x": 3.0, "straightness_z_y": -2.5}  # fmt: skip
+    turns = {"rotation_x_x": 4.0, "rotation_x_y": -3.0, "rotation_x_z": 6.0, "rotation_y_x": -4.0, "rotation_y_y": 2.5,
+             "rotation_y_z": 3.0, "rotation_z_x": -5.0, "rotation_z_y": 5.0, "rotation_z_z": 8.0}  # fmt: skip
+    truth = {**SCALE, **SQUARE, **curves, **turns}
+    return Simulated(
+        "multilateration-simulated", "Distances from four places of a tracking interferometer to a reflector on three arms",
+        {"kind": "multilateration", "name": "Tracking interferometer", "u_scale_um_per_m": 0.2},
+        recording(xyz, measurement, np.tile(np.arange(count) + 1, len(set_ups)), **columns), truth, list(truth), 0.4,
+        columns=tuple(columns), model="tolerances = { squareness_xy = 10.0, squareness_yz = 10.0 }\n",
+    )  # fmt: skip
+
+
 CONFORMITY_OF_RUNS = """
 [test_uncertainty]
 u_alignment_um = 0.2
@@ -315,7 +343,7 @@ def digitizer() -> Simulated:
 
 
 EXAMPLES = (
-    step_gauge, gauge_blocks, sphere, plate, plate_two_dates, bryan, axis_runs, triangle, plane, digitizer,
+    step_gauge, gauge_blocks, sphere, plate, plate_two_dates, bryan, axis_runs, multilateration, triangle, plane, digitizer,
 )  # fmt: skip
 
 
@@ -355,7 +383,7 @@ def _csv(example: Simulated, points: Points) -> str:
     return "\n".join(rows) + "\n"
 
 
-_DIGITS = {"reading_um": ".3f", "reading_arcsec": ".3f"}  # an instrument's display
+_DIGITS = {"reading_um": ".3f", "reading_arcsec": ".3f", "reading_mm": ".5f"}  # an instrument's display
 
 
 def _toml(example: Simulated) -> str:

@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import Field
 
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import JobTable, Length, Number, Position, Triple, Uncertainty, key, required
-from cmm_uq.base.points import AXES, Machine
+from cmm_uq.base.points import AXES
 from cmm_uq.jobs.beginning import AT_20_C, SIX, Beginning, circumstances
 from cmm_uq.jobs.tables import artefact as tables
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertifiedValue, ReferencedFacts
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS, POSITIONING, Kind
-from cmm_uq.machine.physics.error_map import COLUMNS
 
 _HERE = "cmm_uq.artefacts"
 # figures that a laboratory may decide by its own rule
@@ -222,27 +220,38 @@ DIGITIZER = _kind("digitizer", ReferenceSphereFacts, "digitizer:DigitizerArtefac
 READ, TURN = (tuple(f"{name}_{a}" for a in AXES) for name in ("read", "turn"))
 
 
-class AxisRunsFacts(ArtefactFacts):
-    """What reads along the runs: a laser interferometer, straightness or angular optics, a level, a straightedge."""
+class InterferometerFacts(ArtefactFacts):
+    """What reads displacements of optics on the ram."""
 
     certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
 
     u_scale_um_per_m: Uncertainty | None = None
-    """Standard uncertainty of a displacement along the travel, per metre: wavelength, alignment, stability; without it the
+    """Standard uncertainty of a displacement along the beam, per metre: wavelength, alignment, stability; without it the
     instrument's scale stays free."""
     optics_mm: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
     """Offset of the moving optics from the end of the ram, along x, y, z, by which rotations reach it; columns tip_x_mm,
     tip_y_mm, tip_z_mm of the recording go before it."""
-    arm_mm: Length = key(100.0, "Arm over which a rotation is read: distance of two retroreflectors, base of a level.")
-    zero_each_repeat: bool = key(False, "Whether the instrument was set to zero before each repeat, and not once.")
     air_corrected: bool = True
     """Whether displacements are corrected for the refractive index of air already; else they are, from 20 °C, 1013.25 hPa and
     50 % to `temp_air_c`, `pressure_hpa`, `humidity_pct`."""
-    dead_path_mm: Uncertainty = key(0.0, "Path in air between interferometer and zero, where air is not corrected for.")
 
     @property
     def traced(self) -> bool:
         return self.u_scale_um_per_m is not None
+
+
+class AxisRunsFacts(InterferometerFacts):
+    """What reads along the runs: a laser interferometer, straightness or angular optics, a level, a straightedge."""
+
+    arm_mm: Length = key(100.0, "Arm over which a rotation is read: distance of two retroreflectors, base of a level.")
+    zero_each_repeat: bool = key(False, "Whether the instrument was set to zero before each repeat, and not once.")
+    dead_path_mm: Uncertainty = key(0.0, "Path in air between interferometer and zero, where air is not corrected for.")
+
+
+class MultilaterationFacts(InterferometerFacts):
+    """The tracking interferometer."""
+
+    dead_path_drifts: bool = key(False, "Whether the dead path of each station may drift, in proportion to `time_s`.")
 
 
 _RUNS = f"{_HERE}.axis_runs"
@@ -272,6 +281,28 @@ AXIS_RUNS = Kind(
         noise_um=0.3,
     ),
     tested=(POSITIONING,),
+)
+
+
+_STATIONS = f"{_HERE}.multilateration"
+MULTILATERATION = Kind(
+    "multilateration",
+    MultilaterationFacts,
+    f"{_STATIONS}.artefact:Multilateration",
+    f"{_STATIONS}.plan:SCREENING",
+    f"{_STATIONS}.plan:PLANNING",
+    f"{_STATIONS}.page:PAGE",
+    Beginning(
+        title="Distances from four stations of a tracking interferometer",
+        numbering="One measurement is one station with one reflector; its points are the targets, numbered by place.",
+        artefact={"name": "Tracking interferometer", "u_scale_um_per_m": 0.2, "optics_mm": [0.0, 0.0, -120.0]},
+        plan={"grid": [4, 4], "repeats": 1},
+        columns={
+            "reading_mm": "Distance by the interferometer from a zero that is the same for the whole measurement."
+        },
+        further={f"tip_{a}_mm": "" for a in AXES},
+        noise_um=0.3,
+    ),
 )
 
 
@@ -327,7 +358,7 @@ SHIFT = Kind(
     begin_also={"shift_plate": f"{_HERE}.shift.beginning:PLANE_SHIFTED"},
     check=f"{_HERE}.shift.analysis:refuse_unfit", own=f"{_HERE}.shift.analysis:OWN",
     refusal="a shift job cannot be {}: its machine error is a free function, no list of effects",
-    instead="cmm-uq report JOB estimates it", tested=("linearity",),
+    instead="cmm-uq report JOB estimates it",
 )  # fmt: skip
 
 
@@ -338,39 +369,14 @@ class ErrorMapFacts(ArtefactFacts):
     certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
 
 
-TEMPERATURES = (20.0, 25.0, 30.0)
-EXPANSION_UM_PER_M_K = 8.0  # of the scales, so that the maps differ by temperature alone
-STEPS, NOISE = 20, 0.2  # steps over each axis, and standard deviation of every figure, µm or ″
-
-
-def maps(machine: Machine) -> dict[str, bytes]:
-    """One map at each temperature, simulated."""
-    random, files = np.random.default_rng(1), {}
-    for temperature in TEMPERATURES:
-        lines = ["# simulated by cmm-uq new: put in the maps of your machine", f"axis,position_mm,{','.join(COLUMNS)}"]
-        for axis in machine.axes:
-            low, high = machine.travel(axis)
-            for position in np.linspace(low, high, STEPS + 1):
-                figures = random.normal(0.0, NOISE, len(COLUMNS)) * (position != low)
-                grown = EXPANSION_UM_PER_M_K * (temperature - 20.0) * (position - low) / 1000.0
-                figures[machine.axes.index(axis)] += grown
-                lines.append(",".join((axis, f"{position:g}", *(f"{figure:.2f}" for figure in figures))))
-        files[f"error_map_{temperature:g}C.csv"] = ("\n".join(lines) + "\n").encode()
-    return files
-
-
 ERROR_MAP = Kind(
     "error_map", ErrorMapFacts,
-    begin=Beginning(
-        title="Error maps of a machine at several temperatures",
-        numbering="There is no recording: each map is a file under [machine] error_map.",
-        effects=("thermal_scale_x", "thermal_scale_y", "thermal_scale_z"), files=maps, command="diagnose",
-        machine={"error_map": [{"file": f"error_map_{t:g}C.csv", "temperature_c": t} for t in TEMPERATURES]},
-    ),
+    begin=f"{_HERE}.error_maps.beginning:BEGINNING",
     check=f"{_HERE}.error_maps.diagnosis:refuse_unfit", own=f"{_HERE}.error_maps.page:OWN",
     refusal="error maps cannot be {}: they are free functions, no points of an artefact",
     instead="cmm-uq diagnose JOB compares them with each other",
 )  # fmt: skip
 BUILT_IN = {kind.name: kind for kind in (
     BALLBAR, BRYAN, STEP_GAUGE, GAUGE_BLOCKS, PLATE, TRIANGLE, SPHERE, PLANE, SHIFT, ERROR_MAP, DIGITIZER, AXIS_RUNS,
+    MULTILATERATION,
 )}  # fmt: skip

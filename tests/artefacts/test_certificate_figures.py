@@ -11,6 +11,7 @@ from decimal import Decimal
 from itertools import chain
 from typing import Any
 
+import numpy as np
 import pytest
 
 from cmm_uq.app.commands.report import outcome_of
@@ -145,6 +146,18 @@ def targets(measurement: int) -> Callable[[Results], list[Record]]:
 RUNS = [f"{axis}{kind}{about}" for axis in "xyz" for kind in "tr" for about in "xyz"][:-1]
 """Of the simulated runs, in their order; nothing reads the roll of Z."""
 
+
+def stations(results: Results) -> list[Record]:
+    """Of each station its place, the largest U of its coordinates, dead path, readings and residual."""
+    return [[one | {"U_position_um": [max(one["U_position_um"])]}] for one in results["stations"]]
+
+
+def of_targets(results: Results) -> list[Record]:
+    """Root mean squares along each axis of what is told of every target."""
+    names, each = ("error_um", "left_um", "U_um"), results["targets"]["each"]
+    return [[{name: float(np.sqrt(np.mean([one[name][i] ** 2 for one in each]))) for name in names}] for i in range(3)]
+
+
 STATED = (
     "ASME B89.4.1-1997, volumetric performance",
     "ISO 10360-2:2009, E0",
@@ -188,6 +201,8 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "The offset by other ways": offset_by_other_ways,
     "Every attitude": lambda r: [[pose] for pose in r["digitizer"]["poses"]],
     "Both directions, by ISO 230-2:2014": runs,
+    "Stations": stations,
+    "Errors of the targets along each axis": of_targets,
     "Each direction by itself": runs,
     **{f"Measurement {i}: {name}": targets(i) for i, name in enumerate(RUNS, 1)},
     **{f"All values decided by ISO 230-2:2014, {one}": decided_as(one) for one in "AB"},

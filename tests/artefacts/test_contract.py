@@ -37,7 +37,7 @@ EXAMPLE = {
     "ballbar": "iota-1102-20C", "error_map": "iota-1102-maps", "bryan": "bryan-simulated", "shift": "shift-simulated",
     "step_gauge": "step-gauge-simulated", "gauge_blocks": "gauge-blocks-simulated", "plate": "plate-simulated",
     "triangle": "triangle-simulated", "sphere": "sphere-simulated", "plane": "plane-simulated",
-    "digitizer": "digitizer-simulated", "axis_runs": "axis-runs-simulated",
+    "digitizer": "digitizer-simulated", "axis_runs": "axis-runs-simulated", "multilateration": "multilateration-simulated",
 }  # fmt: skip
 OUTSIDE = "tracker_length"
 PLUGINS = {OUTSIDE: {"outside-kinds": "0.1.0"}}

@@ -24,8 +24,7 @@ from cmm_uq.certificate.clauses import clauses_data, formal_warnings
 from cmm_uq.certificate.document import Document
 from cmm_uq.certificate.origin import posterior_file
 from cmm_uq.certificate.result import Outcome, OwnAnalysis, Recipe
-from cmm_uq.certificate.sections.conformity import conformity_section
-from cmm_uq.certificate.sections.results import as_found_data, as_found_section, headlines, overview_of
+from cmm_uq.certificate.sections.results import as_found_data, as_found_section
 from cmm_uq.certificate.wording import Summary, figure_row
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.ensembles import Progress
@@ -56,13 +55,7 @@ def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
         )
     warned = (*told, *formal_warnings(job))
     figures = tuple(figure_row(name, quantity) for _, _, name, quantity in left)
-    short = Summary(
-        page.measured(found),
-        day(job.facts.job.date),
-        headlines(found),
-        figures,
-        warnings=warned,
-    )
+    short = Summary(page.measured(found), day(job.facts.job.date), figures=figures, warnings=warned)
     draws, table = posterior_file(found.draws, job.origin), table_file(job)
     results = page.shift_results(found) | as_found_data(job) | clauses_data(job) | found.stating.data()
     results["posterior"] = draws.entry
@@ -70,15 +63,14 @@ def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
 
     def certificate() -> Document:
         sections = page.sections(found)
-        sections[1:1] = [conformity_section(found.statements), as_found_section(job, left)]
+        sections.insert(1, as_found_section(job, left))
         produced_by = say(
             "cmm-uq {version}, {sampler}, seed {seed}",
             version=Verbatim(__version__), sampler=Verbatim(found.estimate.chains.sampler), seed=found.estimate.seed,
         )  # fmt: skip
-        overview = overview_of(found)
-        return certificate_of(job, sections, tuple(told), produced_by, tuple(names(files)), overview)
+        return certificate_of(job, sections, tuple(told), produced_by, tuple(names(files)))
 
-    return Outcome(found, certificate, results, short, warned, files, draws=found.draws, verdicts=found.verdicts)
+    return Outcome(found, certificate, results, short, warned, files, draws=found.draws)
 
 
 OWN = OwnAnalysis(report=Recipe(analyse, outcome))

@@ -1,0 +1,219 @@
+"""Multilateration: a tracking interferometer reads how far a reflector on the ram is, from one station after another.
+
+A reading is the distance of the reflector from the station, less a dead path. Where a station stands and its dead path are
+free, so that neither a motion of the frame nor another zero is an error of the machine. The machine's positions, corrected
+by its errors, stand for targets that nobody knows: one observation is what is left of one distance (Schwenke et al. 2005).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.artefacts.kinds import MultilaterationFacts
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, say
+from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.base.units import HOUR, METRE, MICROMETRE, unit
+from cmm_uq.machine.model.artefact import Artefact, Placings, Size
+from cmm_uq.machine.model.recorded import columns_needed, place
+from cmm_uq.machine.physics.effects.drives import index_change
+from cmm_uq.maths.inference.linear_model import Freedoms
+
+# the recorded column; and that of the artefact's own points: they are where the machine would stand if just that were read
+READING, IDEAL = "reading_mm", "_ideal_reading_mm"
+LEAST = 6  # targets of a station: its place, its dead path, a constant of the first solution, and one to see it by
+_ROUNDS, _SETTLED = 30, 1e-9  # mm
+_DEGENERATE = (
+    1e-5  # singular value, over that of a spread of one, below which targets do not say where a station stands
+)
+_SAME_MM = 1e-3
+_STRAY_MM, _STRAY_RATIO = (
+    0.5,
+    5e-3,
+)  # rms misfit that no machine's errors explain: so many mm, and so much of the volume
+
+
+def first_equations(xyz: Floats, readings: Floats) -> tuple[Floats, Floats]:
+    """Linear ones (n, 5) of a station's place S, its dead path L and a constant: |p|² − d² = 2p·S + 2dL + (L² − |S|²)."""
+    design = np.column_stack([2 * xyz, 2 * readings, np.ones(len(readings))])
+    return design, np.sum(xyz**2, axis=1) - readings**2
+
+
+def first_station(xyz: Floats, readings: Floats) -> Floats | None:
+    """Place and dead path (4,) of a station that reads targets (n, 3), mm; ``None`` where they do not say it."""
+    middle, zero = xyz.mean(axis=0), float(readings.mean())
+    size = max(float(np.abs(xyz - middle).max()), _SAME_MM)
+    design, given = first_equations((xyz - middle) / size, (readings - zero) / size)
+    if len(design) < design.shape[1] or np.linalg.svd(design, compute_uv=False)[-1] < _DEGENERATE * np.sqrt(
+        len(design)
+    ):
+        return None
+    found = np.linalg.lstsq(design, given, rcond=None)[0]
+    return np.append(size * found[:3] + middle, size * found[3] - zero)
+
+
+def nearest_station(xyz: Floats, readings: Floats, drift: Floats, start: Floats) -> Floats:
+    """Place, dead path and drift (4 + j,) that suit readings (n,) at targets (n, 3) best: Gauss–Newton.
+
+    ``drift`` (n, j): what a distance grows by for one mm of drift.
+    """
+    found = np.append(start[:4], np.zeros(drift.shape[1]))
+    for _ in range(_ROUNDS):
+        away = xyz - found[:3]
+        distance = np.maximum(np.linalg.norm(away, axis=1), _SETTLED)
+        off = distance - (readings + found[3] + drift @ found[4:])
+        design = np.column_stack([away / distance[:, None], np.ones(len(away)), drift])
+        step = np.linalg.lstsq(design, off, rcond=None)[0]
+        found = found + step
+        if np.abs(step).max() < _SETTLED:
+            break
+    return np.asarray(found, dtype=np.float64)
+
+
+class Multilateration(Artefact):
+    """One observation a reading; one measurement is one station with one reflector.
+
+    ``facts`` what the job says of the interferometer; ``points`` the recording, or the points of such an artefact, displaced.
+    """
+
+    kind = "multilateration"
+    title = say("Tracking interferometer")
+
+    def __init__(self, facts: MultilaterationFacts, points: Points, *, where: str | None = None) -> None:
+        self._facts, count = facts, len(points)
+        self.stations = Placings.of(points.measurement)
+        self.drift = np.zeros((count, 0))
+        if facts.dead_path_drifts:
+            hours = columns_needed(points, ("time_s",), "drifting dead path", where) / HOUR
+            self.drift = hours - self.stations.means(hours)
+        if IDEAL not in points.columns:
+            points = self._with_ideal(points, where)
+        self.points, self.measurement, self.repeat = points, points.measurement, points.repeat
+        self.rows, self.noise_scale = np.arange(count)[:, None], np.ones(count)
+        self._known = (np.zeros((0, 3)), np.zeros((0, 3)))
+        ideal = points.columns[IDEAL]
+        self.found = self._nearest(points.xyz, ideal, self._first(points, ideal, where))
+        self.distances = ideal + self.found[self.stations.index, 3]
+        longest, stated = float(self.distances.max()), facts.u_scale_um_per_m
+        sd = np.inf if stated is None else MICROMETRE * stated * longest / METRE
+        title = say("Longest distance by the interferometer")
+        self.sizes = (Size("length_mm", title, unit("mm"), longest, sd, say("longest distance")),)
+
+    @property
+    def set_up(self) -> Text:
+        return say("Station of the interferometer")
+
+    def _with_ideal(self, points: Points, where: str | None) -> Points:
+        """The artefact's own points of a recording: moved along their beams by what each reading is off."""
+        readings = columns_needed(points, (READING,), "tracking interferometer", where)[:, 0]
+        offset = np.array(self._facts.optics_mm)
+        tips = np.column_stack(
+            [points.columns.get(f"tip_{a}_mm", np.full(len(points), offset[i])) for i, a in enumerate(AXES)]
+        )
+        self._refuse(
+            points,
+            np.any(np.abs(tips - self.stations.means(tips)) > _SAME_MM, axis=1),
+            where,
+            "has several offsets of the reflector",
+            "Number each as a measurement of its own",
+        )
+        start = self._first(points, readings, where)
+        if not self._facts.air_corrected:
+            path = np.linalg.norm(points.xyz - np.array(start)[self.stations.index, :3], axis=1)
+            readings = readings - index_change(points) * path
+        found = self._nearest(points.xyz, readings, start)
+        away = points.xyz - found[self.stations.index, :3]
+        distance = np.linalg.norm(away, axis=1)
+        off = readings + found[self.stations.index, 3] - distance
+        rms = np.sqrt(self.stations.means(off**2))
+        self._refuse(
+            points,
+            rms > _STRAY_MM + _STRAY_RATIO * float(np.linalg.norm(np.ptp(points.xyz, axis=0))),
+            where,
+            f"readings are {rms.max():.3g} mm (rms) off what one station can read at these positions",
+            f"Look for another unit or sign of {READING} (mm, growing with the distance), or rows of another station",
+        )
+        columns = {name: values for name, values in points.columns.items() if name != READING}
+        columns |= {IDEAL: readings - off, **{f"tip_{a}_mm": tips[:, i] for i, a in enumerate(AXES)}}
+        machine = replace(points.machine, tip_on_every_carriage=True)
+        return replace(points, xyz=points.xyz - (off / distance)[:, None] * away, machine=machine, columns=columns)
+
+    def _first(self, points: Points, readings: Floats, where: str | None) -> list[Floats]:
+        """About where stations stand."""
+        found = []
+        for number, rows in zip(self.stations.numbers, self.stations.rows, strict=True):
+            own, count = points.measurement == number, len(np.unique(np.round(points.xyz[rows] / _SAME_MM), axis=0))
+            more = "Read more of them, spread over all three axes, or leave the station out"
+            self._refuse(
+                points,
+                own & (count < LEAST),
+                where,
+                f"has {count} targets, and a station's place and dead path need {LEAST}",
+                more,
+            )
+            start = first_station(points.xyz[rows], readings[rows])
+            if start is None:
+                self._refuse(
+                    points, own, where, "has targets in one plane, that do not say where its station stands", more
+                )
+            else:
+                found.append(start)
+        return found
+
+    def _refuse(self, points: Points, rows: NDArray[np.bool_], where: str | None, problem: str, fix: str) -> None:
+        if np.any(rows):
+            number = points.measurement[np.argmax(rows)]
+            raise CmmUqError(f"measurement {number} {problem}", where=place(points, rows, where), fix=fix)
+
+    def _nearest(self, xyz: Floats, distances: Floats, start: list[Floats] | Floats) -> Floats:
+        """Place, dead path and drift of every station (q, 4 + j)."""
+        rows = self.stations.rows
+        return np.array(
+            [nearest_station(xyz[i], distances[i], self.drift[i], s) for i, s in zip(rows, start, strict=True)]
+        )
+
+    def at(self, xyz: Floats, size: float) -> Floats:
+        """The same of targets that are truly at ``xyz`` (n, 3), the longest distance being ``size``; of no recorded zero."""
+        return self._nearest(
+            xyz, self.distances * size / self.sizes[0].nominal, self.found * [1, 1, 1, 0, 0][: self.found.shape[1]]
+        )
+
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        found = self.at(true_xyz, sizes[0])[self.stations.index]
+        away = true_xyz - found[:, :3]
+        wanted = (
+            self.distances * sizes[0] / self.sizes[0].nominal + found[:, 3] + np.sum(self.drift * found[:, 4:], axis=1)
+        )
+        return np.asarray(found[:, :3] + away * (wanted / np.linalg.norm(away, axis=1))[:, None])
+
+    def beams(self, xyz: Floats) -> Floats:
+        """Unit vectors (n, 3) from the stations, kept for points that nobody can change."""
+        if self._known[0] is not xyz:
+            away = xyz - self.at(xyz, self.sizes[0].nominal)[self.stations.index, :3]
+            away /= np.linalg.norm(away, axis=1, keepdims=True)
+            if xyz.flags.writeable:
+                return away
+            self._known = xyz, away
+        return self._known[1]
+
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        return np.asarray(np.einsum("ni,nik->nk", self.beams(xyz), displacement), dtype=np.float64)
+
+    def size_change(self) -> Floats:
+        return np.asarray(self.distances[:, None] / self.sizes[0].nominal)
+
+    def placing(self, xyz: Floats) -> Freedoms:
+        """Of each station its place, its dead path and, where it may, how that drifts."""
+        return self.stations.columns(np.column_stack([self.beams(xyz), np.ones(len(xyz)), self.drift]))
+
+    def recorded(self, points: Points, xyz: Floats) -> Points:
+        """The machine stands at its targets, and the interferometer reads how far they truly are."""
+        stations, dead = self.found[self.stations.index, :3], self.found[self.stations.index, 3]
+        away = points.xyz - stations
+        away *= (self.distances / np.linalg.norm(away, axis=1))[:, None]
+        path = np.linalg.norm(away + points.xyz - xyz, axis=1)
+        change = 0.0 if self._facts.air_corrected else index_change(points) * path
+        return replace(points, columns={**points.columns, READING: path - dead + change})
