@@ -265,6 +265,62 @@ def multilateration() -> Simulated:
     )  # fmt: skip
 
 
+def circles() -> Simulated:
+    """Circles in three planes, both senses, and runs along both legs of a square in the plane of X and Y."""
+    angle = np.radians(np.arange(0, 360, 5))
+    angle, way = np.concatenate([angle, angle[::-1]]), np.repeat([1.0, -1.0], len(angle))
+    parts: list[tuple[Floats, Floats, Floats]] = []  # places, what is read, travel
+    for axis in range(3):
+        u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+        outward = np.outer(np.cos(angle), u) + np.outer(np.sin(angle), v)
+        tangent = np.outer(np.cos(angle), v) - np.outer(np.sin(angle), u)
+        parts.append((MIDDLE + 150 * outward, outward, way[:, None] * tangent))
+    there = np.tile(np.concatenate([np.linspace(-250, 250, 6), np.linspace(250, -250, 6)]), 2)
+    sense = np.tile(np.repeat([1.0, -1.0], 6), 2)
+    for u, v in (np.eye(3)[[0, 1]], np.eye(3)[[1, 0]]):
+        parts.append((MIDDLE + np.outer(there, u), np.tile(v, (24, 1)), np.outer(sense, u)))
+    xyz, read, travel = (np.vstack(each).round(6) for each in zip(*parts, strict=True))
+    count = [len(part[0]) for part in parts]
+    numbers = [np.repeat(np.arange(1, 6), count), np.concatenate([*(np.arange(1, 145),) * 3, *(np.arange(1, 13),) * 4])]
+    repeats = np.concatenate([np.ones(3 * 144, dtype=np.int64), np.tile(np.repeat([1, 2], 12), 2)])
+    columns = {
+        f"{name}_{a}": of[:, i] for name, of in (("read", read), ("approach", travel)) for i, a in enumerate("xyz")
+    }
+    columns = {n: np.sign(c.round(3)) if n.startswith("approach") else c for n, c in columns.items()}
+    columns |= {f"turn_{a}": np.zeros(len(xyz)) for a in "xyz"}
+    columns |= {"reading_um": np.zeros(len(xyz)), "square": np.repeat([0.0, 1.0], [3 * 144, 48])}
+    truth = {**SCALE, **SQUARE, "hysteresis_x": 3.0, "hysteresis_y": -1.5}
+    return Simulated(
+        "circles-simulated", "Circles in three planes by telescoping ballbar, and runs along the legs of a square",
+        {"kind": "axis_runs", "name": "Telescoping ballbar, 150 mm, and granite square", "u_bar_um": 0.4,
+         "square_arcsec": 0.8, "u_square_arcsec": 0.3}, recording(xyz, *numbers, repeats, **columns), truth, list(truth), 0.3,
+        columns=tuple(columns), extra=CONFORMITY_OF_CIRCLES,
+    )  # fmt: skip
+
+
+CONFORMITY_OF_CIRCLES = """
+[test_uncertainty]
+u_repeat_um = 0.1
+
+[test_uncertainty.negligible]
+temperature = { by = "Laboratory", reason = "simulated at 20 °C" }
+alignment = { by = "Laboratory", reason = "the bar turns about its own centre" }
+
+[rated_conditions]
+declared = { by = "the simulation", reason = "the machine was simulated at 20 °C" }
+
+[[conformity]]
+standard = "ISO 230-4:1996"
+characteristic = "G"
+limit_um = 20.0
+rule = "ISO 14253-1"
+
+[[conformity]]
+standard = "ISO 230-4:1996"
+characteristic = "H"
+limit_um = 4.0
+rule = "ISO 14253-1"
+"""
 CONFORMITY_OF_RUNS = """
 [test_uncertainty]
 u_alignment_um = 0.2
@@ -343,7 +399,8 @@ def digitizer() -> Simulated:
 
 
 EXAMPLES = (
-    step_gauge, gauge_blocks, sphere, plate, plate_two_dates, bryan, axis_runs, multilateration, triangle, plane, digitizer,
+    step_gauge, gauge_blocks, sphere, plate, plate_two_dates, bryan, axis_runs, circles, multilateration, triangle, plane,
+    digitizer,
 )  # fmt: skip
 
 

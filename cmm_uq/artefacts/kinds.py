@@ -7,13 +7,14 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
+from cmm_uq.artefacts.axis_runs.kind import APPROACHES, AXIS_RUNS, InterferometerFacts
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import JobTable, Length, Number, Position, Triple, Uncertainty, key, required
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.beginning import AT_20_C, SIX, Beginning, circumstances
 from cmm_uq.jobs.tables import artefact as tables
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertifiedValue, ReferencedFacts
-from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS, POSITIONING, Kind
+from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS, Kind
 
 _HERE = "cmm_uq.artefacts"
 # figures that a laboratory may decide by its own rule
@@ -77,7 +78,7 @@ def _gauge(name: str, class_: str, effects: tuple[str, ...], further: tuple[str,
     return Kind(name, ReferencedFacts, observe, screen, plan, page, begin, tested=(LENGTHS, *ERRORS))
 
 
-APPROACHES, NORMALS = tuple(f"approach_{a}" for a in AXES), ("nx", "ny", "nz")
+NORMALS = ("nx", "ny", "nz")
 STEP_GAUGE = _gauge(
     "step_gauge", "StepGauge", ("hysteresis_x", "hysteresis_y", "hysteresis_z"), APPROACHES,
     title="Step gauge on seven lines (ISO 10360-2)", artefact={"name": "Step gauge", "u_um": 0.4, "cte_per_k": 11.5e-6},
@@ -217,71 +218,10 @@ DIGITIZER = _kind("digitizer", ReferenceSphereFacts, "digitizer:DigitizerArtefac
 ), "closure", page="digitizer_page")  # fmt: skip
 
 
-READ, TURN = (tuple(f"{name}_{a}" for a in AXES) for name in ("read", "turn"))
-
-
-class InterferometerFacts(ArtefactFacts):
-    """What reads displacements of optics on the ram."""
-
-    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
-
-    u_scale_um_per_m: Uncertainty | None = None
-    """Standard uncertainty of a displacement along the beam, per metre: wavelength, alignment, stability; without it the
-    instrument's scale stays free."""
-    optics_mm: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
-    """Offset of the moving optics from the end of the ram, along x, y, z, by which rotations reach it; columns tip_x_mm,
-    tip_y_mm, tip_z_mm of the recording go before it."""
-    air_corrected: bool = True
-    """Whether displacements are corrected for the refractive index of air already; else they are, from 20 °C, 1013.25 hPa and
-    50 % to `temp_air_c`, `pressure_hpa`, `humidity_pct`."""
-
-    @property
-    def traced(self) -> bool:
-        return self.u_scale_um_per_m is not None
-
-
-class AxisRunsFacts(InterferometerFacts):
-    """What reads along the runs: a laser interferometer, straightness or angular optics, a level, a straightedge."""
-
-    arm_mm: Length = key(100.0, "Arm over which a rotation is read: distance of two retroreflectors, base of a level.")
-    zero_each_repeat: bool = key(False, "Whether the instrument was set to zero before each repeat, and not once.")
-    dead_path_mm: Uncertainty = key(0.0, "Path in air between interferometer and zero, where air is not corrected for.")
-
-
 class MultilaterationFacts(InterferometerFacts):
     """The tracking interferometer."""
 
     dead_path_drifts: bool = key(False, "Whether the dead path of each station may drift, in proportion to `time_s`.")
-
-
-_RUNS = f"{_HERE}.axis_runs"
-AXIS_RUNS = Kind(
-    "axis_runs",
-    AxisRunsFacts,
-    f"{_RUNS}.artefact:AxisRuns",
-    f"{_RUNS}.plan:SCREENING",
-    f"{_RUNS}.plan:PLANNING",
-    f"{_RUNS}.page:PAGE",
-    Beginning(
-        title="Runs along three axes by laser interferometer and angular optics (ISO 230-2)",
-        numbering="One measurement is one quantity along one line; its points are the targets, again on the way back.",
-        artefact={"name": "Laser interferometer", "u_scale_um_per_m": 0.3},
-        effects=("scale_x", "scale_y", "scale_z", "hysteresis_x", "hysteresis_y", "hysteresis_z"),
-        plan={"repeats": 5},
-        recorded=AT_20_C,
-        columns={
-            "reading_um": "Displacement by the instrument less that of the target; 0 where a rotation is read.",
-            "reading_arcsec": "Rotation by the instrument, by the right hand; 0 where a displacement is read.",
-            **{f"read_{a}": f"Direction along which a displacement is read, its part along {a}." for a in AXES},
-            **{f"turn_{a}": f"Axis about which a rotation is read, its part along {a}." for a in AXES},
-        },
-        conformity={"standard": "ISO 230-2:2014", "limit_um": 10.0, "rule": "ISO 14253-1"},
-        test=circumstances(u_alignment_um=0.2, u_temperature_k=0.1, u_repeat_um=0.1),
-        further=dict.fromkeys((*APPROACHES, *(f"tip_{a}_mm" for a in AXES)), ""),
-        noise_um=0.3,
-    ),
-    tested=(POSITIONING,),
-)
 
 
 _STATIONS = f"{_HERE}.multilateration"

@@ -129,7 +129,7 @@ def decided_as(characteristic: str) -> Callable[[Results], list[Record]]:
 
 def runs(results: Results) -> list[Record]:
     """Of each run its figures with U, and how often it was repeated."""
-    return [[run, len(run["drift_of_repeats"])] for run in results["runs"]]
+    return [[run, len(run["drift_of_repeats"])] for run in results["runs"] if "targets_mm" in run]
 
 
 def targets(measurement: int) -> Callable[[Results], list[Record]]:
@@ -204,8 +204,11 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Stations": stations,
     "Errors of the targets along each axis": of_targets,
     "Each direction by itself": runs,
+    "Circles, by ISO 230-4": lambda r: [[run] for run in r["runs"] if "angles_deg" in run],
     **{f"Measurement {i}: {name}": targets(i) for i, name in enumerate(RUNS, 1)},
+    **{f"Measurement {i}: {name}": targets(i) for i, name in ((4, "xty"), (5, "ytx"))},
     **{f"All values decided by ISO 230-2:2014, {one}": decided_as(one) for one in "AB"},
+    **{f"All values decided by ISO 230-4:1996, {one}": decided_as(one) for one in "GH"},
     **{f"All values decided by {name}": decided for name in STATED},
     **{f"Contributions to the uncertainty of the test value named, {name}": of_test_value for name in STATED},
 }  # fmt: skip

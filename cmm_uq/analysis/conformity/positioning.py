@@ -1,4 +1,4 @@
-"""ISO 230-2: figures of positioning against their limits, with the test uncertainty as ISO/TR 230-9 has it.
+"""ISO 230-2, -4 and -6: figures of axes, circles and diagonals against limits, with the test uncertainty of ISO/TR 230-9.
 
 The instrument's scale, alignment and temperature make readings wrong in proportion to the way from the first target;
 what changes between readings, each by itself. The figures are evaluated anew of draws of these; the machine's own scatter is
@@ -7,71 +7,99 @@ no part of it.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.analysis.conformity.standard import NOT_STATED, Characteristic, Test
-from cmm_uq.analysis.conformity.statement import Statement, least_favourable
-from cmm_uq.base.messages import say
+from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, REPORTED, Clause, Statement, least_favourable
+from cmm_uq.base.messages import Text, say
 from cmm_uq.base.units import METRE, MICROMETRE
 from cmm_uq.jobs.tables.conformity import Circumstances
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import POSITIONING
+from cmm_uq.maths.geometry.circular import CircularTest
 from cmm_uq.maths.geometry.positioning import MissingReadingError, PositioningRuns
 
 LINES = ("calibration", "temperature", "alignment", "repeat")
 _DRAWS = 2000
 REPEATS, LEAST_TARGETS, PER_METRE = 5, 5, 5.0  # runs in each direction, targets (ISO 230-2:2014, of axes up to 2 m)
+_APART = 5.0  # degrees between targets of a circle, at most: a path that is recorded as it goes has no targets
 _TITLES = {
     "A": say("bidirectional accuracy of positioning"),
     "E": say("bidirectional systematic deviation of positioning"),
     "R": say("bidirectional repeatability of positioning"),
     "B": say("reversal value"),
     "M": say("range of the mean bidirectional deviation"),
+    "Ed": say("bidirectional systematic deviation of diagonals"),
+    "Bd": say("reversal value of diagonals"),
+    "G": say("circular deviation"),
+    "H": say("circular hysteresis"),
+    "F": say("radial deviation"),
+    "G(b)": say("bidirectional circular deviation"),
+    "D": say("mean bidirectional radial deviation"),
 }
 
 
-def uncertainty_of_figures(runs: PositioningRuns, artefact: Artefact, under: Circumstances) -> dict[str, float]:
-    """Standard uncertainty of each figure of a run, µm, by what is stated of the test; none where nothing is."""
-    stated, size = under.uncertainty, artefact.sizes[0]
-    longest = float(np.ptp(runs.targets))
-    warm = abs(under.cte_per_k or 0.0) * stated.u_temperature_k * longest / MICROMETRE
-    scale = size.sd / size.nominal * longest / MICROMETRE if np.isfinite(size.sd) else 0.0
-    whole = float(np.linalg.norm([scale, warm, stated.u_alignment_um]))
-    if whole == 0 and stated.u_repeat_um == 0:
+def uncertainty_of_figures(runs: PositioningRuns, under: Circumstances) -> dict[str, float]:
+    """Standard uncertainty of each figure of a run, µm or ″, by what is stated of the test; none where nothing is."""
+    stated, growth = under.uncertainty, np.zeros(len(runs.targets)) if runs.growth is None else runs.growth
+    warm = abs(under.cte_per_k or 0.0) * stated.u_temperature_k * runs.length_mm / MICROMETRE
+    alignment, repeat = (stated.u_alignment_um, stated.u_repeat_um) if runs.length_mm else (0.0, 0.0)
+    whole = float(np.linalg.norm([runs.u_reference, warm, alignment]))
+    if whole == 0 and repeat == 0:
         return {}
     random = np.random.default_rng(np.random.SeedSequence(230, spawn_key=(2,)))
-    part = (runs.targets - runs.targets[0]) / longest
-    changes = whole * random.standard_normal((_DRAWS, 1, 1, 1)) * part[None, None, :, None]
-    changes = changes + stated.u_repeat_um * random.standard_normal((_DRAWS, *runs.x.shape))
+    changes = whole * random.standard_normal((_DRAWS, 1, 1, 1)) * growth[None, None, :, None]
+    changes = changes + repeat * random.standard_normal((_DRAWS, *runs.x.shape))
     return dict(runs.spread(changes))
 
 
-def positioning(test: Test, *, figure: str) -> Statement:
-    """The worst of all axes against the limit."""
+_BOTH = {"G": ("G↺", "G↻"), "F": ("Fmax", "Fmin")}  # figures of which the larger is decided
+_CIRCULAR = say(
+    "Evaluated by the definitions of ISO 230-4, of the path of each round by itself: the largest of all rounds."
+)
+_FORMULAS = say("Evaluated by the formulas of ISO 230-2:2014, with twice the standard uncertainty estimators.")
+Runs = Mapping[int, PositioningRuns]
+
+
+def axes(artefact: Artefact) -> Runs:
+    return {number: runs for number, runs in artefact.positionings().items() if runs.axis}
+
+
+def circles(artefact: Artefact) -> Runs:
+    return {number: runs for number, runs in artefact.positionings().items() if isinstance(runs, CircularTest)}
+
+
+def diagonals(artefact: Artefact) -> Runs:
+    found = artefact.positionings().items()
+    return {number: runs for number, runs in found if not runs.axis and not isinstance(runs, CircularTest)}
+
+
+def positioning(test: Test, *, figure: str, of: Callable[[Artefact], Runs], what: str, key: str) -> Statement:
+    """The worst of all against the limit."""
     try:
-        runs = test.artefact.positionings()
+        runs = of(test.artefact)
     except MissingReadingError as error:
         fix = "Record every target in every repeat of each direction, or leave the statement out"
         raise test.error(f"{error}: {test.facts.standard} needs one", fix=fix) from None
-    test.refuse_nothing_measured(bool(runs), "positioning in both directions")
+    test.refuse_nothing_measured(bool(runs), f"{what} in both directions")
     items = []
     for measurement, run in runs.items():
-        figures, spread = run.figures(), uncertainty_of_figures(run, test.artefact, test.circumstances)
-        if figure not in figures:
+        figures, spread = run.figures(), uncertainty_of_figures(run, test.circumstances)
+        own = [name for name in figures if name in (figure, figure.removesuffix("d")) or name in _BOTH.get(figure, ())]
+        if not own or not run.both:
             needs = "both directions, twice" if figure in "AR" else "both directions"
+            needs = f"{needs}, a full circle and u_bar_um in [artefact]" if figure in "DF" else needs
             fix = "Record them, or leave the statement out"
             raise test.error(f"measurement {measurement} has no {figure}, which needs {needs}", "characteristic", fix)
-        length = float(np.ptp(run.targets))
-        u = test.at_least(spread.get(figure, 0.0), length)
-        test.refuse_without_uncertainty(u, "u_scale_um_per_m")
-        items.append(
-            test.decided(
-                figures[figure], u, test.limit_um(length), signed=False, measurement=measurement, length_mm=length
-            )
-        )
+        value, u = max(abs(figures[name]) for name in own), max(spread.get(name, 0.0) for name in own)
+        u = test.at_least(u, run.length_mm)
+        test.refuse_without_uncertainty(u, key or "u_bar_um")
+        limit = test.limit_um(run.length_mm)
+        items.append(test.decided(value, u, limit, signed=False, measurement=measurement, length_mm=run.length_mm))
     worst = least_favourable(tuple(items))
     how = NOT_STATED
     if worst.u_um > 0:
@@ -80,21 +108,31 @@ def positioning(test: Test, *, figure: str) -> Statement:
             "changes between readings: {u:.2g} µm.",
             u=worst.u_um,
         )
-    remarks = [how, say("Evaluated by the formulas of ISO 230-2:2014, with twice the standard uncertainty estimators.")]
-    return test.stated(_TITLES[figure], say("axes"), tuple(items), remarks, signed=False)
+    remarks = [how, _CIRCULAR if of is circles else _FORMULAS]
+    items_of = say("circles") if of is circles else say("diagonals") if of is diagonals else say("axes")
+    return test.stated(_TITLES[figure], items_of, tuple(items), remarks, signed=False)
 
 
-def conditions(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
-    """Targets and runs of every axis that is there; a repeat that is another to the last digit is a copy of it."""
+def _enough(run: PositioningRuns) -> bool:
+    if isinstance(run, CircularTest):
+        return run.both and run.full and float(np.diff(run.targets).max()) <= _APART
+    return run.repeats >= REPEATS and len(run.targets) >= max(LEAST_TARGETS, PER_METRE * run.length_mm / METRE)
+
+
+def conditions(
+    artefact: Artefact, *, recorded: bool, of: Callable[[Artefact], Runs], what: Text
+) -> tuple[Condition, ...]:
+    """Targets and runs of everything that is there; a repeat that is another to the last digit is a copy of it."""
     try:
-        runs = artefact.positionings()
+        runs = of(artefact)
     except MissingReadingError:
         runs = {}
-    what = say("five runs in each direction, five targets a metre and five at least")
     few = []
+    if of is diagonals and len({tuple(np.round(run.travel, 2)) for run in runs.values()}) < 4:
+        few.append(say("{count} of the four body diagonals", count=len(runs)))
     for number, run in runs.items():
-        count, span = len(run.targets), float(np.ptp(run.targets)) / METRE
-        if run.repeats < REPEATS or count < max(LEAST_TARGETS, PER_METRE * span):
+        count = len(run.targets)
+        if not _enough(run):
             few.append(
                 say(
                     "measurement {number}: {repeats} runs, {targets} targets",
@@ -117,14 +155,101 @@ def conditions(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
     return (Condition(what, tuple(few) if runs else (what,)),)
 
 
-CHARACTERISTICS = tuple(
-    Characteristic(
-        name,
-        POSITIONING,
-        partial(positioning, figure=name),
-        conditions,
-        lines=LINES,
-        unstated=lambda artefact: None if getattr(artefact, "u_scale_um_per_m", None) else "u_scale_um_per_m",
+def _characteristics(
+    names: Sequence[str], of: Callable[[Artefact], Runs], what: str, asked: Text, key: str
+) -> tuple[Characteristic, ...]:
+    return tuple(
+        Characteristic(
+            name,
+            POSITIONING,
+            partial(positioning, figure=name, of=of, what=what, key=key),
+            partial(conditions, of=of, what=asked),
+            lines=LINES,
+            unstated=lambda artefact: None if not key or getattr(artefact, key, None) else key,
+        )
+        for name in names
     )
-    for name in _TITLES
+
+
+_RUNS = say("five runs in each direction, five targets a metre and five at least")
+_CIRCLE = say("a full circle in both senses, targets 5° apart at most")
+ISO_230_2 = _characteristics(["A", "E", "R", "B", "M"], axes, "positioning", _RUNS, "u_scale_um_per_m")
+ISO_230_6 = _characteristics(
+    ["Ed", "Bd"],
+    diagonals,
+    "diagonals",
+    say("four body diagonals, five runs in each direction, five targets a metre and five at least"),
+    "u_scale_um_per_m",
 )
+_OF_CIRCLES = partial(_characteristics, of=circles, what="circles", asked=_CIRCLE)  # only F and D rest on the radius
+ISO_230_4_1996 = (*_OF_CIRCLES(["G", "H"], key=""), *_OF_CIRCLES(["F"], key="u_bar_um"))
+ISO_230_4_2005 = (*_OF_CIRCLES(["G(b)"], key=""), *_OF_CIRCLES(["D"], key="u_bar_um"))
+
+_ISO_230_2 = (
+    Clause(
+        "scope",
+        say("scope"),
+        "Linear axes up to 2 m, both directions; of longer and of rotary axes the same formulas.",
+        "its publisher's abstract; 2 m: as commonly reported",
+    ),
+    Clause(
+        "targets_and_runs",
+        say("targets and runs"),
+        "Five runs in each direction; five targets a metre and five at least. "
+        "That they are not evenly spaced is not asked for.",
+        REPORTED,
+    ),
+    Clause(
+        "formulas", say("figures"), "A, E, R, B and M with twice the standard uncertainty estimators, n − 1.", REPORTED
+    ),
+    Clause(
+        "test_uncertainty",
+        say("test uncertainty"),
+        "Instrument, alignment, temperature and changes between readings, by "
+        "draws; the formulas of its annex are not used.",
+        CHOSEN,
+    ),
+    ITS_RULE,
+)
+
+_ISO_230_4 = (
+    Clause(
+        "scope",
+        say("scope"),
+        "Circles of two linear axes, both senses; circles of linear with rotary axes (edition of 2022) are not evaluated.",
+        "its publisher's abstract",
+    ),
+    Clause(
+        "targets",
+        say("targets and runs"),
+        "A full circle in both senses; of a path recorded as it goes, a reading every 5° at least.",
+        CHOSEN,
+    ),
+    Clause(
+        "figures",
+        say("figures"),
+        "G by the minimum zone of each sense, H between both senses, F about the least-squares centre (1996); G(b) and D "
+        "(2005). Diameter and feed, which the standard asks for beside them, are for the procedure to state.",
+        REPORTED,
+    ),
+    _ISO_230_2[-2],
+    ITS_RULE,
+)
+_ISO_230_6 = (
+    Clause("scope", say("scope"), "Body diagonals; face diagonals are evaluated, and not decided.", REPORTED),
+    Clause(
+        "targets_and_runs",
+        say("targets and runs"),
+        "Four diagonals, each with the runs and targets of ISO 230-2.",
+        CHOSEN,
+    ),
+    Clause("formulas", say("figures"), "Ed and Bd: E and B of ISO 230-2, the largest of the four.", REPORTED),
+    _ISO_230_2[-2],
+    ITS_RULE,
+)
+CLAUSES: Mapping[str, tuple[Clause, ...]] = {
+    "ISO 230-2:2014": _ISO_230_2,
+    "ISO 230-4:1996": _ISO_230_4,
+    "ISO 230-4:2005": _ISO_230_4,
+    "ISO 230-6:2002": _ISO_230_6,
+}

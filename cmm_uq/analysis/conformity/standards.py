@@ -14,7 +14,7 @@ from cmm_uq.analysis.conformity.as_recorded import OutsideReadings, repeats_of_g
 from cmm_uq.analysis.conformity.plan_conditions import best_of, conditions
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.analysis.conformity.standard import Characteristic, Standard, Test, characteristic_of
-from cmm_uq.analysis.conformity.statement import Clause, Remeasurement, Statement
+from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, REPORTED, Clause, Remeasurement, Statement
 from cmm_uq.analysis.conformity.uncertainty import FORM_LINES, LENGTH_LINES, REPEAT_LINES, SIZE_LINES, normal_expansion
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import Text, Verbatim, say
@@ -81,19 +81,12 @@ def orientations(plan: plans.ShortLengthPlan, artefact: Artefact, *, recorded: b
     return (Condition(what, lacks), Condition(repeats, fewer), sides)
 
 
-REPORTED = "as commonly reported"
-CHOSEN = "this project"
-
 _LENGTHS = ("E0", "E150")
 
 _UNCERTAINTY = (
     Clause("test_uncertainty", say("test uncertainty"), "Calibration, expansion, temperature, alignment and fixturing of "
            "the artefact, root of the sum of squares; the machine's own errors and scatter are no part of it.",
            "ISO/TS 23165:2006, as commonly reported")
-)  # fmt: skip
-_RULE = (
-    Clause("decision_rule", say("default decision rule"), "ISO 14253-1, where the job names no other.",
-           "publisher's words on ISO 10360-8:2013, of the series: its default rules apply unless otherwise specified", True)
 )  # fmt: skip
 _ASME_RULE = (
     Clause("decision_rule", say("default decision rule"), 'ISO 14253-1, where the job names no other; "ASME B89.7.3.1" '
@@ -134,7 +127,7 @@ _ISO_10360_2 = (
     Clause("range", say("range of repeats"), "Range of the first three repeats of each length, not measured again.",
            REPORTED, of=("R0",)),
     _UNCERTAINTY,
-    _RULE,
+    ITS_RULE,
 )  # fmt: skip
 _ISO_10360_5 = (
     Clause("scope", say("scope"), "Contacting probes, point by point.", "its publisher's abstract", True),
@@ -147,7 +140,7 @@ _ISO_10360_5 = (
     Clause("every_sphere", say("every sphere by itself"), "Every sphere recorded is decided, form and size from the same "
            "points; nothing is measured again.", CHOSEN),
     _UNCERTAINTY,
-    _RULE,
+    ITS_RULE,
 )  # fmt: skip
 _B89 = (
     Clause("positions", say("positions of the bar"), "Twenty in a nearly cubic volume (up to 2 : 1), ten for each "
@@ -166,7 +159,7 @@ _B89 = (
            "four orientations: Harris 2004, 2.6.1; the rest: this project", of=("bidirectional length",)),
     Clause("test_uncertainty", say("test uncertainty"), "That of the artefact alone.", CHOSEN),
     _SET_ASIDE,
-    _RULE,
+    ITS_RULE,
 )  # fmt: skip
 _VDI = (
     Clause("positions", say("positions"), "U1: the axes; U2: all six face diagonals; U3: all four space diagonals.",
@@ -175,7 +168,7 @@ _VDI = (
            "travel, the shortest at most 30 mm, as of ISO 10360-2.", CHOSEN),
     Clause("share_outside", say("share of values outside"), "None may lie outside, and none is measured again.", CHOSEN),
     _UNCERTAINTY,
-    _RULE,
+    ITS_RULE,
 )  # fmt: skip
 _RULES = {
     "ISO/TS 23165:2006": (
@@ -209,36 +202,9 @@ def _sphere(scope: str) -> tuple[Clause, ...]:
     return (first, *(one for one in _ISO_10360_5[1:] if one.name != "sphere_size"))
 
 
-_ISO_230_2 = (
-    Clause(
-        "scope",
-        say("scope"),
-        "Linear axes up to 2 m, both directions; of longer and of rotary axes the same formulas.",
-        "its publisher's abstract; 2 m: as commonly reported",
-    ),
-    Clause(
-        "targets_and_runs",
-        say("targets and runs"),
-        "Five runs in each direction; five targets a metre and five at least. "
-        "That they are not evenly spaced is not asked for.",
-        REPORTED,
-    ),
-    Clause(
-        "formulas", say("figures"), "A, E, R, B and M with twice the standard uncertainty estimators, n − 1.", REPORTED
-    ),
-    Clause(
-        "test_uncertainty",
-        say("test uncertainty"),
-        "Instrument, alignment, temperature and changes between readings, by "
-        "draws; the formulas of its annex are not used.",
-        CHOSEN,
-    ),
-    _RULE,
-)
-
 # Of each standard that is decided here, and of the documents that decisions and budgets go by
 CLAUSES: Mapping[str, tuple[Clause, ...]] = MappingProxyType({
-    "ISO 230-2:2014": _ISO_230_2,
+    **positioning.CLAUSES,
     "ISO 10360-2:2009": _ISO_10360_2,
     "ASME B89.4.10360.2-2008": (
         Clause("additions", say("what it adds to ISO 10360-2"), "Not tested.", "its abstract: it incorporates the entire ISO "
@@ -322,7 +288,10 @@ _STANDARDS = (
     Standard("ASME B89.4.10360.2-2008", (_E0, _R0, _E150), (
         say("ASME B89.4.10360.2-2008 takes over ISO 10360-2; what it adds to it is not tested here."),
     ), "contacting"),
-    Standard("ISO 230-2:2014", positioning.CHARACTERISTICS),
+    Standard("ISO 230-2:2014", positioning.ISO_230_2),
+    Standard("ISO 230-4:1996", positioning.ISO_230_4_1996),
+    Standard("ISO 230-4:2005", positioning.ISO_230_4_2005),
+    Standard("ISO 230-6:2002", positioning.ISO_230_6),
     Standard("ISO 10360-2:2009", (_E0, _R0, _E150), sensing="contacting"),
     Standard("ISO 10360-5:2010", _of_sphere(("P_FTU",), ("P_STU",), plans.ISO_10360_5, _DIAMETER),
              _superseded("ISO 10360-5:2020"), "contacting"),

@@ -228,6 +228,13 @@ class Clause:
         return None if given is None or given.agrees is None or given.does != self.does else given
 
 
+REPORTED, CHOSEN = "as commonly reported", "this project"  # sources of clauses
+ITS_RULE = (
+    Clause("decision_rule", say("default decision rule"), "ISO 14253-1, where the job names no other.",
+           "publisher's words on ISO 10360-8:2013, of the series: its default rules apply unless otherwise specified", True)
+)  # fmt: skip
+
+
 def clauses_in_words(
     standard: str, asked: Sequence[Clause], form: ClausesForm | None
 ) -> tuple[list[Text], tuple[Text, ...]]:

@@ -8,16 +8,18 @@ The zero of a run is free, of a straightness its slope too. Positions are target
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.artefacts.axis_runs.kind import READ, TURN, AxisRunsFacts
 from cmm_uq.artefacts.axis_runs.run import (
     ACROSS,
     ALONG,
+    CIRCLE,
     END,
     READINGS,
     START,
@@ -25,13 +27,17 @@ from cmm_uq.artefacts.axis_runs.run import (
     TURNING,
     ZERO,
     Run,
+    circle_axes,
     kinds_of,
+    profiles,
+    reference_shape,
     refuse,
+    reversed_profile,
     runs_of,
     scatter,
     senses_of,
+    squares,
 )
-from cmm_uq.artefacts.kinds import READ, TURN, AxisRunsFacts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
@@ -39,9 +45,11 @@ from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, unit
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size
 from cmm_uq.machine.model.recorded import expansion
 from cmm_uq.machine.physics.effects.drives import index_change
+from cmm_uq.maths.geometry.circular import CircularTest
 from cmm_uq.maths.geometry.positioning import PositioningRuns
 
 _FAR = {False: 2000.0, True: 3600.0}  # µm or ″ beyond which a reading is in another unit
+_UNITS = {ACROSS: unit("µm"), TURNING: unit("″")}
 _LEAST_DOF = 10  # of the scatter of repeats, from which on it weighs the kinds of reading against each other
 _SAME_MM = 1e-6
 
@@ -72,19 +80,31 @@ class AxisRuns(Artefact):
         self._kind = kinds_of(self.runs, len(own))
         self._turned, self._ends = np.flatnonzero(self._kind == TURNING), self._ends[self._kind == TURNING]
         self._sense, _ = senses_of(self.runs, len(own))
-        self._base, slope = np.zeros(len(own)), np.zeros((len(own), 1))
+        self._base, free = np.zeros(len(own)), np.zeros((len(own), 3))
+        turned, square = squares(own, self.runs, where)
         for run in self.runs:
+            free[run.rows, 0] = float(run.kind != CIRCLE or facts.u_bar_um is None)
             if run.kind == ALONG:
                 self._base[run.rows] = run.positions * np.sign(run.sense @ run.travel)
-            elif run.kind == ACROSS:
-                slope[run.rows, 0] = run.positions / max(float(run.positions.max()), _SAME_MM) - 0.5
+            elif run.kind == CIRCLE:
+                self._base[run.rows] = own.columns[TARGET][run.rows]
+                free[run.rows, 1:] = run.sense @ circle_axes(run)
+            elif run.kind == ACROSS and not turned[run.rows].any():
+                free[run.rows, 1] = run.positions / max(float(run.positions.max()), _SAME_MM) - 0.5
         self._base *= expansion(facts, own)
-        ones, slopes = (self._zeros.columns(each).dense() for each in (np.ones((len(own), 1)), slope))
-        self._freedoms = np.hstack([ones, slopes[:, np.any(slopes != 0, axis=0)]])
+        columns = (self._zeros.columns(each[:, None]).dense() for each in free.T)
+        edges = profiles(own, self.runs)
+        freedoms = np.hstack([*columns, turned, edges])
+        self._freedoms = freedoms[:, np.any(freedoms != 0, axis=0)]
         self.readings = self._base - self._seen(points.xyz[:, :, None])[:, 0]
-        self.readings += own.columns[ZERO] - self._zeros.means(self.readings)
+        zero = own.columns[ZERO] - self._zeros.means(self.readings)
+        self.readings += np.where(free[:, 0] > 0, zero, 0.0)
+        self._profile = reversed_profile(own, self.runs, self.readings)
         spans = [np.ptp(self._base[run.rows]) for run in self.runs if run.kind == ALONG]
-        self.sizes = self._instrument(float(max(spans))) if spans else ()
+        self._length = self._instrument(float(max(spans))) if spans else ()
+        further = list(self._references(square, np.any(edges != 0, axis=1), where))
+        self._shapes = -np.column_stack([shape for _, shape in further]) if further else np.zeros((len(own), 0))
+        self.sizes = (*self._length, *(size for size, _ in further))
         self.noise_scale = self._noise_scale()
 
     def _with_ends(self, points: Points, where: str | None) -> Points:
@@ -94,9 +114,14 @@ class AxisRuns(Artefact):
         turned, target = np.flatnonzero(kind == TURNING), np.zeros(n)
         start = np.zeros(n)
         for run in runs:
-            target[run.rows], start[run.rows] = run.positions, run.start
+            target[run.rows], start[run.rows] = run.positions, run.radius or run.start
+            if run.kind == CIRCLE:
+                xyz = points.xyz[run.rows]
+                target[run.rows] = run.radius + run.sense @ (xyz - run.radius * run.sense).mean(axis=0)
         readings = self._in_mm(points, kind, target, where)
         zero = self._zeros_of(points).means(readings)
+        if self._facts.u_bar_um is not None:
+            zero[kind == CIRCLE] = 0.0
         shift = (readings - zero)[:, None] * sense
         optics = zip(AXES, self._facts.optics_mm, strict=True)
         given = np.column_stack([points.columns.get(f"tip_{a}_mm", np.full(n, at)) for a, at in optics])
@@ -162,10 +187,46 @@ class AxisRuns(Artefact):
         title = say("Longest displacement by the instrument")
         return (Size("length_mm", title, unit("mm"), span, sd, say("longest displacement")),)
 
+    def _references(self, square: Floats, edge: Any, where: str | None) -> Iterator[tuple[Size, Floats]]:
+        """What is stated of what the instrument reads against, and what (n,) of the readings each changes, mm per unit."""
+        facts, n = self._facts, len(square)
+        if square.any():
+            if facts.u_square_arcsec is None:
+                fix = "State it (k = 1) in [artefact], or leave the column square out"
+                raise CmmUqError("runs against a square, and no u_square_arcsec", where=where, fix=fix)
+            title = say("Square's angle less 90°")
+            nominal, u = facts.square_arcsec, facts.u_square_arcsec
+            yield Size("square_arcsec", title, unit("″"), nominal, u, role="set-up"), ARCSECOND * square
+        circles = np.where(self._kind == CIRCLE, -MICROMETRE, 0.0)
+        if facts.u_bar_um is not None and circles.any():
+            yield (
+                Size(
+                    "bar_um",
+                    say("Length of the ballbar less its certified one"),
+                    unit("µm"),
+                    0.0,
+                    facts.u_bar_um,
+                    role="set-up",
+                ),
+                circles,
+            )
+        for run in self.runs:
+            stated = {ACROSS: facts.u_straightness_um, TURNING: facts.u_rotation_arcsec}.get(run.kind)
+            if stated is None or edge[run.rows].any():
+                continue
+            shape = np.zeros(n)
+            shape[run.rows] = self._factor(turns=run.kind == TURNING) * reference_shape(run)
+            title = say("Reference of measurement {number}", number=run.measurement)
+            symbol = "arcsec" if run.kind == TURNING else "um"
+            yield (
+                Size(f"reference_{run.measurement}_{symbol}", title, _UNITS[run.kind], 0.0, stated, role="set-up"),
+                shape,
+            )
+
     def _noise_scale(self) -> Floats:
         """Of a rotation that of two ends of an arm; where repeats show how the scatter of the kinds compares, as they show."""
         scale, found = np.where(self._kind == TURNING, np.sqrt(2.0), 1.0), {}
-        for kind in (ALONG, ACROSS, TURNING):
+        for kind in (ALONG, ACROSS, TURNING, CIRCLE):
             squares, dof = 0.0, 0
             for run in (each for each in self.runs if each.kind == kind):
                 own, count = scatter(run, self.readings[run.rows], self.repeat[run.rows])
@@ -185,7 +246,8 @@ class AxisRuns(Artefact):
         return np.asarray(np.einsum("ni,nik->nk", self._sense, moved))
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        target = self._base * (sizes[0] / self.sizes[0].nominal if self.sizes else 1.0)
+        target = self._base * (sizes[0] / self.sizes[0].nominal if self._length else 1.0)
+        target = target + self._shapes @ sizes[len(self._length) :]
         gap = self.about_zero(target - self._seen(true_xyz[:, :, None])[:, 0])
         placed, step, linear = true_xyz.copy(), gap[:, None] * self._sense, self._kind != TURNING
         placed[self.rows[linear, 0]] += step[linear]
@@ -200,7 +262,8 @@ class AxisRuns(Artefact):
         return self._seen(displacement)
 
     def size_change(self) -> Floats:
-        return self._base[:, None] / self.sizes[0].nominal if self.sizes else np.zeros((len(self.rows), 0))
+        whole = self._base[:, None] / self.sizes[0].nominal if self._length else np.zeros((len(self.rows), 0))
+        return np.hstack([whole, self._shapes])
 
     def placing(self, xyz: Floats) -> Floats:
         return self._freedoms
@@ -217,15 +280,37 @@ class AxisRuns(Artefact):
 
     def positioning(self, run: Run) -> PositioningRuns:
         """Readings of a run by target, direction and repeat, µm or ″, for ISO 230-2; of a position actual less target."""
-        readings = self.readings[run.rows] / self._factor(turns=run.kind == TURNING)
+        readings = (self.readings - self._profile)[run.rows] / self._factor(turns=run.kind == TURNING)
         if run.kind == ALONG:
             readings = readings * np.sign(run.sense @ run.travel)
         at, repeat = run.positions + run.start, self.repeat[run.rows]
         found = PositioningRuns.of(at, run.directions, repeat, readings, straight=run.kind == ACROSS)
-        return replace(found, axis=run.axis) if run.kind == ALONG else found
+        span, sd = float(np.ptp(found.targets)), 0.0
+        growth = (found.targets - found.targets[0]) / span
+        if run.kind == ALONG:
+            size = self.sizes[0]
+            sd = size.sd / size.nominal * span / MICROMETRE if size.certified else 0.0
+            return replace(
+                found, axis=run.axis, u_reference=sd, growth=growth, length_mm=span, travel=tuple(run.travel)
+            )
+        if run.kind == CIRCLE:
+            known = self._facts.u_bar_um
+            ones, arrows = np.ones(len(found.targets)), found.arrows.replace("↑", "↺").replace("↓", "↻")
+            return CircularTest(
+                found.targets,
+                found.x,
+                arrows,
+                u_reference=known or 0.0,
+                growth=ones,
+                length_mm=run.radius,
+                calibrated=known is not None,
+            )
+        own = [size for size in self.sizes if size.name.startswith(f"reference_{run.measurement}_")]
+        bow = 4 * growth * (1 - growth) if run.kind == ACROSS else growth
+        return replace(found, u_reference=own[0].sd if own else 0.0, growth=bow)
 
     def positionings(self) -> Mapping[int, PositioningRuns]:
-        return {run.measurement: self.positioning(run) for run in self.runs if run.kind == ALONG}
+        return {run.measurement: self.positioning(run) for run in self.runs if run.kind in (ALONG, CIRCLE)}
 
 
 def _ends_of(points: Points) -> Ints:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
 
 from cmm_uq.analysis.conformity.positioning import uncertainty_of_figures
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
-from cmm_uq.artefacts.axis_runs.run import ALONG, TURNING, Run
+from cmm_uq.artefacts.axis_runs.run import CIRCLE, SQUARE, TURNING, Run
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say, signed
+from cmm_uq.base.points import AXES
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, table, text_columns
 from cmm_uq.certificate.plots.residuals import length_plot, positioning_plot, residual_volume
@@ -33,8 +35,7 @@ def _evaluated(result: Result) -> list[tuple[Run, PositioningRuns | MissingReadi
         except MissingReadingError as error:
             found.append((run, error, {}))
         else:
-            spread = uncertainty_of_figures(evaluated, artefact, under) if run.kind == ALONG else {}
-            found.append((run, evaluated, spread))
+            found.append((run, evaluated, uncertainty_of_figures(evaluated, under)))
     return found
 
 
@@ -66,7 +67,11 @@ def results(result: Result) -> dict[str, Any]:
             {"mean": m.tolist(), "s": None if np.isnan(s).any() else s.tolist()}
             for m, s in zip(found.mean, found.s, strict=True)
         ]
-        told |= {"targets_mm": found.targets.tolist(), "directions": by_way, "reversal": found.reversal.tolist()}
+        told |= {
+            "angles_deg" if run.kind == CIRCLE else "targets_mm": found.targets.tolist(),
+            "directions": by_way,
+            "reversal": found.reversal.tolist(),
+        }
         told |= {"figures": dict(found.figures()), "U": {name: COVERAGE * u for name, u in spread.items()}}
         runs.append({**told, "drift_of_repeats": found.drift.tolist()})
     return {"runs": runs, "not_read": _not_read(result)}
@@ -74,14 +79,22 @@ def results(result: Result) -> dict[str, Any]:
 
 def _not_read(result: Result) -> list[str]:
     """Parametric errors that no run reads, by their name in VDI/VDE 2617."""
-    read = {str(run.quantity) for run in cast("AxisRuns", result.artefact).runs}
+    artefact = cast("AxisRuns", result.artefact)
+    read = {str(run.quantity) for run in artefact.runs}
+    for run in (each for each in artefact.runs if each.kind == CIRCLE):
+        plane = [a for a, part in zip(AXES, np.abs(run.travel), strict=True) if part < 0.5]
+        read |= {f"{a}{how}{b}" for a in plane for b in plane for how in "tw"}
+    square = artefact.points.columns.get(SQUARE, np.zeros(len(artefact.points)))
+    read |= {f"{run.axis}w{str(run.quantity)[-1]}" for run in artefact.runs if square[artefact.rows[run.rows, 0]].any()}
     return [error.vdi for error in PARAMETRIC_ERRORS if error.vdi not in read]
 
 
 def sections(result: Result) -> list[Section]:
     every = _evaluated(result)
     whole = [(run, found, spread) for run, found, spread in every if isinstance(found, PositioningRuns)]
-    blocks: list[Block | None] = [_both(whole), _each_way(whole)]
+    straight = [each for each in whole if each[0].kind != CIRCLE]
+    round_ = [each for each in whole if each[0].kind == CIRCLE]
+    blocks: list[Block | None] = [_both(straight), _each_way(straight), _circles(round_)]
     blocks += [
         Paragraph(say("{why:capital}.", why=missing_words(run, found)))
         for run, found, _ in every
@@ -148,7 +161,9 @@ def _both(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
             say(
                 "Figures without U, as those of straightnesses and rotations: no test uncertainty is stated of what reads "
                 "them."
-            ),
+            )
+            if not all(spread for *_, spread in whole)
+            else NOTHING,
         ),
     )
 
@@ -158,9 +173,35 @@ def _each_way(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
     return _table(say("Each direction by itself"), names, whole, ())
 
 
+def _circles(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
+    names = ["G↺", "G↻", "H", "G(b)", "Fmax", "Fmin", "D"]
+    return _table(
+        say("Circles, by ISO 230-4"),
+        names,
+        whole,
+        (
+            say(
+                "G circular deviation, by the minimum zone, ↺ counter-clockwise about the positive axis; H circular "
+                "hysteresis; F radial deviation about the least-squares centre (1996). G(b) bidirectional circular deviation; "
+                "D mean bidirectional radial deviation (2005). Of several rounds the largest."
+            ),
+            say("F and D rest on the length of the ballbar: without u_bar_um they are not evaluated."),
+        ),
+    )
+
+
 def _targets(run: Run, found: PositioningRuns) -> Iterator[Block]:
-    """The picture of a run that was repeated, as ISO 230-2 draws it, and its targets as a table."""
-    own = _unit(run)
+    """The picture of a circle, or of a run that was repeated, as ISO 230-2 draws it, and its targets as a table."""
+    own, title = _unit(run), say("Measurement {number}: {quantity}", number=run.measurement, quantity=run.quantity)
+    low, high = (signed(m, ".2f") for m in (found.mean.min(), found.mean.max()))
+    told = say("Mean deviations from {low} to {high} {unit}.", low=low, high=high, unit=own)
+    picture = partial(
+        positioning_plot, found.targets, found.mean, np.nan_to_num(found.s), found.arrows, own, alternative=told
+    )
+    if run.kind == CIRCLE:
+        caption = say("{title}: radial deviations, filled counter-clockwise about the positive axis.", title=title)
+        yield picture(label=say("Angle / °"), caption=caption)
+        return
     ways = {"↑": (say("Mean ↑"), say("s ↑")), "↓": (say("Mean ↓"), say("s ↓"))}
     heads = [*(head for arrow in found.arrows for head in ways[arrow]), say("Reversal")]
     columns = [values for way in zip(found.mean, found.s, strict=True) for values in way]
@@ -172,28 +213,17 @@ def _targets(run: Run, found: PositioningRuns) -> Iterator[Block]:
         )
         for i, target in enumerate(found.targets)
     )
-    title = say("Measurement {number}: {quantity}", number=run.measurement, quantity=run.quantity)
     columns_of = (Column(say("Target"), unit("mm")), *figure_columns(*heads[: len(columns)], unit=own))
     if found.repeats == 1:
         yield Table(title, columns_of, rows)
         return
-    drift, low, high = (
-        number(float(np.abs(found.drift).max()), ".2g"),
-        *(signed(m, ".2f") for m in (found.mean.min(), found.mean.max())),
+    caption = say(
+        "{title}: means of {repeats} repeats, filled in the positive direction, with ±2s.",
+        title=title,
+        repeats=found.repeats,
     )
-    yield positioning_plot(
-        found.targets,
-        found.mean,
-        found.s,
-        found.arrows,
-        own,
-        caption=say(
-            "{title}: means of {repeats} repeats, filled in the positive direction, with ±2s.",
-            title=title,
-            repeats=found.repeats,
-        ),
-        alternative=say("Mean deviations from {low} to {high} {unit}.", low=low, high=high, unit=own),
-    )
+    yield picture(label=say("Target / mm"), caption=caption)
+    drift = number(float(np.abs(found.drift).max()), ".2g")
     drifts = say("The mean of a repeat differs from that of all by up to {drift} {unit}.", drift=drift, unit=own)
     yield Table(title, columns_of, rows, (drifts,))
 

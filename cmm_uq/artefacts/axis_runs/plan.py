@@ -12,14 +12,14 @@ from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, dire
 from cmm_uq.analysis.planning.setting import Planning, Setting, Volume
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, no_references, rows_by
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
+from cmm_uq.artefacts.axis_runs.kind import READ, TURN
 from cmm_uq.artefacts.axis_runs.run import READINGS
-from cmm_uq.artefacts.kinds import READ, TURN
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact
 
-_SAME_MM = 1e-6
+_SAME_MM, _STRAIGHT = 1e-6, 0.05  # part of a run's length, beyond which most positions are on no line
 
 
 def _misfit(xyz: Floats, _: Floats, __: float) -> Floats:
@@ -27,18 +27,35 @@ def _misfit(xyz: Floats, _: Floats, __: float) -> Floats:
     middle = np.median(xyz, axis=0)
     travel = np.argmax(np.median(np.abs(xyz - middle), axis=0))
     steps = xyz[np.argmax(xyz[:, travel])] - xyz[np.argmin(xyz[:, travel])]
-    best = np.full(len(xyz), np.inf)
+    best, steps_long = np.full(len(xyz), np.inf), float(np.linalg.norm(steps))
     for direction in (np.eye(3)[travel], steps / max(float(np.linalg.norm(steps)), _SAME_MM)):
         off = (xyz - middle) - np.outer((xyz - middle) @ direction, direction)
         off = np.linalg.norm(off - np.median(off, axis=0), axis=1)
         if np.median(off) < np.median(best):
             best = off
+    if np.median(best) > _STRAIGHT * steps_long:
+        return _off_circle(xyz)
     values, index, counts = np.unique(np.round(xyz[:, travel], 3), return_inverse=True, return_counts=True)
     alone = (counts == 1)[index.ravel()] & (len(values) < 0.6 * len(xyz))
     nearest = np.array([np.abs(np.delete(values, i) - v).min(initial=np.inf) for i, v in enumerate(values)])[
         index.ravel()
     ]
     return np.asarray(np.maximum(best, np.where(alone & np.isfinite(nearest), nearest, 0.0)))
+
+
+def _off_circle(xyz: Floats) -> Floats:
+    """Distance of each position from the circle that most are on."""
+    middle = np.median(xyz, axis=0)
+    plane, keep = np.linalg.svd(xyz - middle, full_matrices=False)[2], np.ones(len(xyz), dtype=bool)
+    for _ in range(3):
+        flat = (xyz - middle) @ plane[:2].T
+        found, *_ = np.linalg.lstsq(
+            np.column_stack([flat, np.ones(len(flat))])[keep], np.sum(flat[keep] ** 2, axis=1), rcond=None
+        )
+        radius = np.sqrt(found[2] + found[:2] @ found[:2] / 4)
+        off = np.hypot(np.linalg.norm(flat - found[:2] / 2, axis=1) - radius, (xyz - middle) @ plane[2])
+        keep = off <= 3 * np.median(off) + _SAME_MM
+    return np.asarray(off)
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
@@ -49,6 +66,7 @@ def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
 
 
 SCREENING = Screening(shape_of)
+_DEGREES = 5.0  # between targets on a circle
 STEPS = 10  # between targets along each axis, where the plan does not say
 
 
@@ -61,6 +79,32 @@ def all_errors(setting: Setting) -> tuple[SetUp, ...]:
     """The same lines: position, two straightnesses and three rotations of each."""
     return tuple(
         _run(setting, axis, sense, turns=turns) for axis in np.eye(3) for turns in (False, True) for sense in np.eye(3)
+    )
+
+
+def circles(setting: Setting) -> tuple[SetUp, ...]:
+    """A circle in each plane through the middle of the volume, in both senses (ISO 230-4), read by a telescoping ballbar."""
+    found = []
+    for axis, name in zip(np.eye(3), ("YZ", "ZX", "XY"), strict=True):
+        candidates.check_allowed(setting, axis)
+        attitude = attitude_along(axis)[:, [1, 2, 0]]
+        words = say("Circle in the plane {plane}, both senses", plane=Verbatim(name))
+        found.append(setting.volume.set_up(circle_pattern(setting), attitude, candidates.MIDDLE, words))
+    return tuple(found)
+
+
+def circle_pattern(setting: Setting) -> Pattern:
+    """Targets on a circle about the third axis, round and back."""
+    plan = setting.plan
+    radius = (plan.length_mm or float(setting.volume.size.min())) / 2
+    there = np.radians(np.arange(0, 360, _DEGREES))
+    at, way = np.concatenate([there, there[::-1]]), np.repeat([1.0, -1.0], len(there))
+    outward = np.column_stack([np.cos(at), np.sin(at), 0 * at])
+    travel = way[:, None] * np.column_stack([-np.sin(at), np.cos(at), 0 * at])
+    vectors = {"approach": travel, "read": outward, "turn": 0 * outward}
+    columns, n = {name: np.zeros(len(at)) for name in READINGS.values()}, len(at)
+    return Pattern(radius * outward, np.arange(1, n + 1), np.ones(n, dtype=np.int64), columns, vectors).repeated(
+        plan.repeats
     )
 
 
@@ -107,4 +151,6 @@ def elsewhere(artefact: Artefact, volume: Volume, count: int) -> tuple[SetUp, ..
 
 _RELOCATED = candidates.RelocatedCandidates(candidates.along_lines)
 _PLACES = candidates.VolumeCandidates(candidates.along_lines, _shape, _RELOCATED)
-PLANNING = Planning({"positioning": positioning, "all errors": all_errors}, _PLACES.candidates, elsewhere)
+PLANNING = Planning(
+    {"positioning": positioning, "all errors": all_errors, "circles": circles}, _PLACES.candidates, elsewhere
+)

@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.planning.set_up import direction_words
 from cmm_uq.analysis.screening.shape import rows_by
-from cmm_uq.artefacts.kinds import APPROACHES, READ, TURN
+from cmm_uq.artefacts.axis_runs.kind import APPROACHES, READ, TURN
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Text, Verbatim
+from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.units import METRE
 from cmm_uq.machine.model.recorded import place
 
-ALONG, ACROSS, TURNING = "along", "across", "turning"
+ALONG, ACROSS, TURNING, CIRCLE = "along", "across", "turning", "circle"
 READINGS = {False: "reading_um", True: "reading_arcsec"}  # by whether a rotation is read
-# columns of the artefact's own points: whether one is the other end of an arm; the target along the run from its first, and
-# where that is; the mean of the readings of one zero; mm
+# columns of the artefact's own points: whether one is the other end of an arm; the target along the run from its first, or
+# outward on a circle, and where that is, or the circle's radius; the mean of the readings of one zero; mm
 END, TARGET, START, ZERO = "_arm_end", "_target_mm", "_start_mm", "_zero_mm"
+STRAIGHTEDGE, SQUARE = "straightedge", "square"  # columns: +1, and −1 reversed; number of the setting
 _UNIT, _SAME_MM = 0.01, 1e-6
 _ALONG, _ACROSS = 0.999, 0.05  # cosines between what is read and the travel
+_ROUND = 0.02  # of its radius, by which targets may be off a circle
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,23 +34,29 @@ class Run:
     """The readings of one measurement: all repeats, in both directions."""
 
     measurement: int
-    kind: str  # ALONG, ACROSS or TURNING
+    kind: str  # ALONG, ACROSS, TURNING or CIRCLE
     rows: Ints  # (k,) of the recording
-    travel: Floats  # (3,) unit vector of the travel, in the sense of growing positions
-    sense: Floats  # (3,) unit vector along which, or about which, the instrument reads
+    travel: Floats  # (3,) unit vector of the travel, in the sense of growing positions; the axis of a circle
+    sense: Floats  # (3,) unit vector along which, or about which, the instrument reads; (k, 3) outward on a circle
     start: float  # where the first target is along the travel, mm
-    positions: Floats  # (k,) of the targets along the travel, from the first, mm
+    positions: Floats  # (k,) of the targets along the travel, from the first, mm; angles on a circle, degrees
     directions: Floats  # (k,) −1 or +1, in which each position was approached; 0 where nobody says
+    radius: float = 0.0  # of a circle, mm
 
     @property
     def axis(self) -> str:
         """The carriage that moves; empty where several do."""
+        if self.kind == CIRCLE:
+            return ""
         moved = np.flatnonzero(np.abs(self.travel) > _ALONG)
         return AXES[moved[0]] if len(moved) else ""
 
     @property
     def quantity(self) -> Text:
         """Name in VDI/VDE 2617 of the parametric error that it shows, as ``xtx``; its direction where it shows several."""
+        if self.kind == CIRCLE:
+            about = np.flatnonzero(np.abs(self.travel) > _ALONG)
+            return say("circle {plane}", plane=Verbatim(("YZ", "ZX", "XY")[about[0]] if len(about) else "–"))
         read = np.flatnonzero(np.abs(self.sense) > _ALONG)
         if self.axis and len(read):
             return Verbatim(f"{self.axis}{'r' if self.kind == TURNING else 't'}{AXES[read[0]]}")
@@ -63,6 +73,91 @@ def scatter(run: Run, readings: Floats, repeat: Ints) -> tuple[float, int]:
     design = np.hstack([np.eye(block.max() + 1)[block] for block in blocks])
     fitted, _, rank, _ = np.linalg.lstsq(design, readings, rcond=None)
     return float(np.sum((readings - design @ fitted) ** 2)), len(readings) - int(rank)
+
+
+def reference_shape(run: Run) -> Floats:
+    """(k,) what an error of 1 of the reference of a run changes of its readings: a bow, or a rotation that grows."""
+    part = run.positions / max(float(run.positions.max()), _SAME_MM)
+    return part if run.kind == TURNING else 4 * part * (1 - part)
+
+
+def _beside(points: Points, runs: tuple[Run, ...], column: str) -> dict[tuple[float, ...], list[Run]]:
+    """Runs across the travel that a column says something of, by travel, what is read, and that."""
+    found: dict[tuple[float, ...], list[Run]] = {}
+    values = points.columns.get(column, np.zeros(len(points)))
+    for run in runs:
+        if run.kind == ACROSS and values[run.rows].any():
+            found.setdefault((*run.travel.round(3), *run.sense.round(3), float(values[run.rows][0])), []).append(run)
+    return found
+
+
+def profiles(points: Points, runs: tuple[Run, ...]) -> Floats:
+    """(n, q) freedoms of straightedges, whose profile less a line is read with the sign of ``straightedge`` (reversal)."""
+    blocks, signs = [np.zeros((len(points), 0))], points.columns.get(STRAIGHTEDGE, np.zeros(len(points)))
+    for own in {key[:6] for key in _beside(points, runs, STRAIGHTEDGE)}:
+        both = [run for sign in (-1.0, 1.0) for run in _beside(points, runs, STRAIGHTEDGE).get((*own, sign), [])]
+        rows = np.concatenate([run.rows for run in both])
+        at = np.concatenate([run.positions + run.start for run in both])
+        targets, index = np.unique(np.round(at, 3), return_inverse=True)
+        line = np.column_stack([np.ones(len(targets)), targets - targets.mean()])
+        shape = scipy.linalg.null_space(line.T)
+        block = np.zeros((len(points), shape.shape[1]))
+        block[rows] = signs[rows, None] * shape[index.ravel()]
+        blocks.append(block)
+    return np.hstack(blocks)
+
+
+def reversed_profile(points: Points, runs: tuple[Run, ...], readings: Floats) -> Floats:
+    """(n,) what of readings (n,) is the straightedge's: half the difference of its two positions, target by target."""
+    found, sign = np.zeros(len(points)), points.columns.get(STRAIGHTEDGE, np.zeros(len(points)))
+    whole = _beside(points, runs, STRAIGHTEDGE)
+    for key, there in whole.items():
+        back = whole.get((*key[:6], -1.0), [])
+        if key[6] < 0 or not back:
+            continue
+        means = []
+        for side in (there, back):
+            at = np.round(np.concatenate([run.positions + run.start for run in side]), 3)
+            flat = [
+                readings[run.rows] - np.polyval(np.polyfit(run.positions, readings[run.rows], 1), run.positions)
+                for run in side
+            ]
+            targets, index = np.unique(at, return_inverse=True)
+            means.append((targets, np.bincount(index.ravel(), np.concatenate(flat)) / np.bincount(index.ravel())))
+        common, *where = np.intersect1d(means[0][0], means[1][0], return_indices=True)
+        own = 0.5 * (means[0][1][where[0]] - means[1][1][where[1]])
+        for run in (*there, *back):
+            found[run.rows] = sign[run.rows] * np.interp(run.positions + run.start, common, own)
+    return found
+
+
+def squares(points: Points, runs: tuple[Run, ...], where: str | None) -> tuple[Floats, Floats]:
+    """Runs along the two legs of a square: (n, q) the turn of each setting, per mm, and (n,) of its angle less 90°, per rad.
+
+    The leg that the later run lies along carries the angle's error: with 90° + δ it leans by δ away from the other.
+    """
+    turns, angle = [np.zeros((len(points), 0))], np.zeros(len(points))
+    settings = _beside(points, runs, SQUARE)
+    for setting in sorted({key[6] for key in settings}):
+        legs = [run for key, each in settings.items() if key[6] == setting for run in each]
+        first, last = legs[0], next((run for run in legs if abs(run.travel @ legs[0].travel) < _ACROSS), legs[0])
+        pairs = ((first, last), (last, first))
+        lie = all(
+            any(min(abs(run.travel @ leg.travel), abs(run.sense @ other.travel)) > _ALONG for leg, other in pairs)
+            for run in legs
+        )
+        if first is last or not lie:
+            problem = f"square {setting:g} has no runs along two legs, each read along the other"
+            fix = "Give the runs along both legs of one setting the same number in the column square, 0 the others"
+            raise CmmUqError(problem, where=where or "recording", fix=fix)
+        normal, turn = np.cross(first.travel, last.travel), np.zeros((len(points), 1))
+        for run in legs:
+            along = run.positions + run.start
+            turn[run.rows, 0] = (run.sense @ np.cross(normal, run.travel)) * along / METRE
+            if abs(run.travel @ last.travel) > _ALONG:
+                angle[run.rows] = (run.sense @ first.travel) * along
+        turns.append(turn)
+    return np.hstack(turns), angle
 
 
 def kinds_of(runs: tuple[Run, ...], count: int) -> NDArray[Any]:
@@ -102,6 +197,33 @@ def _vectors(points: Points, names: tuple[str, ...]) -> Floats:
     return np.column_stack([points.columns.get(name, np.zeros(len(points))) for name in names])
 
 
+def circle_axes(run: Run) -> Floats:
+    """(3, 2) unit vectors in the plane of a circle: where its angles begin, and where they grow to."""
+    first = np.eye(3)[(int(np.argmax(np.abs(run.travel))) + 1) % 3]
+    first = first - (first @ run.travel) * run.travel
+    first = first / np.linalg.norm(first)
+    return np.column_stack([first, np.cross(run.travel, first)])
+
+
+def _circle(points: Points, number: int, rows: Ints, senses: Floats) -> Run | None:
+    """A run read along the radii of a circle, by unit vectors (k, 3) outward; ``None`` where it is none."""
+    off, turned = points.xyz[rows] - points.xyz[rows].mean(axis=0), senses - senses.mean(axis=0)
+    radius = np.sum(off * turned) / np.sum(turned**2)
+    axis = np.linalg.svd(senses, full_matrices=False)[2][2]
+    axis = axis * np.sign(axis[int(np.argmax(np.abs(axis)))])
+    unit = max(np.abs(np.linalg.norm(senses, axis=1) - 1).max(), np.abs(senses @ axis).max())
+    senses = senses / np.linalg.norm(senses, axis=1)[:, None]
+    if not radius > 0 or np.linalg.norm(off - radius * turned, axis=1).max() > _ROUND * radius or unit > _UNIT:
+        return None
+    run = Run(number, CIRCLE, rows, axis, senses, 0.0, np.zeros(0), np.zeros(0), round(float(radius), 4))
+    if START in points.columns:
+        run = replace(run, radius=float(points.columns[START][rows[0]]))
+    along, across = (senses @ circle_axes(run)).T
+    forward = np.sum(_vectors(points, APPROACHES)[rows] * np.cross(axis, senses), axis=1)
+    angles = np.round(np.degrees(np.arctan2(across, along)), 3) % 360
+    return replace(run, positions=angles, directions=np.sign(np.round(forward, 9)))
+
+
 def runs_of(points: Points, where: str | None) -> tuple[Run, ...]:
     """The runs of a recording; what is none is refused."""
     read, turn = _vectors(points, READ), _vectors(points, TURN)
@@ -133,14 +255,17 @@ def runs_of(points: Points, where: str | None) -> tuple[Run, ...]:
             "has both read_x … and turn_x …: a reading is one of them",
             "Put 0 into the three that are not read",
         )
+        if not turns and np.ptp(senses, axis=0).max() > _SAME_MM and (circle := _circle(points, number, rows, senses)):
+            found.append(circle)
+            continue
         sense, other = senses[0], np.zeros(len(points), dtype=bool)
         other[rows] = np.abs(senses - sense).max(axis=1) > _SAME_MM
         refuse(
             points,
             other,
             where,
-            f"measurement {number} reads along several directions",
-            "Number each quantity as a measurement of its own",
+            f"measurement {number} reads along several directions, which are no radii of a circle",
+            "Number each quantity as a measurement of its own; on a circle give read_x … outward at each target",
         )
         if abs(np.linalg.norm(sense) - 1) > _UNIT:
             refuse(points, own, where, "what is read has no unit length", "Give read_x … or turn_x … as a unit vector")

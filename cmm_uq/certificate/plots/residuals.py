@@ -197,13 +197,21 @@ def curve_with_band(
 
 
 def positioning_plot(
-    targets: ArrayLike, mean: Floats, s: Floats, arrows: str, unit: Text, *, caption: Text, alternative: Text
+    targets: ArrayLike,
+    mean: Floats,
+    s: Floats,
+    arrows: str,
+    unit: Text,
+    *,
+    label: Text,
+    caption: Text,
+    alternative: Text,
 ) -> Plot:
-    """Mean deviations ``mean`` (d, t) at targets (t,), mm, of each direction, with two standard deviations ``s`` (d, t)."""
+    """Mean deviations ``mean`` (d, t) at targets (t,) of each direction, with two standard deviations ``s`` (d, t)."""
     across = style.finite("target", targets, (None,))
     with style.picture(62, left=0.105, right=0.975, bottom=0.16, top=0.92) as (figure, ax):
         for arrow, values, sd in zip(arrows, mean, s, strict=True):
-            back, colour = arrow == "↓", MUTED if arrow == "↓" else ACCENT
+            back, colour = arrow in "↓↻", MUTED if arrow in "↓↻" else ACCENT
             half = 2 * style.finite("standard deviation", sd, across.shape)
             style.band(ax, across, style.finite("mean", values, across.shape), half, colour, alpha=0.16)
             ax.plot(across, values, color=colour, lw=1.1, ls="--" if back else "-")
@@ -211,7 +219,7 @@ def positioning_plot(
         ax.axhline(0, color=INK, lw=0.6, zorder=1)
         ax.grid(axis="y")
         ax.margins(x=0.02)
-        ax.set(xlabel=say("Target / mm"), ylabel=say("Deviation / {unit}", unit=unit))
+        ax.set(xlabel=label, ylabel=say("Deviation / {unit}", unit=unit))
         return style.drawn(figure, caption, alternative)
 
 

@@ -27,6 +27,12 @@ class PositioningRuns:
     x: Floats  # (d, t, n) deviations by direction, target and repeat; d = 1 where all came from one side
     arrows: str = "↑↓"  # of the directions; "↓" where all came from above
     axis: str = ""  # that is positioned; empty along a diagonal, or where something else is read
+    # standard uncertainty of what the instrument reads against, µm or ″, where it is largest; what part of it acts at each
+    # target (t,); over what length temperature and alignment act, mm, 0 where they do not
+    u_reference: float = 0.0
+    growth: Floats | None = None
+    length_mm: float = 0.0
+    travel: tuple[float, ...] = ()  # unit vector
 
     @classmethod
     def of(

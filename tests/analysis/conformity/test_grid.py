@@ -102,7 +102,7 @@ def test_without_an_uncertainty_only_simple_acceptance_decides(standard: str, ch
     hand = by_hand(standard, characteristic, "no u")
     if rule != "simple":
         states_none = (
-            r"needs the uncertainty.*states no (u_um|u_blocks_um|u_repeat_um|form_um|u_scale_um_per_m) above 0"
+            r"needs the uncertainty.*states no (u_um|u_blocks_um|u_repeat_um|form_um|u_scale_um_per_m|u_bar_um) above 0"
         )
         with pytest.raises(CmmUqError, match=states_none):
             judged(hand, standard, characteristic, rule, 10.0)

@@ -23,6 +23,7 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.analysis.conformity.own_by_hand import OWN
 from tests.analysis.conformity.recorded import BAR_U, DIAGONALS, MACHINE, NEGLIGIBLE, SEVEN, STATED, bars, gauge, sphere
 from tests.artefacts.test_axis_runs import joined, run
+from tests.artefacts.test_axis_runs_references import circle
 from tests.maths.geometry.test_positioning import by_loops
 from tests.recordings import bar_facts, with_columns
 
@@ -221,6 +222,85 @@ def own(figure: str) -> Callable[[str], Hand]:
     return made
 
 
+def diagonals(figure: str) -> Callable[..., Hand]:
+    """The runs of ``positioned`` along four body diagonals; on three of them no mean is off, so that E and B are 0."""
+
+    def made(how: str) -> Hand:
+        targets = np.linspace(0.0, 800.0, 9)
+        turned, runs = 0 if how == "copied" else 1, []
+        for number, (y, z) in enumerate([(1, 1), (1, -1), (-1, 1), (-1, -1)][: 3 if how == "incomplete" else 4], 1):
+            x = np.array([[np.roll([-1.0, -1.0, 0.0, 1.0, 1.0], turned * i) for i in range(9)]] * 2)
+            x[0, -1] += 6.0 * (number == 1)
+            along = np.array([9.0, 5.5 * y, 5.0 * z]) / np.linalg.norm([9.0, 5.5, 5.0])
+            rows = run(number, along, at=targets, repeats=5)
+            rows["reading_um"] = np.concatenate([[*x[0, :, k], *x[1, ::-1, k]] for k in range(5)])
+            start = np.array([50.0, 300.0 - 250.0 * y, -250.0 - 220.0 * z])
+            sense = rows["approach_x"].copy()
+            rows["xyz"] = start + np.outer(rows["xyz"][:, 0], along)
+            rows |= {f"approach_{a}": sense * along[i] for i, a in enumerate("xyz")}
+            runs.append(rows)
+        facts = artefact_facts(kind="axis_runs", u_scale_um_per_m=0.0 if how == "no u" else 0.1)
+        x = np.array([[np.roll([-1.0, -1.0, 0.0, 1.0, 1.0], turned * i) for i in range(9)]] * 2)
+        x[0, -1] += 6.0
+        u = 0.1 if how == "no u" else spread_by_loops(tuple(x.ravel()), 9, figure[0])
+        stated = changing(0.0 if how == "no u" else 0.05)
+        return Hand(AxisRuns(facts, joined(*runs)), stated, {}, 6.0, u, False)
+
+    return made
+
+
+ROUND = np.radians(np.arange(0, 360, 5))
+LOBES = 2.0 * np.cos(3 * ROUND)  # µm: no shift of the centre makes its zone less than 4
+
+
+def circular(figure: str, value: float, counter: Floats, clockwise: Floats) -> Callable[..., Hand]:
+    """Paths of three lobes about a bar that is known to 0.2 µm; u is what that and 0.05 µm of each reading make of it."""
+
+    def made(how: str) -> Hand:
+        chosen = np.arange(0, 72, 2 if how == "incomplete" else 1)
+        paths = np.stack([counter, clockwise])[:, chosen]
+        rounds = [circle(1, 150.0, paths, ROUND[chosen]) for _ in range(2 if how == "copied" else 1)]
+        for number, rows in enumerate(rounds, 1):
+            rows["repeat"] = np.full(len(rows["xyz"]), number)
+        facts = artefact_facts(kind="axis_runs", u_bar_um=0.0 if how == "no u" else 0.2)
+        u = 0.1 if how == "no u" else spread_of_circle(figure, tuple(paths.ravel()), len(chosen), len(rounds))
+        stated = changing(0.0 if how == "no u" else 0.05)
+        return Hand(AxisRuns(facts, joined(*rounds)), stated, {}, value, u, False)
+
+    return made
+
+
+def about_least_squares_centre(path: Floats, angle: Floats) -> Floats:
+    design = np.column_stack([np.ones_like(angle), np.cos(angle), np.sin(angle)])
+    return path - design[:, 1:] @ np.linalg.solve(design.T @ design, design.T @ path)[1:]
+
+
+def of_circle(figure: str, x: Floats) -> Floats:
+    """The values (one or two) of which a figure is the larger, of paths (2, t, n) about their least-squares centres."""
+    angle, rounds = np.linspace(0, 2 * np.pi, x.shape[1], endpoint=False), range(x.shape[2])
+    off = np.array([[about_least_squares_centre(x[d, :, r], angle) for r in rounds] for d in (0, 1)])
+    if figure == "G":
+        return np.ptp(off, axis=2).max(axis=1)
+    if figure == "H":
+        return np.array([np.abs(x[0] - x[1]).max()])
+    if figure == "F":
+        return np.array([off.max(), off.min()])
+    if figure == "D":
+        return np.array([off.mean()])
+    both = [about_least_squares_centre(np.concatenate([x[0, :, r], x[1, :, r]]), np.tile(angle, 2)) for r in rounds]
+    return np.array([max(np.ptp(each) for each in both)])
+
+
+@cache
+def spread_of_circle(figure: str, paths: tuple[float, ...], targets: int, rounds: int) -> float:
+    random = np.random.default_rng(np.random.SeedSequence(230, spawn_key=(2,)))
+    x = np.repeat(np.array(paths).reshape(2, targets, 1), rounds, axis=2)
+    changes = 0.2 * random.standard_normal((2000, 1, 1, 1)) * np.ones((1, 1, targets, 1))
+    changes = changes + 0.05 * random.standard_normal((2000, *x.shape))
+    moved = np.array([of_circle(figure, x + change) - of_circle(figure, x) for change in changes])
+    return float(np.sqrt(np.mean(moved**2, axis=0)).max())
+
+
 E0 = lengths(SEVEN)
 TESTS: Mapping[tuple[str, str], Callable[[str], Hand]] = {
     ("ASME B89.4.1-1997", "volumetric performance"): volumetric,
@@ -242,6 +322,13 @@ TESTS: Mapping[tuple[str, str], Callable[[str], Hand]] = {
     ("ISO 10360-8:2013", "P_Size.Sph.1x25:Tr:ODS"): probed(size=True, sensing="optical"),
     **{("ISO 230-2:2014", figure): positioned(figure) for figure in POSITIONED},
     **{(own_rule.NAME, figure): own(figure) for figure in OWN},
+    ("ISO 230-6:2002", "Ed"): diagonals("E"),
+    ("ISO 230-6:2002", "Bd"): diagonals("B"),
+    ("ISO 230-4:1996", "G"): circular("G", 4.0, LOBES, 0.5 * LOBES),
+    ("ISO 230-4:1996", "H"): circular("H", 3.0, LOBES, LOBES - 3.0 * (np.arange(72) == 6)),
+    ("ISO 230-4:1996", "F"): circular("F", -7.0, LOBES - 5.0, LOBES - 5.0),
+    ("ISO 230-4:2005", "G(b)"): circular("G(b)", 4.0, LOBES, 0.5 * LOBES),
+    ("ISO 230-4:2005", "D"): circular("D", 8.0, LOBES + 8.0, LOBES + 8.0),
     ("VDI/VDE 2617", "E0"): E0,
     ("VDI/VDE 2617-2.1", "U3"): lengths(DIAGONALS),
     ("VDI/VDE 2617-2.1", "U1"): lengths([X, Y, Z]),

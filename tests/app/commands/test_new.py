@@ -43,7 +43,7 @@ from tests.app.commands.test_budget import dated
 from tests.plugin.packages import OUTSIDE_KINDS, install
 from tests.result_keys import RESULTS, described
 
-NAMES = (*BUILT_IN, "shift_plate")
+NAMES = (*BUILT_IN, "shift_plate", "circular_test")
 
 
 @cache

@@ -144,7 +144,10 @@ def withhold(result: SearchResult, withheld: Key) -> SearchResult:
         return result
     versions = combinations.versions(chosen)
     model = with_effects(first, versions, chosen) if chosen else first.model
-    last = comparison_of(model, result.stated, ()) if chosen else first.comparison
+    try:
+        last = comparison_of(model, result.stated, ()) if chosen else first.comparison
+    except CmmUqError:  # what went had kept the others to sizes that a machine can have
+        return replace(_estimated(first, combinations, chosen, result.stated), unexplained=1.0)
     rough = result.rough - withheld
     return replace(result, last=last, chosen=chosen, versions=versions, model=model, unexplained=1.0, rough=rough)
 
@@ -159,7 +162,10 @@ def substitute(result: SearchResult, index: int, tried: Key) -> tuple[SearchResu
         if chosen not in combinations.of_effects or result.first.explanations[other].shaped:
             continue
         if combinations.of(other) >= _MECHANISM and probability_with_rivals(combinations, chosen, other) >= ASSERTED:
-            instead = _of(result.first, combinations, chosen, result.stated)
+            try:
+                instead = _of(result.first, combinations, chosen, result.stated)
+            except CmmUqError:
+                continue
             return replace(instead, unexplained=max(instead.unexplained, result.unexplained)), other
     return None
 

@@ -1,0 +1,95 @@
+"""The kind of runs along axes: what a job says of the instrument, and what a new job begins with."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pydantic import Field
+
+from cmm_uq.base.files.table import Length, Triple, Uncertainty, key
+from cmm_uq.base.points import AXES
+from cmm_uq.jobs.beginning import AT_20_C, SIX, Beginning, circumstances
+from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertifiedValue
+from cmm_uq.machine.model.kind import POSITIONING, Kind
+
+APPROACHES, READ, TURN = (tuple(f"{name}_{a}" for a in AXES) for name in ("approach", "read", "turn"))
+
+
+class InterferometerFacts(ArtefactFacts):
+    """What reads displacements of optics on the ram."""
+
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
+
+    u_scale_um_per_m: Uncertainty | None = None
+    """Standard uncertainty of a displacement along the beam, per metre: wavelength, alignment, stability; without it the
+    instrument's scale stays free."""
+    optics_mm: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
+    """Offset of the moving optics from the end of the ram, along x, y, z, by which rotations reach it; columns tip_x_mm,
+    tip_y_mm, tip_z_mm of the recording go before it."""
+    air_corrected: bool = True
+    """Whether displacements are corrected for the refractive index of air already; else they are, from 20 °C, 1013.25 hPa and
+    50 % to `temp_air_c`, `pressure_hpa`, `humidity_pct`."""
+
+    @property
+    def traced(self) -> bool:
+        return self.u_scale_um_per_m is not None
+
+
+class AxisRunsFacts(InterferometerFacts):
+    """What reads along the runs: a laser interferometer, straightness or angular optics, a level, a straightedge."""
+
+    u_straightness_um: Uncertainty | None = None
+    """Standard uncertainty of what a straightness is read against, as a bow over the run: straightness optics, straightedge
+    that was not reversed."""
+    u_rotation_arcsec: Uncertainty | None = None
+    """Standard uncertainty of a rotation at the end of a run against its beginning: angular optics, level, autocollimator."""
+    u_bar_um: Uncertainty | None = None
+    """Standard uncertainty of the calibrated length of a telescoping ballbar that reads along circles; without it their
+    radius stays free."""
+    square_arcsec: float = key(0.0, "Angle of a square less 90°, by its certificate; see the column square.")
+    u_square_arcsec: Uncertainty | None = key(None, "Standard uncertainty of the angle of a square.")
+    arm_mm: Length = key(100.0, "Arm over which a rotation is read: distance of two retroreflectors, base of a level.")
+    zero_each_repeat: bool = key(False, "Whether the instrument was set to zero before each repeat, and not once.")
+    dead_path_mm: Uncertainty = key(0.0, "Path in air between interferometer and zero, where air is not corrected for.")
+
+
+CIRCLES = Beginning(
+    title="Circles in three planes by telescoping ballbar (ISO 230-4)",
+    numbering="One measurement is one circle; its points go round it, and back.",
+    artefact={"name": "Telescoping ballbar", "u_bar_um": 0.5},
+    effects=(*SIX, "hysteresis_x", "hysteresis_y", "hysteresis_z"),
+    plan={"ready": "circles", "repeats": 1, "length_mm": 300.0},
+    recorded=AT_20_C,
+    conformity={"standard": "ISO 230-4:1996", "characteristic": "G", "limit_um": 15.0, "rule": "ISO 14253-1"},
+    test=circumstances(u_alignment_um=0.1, u_temperature_k=0.1, u_repeat_um=0.2),
+    noise_um=0.3,
+)
+_RUNS = "cmm_uq.artefacts.axis_runs"
+AXIS_RUNS = Kind(
+    "axis_runs",
+    AxisRunsFacts,
+    f"{_RUNS}.artefact:AxisRuns",
+    f"{_RUNS}.plan:SCREENING",
+    f"{_RUNS}.plan:PLANNING",
+    f"{_RUNS}.page:PAGE",
+    Beginning(
+        title="Runs along three axes by laser interferometer and angular optics (ISO 230-2)",
+        numbering="One measurement is one quantity along one line; its points are the targets, again on the way back.",
+        artefact={"name": "Laser interferometer", "u_scale_um_per_m": 0.3},
+        effects=("scale_x", "scale_y", "scale_z", "hysteresis_x", "hysteresis_y", "hysteresis_z"),
+        plan={"repeats": 5},
+        recorded=AT_20_C,
+        columns={
+            "reading_um": "Displacement by the instrument less that of the target; 0 where a rotation is read.",
+            "reading_arcsec": "Rotation by the instrument, by the right hand; 0 where a displacement is read.",
+            **{f"read_{a}": f"Direction along which a displacement is read, its part along {a}." for a in AXES},
+            **{f"turn_{a}": f"Axis about which a rotation is read, its part along {a}." for a in AXES},
+        },
+        conformity={"standard": "ISO 230-2:2014", "limit_um": 10.0, "rule": "ISO 14253-1"},
+        test=circumstances(u_alignment_um=0.2, u_temperature_k=0.1, u_repeat_um=0.1),
+        further=dict.fromkeys((*APPROACHES, *(f"tip_{a}_mm" for a in AXES), "straightedge", "square"), ""),
+        noise_um=0.3,
+    ),
+    begin_also={"circular_test": f"{_RUNS}.kind:CIRCLES"},
+    tested=(POSITIONING,),
+)
