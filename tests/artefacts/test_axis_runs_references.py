@@ -208,7 +208,7 @@ def test_the_errors_that_were_put_in_are_found() -> None:
 
 @pytest.mark.parametrize("measurement", [1, 2, 3])
 def test_figures_are_those_of_the_recorded_radii(measurement: int) -> None:
-    """By the rows alone: the angle of each reading by its unit vector outward, and zones by another search."""
+    """By the rows alone, to the 10 nm of their positions: angles by the vectors outward, and zones by another search."""
     (found,) = (run for run in results(NAME)["runs"] if run["measurement"] == measurement)
     own = [row for row in ROWS if row["measurement"] == str(measurement)]
     first, second = ("yz", "zx", "xy")[measurement - 1]
@@ -218,16 +218,16 @@ def test_figures_are_those_of_the_recorded_radii(measurement: int) -> None:
     for k, (row, at) in enumerate(zip(own, order, strict=True)):
         paths[k // 72, at] = float(row["reading_um"])
     there = np.radians(np.arange(0, 360, 5))
-    assert found["figures"]["H"] == pytest.approx(np.abs(paths[0] - paths[1]).max(), abs=1e-3)
+    assert found["figures"]["H"] == pytest.approx(np.abs(paths[0] - paths[1]).max(), abs=0.02)
     for arrow, path in zip("↺↻", paths, strict=True):
-        assert found["figures"][f"G{arrow}"] == pytest.approx(zone(path, there), abs=1e-3)
+        assert found["figures"][f"G{arrow}"] == pytest.approx(zone(path, there), abs=0.02)
     off = []
     for path in paths:
         design = np.column_stack([np.cos(there), np.sin(there), np.ones(72)])
         off.append(path - design[:, :2] @ np.linalg.lstsq(design, path, rcond=None)[0][:2])
-    assert found["figures"]["Fmax"] == pytest.approx(np.max(off), abs=1e-3)
-    assert found["figures"]["Fmin"] == pytest.approx(np.min(off), abs=1e-3)
-    assert found["figures"]["D"] == pytest.approx(np.mean(paths), abs=1e-3)
+    assert found["figures"]["Fmax"] == pytest.approx(np.max(off), abs=0.02)
+    assert found["figures"]["Fmin"] == pytest.approx(np.min(off), abs=0.02)
+    assert found["figures"]["D"] == pytest.approx(np.mean(paths), abs=0.02)
 
 
 def test_circles_and_squares_read_the_errors_of_their_planes() -> None:

@@ -68,7 +68,7 @@ class CircularTest(PositioningRuns):
             b_ub=np.concatenate([-flat, flat]),
             bounds=(None, None),
         )
-        return float(least.x[2] - least.x[3])
+        return float(np.asarray(least.x) @ [0.0, 0.0, 1.0, -1.0])
 
     def _figures(self, x: Floats) -> Floats:
         """(N, figures) of deviations (N, d, t, n), zones about the least-squares centre, in the order of the names."""
