@@ -87,7 +87,11 @@ AXIS_RUNS = Kind(
         },
         conformity={"standard": "ISO 230-2:2014", "limit_um": 10.0, "rule": "ISO 14253-1"},
         test=circumstances(u_alignment_um=0.2, u_temperature_k=0.1, u_repeat_um=0.1),
-        further=dict.fromkeys((*APPROACHES, *(f"tip_{a}_mm" for a in AXES), "straightedge", "square"), ""),
+        further={
+            **dict.fromkeys((*APPROACHES, *(f"tip_{a}_mm" for a in AXES)), ""),
+            "straightedge": "+1 against a straightedge as it lies first, −1 against it turned over, 0 without one.",
+            "square": "Number of the setting of a square, the same along both of its legs; 0 without one.",
+        },
         noise_um=0.3,
     ),
     begin_also={"circular_test": f"{_RUNS}.kind:CIRCLES"},
