@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.own_rule import FIGURES, NAME
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
@@ -16,11 +19,15 @@ from cmm_uq.artefacts import BUILT_IN, artefact_facts, kind_named
 from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.artefacts.triangle import Triangle
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts
+from cmm_uq.base.points import Points
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts, TestUncertainty
 from cmm_uq.jobs.tables.plan import CompleteTest
 from cmm_uq.machine.model.artefact import Artefact
 from tests.analysis.conformity.own_by_hand import OWN, SIDES, by_loops, changing, swept
 from tests.analysis.conformity.recorded import STATED, gauge
+from tests.analysis.conformity.test_as_recorded import numbered_lines
+from tests.recordings import screened, with_columns
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 WHOLE = CompleteTest(measurements=1, repeats=1, points=1)
@@ -31,6 +38,18 @@ def decided(
 ) -> Statement:
     wish = ConformityFacts(standard=NAME, characteristic=figure, limit_um=limit, complete=complete)
     return statement(wish, artefact, {}, "[[conformity]] 1", tuple(FIGURES), None, under)
+
+
+def screened_and_decided(
+    points: Points, facts: ArtefactFacts, figure: str, limit: float, under: Circumstances, aside: tuple[int, ...] = ()
+) -> Statement:
+    """As every command does it."""
+    points = numbered_lines(points)
+    recording = screened(points, facts, needed=set(), set_aside=aside, where="recording.csv")
+    observe = partial(kind_named(facts.kind).observing("decided"), facts)
+    left_out = OutsideReadings.of(points, recording.findings, observe)
+    wish = ConformityFacts(standard=NAME, characteristic=figure, limit_um=limit, complete=WHOLE)
+    return statement(wish, observe(recording.points), {}, "[[conformity]] 1", tuple(FIGURES), None, under, left_out)
 
 
 def example(name: str, added: str) -> dict[str, bytes]:
@@ -88,6 +107,134 @@ def test_without_saying_what_is_complete_nothing_passes(figure: str) -> None:
     for key in ("measurements", "repeats", "points"):
         more = complete.model_copy(update={key: getattr(complete, key) + 1})
         assert decided(artefact, figure, limit, under, more).outcome == "incomplete", key
+
+
+@pytest.mark.parametrize("figure", OWN)
+def test_errors_have_two_sides_and_spreads_one(figure: str) -> None:
+    artefact, under, value, _, signed, complete = OWN[figure]("complete")
+    found = decided(artefact, figure, 10 * abs(value), under, complete)
+    assert found.signed == signed == ("error" in figure and "deviation" not in figure)
+    assert found.named.error_um == pytest.approx(value, abs=2e-5)
+
+
+def test_a_radius_read_too_long_is_an_error_above_zero() -> None:
+    bar, points = swept("complete", certified=True)
+    xyz = points.xyz.copy()
+    xyz[7] += 50e-3 * (xyz[7] - [440.0, 270.0, -240.0]) / 250.0
+    longer = Bryan(artefact_facts(kind="bryan", length_mm=250.0, u_um=0.2), points.at(xyz))
+    counts = np.ones(60, dtype=bool)
+    assert longer.figures(counts)["error"].values[7] - bar.figures(counts)["error"].values[7] > 0.04
+
+
+def test_the_budget_is_that_of_the_value_named() -> None:
+    artefact, under, *_ = OWN["error"]("complete")
+    found = decided(artefact, "error", 100.0, under)
+    assert found.budget is not None
+    assert 1e3 * found.budget.u == pytest.approx(found.u_um)
+    assert found.budget.lines[0].u == pytest.approx(0.2e-3)
+
+
+def test_a_surface_of_unknown_form_makes_no_pass() -> None:
+    _, under, value, _, _, complete = OWN["flatness"]("complete")
+    plane = OWN["flatness"]("no u")[0]
+    under = replace(under, uncertainty=TestUncertainty(u_form_um=0.3))
+    found = decided(plane, "flatness", 10 * value, under, complete)
+    assert (found.outcome, *found.missing) == (
+        "incomplete",
+        "uncertainty: the form deviation of the surface is not stated",
+    )
+
+
+@pytest.mark.parametrize("figure", [one for one in OWN if one != "linearity"])
+def test_copies_are_in_no_figure(figure: str) -> None:
+    """Worked from all but the copies."""
+    artefact, under, value, u, _, complete = OWN[figure]("copied")
+    found = decided(artefact, figure, 10 * abs(value), under, complete)
+    assert found.outcome == "incomplete"
+    assert (found.value_um, found.u_um) == (pytest.approx(abs(value), abs=2e-5), pytest.approx(u))
+
+
+def test_lengths_are_those_at_20_degrees() -> None:
+    """Two kelvin warm, all radii and sides are longer by 2 × 11.5 ppm, and nothing is found of it."""
+    warm = np.full(60, 22.0)
+    bar, points = swept("complete", certified=True)
+    longer = points.at(np.array([440.0, 270.0, -240.0]) + (points.xyz - [440.0, 270.0, -240.0]) * (1 + 23e-6))
+    facts = artefact_facts(kind="bryan", length_mm=250.0, u_um=0.2, cte_per_k=11.5e-6)
+    found = Bryan(facts, with_columns(longer, temp_artefact_c=warm)).figures(np.ones(60, dtype=bool))
+    for name, figure in bar.figures(np.ones(60, dtype=bool)).items():
+        np.testing.assert_allclose(found[name].values, figure.values, atol=1e-6)
+
+    cold = OWN["mean error"]("complete")[0]
+    facts = artefact_facts(kind="triangle", blocks_mm=[380.0, 230.0, 280.0], cylinders_mm=[20.0] * 3, cte_per_k=11.5e-6)
+    longer = with_columns(cold.points.at(cold.points.xyz * (1 + 23e-6)), temp_artefact_c=np.full(18, 22.0))
+    found = Triangle(facts, longer).figures(np.ones(18, dtype=bool))
+    for name, figure in cold.figures(np.ones(18, dtype=bool)).items():
+        np.testing.assert_allclose(found[name].values, figure.values, atol=1e-7)
+
+
+def test_three_points_have_no_flatness() -> None:
+    plane = OWN["flatness"]("complete")[0]
+    counts = (plane.points.measurement == 1) & (plane.points.point <= 3)
+    assert plane.figures(counts) == {}
+
+
+def test_what_the_screening_leaves_out_is_in_the_decision() -> None:
+    """One of sixty readings is 2 mm off: left out of the estimates, it fails, whatever the limit."""
+    _, points = swept("complete", certified=True)
+    xyz = points.xyz.copy()
+    xyz[7] += 2.0 * (xyz[7] - [440.0, 270.0, -240.0]) / 250.0
+    facts = artefact_facts(kind="bryan", length_mm=250.0, u_um=0.2)
+    for figure in ("error", "span", "repeatability"):
+        under = STATED if figure == "error" else changing(0.3)
+        found = screened_and_decided(points.at(xyz), facts, figure, 1e4, under)
+        assert (found.outcome, found.named.set_aside) == ("fail", True), figure
+        assert screened_and_decided(points, facts, figure, 1e4, under).outcome == "pass"
+
+
+def test_what_the_laboratory_sets_aside_is_decided_as_recorded() -> None:
+    _, points = swept("complete", certified=True)
+    facts = artefact_facts(kind="bryan", length_mm=250.0, u_um=0.2)
+    whole = screened_and_decided(points, facts, "error", 1e4, STATED)
+    aside = screened_and_decided(points, facts, "error", 1e4, STATED, aside=(4,))
+    assert [one.error_um for one in aside.errors] == pytest.approx([one.error_um for one in whole.errors])
+    gauged = gauge(errors={(1, 1, 20.0): 9.0})
+    length = artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000")
+    mean = screened_and_decided(gauged.points, length, "mean error", 1e4, STATED, aside=(4,))
+    assert mean.value_um == pytest.approx(9.0 / 105, abs=1e-6)
+
+
+def test_a_recording_corrected_is_decided_as_corrected() -> None:
+    """Beside a reading that was left out, figures of the corrected readings are those, and not the recorded ones."""
+    _, points = swept("complete", certified=True)
+    facts, centre = artefact_facts(kind="bryan", length_mm=250.0, u_um=0.2), np.array([440.0, 270.0, -240.0])
+    xyz = points.xyz.copy()
+    xyz[7] += 2.0 * (xyz[7] - centre) / 250.0
+    points, observe = numbered_lines(points.at(xyz)), partial(Bryan, facts)
+    recording = screened(points, facts, needed=set(), set_aside=(), where="recording.csv")
+    left_out = OutsideReadings.of(points, recording.findings, observe)
+    assert np.flatnonzero(~left_out.kept).tolist() == [7]
+    corrected = recording.points.at(centre + (recording.points.xyz - centre) * (1 + 100e-6))
+    found = left_out.whole(observe(corrected)).figures(np.ones(60, dtype=bool))["error"].values
+    mixed = centre + (xyz - centre) * (1 + 100e-6 * left_out.kept)[:, None]
+    by_itself, recorded = (
+        observe(points.at(each)).figures(np.ones(60, dtype=bool))["error"].values for each in (mixed, xyz)
+    )
+    np.testing.assert_allclose(found, by_itself, atol=1e-9)
+    assert np.abs(found - recorded).max() > 0.01
+
+
+def test_lengths_corrected_beside_one_left_out_are_decided_as_corrected() -> None:
+    facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000")
+    observe = partial(kind_named("step_gauge").observing("decided"), facts)
+    points = gauge(errors={(2, 2, 20.0): 5000.0}).points
+    points = numbered_lines(points)
+    recording = screened(points, facts, needed=set(), set_aside=(), where="recording.csv")
+    left_out = OutsideReadings.of(points, recording.findings, observe)
+    assert left_out.artefact is not None
+    corrected = observe(recording.points.at(recording.points.xyz * (1 + 50e-6)))
+    found = left_out.whole(corrected).figures(np.ones(len(points), dtype=bool))["error"]
+    known = np.abs(found.values) < 1.0
+    np.testing.assert_allclose(found.values[known], 50e-6 * found.lengths[known], atol=1e-6)
 
 
 def test_a_larger_error_of_one_reading_has_no_better_decision() -> None:
