@@ -60,6 +60,11 @@ COLUMNS: Mapping[str, str] = MappingProxyType({
 _OF_SOME_MACHINES = re.compile(r"temp_(bridge|ram)_.*|depth_mm|turned_deg")
 # columns that a recording may have, and that are refused in another unit than that of their name
 OPTIONAL = tuple(name for name in COLUMNS if name not in REQUIRED and not _OF_SOME_MACHINES.fullmatch(name))
+# what instruments read, which the kinds that go by it describe
+READINGS = (
+    *("reading_um", "reading_mm", "reading_arcsec", "straightedge", "square", "ball", "u_mm", "v_mm"),
+    *(f"{name}_{a}" for name in ("read", "turn") for a in AXES),
+)
 LARGEST_NUMBER = 1e9  # of a measurement, point or repeat
 LARGEST_OF = {"_mm": LONGEST_MM, "_um": 1e9, "_c": 1e5, "_pct": 1e6, "_deg": 1e6}
 """By the ending of a column's name: far beyond any recording in its unit, so that a mistaken unit is still told as one."""

@@ -190,6 +190,20 @@ def test_a_square_without_its_uncertainty_or_with_one_leg_is_refused() -> None:
         AxisRuns(LEGS, joined(marked(run(1, Y), square=1.0)))
 
 
+def test_a_repeat_with_the_other_sign_is_refused_and_noise_alone_is_not() -> None:
+    rows = read(run(1, X, repeats=3), 5.0)
+    assert len(AxisRuns(EXACT, joined(rows)).readings) == 60
+    second = rows["repeat"] == 2
+    rows["reading_um"] = np.where(second, -rows["reading_um"], rows["reading_um"])
+    with pytest.raises(
+        CmmUqError, match=r"line 22.*repeat 2 of measurement 1 reads as the others do with the other sign"
+    ):
+        AxisRuns(EXACT, joined(rows))
+    for seed in range(50):
+        rows["reading_um"] = np.random.default_rng(seed).normal(0, 1, 60)
+        AxisRuns(EXACT, joined(rows))
+
+
 # --- the certificate of the simulated circles ------------------------------------------------------------------------
 
 NAME = "circles-simulated"

@@ -37,6 +37,7 @@ from cmm_uq.artefacts.axis_runs.run import (
     scatter,
     senses_of,
     squares,
+    turned_over,
 )
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
@@ -119,6 +120,11 @@ class AxisRuns(Artefact):
                 xyz = points.xyz[run.rows]
                 target[run.rows] = run.radius + run.sense @ (xyz - run.radius * run.sense).mean(axis=0)
         readings = self._in_mm(points, kind, target, where)
+        for run in runs if len(points.lines) else ():
+            if (one := turned_over(run, readings[run.rows], points.repeat[run.rows])) is not None:
+                wrong = (points.measurement == run.measurement) & (points.repeat == one)
+                problem = f"repeat {one} of measurement {run.measurement} reads as the others do with the other sign"
+                refuse(points, wrong, where, problem, "Turn its readings over, or leave it out")
         zero = self._zeros_of(points).means(readings)
         if self._facts.u_bar_um is not None:
             zero[kind == CIRCLE] = 0.0

@@ -26,6 +26,7 @@ END, TARGET, START, ZERO = "_arm_end", "_target_mm", "_start_mm", "_zero_mm"
 STRAIGHTEDGE, SQUARE = "straightedge", "square"  # columns: +1, and −1 reversed; number of the setting
 _UNIT, _SAME_MM = 0.01, 1e-6
 _ALONG, _ACROSS = 0.999, 0.05  # cosines between what is read and the travel
+_OPPOSITE = 16.0  # how much nearer a repeat is to the others with its sign changed, in squares, to be one turned over
 _ROUND = 0.02  # of its radius, by which targets may be off a circle
 
 
@@ -73,6 +74,25 @@ def scatter(run: Run, readings: Floats, repeat: Ints) -> tuple[float, int]:
     design = np.hstack([np.eye(block.max() + 1)[block] for block in blocks])
     fitted, _, rank, _ = np.linalg.lstsq(design, readings, rcond=None)
     return float(np.sum((readings - design @ fitted) ** 2)), len(readings) - int(rank)
+
+
+def turned_over(run: Run, readings: Floats, repeat: Ints) -> int | None:
+    """The repeat whose readings (k,) are those of the others with the other sign; ``None`` where there is none such.
+
+    Noise does not look so: the mean of others is smaller than it.
+    """
+    where = np.column_stack([np.round(run.positions / _SAME_MM), run.directions])
+    index = np.unique(where, axis=0, return_inverse=True)[1].ravel()
+    for one in np.unique(repeat) if len(np.unique(repeat)) > 2 else ():
+        means = []
+        for rows in (repeat == one, repeat != one):
+            count = np.maximum(np.bincount(index[rows], minlength=index.max() + 1), 1)
+            means.append(np.bincount(index[rows], readings[rows], index.max() + 1) / count)
+        own, others = means
+        own, others = own - own.mean(), others - others.mean()
+        if np.sum((own - others) ** 2) > _OPPOSITE * np.sum((own + others) ** 2):
+            return int(one)
+    return None
 
 
 def reference_shape(run: Run) -> Floats:

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES
-from cmm_uq.jobs.columns import COORDINATES, OPTIONAL, REQUIRED
+from cmm_uq.jobs.columns import COORDINATES, OPTIONAL, READINGS, REQUIRED
 from cmm_uq.jobs.importing.encodings import is_number
 from cmm_uq.jobs.importing.format import ImportKeys, Sheet, WrittenUnit, sources_of, unit_named
 
@@ -71,7 +71,7 @@ COVERAGE = re.compile(r"[\[(,;]?\s*\bk\s*=\s*(\d+(?:[.,]\d+)?)\s*[\])]?", re.IGN
 # what certificates print above a column, beside its unit or its coverage factor
 _SYMBOLS: Mapping[str, str] = {"U": "reference_U_um", "U95": "reference_U_um", "u": "reference_u_um"}
 _FIGURES = frozenset("0123456789+-−.,")
-_OWN = frozenset((*REQUIRED, *OPTIONAL))
+_OWN = frozenset((*REQUIRED, *OPTIONAL, *READINGS))
 _IN_BRACKETS = re.compile(r"\s*[\[(<{]\s*([^\])>}]*?)\s*[\])>}]\s*$")
 _AFTER_SIGN = re.compile(r"\s*(?:/|\bin\b|,|:)\s*([^\s/,:]+)\s*$", re.IGNORECASE)
 _AT_THE_END = re.compile(r"[\s_]+([^\s_]+)\s*$")

@@ -277,7 +277,7 @@ def placed(
 ) -> tuple[dict[str, Floats], list[Fact], list[int]]:
     """Columns of a recording, (2n,): both ends of every length, where the job says that its line lies."""
     wanted = list(dict.fromkeys(name for one in tables for name in one.names))
-    starts = {name: _place(keys.lines[name]) for name in wanted if name in keys.lines}
+    starts = {name: place_of(keys.lines[name]) for name in wanted if name in keys.lines}
     if lacking := [name for name in wanted if name not in starts]:
         one, which = lacking[0], ", ".join(map(repr, lacking))
         lie = f"lines {which} lie" if len(lacking) > 1 else f"line {one!r} lies"
@@ -321,7 +321,7 @@ def placed(
     return {name: np.array(values) for name, values in columns.items()}, facts, lines
 
 
-def _place(text: str) -> tuple[Floats, Floats]:
+def place_of(text: str) -> tuple[Floats, Floats]:
     """Start (3,) and direction (3,) of a line."""
     parts = LINE_PLACE.fullmatch(text.strip())
     if parts is None:

@@ -1,0 +1,107 @@
+"""Runs of a laser interferometer in Renishaw's form (``.rtl``): targets, and the deviation of each run at each target.
+
+The form is published nowhere. What is read here is what three public programs that read or write it agree on: sections in
+capitals with two colons; ``Targets :`` in mm, over several lines; below ``Run Target Data:`` the numbers of run and target
+with the deviation in µm, actual less target. Where the axis lies no file says: it is asked for.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Verbatim, say
+from cmm_uq.base.points import AXES
+from cmm_uq.jobs.importing.format import Fact, ImportKeys, Sheet, sheets_of
+from cmm_uq.jobs.importing.lengths import place_of
+from cmm_uq.jobs.importing.reports import TextReport
+
+_SECTION, _KEY = re.compile(r"([A-Z][A-Z -]{0,40})::"), re.compile(r"([A-Za-z][\w -]{0,40}?)\s{0,9}:\s{0,9}(.{0,200})")
+_LINEAR, _TRIPLE = {"linear", ""}, 3
+_AGAIN = "Export the runs anew"
+HEADINGS = [
+    "measurement", "point", "repeat", *(f"{a}_mm" for a in AXES), "reading_um", *(f"read_{a}" for a in AXES),
+    *(f"approach_{a}" for a in AXES),
+]  # fmt: skip
+
+
+class _Runs:
+    """What a file says: facts by name in small letters, targets, mm, and of each run its targets and deviations in turn."""
+
+    def __init__(self, lines: Sequence[str], where: str) -> None:
+        self.facts: dict[str, str] = {}
+        self.targets: list[float] = []
+        self.runs: dict[int, list[tuple[int, float, int]]] = {}
+        section = part = ""
+        for number, line in enumerate(lines, 1):
+            if not (text := line.strip()):
+                continue
+            if match := _SECTION.fullmatch(text):
+                section, part = match[1], ""
+            elif match := _KEY.fullmatch(text):
+                part = match[1].lower()
+                self.facts.setdefault(part, match[2].strip())
+            elif section == "TARGET DATA" and part == "targets":
+                self.targets += self._figures(text, f"{where} line {number}")
+            elif section == "DEVIATIONS" and part.startswith("run target data"):
+                figures = self._figures(text, f"{where} line {number}")
+                if (
+                    len(figures) != _TRIPLE
+                    or figures[0] % 1
+                    or not 1 <= figures[1] <= len(self.targets)
+                    or figures[1] % 1
+                ):
+                    raise CmmUqError("is no run, target and deviation", where=f"{where} line {number}", fix=_AGAIN)
+                self.runs.setdefault(int(figures[0]), []).append((int(figures[1]) - 1, figures[2], number))
+        self._check(where)
+
+    def _check(self, where: str) -> None:
+        kind = self.facts.get("owner", "").lower()
+        if kind not in _LINEAR:
+            problem = f"holds a measurement of the kind {self.facts['owner']!r}, whose unit no public text says"
+            raise CmmUqError(problem, where=where, fix="Export it as CSV, with reading_um or reading_arcsec")
+        for name, count in (("target-count", len(self.targets)), ("run-count", len(self.runs))):
+            if not count or self.facts.get(name, str(count)) != str(count):
+                raise CmmUqError(f"has {count} of {self.facts.get(name, 'some')} ({name})", where=where, fix=_AGAIN)
+        for run, rows in self.runs.items():
+            if sorted(target for target, _, _ in rows) != list(range(len(self.targets))):
+                raise CmmUqError(f"run {run} has not each target once", where=f"{where} line {rows[0][2]}", fix=_AGAIN)
+
+    @staticmethod
+    def _figures(text: str, place: str) -> list[float]:
+        try:
+            return [float(figure) for figure in text.split()]
+        except ValueError:
+            raise CmmUqError(f"{text!r} holds no figures", where=place, fix=_AGAIN) from None
+
+    def ways(self) -> Iterator[tuple[int, float]]:
+        """Number and sense of each run: by the order of its targets; none where all are listed in the same one."""
+        senses = [float(np.sign(rows[-1][0] - rows[0][0])) for rows in self.runs.values()]
+        both = len(set(senses)) > 1
+        for i, sense in enumerate(senses):
+            yield senses[: i + 1].count(sense), sense if both else 0.0
+
+
+class Rtl(TextReport):
+    name, title = "rtl", say("Laser interferometer (RTL)")
+    shows = (re.compile(r"^\s{0,9}TARGET DATA::", re.M), re.compile(r"^\s{0,9}Target-count\s{0,9}:", re.M))
+
+    def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
+        found = _Runs(lines, where)
+        axis = found.facts.get("axis", "") or "1"
+        if axis not in keys.lines:
+            fix = f'Say it, with the place where its scale reads 0, in mm: lines = {{ "{axis}" = "along X from 0,200,300" }}'
+            raise CmmUqError(f"nothing says where line {axis!r} lies, along which was measured", where=where, fix=fix)
+        start, direction = place_of(keys.lines[axis])
+        rows = []
+        for targets, (repeat, way) in zip(found.runs.values(), found.ways(), strict=True):
+            for k, (target, deviation, line) in enumerate(targets, 1):
+                place = start + found.targets[target] * direction
+                first = 0 if way >= 0 else len(found.targets)
+                cells = [1, first + k, repeat, *place, deviation, *direction, *(way * np.sign(direction) + 0.0)]
+                rows.append(("", [f"{cell:.10g}" for cell in cells], line))
+        told = [Fact("lines", say("Lines"), Verbatim(f"{axis}: {keys.lines[axis]}"))]
+        return sheets_of(rows, HEADINGS, unit="mm", facts=(encoding, *told))
