@@ -9,7 +9,7 @@ from pydantic import Field
 
 from cmm_uq.artefacts.axis_runs.kind import APPROACHES, AXIS_RUNS, InterferometerFacts
 from cmm_uq.base.files.limits import LISTED
-from cmm_uq.base.files.table import JobTable, Length, Number, Position, Triple, Uncertainty, key, required
+from cmm_uq.base.files.table import JobTable, Length, Number, Numbers, Position, Triple, Uncertainty, key, required
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.beginning import AT_20_C, SIX, Beginning, circumstances
 from cmm_uq.jobs.tables import artefact as tables
@@ -270,9 +270,14 @@ class ShiftFacts(ArtefactFacts):
     u_shift_um: Uncertainty = key(0.0, "Standard uncertainty of the shifts; where it is not 0 they are estimated.")
     known: KnownLength | None = None
     """A known length between two points of the artefact, for the mean scale of the axis."""
+    integrated_points: Annotated[list[Numbers], Field(max_length=20)] = Field(default_factory=list)
+    """Of two series along an axis: numbers of points from which alone the integrations of the method's source are made too,
+    a list each, to be compared with the joint fit of all readings."""
 
     def problems(self) -> Iterator[str]:
         yield from super().problems()
+        if self.integrated_points and (self.plane is not None or len(self.shifts_mm) != 2):
+            yield "integrated_points are of two series along an axis: give axis and two shifts_mm, or leave them out"
         if self.plane is not None and (self.axis is not None or self.shifts_mm or self.u_shift_um):
             yield (
                 "plane belongs to a plate that is shifted and turned: its placings are found from the readings; leave out "
@@ -285,7 +290,7 @@ class ShiftFacts(ArtefactFacts):
 
 
 SHIFT = Kind(
-    "shift", ShiftFacts, plan=f"{_HERE}.shift.analysis:PLANNING",
+    "shift", ShiftFacts, f"{_HERE}.shift.artefact:ShiftedArtefact", plan=f"{_HERE}.shift.analysis:PLANNING",
     begin=Beginning(
         title="Self-calibration of an axis by shifting an uncalibrated gauge",
         numbering="One measurement is one series, at one shift; its points are those of the gauge.",

@@ -85,6 +85,23 @@ def offset_by_other_ways(results: Results) -> list[Record]:
     return list(zip(found["offset_mm"].values(), found["by_centres_mm"], found["closed_form_mm"], strict=True))
 
 
+def beside_integrations(results: Results) -> list[Record]:
+    pitch, improved = (results["integrations"][method] for method in ("pitch", "improved"))
+    joint = results["beside_integrations"]
+    curves = [one[name] for one in (pitch, improved, joint) for name in ("error_um", "u_um")]
+    return list(zip(pitch["position_mm"], *curves, strict=True))
+
+
+def selections(results: Results) -> list[Record]:
+    """Of some points what each integration leaves of the error by the joint fit."""
+    found = []
+    for one in results["selections"]:
+        joint, steps = one["joint_um"], np.abs(np.diff(one["pitch"]["position_mm"])).round(1)
+        left = [one[method][name] for method in ("pitch", "improved") for name in ("left_um", "u_left_um")]
+        found.append([len(one["points"]), steps.min(), steps.max(), max(joint) - min(joint), *left])
+    return found
+
+
 def decided(results: Results) -> list[Record]:
     """Values of one length in one measurement, as a row has them, in the order of the first."""
     (stated,) = results["conformity"]
@@ -197,6 +214,8 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Placings, as found from the readings": lambda r: [[placing] for placing in r["placings"]],
     "The plate's own geometry": ball_places,
     "Offset of the mount": offset,
+    "Beside the integrations of the method's source": beside_integrations,
+    "Integrations from some of the points": selections,
     "Centres of the balls": lambda r: [[ball] for ball in r["balls"]],
     "The offset by other ways": offset_by_other_ways,
     "Every attitude": lambda r: [[pose] for pose in r["digitizer"]["poses"]],

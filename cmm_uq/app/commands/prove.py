@@ -147,7 +147,7 @@ def design_of(job: Job) -> tuple[Job, Design]:
     """The job with the set-ups that cases are drawn on, and these, with the job's own errors and noise."""
     kind, facts = kind_of(job), job.facts
     offered = kind.offers("own", OwnAnalysis)
-    if kind.observe is None or (offered is not None and offered.diagnose is not None):
+    if not kind.by_effects or (offered is not None and offered.diagnose is not None):
         kind_of_its_own = f"a job of kind {facts.artefact.kind!r} has an analysis of its own"
         raise CmmUqError(f"{kind_of_its_own}, which is not proved by cases of effects", where=_KIND, fix=_EXPLAINED)
     if facts.simulation is not None:

@@ -182,6 +182,41 @@ _MISREAD = 0.02  # part of a known length by which the readings may differ from 
 
 
 @dataclass(frozen=True, eq=False)
+class SelectedPoints:
+    """The integrations from some points alone, beside the joint fit of all."""
+
+    numbers: Ints  # of the points, ascending
+    integrated: dict[Method, IntegratedCurve]
+    joint: Floats  # (n,) error by the joint fit at the positions of the integrations, mm
+
+    @classmethod
+    def of(
+        cls, series: ShiftedSeries, estimate: CurveEstimate, known: KnownSpan | None, numbers: Ints
+    ) -> SelectedPoints:
+        points, where = np.flatnonzero(np.isin(series.numbers, numbers)), "job.toml [artefact] integrated_points"
+        if series.pair is None:
+            raise CmmUqError("a point was not read in both series", where=where, fix="Leave integrated_points out")
+        ends = [] if known is None else series.numbers[[known.first, known.last]].tolist()
+        if unknown := set(numbers.tolist()) - set(series.numbers.tolist()):
+            raise CmmUqError(f"there is no point {min(unknown)}", where=where, fix="Name points that both series have")
+        if len(points) < 3 or not set(ends) <= set(numbers.tolist()):
+            with_ends = f", among them {ends[0]} and {ends[1]}, between which the length is known" if ends else ""
+            raise CmmUqError("too few points for an integration", where=where, fix=f"Name three or more{with_ends}")
+        found = _integrated(series, estimate, known, points)
+        return cls(series.numbers[points], found, estimate.at(next(iter(found.values())).position).error)
+
+    def left(self, method: Method) -> Floats:
+        """(n,) what a method leaves of the error by the joint fit, mm, about zero at the first point."""
+        return np.asarray(self.integrated[method].error - (self.joint - self.joint[0]))
+
+    def peak_to_valley(self, method: Method) -> tuple[float, float]:
+        """Of what it leaves, mm, with the standard uncertainty that the integration has of that difference."""
+        left, C = self.left(method), self.integrated[method].covariance
+        i, j = int(left.argmax()), int(left.argmin())
+        return float(left[i] - left[j]), float(np.sqrt(max(C[i, i] + C[j, j] - 2 * C[i, j], 0.0)))
+
+
+@dataclass(frozen=True, eq=False)
 class ShiftResult(ShiftFound):
     """All that is known of a shift job after its analysis; see also :class:`~cmm_uq.artefacts.shift.result.ShiftFound`."""
 
@@ -189,6 +224,7 @@ class ShiftResult(ShiftFound):
     undetermined: Undetermined  # what no reading shows
     # the paper's integrations of two complete series, by method; empty otherwise
     integrated: dict[Method, IntegratedCurve]
+    selected: tuple[SelectedPoints, ...] = ()  # the same from some points alone
 
     @property
     def axis(self) -> str:
@@ -259,9 +295,10 @@ def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) 
     estimate = estimate_curve(
         series, known, sigma=None if stated is None else stated * MICROMETRE, seed=seed, progress=progress
     )
-    return ShiftResult(
-        job, estimate, undetermined(series, scale_known=estimate.scale_known), _integrated(series, estimate, known)
-    )
+    every = _integrated(series, estimate, known, np.arange(len(series.numbers)))
+    chosen = [np.array(sorted(each), dtype=np.int64) for each in shared.shift_facts(job).integrated_points]
+    selected = tuple(SelectedPoints.of(series, estimate, known, each) for each in (series.numbers, *chosen) if chosen)
+    return ShiftResult(job, estimate, undetermined(series, scale_known=estimate.scale_known), every, selected)
 
 
 def checked_series(job: Job) -> tuple[ShiftedSeries, KnownSpan | None]:
@@ -328,13 +365,17 @@ def _known(given: KnownLength, series: ShiftedSeries) -> KnownSpan:
 
 
 def _integrated(
-    series: ShiftedSeries, estimate: CurveEstimate, known: KnownSpan | None
+    series: ShiftedSeries, estimate: CurveEstimate, known: KnownSpan | None, points: Ints
 ) -> dict[Method, IntegratedCurve]:
+    """From the points of these indices alone, in ascending order."""
     if series.pair is None:
         return {}
-    a, b = series.pair
+    a, b = (readings[points] for readings in series.pair)
+    if known is not None:
+        first, last = np.searchsorted(points, [known.first, known.last]).tolist()
+        known = replace(known, first=first, last=last)
     scatter = float(estimate.sigma.mean()) * series.noise_scale
-    u = np.stack([scatter[series.series == 0], scatter[series.series == 1]])
+    u = np.stack([scatter[series.series == 0][points], scatter[series.series == 1][points]])
     shift = float(series.shifts[1] - series.shifts[0]) if series.u_shift == 0 else None
     methods: tuple[Method, ...] = ("pitch", "improved")
     return {method: integrated(a, b, u, method=method, shift=shift, known=known) for method in methods}

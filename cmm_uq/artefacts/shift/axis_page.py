@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.artefacts.shift import result as shared
-from cmm_uq.artefacts.shift.axis import ShiftResult
+from cmm_uq.artefacts.shift.axis import SelectedPoints, ShiftResult
 from cmm_uq.base.messages import Number, Text, Verbatim, in_a_row, number, plural, say, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
@@ -33,6 +33,7 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
             method: {"position_mm": one.position.tolist(), "error_um": _um(one.error), "u_um": _um(one.u)}
             for method, one in result.integrated.items()
         },
+        **({"selections": [_selected_data(one) for one in result.selected]} if result.selected else {}),
         "beside_integrations": None if joint is None else shared.curve_data(joint, joint.expanded),
         "artefact": {
             "point": estimate.series.numbers.tolist(), "distance_mm": None if mean is None else mean.tolist(),
@@ -55,6 +56,34 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
 def _um(values: Floats) -> list[float]:
     found: list[float] = (values / MICROMETRE).tolist()
     return found
+
+
+def _selected_data(one: SelectedPoints) -> dict[str, Any]:
+    data: dict[str, Any] = {"points": one.numbers.tolist(), "joint_um": _um(one.joint)}
+    for method, found in one.integrated.items():
+        left, u = one.peak_to_valley(method)
+        curve = {"position_mm": found.position.tolist(), "error_um": _um(found.error), "u_um": _um(found.u)}
+        data[method] = {**curve, "left_um": left / MICROMETRE, "u_left_um": u / MICROMETRE}
+    return data
+
+
+def _selections(result: ShiftResult) -> tuple[Table, ...]:
+    """The source's experiments side by side: what each integration leaves, from all points and from some."""
+    rows = []
+    for one in result.selected:
+        steps = np.diff(next(iter(one.integrated.values())).position)
+        sizes = [nominal(round(float(step), 1)) for step in (np.abs(steps).min(), np.abs(steps).max())]
+        pitch = sizes[0] if sizes[0] == sizes[1] else say("{low} to {high}", low=sizes[0], high=sizes[1])
+        before = number(float(np.ptp(one.joint)) / MICROMETRE, ".1f")
+        left = [part for method in one.integrated for part in one.peak_to_valley(method)]
+        rows.append((number(len(one.numbers)), pitch, before, *(number(part / MICROMETRE, ".1f") for part in left)))
+    heads = _in_um(say("Error"), say("Integrated leaves"), say("u"), say("Improved leaves"), say("u"))
+    columns = (Column(say("Points")), Column(say("Pitch"), unit("mm")), *heads)
+    note = say(
+        "Peak to valley at the points: of the error by the joint fit of all readings, and of what the integrations from these "
+        "points alone leave of it; u of that difference by the law of propagation, from repeatability alone."
+    )
+    return (Table(say("Integrations from some of the points"), columns, tuple(rows), (note,)),) if rows else ()
 
 
 MOST_ROWS = 60  # of a table
@@ -137,7 +166,7 @@ def _beside_integrations(result: ShiftResult) -> tuple[Table, ...]:
         return ()
     integrations = (values for one in result.integrated.values() for values in (one.error, one.u))
     rows = tuple(
-        (number(x, ".3f"), *(number(v / MICROMETRE, ".2f") for v in figures))
+        (number(x, ".3f"), *(signed(v / MICROMETRE, ".2f") for v in figures))
         for x, *figures in _sparse(joint.position, *integrations, joint.error, joint.u)
     )
     each = _in_um(say("Integrated"), say("u"), say("Improved"), say("u"), say("Joint fit"), say("u"))
@@ -268,4 +297,6 @@ def _method(result: ShiftResult) -> Section:
         "smooth function (Gaussian process, Matérn 7/2) whose size, correlation length and growth towards the ends are "
         "sampled, all else is drawn from its exact conditional distribution."
     )
-    return shared.method_section(result, text, len(result.estimate.series.reading), *_beside_integrations(result))
+    return shared.method_section(
+        result, text, len(result.estimate.series.reading), *_beside_integrations(result), *_selections(result)
+    )

@@ -76,6 +76,11 @@ class Kind:
         found = self._loaded(self.begin_also[name]) if name in self.begin_also else self.offers("begin", Beginning)
         return found if isinstance(found, Beginning) else Beginning(self.name, "")
 
+    @property
+    def by_effects(self) -> bool:
+        """Whether its certificate is of effects that are named, and not of an analysis of its own."""
+        return self.observe is not None and getattr(self._loaded(self.own), "report", None) is None
+
     def observing(self, what: str) -> Observe:
         """What makes an artefact of facts and points, for a command that cannot do without."""
         found = self._loaded(self.observe)

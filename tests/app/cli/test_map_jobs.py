@@ -153,17 +153,13 @@ def test_compensating_by_the_table_brings_the_error_down(report: Path, tmp_path:
     assert left[1] < left[0] / 5
 
 
-@pytest.mark.parametrize("command", ["diagnose", "simulate", "compensate", "budget"])
+@pytest.mark.parametrize("command", ["prove", "compensate", "budget"])
 def test_what_a_shift_job_cannot_have_is_one_line_and_exit_code_2(command: str, tmp_path: Path) -> None:
-    truth = tmp_path / "truth.toml"
-    truth.write_text("[effects.scale_x]\nppm = 10.0\n", encoding="utf-8")
-    more = ["--truth", truth] if command == "simulate" else []
-    process = run(command, SHIFT, *more, "--out", tmp_path / "out")
+    process = run(command, SHIFT, "--out", tmp_path / "out")
     assert process.returncode == 2
     assert "Traceback" not in process.stderr
     said = {
-        "diagnose": "a shift job cannot be diagnosed",
-        "simulate": "a shift job cannot be simulated",
+        "prove": "has an analysis of its own",
         "compensate": "the job has no error map",
         "budget": "is a folder, not a file",
     }

@@ -25,7 +25,7 @@ from cmm_uq.machine.model import RecordingModel
 from tests.conftest import ROOT
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
-NO_POINTS = {"shift-simulated", "shift-plate-simulated", "iota-1102-maps"}
+NO_POINTS = {"shift-simulated", "shift-source-simulated", "shift-plate-simulated", "iota-1102-maps"}
 KINDS = sorted(
     {path.parent.name for path in EXAMPLES.glob("*/*.csv") if not path.parent.name.startswith("part-")} - NO_POINTS
 )

@@ -313,7 +313,7 @@ def _drawn(job: Job, kind: Kind, begin: Beginning) -> Points:
         wanted = {name: values for name, values in points.columns.items() if name != "time_s"}
         constant = {name: np.full(len(points), value) for name, value in begin.recorded.items()}
         points = replace(points, columns=wanted | constant)
-    if kind.observe is None:
+    if not kind.by_effects:
         noise = np.random.default_rng(SEED).normal(0.0, begin.noise_um * MICROMETRE, points.xyz.shape)
         return points.at(points.xyz + noise)
     from cmm_uq.app.commands.jobs.simulate import simulate

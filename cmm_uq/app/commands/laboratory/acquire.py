@@ -204,7 +204,7 @@ def _lead(job: Job, plan: str, titles: Sequence[str]) -> Lead:
 def _judge(job: Job) -> Judge:
     kind, stated = kind_of(job), job.facts.recording.u_coordinate_um
     observe: Observe | None = None
-    if kind.observe is not None:
+    if kind.by_effects:
         observe = kind.observing("judged")
     return Judge(
         job.facts.artefact, kind.offers("screen", Screening), observe, job.points.machine,

@@ -188,7 +188,7 @@ def further_of(
         if one.effect in every():
             shares[one.effect] = max(shares.get(one.effect, 0.0), one.share)
     wanted = [every()[name] for name in sorted(shares, key=lambda name: -shares[name])]
-    if not wanted or calibrated is None or kind_of(calibrated).observe is None:
+    if not wanted or calibrated is None or not kind_of(calibrated).by_effects:
         return None, {}
     here = [effect for effect in wanted if _why_not(calibrated, effect) is None][:MOST]
     plan = _plan(calibrated, here)

@@ -77,7 +77,7 @@ def further_certificates(
         if own is None or results is None:
             raise refuse("has no recording inside", fix="Give the certificate as PDF, as cmm-uq report wrote it")
         _refuse_other(own, calibrated, job.facts.job.date, refuse)
-        if kind_of(own).observe is None:
+        if not kind_of(own).by_effects:
             problem = f"is of a {own.facts.artefact.kind}, which by itself shows no errors of a machine"
             raise refuse(problem, fix="Leave it out")
         if (recording := _recording(own)) in seen:

@@ -373,7 +373,7 @@ def _given(
     apart = say("errors that it did not model are each drawn on its own, which makes most uncertainties too large")
     if job is None:
         return state, say("The recording of the calibration is not at hand: {apart}.", apart=apart), False, (), ()
-    if kind_of(job).observe is None:
+    if not kind_of(job).by_effects:
         told = say("The calibration is of another sort than one by named errors: {apart}.", apart=apart)
         return state, told, False, (), ()
     try:
