@@ -50,6 +50,12 @@ class BallbarFacts(ArtefactFacts):
     """Largest less smallest diameter of the scanned balls, by their grade: 5.08 of grade 200."""
 
 
+def _own_rule(figure: str, limit_um: float, measurements: int, repeats: int, points: int) -> dict[str, Any]:
+    """What a new job wishes to be decided by the laboratory's own rule."""
+    complete = {"measurements": measurements, "repeats": repeats, "points": points}
+    return {"standard": "laboratory's own rule", "characteristic": figure, "limit_um": limit_um, "complete": complete}
+
+
 BALLBAR = _kind("ballbar", BallbarFacts, "scanned_ballbar:observe", Beginning(
     title="Ballbar in twenty positions (ASME B89.4.1)",
     numbering="One measurement is one position of the bar; points 1 and 2 are the centres of its balls.",
@@ -63,6 +69,7 @@ BRYAN = _kind("bryan", ArtefactFacts, "bryan:Bryan", Beginning(
     title="Bryan gauge, a bar swept about a fixed ball",
     numbering="One measurement is one position of the swept ball, which is point 1; the fixed ball is not recorded.",
     artefact={"name": "Swept bar", "length_mm": 250.0, "u_um": 0.5}, plan={"repeats": 1},
+    conformity=_own_rule("span", 10.0, 25, 1, 1), test=circumstances(u_repeat_um=0.1), recorded=AT_20_C,
 ), "error", *SWEPT)  # fmt: skip
 
 
@@ -129,6 +136,8 @@ TRIANGLE = _kind("triangle", TriangleFacts, "triangle:Triangle", Beginning(
     artefact={"name": "Triangle of gauge blocks and cylinders", "cte_per_k": 11.5e-6,
               "blocks_mm": [380.0, 280.0, 340.0], "u_blocks_um": 0.1, "cylinders_mm": [20.0] * 3, "u_cylinders_um": 0.1},
     plan={"repeats": 3}, further=dict.fromkeys((f"tip_{a}_mm" for a in AXES), ""), noise_um=0.3,
+    conformity=_own_rule("mean error", 2.0, 7, 3, 3), recorded=AT_20_C,
+    test=circumstances(u_cte_per_k=1e-6, u_temperature_k=0.1, u_alignment_um=0.1, u_fixturing_um=0.1),
 ), *ERRORS, "angle error", "repeatability", page="triangle_page")  # fmt: skip
 
 
@@ -173,7 +182,8 @@ class PlaneFacts(ArtefactFacts):
 PLANE = _kind("plane", PlaneFacts, "plane:PlaneSurface", Beginning(
     title="Surface plate, a grid of points",
     numbering="One measurement is one place of the surface; point 0, where there is one, lies just before contact.",
-    artefact={"name": "Surface plate"}, effects=("straightness_x_z", "straightness_y_z"),
+    artefact={"name": "Surface plate", "form_um": 1.0}, effects=("straightness_x_z", "straightness_y_z"),
+    conformity=_own_rule("flatness", 10.0, 1, 2, 49), test=circumstances(u_form_um=0.1), recorded=AT_20_C,
     plan={"grid": [7, 7], "repeats": 2},
 ), "flatness")  # fmt: skip
 
@@ -207,6 +217,7 @@ DIGITIZER = _kind("digitizer", ReferenceSphereFacts, "digitizer:DigitizerArtefac
     artefact={"name": "Laser digitizer", "length_mm": 25.4, "u_um": 0.3, "offset_mm": [1.0, 200.0, 130.0],
               "u_attitude_arcsec": 2.0, "u_centre_um": [1.0, 1.0, 1.0]},
     effects=(), plan={"repeats": 2}, noise_um=5.0,
+    conformity=_own_rule("closure", 20.0, 3, 2, 37), test=circumstances(u_repeat_um=0.5), recorded=AT_20_C,
     columns={
         "alpha_deg": "First Euler angle (3-1-3) of the digitizer.", "beta_deg": "Second Euler angle of the digitizer.",
         "gamma_deg": "Third Euler angle of the digitizer.",
@@ -298,12 +309,13 @@ SHIFT = Kind(
             "name": "Step gauge, uncalibrated but for its length", "axis": "x", "shifts_mm": [0.0, 20.0, 50.0],
             "u_shift_um": 100.0, "known": {"from": 1, "to": 21, "length_mm": 400.0, "u_um": 0.5},
         },
-        effects=(), plan={"repeats": 3},
+        effects=(), plan={"repeats": 3}, recorded=AT_20_C,
+        conformity=_own_rule("linearity", 10.0, 3, 3, 21), test=circumstances(),
     ),
     begin_also={"shift_plate": f"{_HERE}.shift.beginning:PLANE_SHIFTED"},
     check=f"{_HERE}.shift.analysis:refuse_unfit", own=f"{_HERE}.shift.analysis:OWN",
     refusal="a shift job cannot be {}: its machine error is a free function, no list of effects",
-    instead="cmm-uq report JOB estimates it",
+    instead="cmm-uq report JOB estimates it", tested=("linearity",),
 )  # fmt: skip
 
 

@@ -33,6 +33,9 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import ArtefactFigure, Indications
 
 NAME = "laboratory's own rule"
+EVALUATED: tuple[
+    str, ...
+] = ()  # lines of a figure whose u is that of its evaluation, with all that is stated of the readings
 # each figure: what is compared, what is counted of it, and the lines of its uncertainty
 FIGURES: Mapping[str, tuple[Text, Text, tuple[str, ...]]] = {
     "error": (say("error of length, worst against its limit"), say("lengths"), LENGTH_LINES),
@@ -75,9 +78,10 @@ FIGURES: Mapping[str, tuple[Text, Text, tuple[str, ...]]] = {
         say("distances"),
         REPEAT_LINES,
     ),
+    "linearity": (say("linearity error of the axis, peak to valley"), say("curves"), EVALUATED),
 }
 SIGNED = ("error", "mean error", "angle error")
-_UNSTATED = {LENGTH_LINES: "u_um", REPEAT_LINES: "u_repeat_um", FORM_LINES: "form_um"}
+_UNSTATED = {EVALUATED: "u_coordinate_um", LENGTH_LINES: "u_um", REPEAT_LINES: "u_repeat_um", FORM_LINES: "form_um"}
 
 
 def decided(test: Test, *, name: str) -> Statement:
@@ -121,6 +125,7 @@ def decided(test: Test, *, name: str) -> Statement:
 
 
 _SAID = {
+    EVALUATED: say("u is that of the evaluation, half the longer side of its 95 % interval."),
     LENGTH_LINES: say("u is the test uncertainty of the artefact (as ISO/TS 23165 has that of a length)."),
     REPEAT_LINES: say(
         "What the artefact's certificate leaves uncertain cancels; u is what of it changes between readings."
@@ -138,6 +143,8 @@ def _causes(test: Test, found: ArtefactFigure, lines: tuple[str, ...]) -> Causes
     m, least = len(found.values), test.least_u(found.lengths)
     if lines == LENGTH_LINES:
         return causes_of_lengths(_indications(found), test.artefact, test.circumstances).at_least(least)
+    if lines == EVALUATED and found.u is not None:
+        return Causes((found.u / MICROMETRE)[:, None], np.zeros(m), np.arange(m)).at_least(least)
     if lines == FORM_LINES:
         u = float(np.hypot(test.artefact.form / MICROMETRE / 2, test.circumstances.uncertainty.u_form_um))
         return Causes(np.full((m, 1), u), np.zeros(m), np.arange(m)).at_least(least)
@@ -187,7 +194,7 @@ def _unstated(lines: tuple[str, ...], artefact: ArtefactFacts) -> str | None:
         return key if key is not None and not getattr(artefact, key) else None
     keys = [value.u_key for value in artefact.certified_values if value.u_key]
     known = any(getattr(artefact, key, None) for key in keys)
-    return None if known or not keys or lines == REPEAT_LINES or not artefact.traced else keys[0]
+    return None if known or not keys or lines != LENGTH_LINES or not artefact.traced else keys[0]
 
 
 STANDARD = Standard(

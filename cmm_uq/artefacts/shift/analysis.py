@@ -24,7 +24,8 @@ from cmm_uq.certificate.clauses import clauses_data, formal_warnings
 from cmm_uq.certificate.document import Document
 from cmm_uq.certificate.origin import posterior_file
 from cmm_uq.certificate.result import Outcome, OwnAnalysis, Recipe
-from cmm_uq.certificate.sections.results import as_found_data, as_found_section
+from cmm_uq.certificate.sections.conformity import conformity_section
+from cmm_uq.certificate.sections.results import as_found_data, as_found_section, headlines, overview_of
 from cmm_uq.certificate.wording import Summary, figure_row
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.ensembles import Progress
@@ -55,7 +56,13 @@ def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
         )
     warned = (*told, *formal_warnings(job))
     figures = tuple(figure_row(name, quantity) for _, _, name, quantity in left)
-    short = Summary(page.measured(found), day(job.facts.job.date), figures=figures, warnings=warned)
+    short = Summary(
+        page.measured(found),
+        day(job.facts.job.date),
+        headlines(found),
+        figures,
+        warnings=warned,
+    )
     draws, table = posterior_file(found.draws, job.origin), table_file(job)
     results = page.shift_results(found) | as_found_data(job) | clauses_data(job) | found.stating.data()
     results["posterior"] = draws.entry
@@ -63,14 +70,15 @@ def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
 
     def certificate() -> Document:
         sections = page.sections(found)
-        sections.insert(1, as_found_section(job, left))
+        sections[1:1] = [conformity_section(found.statements), as_found_section(job, left)]
         produced_by = say(
             "cmm-uq {version}, {sampler}, seed {seed}",
             version=Verbatim(__version__), sampler=Verbatim(found.estimate.chains.sampler), seed=found.estimate.seed,
         )  # fmt: skip
-        return certificate_of(job, sections, tuple(told), produced_by, tuple(names(files)))
+        overview = overview_of(found)
+        return certificate_of(job, sections, tuple(told), produced_by, tuple(names(files)), overview)
 
-    return Outcome(found, certificate, results, short, warned, files, draws=found.draws)
+    return Outcome(found, certificate, results, short, warned, files, draws=found.draws, verdicts=found.verdicts)
 
 
 OWN = OwnAnalysis(report=Recipe(analyse, outcome))

@@ -18,6 +18,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.analysis.conformity.statement import Statement, by_standard
 from cmm_uq.artefacts.kinds import ShiftFacts
 from cmm_uq.artefacts.shift.smooth import Coefficients
 from cmm_uq.base.messages import Text, Verbatim, number, say
@@ -27,10 +28,10 @@ from cmm_uq.certificate.clauses import artefact_rows, certificate_rows, traceabi
 from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
 from cmm_uq.certificate.origin import file_name, quantity_data
 from cmm_uq.certificate.result import StatedUncertainty
-from cmm_uq.certificate.results.contents import covariance_data, head
+from cmm_uq.certificate.results.contents import covariance_data, head, statement_data
 from cmm_uq.certificate.sections.results import SIGN, Left, stated_table
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.verdicts import NO_VERDICTS
+from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, error_map_csv
 from cmm_uq.maths.inference.draws import Draws, by_ensemble
 from cmm_uq.maths.inference.ensembles import Chains
@@ -150,6 +151,15 @@ class ShiftFound(ABC):
     job: Job  # what was analysed
     estimate: Estimated  # of the machine and the artefact, with its posterior
 
+    @property
+    def statements(self) -> tuple[Statement, ...]:
+        """What the job wishes to be decided."""
+        return ()
+
+    @cached_property
+    def verdicts(self) -> Verdicts:
+        return Verdicts(map(by_standard, self.statements))
+
     @cached_property
     def disagreement_um(self) -> tuple[float, float]:
         """Root mean square of what the placings disagree by, without and with the machine's errors, µm."""
@@ -243,8 +253,8 @@ def shared_results(
         },
         **further,
         "improvement": {"rms_before_um": before, "rms_after_um": after},
-        "conformity": [],
-        "verdicts": NO_VERDICTS.data(),
+        "conformity": [statement_data(one) for one in result.statements],
+        "verdicts": result.verdicts.data(),
     }  # fmt: skip
 
 

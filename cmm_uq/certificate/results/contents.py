@@ -93,7 +93,7 @@ def results(result: Result) -> dict[str, Any]:
         "identifiability": _identifiability(result),
         "accuracy": {name: quantity.value for name, quantity in result.accuracy.items()},
         "accuracy_uncertainty": _quantities(result.accuracy),
-        "conformity": [_statement(statement) for statement in result.statements],
+        "conformity": [statement_data(statement) for statement in result.statements],
         "verdicts": result.verdicts.data(),
         "diagnosis": diagnosis_data(result.diagnosed),
         "screening": [finding_data(finding, result.job.facts.recording.file) for finding in result.findings],
@@ -141,7 +141,7 @@ def diagnosis_data(found: JobDiagnosis) -> dict[str, Any]:
         "corrected": None if changes is None else {
             "accuracy": {name: {"before": quantity_data(a), "after": quantity_data(b)}
                          for name, (a, b) in changes.figures.items()},
-            "conformity": [{"before": _statement(a), "after": _statement(b)} for a, b in changes.statements],
+            "conformity": [{"before": statement_data(a), "after": statement_data(b)} for a, b in changes.statements],
         },
     }  # fmt: skip
 
@@ -349,7 +349,7 @@ def _identifiability(result: Result) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _statement(statement: Statement) -> dict[str, Any]:
+def statement_data(statement: Statement) -> dict[str, Any]:
     return {
         "standard": statement.facts.standard, "characteristic": statement.characteristic,
         "quantity": statement.quantity, "value_um": statement.value_um, "signed": statement.signed,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.analysis.conformity.decision import rule_words
@@ -17,7 +17,7 @@ from cmm_uq.certificate.plots.residuals import tolerance_plot
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.sections.conformity import has_picture, named, picture
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.verdicts import GRAVEST, NONE, Verdict, gravest, standing_of
+from cmm_uq.jobs.verdicts import GRAVEST, NONE, Verdict, Verdicts, gravest, standing_of
 from cmm_uq.maths.uncertainty.quantity import Quantity, limit_in_full, rounded, significant
 
 SIGN = say("Sign rule: true coordinate = indicated coordinate + error.")
@@ -175,12 +175,28 @@ def summary(result: Result, warnings: Iterable[Text]) -> wording.Summary:
         wording.figure_row(wording.title_of(key, result), one, known=key not in result.not_given)
         for key, one in reported(result)
     ]
+    return wording.Summary(subject, day(facts.job.date), headlines(result), tuple(figures), warnings=tuple(warnings))
+
+
+class Stating(Protocol):
+    """What states whether something conforms."""
+
+    @property
+    def statements(self) -> tuple[Statement, ...]:
+        """By standards, or the laboratory's own rule."""
+
+    @property
+    def verdicts(self) -> Verdicts:
+        """The same, then parameters with a tolerance."""
+
+
+def headlines(result: Stating) -> tuple[wording.Headline, ...]:
+    """Every statement, for the end of a command."""
     remarks = (*map(_remarks, result.statements), *map(_tolerance_remarks, tolerances_of(result)))
-    decided = tuple(
+    return tuple(
         wording.Headline(one.outcome.upper(), one.standing, subject_of(one), tuple(told))
         for one, told in zip(result.verdicts, remarks, strict=True)
     )
-    return wording.Summary(subject, day(facts.job.date), decided, tuple(figures), warnings=tuple(warnings))
 
 
 def subject_of(one: Verdict) -> Text:
@@ -191,7 +207,7 @@ def subject_of(one: Verdict) -> Text:
     return say("{title}, tolerance {limit} {unit}", title=one.title, limit=limit, unit=one.unit)
 
 
-def tolerances_of(result: Result) -> list[Verdict]:
+def tolerances_of(result: Stating) -> list[Verdict]:
     return [one for one in result.verdicts if not one.by]
 
 
@@ -239,7 +255,7 @@ _WORDS: Mapping[str, Text] = {
 }
 
 
-def overview_of(result: Result) -> doc.Overview | None:
+def overview_of(result: Stating) -> doc.Overview | None:
     """The verdict on the whole and each statement behind it; nothing where nothing is stated."""
     verdicts = result.verdicts
     if verdicts.overall == NONE:

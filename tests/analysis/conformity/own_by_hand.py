@@ -12,10 +12,12 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.artefacts.digitizer import THREE, DigitizerArtefact
 from cmm_uq.artefacts.plane import PlaneSurface
+from cmm_uq.artefacts.shift.axis import ShiftedReadings
 from cmm_uq.artefacts.triangle import Triangle, corners
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
 from cmm_uq.jobs.tables.plan import CompleteTest
+from cmm_uq.machine.model.artefact import ArtefactFigure
 from cmm_uq.machine.physics.kinematics import euler_313
 from tests.analysis.conformity.recorded import MACHINE, NEGLIGIBLE, STATED
 
@@ -224,6 +226,15 @@ def attitudes(how: str) -> Made:
     return DigitizerArtefact(artefact_facts(kind="digitizer"), points), under, value * 1e3, 0.2, False, asked
 
 
+def curve(how: str) -> Made:
+    """The curve of an axis that comes to 27 µm, with u = 1.2 µm, from three series of four points."""
+    xyz = np.array([[100.0 * i + 20.0 * j + 1e-4 * i * j, 200.0, -300.0] for j in range(3) for i in range(4)])
+    points = numbered(xyz, how, 1, 4)
+    figure = ArtefactFigure(np.array([27e-3]), np.arange(len(points))[None], np.array([300.0]), np.array([1.2e-3]))
+    asked = CompleteTest(measurements=3, repeats=1, points=4)
+    return ShiftedReadings(points, figure), STATED, 27.0, 1.2, False, asked
+
+
 OWN: Mapping[str, Callable[[str], Made]] = {
     "error": of_bar("error", certified=True),
     **{name: of_bar(name) for name in ("span", "standard deviation", "span corrected", "standard deviation corrected",
@@ -231,4 +242,5 @@ OWN: Mapping[str, Callable[[str], Made]] = {
     **{name: triangle(name) for name in ("mean error", "standard deviation of errors", "angle error", "repeatability")},
     "flatness": surface,
     "closure": attitudes,
+    "linearity": curve,
 }  # fmt: skip

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.report import analyse
+from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.artefacts.shift.axis import CurveEstimate, ShiftResult, estimate_curve
 from cmm_uq.artefacts.shift.integration import KnownSpan, integrated
 from cmm_uq.artefacts.shift.series import shifted_series
@@ -271,6 +271,31 @@ def test_without_a_known_length_there_is_no_scale(tmp_path: Path) -> None:
     assert result.estimate.curve.error[0] == 0.0
 
 
+WISH = (
+    'effects = []\n[[conformity]]\nstandard = "laboratory\'s own rule"\ncharacteristic = "linearity"\nlimit_um = {limit}\n'
+    "complete = {{ measurements = 3, repeats = 3, points = {points} }}\n[rated_conditions]\n"
+    'declared = {{ by = "A. Muster", reason = "20 °C" }}\n'
+)
+
+
+@pytest.mark.long
+def test_the_linearity_error_is_decided_by_the_laboratorys_own_rule(tmp_path: Path) -> None:
+    for limit, points, outcome in (
+        (40.0, 23, "pass"),
+        (28.0, 23, "undecided"),
+        (20.0, 23, "fail"),
+        (40.0, 24, "incomplete"),
+    ):
+        job = edited(tmp_path / str(points + limit), (r"effects = .*", WISH.format(limit=limit, points=points)))
+        result = analyse(job)
+        assert isinstance(result, ShiftResult)
+        ((found,), low, high) = result.statements, *result.linearity.interval95
+        assert found.outcome == outcome
+        assert found.value_um == pytest.approx(result.linearity.value)
+        assert found.u_um == pytest.approx(max(high - found.value_um, found.value_um - low) / 2)
+        assert outcome_of(result).results["verdicts"]["overall"] == outcome
+
+
 @pytest.mark.parametrize(
     ("pattern", "replacement", "where", "said"),
     [
@@ -280,7 +305,7 @@ def test_without_a_known_length_there_is_no_scale(tmp_path: Path) -> None:
         (r"shifts_mm = .*", "shifts_mm = [0.0, 20.0, 20.0]", "shifts_mm", "same shift"),
         (r"effects = .*", 'effects = ["scale_x"]', "effects", "not by effects"),
         (r"effects = .*", 'effects = []\n[[conformity]]\nstandard = "VDI/VDE 2617"\nlimit_um = 5.0', "conformity",
-         "no standard here"),
+         "is not decided on a shift"),
         (r'file = "recording.csv"', 'file = "recording.csv"\nset_aside = [2]', "set_aside", "cannot be set aside"),
         (r'file = "recording.csv"', 'file = "recording.csv"\nset_aside = [9]', "set_aside", "no measurement 9"),
         (r"to = 23", "to = 24", "known", "no point 24"),
