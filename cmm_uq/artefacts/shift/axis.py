@@ -11,22 +11,19 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cmm_uq.analysis.conformity.standards import decidable, statement
 from cmm_uq.analysis.conformity.statement import Statement
-from cmm_uq.artefacts.kinds import SHIFT, KnownLength, ShiftFacts
+from cmm_uq.artefacts.kinds import KnownLength, ShiftFacts
 from cmm_uq.artefacts.shift import result as shared
+from cmm_uq.artefacts.shift.decisions import decided, refuse_undecidable
 from cmm_uq.artefacts.shift.integration import IntegratedCurve, KnownSpan, Method, integrated
 from cmm_uq.artefacts.shift.result import Curve, Reported, ShiftFound
 from cmm_uq.artefacts.shift.series import RepeatedDrift, ShiftedSeries, Undetermined, shifted_series, undetermined
 from cmm_uq.artefacts.shift.smooth import FINEST, SmoothFunction, SmoothModel, sampled
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Verbatim
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import HOUR, MICROMETRE, PPM, unit
 from cmm_uq.jobs.job import Job
-from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure
 from cmm_uq.machine.physics.effects.rigid_body import SCALE
 from cmm_uq.machine.physics.error_map import ErrorMap
 from cmm_uq.maths.inference.ensembles import Progress
@@ -186,30 +183,6 @@ _FINE = 101
 _MISREAD = 0.02  # part of a known length by which the readings may differ from it
 
 
-class ShiftedReadings(Artefact):
-    """The recording of an axis with what its curve comes to, for decisions: no list of effects moves its points."""
-
-    kind = "shift"
-    title = Verbatim("shift")
-
-    def __init__(self, points: Points, linearity: ArtefactFigure) -> None:
-        self.points, self._linearity = points, linearity
-        self.sizes, self.noise_scale, self.rows = (), np.ones(len(points)), np.arange(len(points))[:, None]
-        self.measurement, self.repeat = points.measurement, points.repeat
-
-    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        return true_xyz
-
-    def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        return np.zeros((len(xyz), displacement.shape[2]))
-
-    def size_change(self) -> Floats:
-        return np.zeros((len(self.rows), 0))
-
-    def figures(self, counts: NDArray[np.bool_]) -> dict[str, ArtefactFigure]:
-        return {"linearity": self._linearity}
-
-
 @dataclass(frozen=True, eq=False)
 class SelectedPoints:
     """The integrations from some points alone, beside the joint fit of all."""
@@ -284,16 +257,7 @@ class ShiftResult(ShiftFound):
 
     @cached_property
     def statements(self) -> tuple[Statement, ...]:
-        points, found = self.job.points, self.linearity
-        low, high = found.interval95
-        u = 0.5 * max(found.value - low, high - found.value)
-        value, uncertain = MICROMETRE * np.array([found.value]), MICROMETRE * np.array([u])
-        length, rows = np.array([float(np.ptp(self.estimate.series.span))]), np.arange(len(points))[None]
-        readings = ShiftedReadings(points, ArtefactFigure(value, rows, length, uncertain))
-        return tuple(
-            statement(wish, readings, {}, f"[[conformity]] {i}", SHIFT.tested, None, self.job.circumstances)
-            for i, wish in enumerate(self.job.facts.conformity, 1)
-        )
+        return decided(self.job, self.linearity, float(np.ptp(self.estimate.series.span)))
 
     @cached_property
     def reported(self) -> Reported:
@@ -367,11 +331,7 @@ def check_facts(job: Job) -> None:
     if facts.model.effects:
         raise CmmUqError("a shift job estimates errors as free functions, not by effects",
                          where="job.toml [model] effects", fix="Write effects = []")  # fmt: skip
-    if facts.conformity and shared.shift_facts(job).plane is not None:
-        raise CmmUqError("no rule here decides on errors of a plane", where="job.toml [[conformity]]",
-                         fix="Leave it out; the certificate states the errors with their uncertainty")  # fmt: skip
-    for i, wish in enumerate(facts.conformity, 1):
-        decidable(wish, SHIFT.name, f"[[conformity]] {i}", SHIFT.tested, job.circumstances)
+    refuse_undecidable(job)
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
                          fix="Name measurements that the recording has")  # fmt: skip
