@@ -107,12 +107,11 @@ def study(kind: str, count: int) -> None:
             draws = posterior(model, np.random.default_rng(seed), 0.3, len(NAMES))
             low, high = np.quantile(draws, [0.025, 0.975], axis=0)
         else:
-            estimate = model.estimate()
-            found = estimate.least_squares
+            found = model.estimate().least_squares
             factor = float(stats.t.ppf(0.975, found.degrees_of_freedom))
             half = factor * np.sqrt(np.diag(found.covariance))
             low, high = ((found.value + sign * half)[: len(NAMES)] for sign in (-1, 1))
-            stations = standpoints(model, estimate.linear, found.value, found.covariance, found.sigma)
+            stations = standpoints(model, found.value, found.covariance, found.sigma)
             for (place, _), path, one in zip(SET_UPS, dead, stations, strict=True):
                 held["stations"] += (np.abs(one.position - place) <= factor * one.u[:3]).tolist()
                 held["dead paths"].append(abs(one.dead_path - path) <= factor * one.u[3])

@@ -71,7 +71,7 @@ def test_errors_stations_and_dead_paths_come_out_of_exact_distances() -> None:
     found = estimate.least_squares
     assert found.value[:21] == pytest.approx(machine().true, abs=2e-6)
     for one, (place, _), dead in zip(
-        standpoints(model, estimate.linear, found.value, found.covariance, 0.0), SET_UPS, DEAD, strict=True
+        standpoints(model, found.value, found.covariance, 0.0), SET_UPS, DEAD, strict=True
     ):
         assert one.position == pytest.approx(place, abs=2e-6)
         assert one.dead_path == pytest.approx(dead, abs=2e-6)
@@ -119,11 +119,22 @@ def test_estimates_and_uncertainties_are_those_of_dense_least_squares_over_all_u
     assert found.value[:21] == pytest.approx(values[:21], abs=1e-6)
     assert np.abs((found.value[:21] - values[:21]) / u[:21]).max() < 1e-3
     assert np.sqrt(np.diag(found.covariance))[:21] == pytest.approx(u[:21], rel=1e-4)
-    stations = standpoints(model, estimate.linear, found.value, found.covariance, found.sigma)
+    stations = standpoints(model, found.value, found.covariance, found.sigma)
     for i, one in enumerate(stations):
         own = slice(21 + 4 * i, 25 + 4 * i)
         assert [*one.position, one.dead_path] == pytest.approx(values[own], abs=1e-8)
         assert one.u == pytest.approx(u[own], rel=1e-4)
+
+
+def test_a_station_stands_where_the_readings_that_are_used_put_it() -> None:
+    off = 0.05 * (np.arange(COUNT * STATIONS) == 60)
+    model = RecordingModel(Multilateration(KNOWN, recording(off)), effects(NAMES), 1e-3, off == 0)
+    estimate = model.estimate()
+    found = estimate.least_squares
+    one = standpoints(model, found.value, found.covariance, 0.0)[1]
+    assert one.position == pytest.approx(SET_UPS[1][0], abs=2e-6)
+    assert one.dead_path == pytest.approx(DEAD[1], abs=2e-6)
+    assert one.readings == COUNT - 1
 
 
 def test_without_its_scale_known_all_scales_stay_open_together() -> None:
@@ -174,7 +185,7 @@ def test_a_dead_path_that_drifts_is_told_apart_where_the_job_says_so() -> None:
     model = RecordingModel(Multilateration(facts, drifting), effects(NAMES), 1e-3)
     found = model.estimate()
     assert found.least_squares.value[:21] == pytest.approx(machine().true, abs=1e-4)
-    stations = standpoints(model, found.linear, found.least_squares.value, found.least_squares.covariance, 0.0)
+    stations = standpoints(model, found.least_squares.value, found.least_squares.covariance, 0.0)
     assert [one.drift for one in stations] == pytest.approx([0.02 * i for i in range(1, 7)], rel=1e-3)
     assert np.abs(estimated(drifting).value[:21] - machine().true).max() > 0.1
     assert found.least_squares.degrees_of_freedom == STATIONS * COUNT - 21 - 5 * STATIONS

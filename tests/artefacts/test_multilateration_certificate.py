@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -90,6 +91,27 @@ def job_of(points: object, tmp_path: Path, more: str = "") -> Path:
     toml = (job / "job.toml").read_text(encoding="utf-8").replace("tolerances", "# tolerances")
     (job / "job.toml").write_text(toml.replace("\n[recording]", f"{more}\n[recording]"), encoding="utf-8")
     return job
+
+
+@pytest.mark.long
+def test_the_drift_of_a_dead_path_is_told_with_its_sign(tmp_path: Path) -> None:
+    """A distance is the reading and a dead path that grows: 0.1 mm/h of the second station, −0.1 mm/h of the fifth."""
+    points = recorded(
+        Square(np.random.default_rng(21)), np.arange(6.0), 3e-4 * np.random.default_rng(22).normal(size=288)
+    )
+    grows = 0.1 * ((points.measurement == 2) * 1.0 - (points.measurement == 5)) * points.columns["time_s"] / 3600
+    points = replace(points, columns={**points.columns, "reading_mm": points.columns["reading_mm"] - grows})
+    job = job_of(points.select((points.point - 1) // 3 % 3 != 0), tmp_path, "dead_path_drifts = true\n")
+    write_report(job, tmp_path / "out")
+    stations = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))["stations"]
+    for one, true in zip(stations, (0.0, 100.0, 0.0, 0.0, -100.0, 0.0), strict=True):
+        assert abs(one["drift_um_per_h"] - true) < 1.5 * one["U_drift_um_per_h"] < 50
+    page = (tmp_path / "out" / "certificate-simulated.html").read_text(encoding="utf-8")
+    told = re.findall(r"Measurement (\d): the dead path drifts by (\S+) ± (\S+) µm/h", page)
+    assert [which for which, *_ in told] == list("123456")
+    assert float(told[4][1].replace("−", "-")) == pytest.approx(stations[4]["drift_um_per_h"], abs=1)
+    assert float(told[4][2]) == pytest.approx(stations[4]["U_drift_um_per_h"], rel=0.06)
+    assert "how each dead path drifts, in proportion to time" in page
 
 
 @pytest.mark.long

@@ -83,19 +83,19 @@ class Multilateration(Artefact):
     title = say("Tracking interferometer")
 
     def __init__(self, facts: MultilaterationFacts, points: Points, *, where: str | None = None) -> None:
-        self._facts, count = facts, len(points)
+        self._facts, self._where, count = facts, where, len(points)
         self.stations = Placings.of(points.measurement)
         self.drift = np.zeros((count, 0))
         if facts.dead_path_drifts:
             hours = columns_needed(points, ("time_s",), "drifting dead path", where) / HOUR
             self.drift = hours - self.stations.means(hours)
         if IDEAL not in points.columns:
-            points = self._with_ideal(points, where)
+            points = self._with_ideal(points)
         self.points, self.measurement, self.repeat = points, points.measurement, points.repeat
         self.rows, self.noise_scale = np.arange(count)[:, None], np.ones(count)
         self._known = (np.zeros((0, 3)), np.zeros((0, 3)))
         ideal = points.columns[IDEAL]
-        self.found = self._nearest(points.xyz, ideal, self._first(points, ideal, where))
+        self.found = self._nearest(points.xyz, ideal, self._first(points, ideal))
         self.distances = ideal + self.found[self.stations.index, 3]
         longest, stated = float(self.distances.max()), facts.u_scale_um_per_m
         sd = np.inf if stated is None else MICROMETRE * stated * longest / METRE
@@ -106,21 +106,14 @@ class Multilateration(Artefact):
     def set_up(self) -> Text:
         return say("Station of the interferometer")
 
-    def _with_ideal(self, points: Points, where: str | None) -> Points:
+    def _with_ideal(self, points: Points) -> Points:
         """The artefact's own points of a recording: moved along their beams by what each reading is off."""
-        readings = columns_needed(points, (READING,), "tracking interferometer", where)[:, 0]
-        offset = np.array(self._facts.optics_mm)
-        tips = np.column_stack(
-            [points.columns.get(f"tip_{a}_mm", np.full(len(points), offset[i])) for i, a in enumerate(AXES)]
-        )
-        self._refuse(
-            points,
-            np.any(np.abs(tips - self.stations.means(tips)) > _SAME_MM, axis=1),
-            where,
-            "has several offsets of the reflector",
-            "Number each as a measurement of its own",
-        )
-        start = self._first(points, readings, where)
+        readings = columns_needed(points, (READING,), "tracking interferometer", self._where)[:, 0]
+        offsets = zip(AXES, self._facts.optics_mm, strict=True)
+        tips = np.column_stack([points.columns.get(f"tip_{a}_mm", np.full(len(points), at)) for a, at in offsets])
+        several = np.any(np.abs(tips - self.stations.means(tips)) > _SAME_MM, axis=1)
+        self._refuse(points, several, "has several offsets of the reflector", "Number each as a measurement of its own")
+        start = self._first(points, readings)
         if not self._facts.air_corrected:
             path = np.linalg.norm(points.xyz - np.array(start)[self.stations.index, :3], axis=1)
             readings = readings - index_change(points) * path
@@ -128,65 +121,51 @@ class Multilateration(Artefact):
         away = points.xyz - found[self.stations.index, :3]
         distance = np.linalg.norm(away, axis=1)
         off = readings + found[self.stations.index, 3] - distance
-        rms = np.sqrt(self.stations.means(off**2))
-        self._refuse(
-            points,
-            rms > _STRAY_MM + _STRAY_RATIO * float(np.linalg.norm(np.ptp(points.xyz, axis=0))),
-            where,
-            f"readings are {rms.max():.3g} mm (rms) off what one station can read at these positions",
-            f"Look for another unit or sign of {READING} (mm, growing with the distance), or rows of another station",
+        rms, most = (
+            np.sqrt(self.stations.means(off**2)),
+            _STRAY_MM + _STRAY_RATIO * np.linalg.norm(np.ptp(points.xyz, axis=0)),
         )
+        what = f"has readings {rms.max():.3g} mm (rms) off what one station can read at these positions"
+        fix = f"Look for another unit or sign of {READING} (mm, growing with the distance), or rows of another station"
+        self._refuse(points, rms > most, what, fix)
         columns = {name: values for name, values in points.columns.items() if name != READING}
         columns |= {IDEAL: readings - off, **{f"tip_{a}_mm": tips[:, i] for i, a in enumerate(AXES)}}
         machine = replace(points.machine, tip_on_every_carriage=True)
         return replace(points, xyz=points.xyz - (off / distance)[:, None] * away, machine=machine, columns=columns)
 
-    def _first(self, points: Points, readings: Floats, where: str | None) -> list[Floats]:
+    def _first(self, points: Points, readings: Floats) -> list[Floats]:
         """About where stations stand."""
-        found = []
+        found, more = [], "Read more of them, spread over all three axes, or leave the station out"
         for number, rows in zip(self.stations.numbers, self.stations.rows, strict=True):
             own, count = points.measurement == number, len(np.unique(np.round(points.xyz[rows] / _SAME_MM), axis=0))
-            more = "Read more of them, spread over all three axes, or leave the station out"
-            self._refuse(
-                points,
-                own & (count < LEAST),
-                where,
-                f"has {count} targets, and a station's place and dead path need {LEAST}",
-                more,
-            )
+            few = f"has {count} targets, and a station's place and dead path need {LEAST}"
+            self._refuse(points, own & (count < LEAST), few, more)
             start = first_station(points.xyz[rows], readings[rows])
-            if start is None:
-                self._refuse(
-                    points, own, where, "has targets in one plane, that do not say where its station stands", more
-                )
-            else:
-                found.append(start)
+            flat = "has targets in one plane, that do not say where its station stands"
+            self._refuse(points, own & (start is None), flat, more)
+            found += [] if start is None else [start]
         return found
 
-    def _refuse(self, points: Points, rows: NDArray[np.bool_], where: str | None, problem: str, fix: str) -> None:
+    def _refuse(self, points: Points, rows: NDArray[np.bool_], problem: str, fix: str) -> None:
         if np.any(rows):
             number = points.measurement[np.argmax(rows)]
-            raise CmmUqError(f"measurement {number} {problem}", where=place(points, rows, where), fix=fix)
+            raise CmmUqError(f"measurement {number} {problem}", where=place(points, rows, self._where), fix=fix)
 
-    def _nearest(self, xyz: Floats, distances: Floats, start: list[Floats] | Floats) -> Floats:
+    def _nearest(self, xyz: Floats, distances: Floats, starts: list[Floats] | Floats) -> Floats:
         """Place, dead path and drift of every station (q, 4 + j)."""
-        rows = self.stations.rows
-        return np.array(
-            [nearest_station(xyz[i], distances[i], self.drift[i], s) for i, s in zip(rows, start, strict=True)]
-        )
+        each = zip(self.stations.rows, starts, strict=True)
+        return np.array([nearest_station(xyz[i], distances[i], self.drift[i], start) for i, start in each])
 
     def at(self, xyz: Floats, size: float) -> Floats:
         """The same of targets that are truly at ``xyz`` (n, 3), the longest distance being ``size``; of no recorded zero."""
-        return self._nearest(
-            xyz, self.distances * size / self.sizes[0].nominal, self.found * [1, 1, 1, 0, 0][: self.found.shape[1]]
-        )
+        start = self.found * (np.arange(self.found.shape[1]) < 3)
+        return self._nearest(xyz, self.distances * size / self.sizes[0].nominal, start)
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         found = self.at(true_xyz, sizes[0])[self.stations.index]
         away = true_xyz - found[:, :3]
-        wanted = (
-            self.distances * sizes[0] / self.sizes[0].nominal + found[:, 3] + np.sum(self.drift * found[:, 4:], axis=1)
-        )
+        beyond = found[:, 3] + np.sum(self.drift * found[:, 4:], axis=1)
+        wanted = self.distances * sizes[0] / self.sizes[0].nominal + beyond
         return np.asarray(found[:, :3] + away * (wanted / np.linalg.norm(away, axis=1))[:, None])
 
     def beams(self, xyz: Floats) -> Floats:
