@@ -1,6 +1,6 @@
 """How often intervals hold of runs along axes: figures of ISO 230-2, named errors, and the map of curves of no known form.
 
-    python -m benchmarks.artefacts.axis_runs_coverage figures|errors|map COUNT
+    python -m benchmarks.artefacts.axis_runs_coverage figures|errors|map|references|circles COUNT
 
 The machine is simulated here, by its kinematics written out for the chain XYZ, and shares no code with the package.
 """
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +18,14 @@ from scipy import stats
 from cmm_uq.analysis.conformity.positioning import uncertainty_of_figures
 from cmm_uq.app.commands.jobs.compensate import write_new_map
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.artefacts import artefact_of
+from cmm_uq.artefacts import artefact_facts, artefact_of
+from cmm_uq.base.points import Machine as MachineFacts, Points
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.maths.geometry.circular import CircularTest
 
 TRAVEL = np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]])
 MIDDLE, SECOND = TRAVEL.mean(axis=1), np.pi / 180 / 3600
@@ -138,8 +142,8 @@ def figures(count: int) -> None:
             part = (true.targets - true.targets[0]) / np.ptp(true.targets)
             whole = random.normal(0, 0.4 * np.ptp(true.targets) / 1000) + random.normal(0, 0.3)
             x = true.x + whole * part[None, :, None] + 0.2 * random.normal(size=true.x.shape)
-            read = type(true)(true.targets, x)
-            spread, found, at = uncertainty_of_figures(read, runs, job.circumstances), read.figures(), true.figures()
+            read = replace(runs.positionings()[1], x=x)
+            spread, found, at = uncertainty_of_figures(read, job.circumstances), read.figures(), true.figures()
             for figure, u in spread.items():
                 held[figure] = held.get(figure, 0) + (abs(found[figure] - at[figure]) <= 2 * u)
     for figure, times in held.items():
@@ -208,5 +212,120 @@ def of_map(count: int) -> None:
         )
 
 
+def against(key: str, rows: dict[str, np.ndarray], names: list[str], **facts: float) -> tuple[np.ndarray, np.ndarray]:
+    """Estimates and half-widths of 95 % intervals of a recording of runs that stands in the memory."""
+    xyz, numbers = rows.pop("xyz"), [rows.pop(name).astype(np.int64) for name in ("measurement", "point", "repeat")]
+    points = Points(
+        xyz, *numbers, MachineFacts("of this study", "XYZ", TRAVEL), {k: v.astype(float) for k, v in rows.items()}
+    )
+    seen = artefact_of(artefact_facts(kind="axis_runs", **{key: facts.pop(key), **facts}), points)
+    found = RecordingModel(seen, effects(names)).estimate().least_squares
+    half = float(stats.t.ppf(0.975, found.degrees_of_freedom)) * np.sqrt(np.diag(found.covariance))
+    return found.value[: len(names)], half[: len(names)]
+
+
+def runs_of(
+    axis: int, sense: int, read: np.ndarray, at: np.ndarray, number: int, repeats: int
+) -> dict[str, np.ndarray]:
+    """Rows of a run there and back; ``read`` (repeats, 2·t) µm."""
+    both, way, n = np.concatenate([at, at[::-1]]), np.repeat([1.0, -1.0], len(at)), 2 * len(at) * repeats
+    xyz = np.tile(MIDDLE, (n, 1))
+    xyz[:, axis] = np.tile(both, repeats)
+    rows = {"xyz": xyz, "measurement": np.full(n, number), "point": np.tile(np.arange(1, 2 * len(at) + 1), repeats),
+            "repeat": np.repeat(np.arange(1, repeats + 1), 2 * len(at)), "reading_um": read.ravel()}  # fmt: skip
+    for i, a in enumerate("xyz"):
+        rows |= {f"approach_{a}": np.tile(way, repeats) * (i == axis), f"read_{a}": np.full(n, float(i == sense)),
+                 f"turn_{a}": np.zeros(n)}  # fmt: skip
+    return rows
+
+
+def noise_of(kind: str, random: np.random.Generator, shape: tuple[int, int], sigma: float) -> np.ndarray:
+    """White; or slow: half of it white, and a random walk that is as large over a repeat; or with tails (t of 4)."""
+    white = random.standard_normal(shape)
+    if kind == "tails":
+        return sigma * random.standard_t(4, shape) / np.sqrt(2)
+    if kind == "slow":
+        walk = np.cumsum(random.standard_normal(shape), axis=1) / np.sqrt(shape[1])
+        return sigma * np.sqrt(0.5) * (white + walk)
+    return sigma * white
+
+
+def joined(parts: list[dict[str, np.ndarray]], **columns: list[float]) -> dict[str, np.ndarray]:
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    count = [len(part["xyz"]) for part in parts]
+    return whole | {name: np.repeat(np.array(values), count) for name, values in columns.items()}
+
+
+def references(count: int) -> None:
+    """Squareness by a square (its angle drawn of its u) and straightness by a straightedge turned over, by noise."""
+    at = np.linspace(100.0, 800.0, 8)
+    for kind in ("white", "slow", "tails"):
+        held = np.zeros(2)
+        for seed in range(count):
+            random = np.random.default_rng([4, seed])
+            s, angle, turn, bow = random.normal(0, [10, 0.5, 20, 4])
+            off = [noise_of(kind, random, (2, 16), 0.3) for _ in range(4)]
+            there = np.concatenate([at, at[::-1]])
+            legs = [runs_of(0, 1, -1000 * SECOND * turn * there + off[0], at, 1, 2),
+                    runs_of(1, 0, 1000 * SECOND * (angle + turn - s) * there + off[1], at, 2, 2)]  # fmt: skip
+            value, half = against(
+                "u_square_arcsec", joined(legs, square=[1.0, 1.0]), ["squareness_xy"], u_square_arcsec=0.5
+            )
+            held[0] += abs(value[0] - s) <= half[0]
+            profile = random.normal(0, 1, 8)[[*range(8), *range(7, -1, -1)]]
+            straight = bow * (1 - (2 * there / 900 - 1) ** 2)
+            edges = []
+            for i, sign in ((2, 1.0), (3, -1.0)):
+                line = random.normal(0, 5) + random.normal(0, 5) * there / 1000
+                edges.append(runs_of(0, 1, straight + sign * profile + line + off[i], at, i, 2))
+            value, half = against("arm_mm", joined(edges, straightedge=[1.0, -1.0]), ["straightness_x_y"], arm_mm=100.0)
+            held[1] += abs(value[0] - bow) <= half[0]
+        print(f"| {kind} | squareness {100 * held[0] / count:.1f} % | straightness {100 * held[1] / count:.1f} % |")
+
+
+def circles(count: int) -> None:
+    """Squareness, scales and plays of two axes by a circle, and U of G, H, F and D against a perfect bar on the same path."""
+    angle = np.radians(np.arange(0, 360, 5))
+    outward = np.column_stack([np.cos(angle), np.sin(angle)])
+    tangent = np.column_stack([-np.sin(angle), np.cos(angle)])
+    names = ["squareness_xy", "scale_x", "scale_y", "hysteresis_x", "hysteresis_y"]
+    for kind in ("white", "slow", "tails"):
+        held, figures_held = np.zeros(5), {}
+        for seed in range(count):
+            random = np.random.default_rng([5, seed])
+            true = random.normal(0, [10, 15, 15, 2, 2])
+            bar, centre = random.normal(0, 0.4), random.normal(0, 5, 2)
+            path = []
+            for way in (1.0, -1.0):
+                place = MIDDLE[:2] + 150 * outward
+                error = np.column_stack([
+                    true[1] * place[:, 0] / 1000 - 1000 * SECOND * true[0] * place[:, 1], true[2] * place[:, 1] / 1000,
+                ]) + 0.5 * true[3:] * np.sign(np.round(way * tangent, 9))  # fmt: skip
+                path.append(np.sum(outward * (error + centre), axis=1))
+            actual = np.array(path)
+            read = actual - bar + noise_of(kind, random, (2, 72), 0.3)
+            rows = {"xyz": np.tile(np.column_stack([MIDDLE[:2] + 150 * outward, np.full(72, MIDDLE[2])]), (2, 1)),
+                    "measurement": np.ones(144), "point": np.arange(1, 145), "repeat": np.ones(144),
+                    "reading_um": read.ravel()}  # fmt: skip
+            way = np.vstack([tangent, -tangent])
+            for i, a in enumerate("xyz"):
+                rows[f"approach_{a}"] = np.sign(np.round(way[:, i], 9)) if i < 2 else np.zeros(144)
+                rows[f"read_{a}"] = np.tile(outward[:, i], 2) if i < 2 else np.zeros(144)
+                rows[f"turn_{a}"] = np.zeros(144)
+            value, half = against("u_bar_um", rows, names, u_bar_um=0.4)
+            held += np.abs(value - true) <= half
+            targets, ones = np.degrees(angle), np.ones(72)
+            made = [CircularTest(targets, x[:, :, None], "↺↻", u_reference=0.4, growth=ones, length_mm=150.0, calibrated=True)
+                    for x in (actual, read)]  # fmt: skip
+            spread = uncertainty_of_figures(made[1], Circumstances(uncertainty=TestUncertainty(u_repeat_um=0.3)))
+            exact, found = (one.figures() for one in made)
+            for figure, u in spread.items():
+                figures_held[figure] = figures_held.get(figure, 0) + (abs(found[figure] - exact[figure]) <= 2 * u)
+        told = [f"{name} {100 * one / count:.1f}" for name, one in zip(names, held, strict=True)]
+        told += [f"{figure} {100 * times / count:.1f}" for figure, times in figures_held.items()]
+        print(f"| {kind} | " + ", ".join(told) + " |")
+
+
 if __name__ == "__main__":
-    {"figures": figures, "errors": errors, "map": of_map}[sys.argv[1]](int(sys.argv[2]))
+    studies = {"figures": figures, "errors": errors, "map": of_map, "references": references, "circles": circles}
+    studies[sys.argv[1]](int(sys.argv[2]))

@@ -52,9 +52,8 @@ def uncertainty_of_figures(runs: PositioningRuns, under: Circumstances) -> dict[
     if whole == 0 and repeat == 0:
         return {}
     random = np.random.default_rng(np.random.SeedSequence(230, spawn_key=(2,)))
-    changes = whole * random.standard_normal((_DRAWS, 1, 1, 1)) * growth[None, None, :, None]
-    changes = changes + repeat * random.standard_normal((_DRAWS, *runs.x.shape))
-    return dict(runs.spread(changes))
+    common = whole * random.standard_normal((_DRAWS, 1, 1, 1)) * growth[None, None, :, None]
+    return dict(runs.spread(common, repeat * random.standard_normal((_DRAWS, *runs.x.shape))))
 
 
 _BOTH = {"G": ("G↺", "G↻"), "F": ("Fmax", "Fmin")}  # figures of which the larger is decided

@@ -40,18 +40,13 @@ class CircularTest(PositioningRuns):
         return tuple(found)
 
     def figures(self) -> Mapping[str, float]:
-        found = dict(zip(self.names(), self._figures(self.x[None])[0].tolist(), strict=True))
+        found = dict(super().figures())
         rounds = np.moveaxis(self.x, 2, 0)  # (n, d, t)
         for side, arrow in enumerate(self.arrows):
             found[f"G{arrow}"] = max(self._least_zone(each[side : side + 1]) for each in rounds)
         if self.both:
             found["G(b)"] = max(map(self._least_zone, rounds))
         return found
-
-    def spread(self, changes: Floats) -> Mapping[str, float]:
-        """As of positioning; what a zone changes by is taken about the least-squares centre."""
-        change = self._figures(self.x + changes) - self._figures(self.x[None])
-        return dict(zip(self.names(), np.sqrt(np.mean(change**2, axis=0)).tolist(), strict=True))
 
     def _circle(self) -> Floats:
         angle = np.radians(self.targets)

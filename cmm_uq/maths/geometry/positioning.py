@@ -88,7 +88,7 @@ class PositioningRuns:
         return np.asarray(each - each.mean())
 
     def figures(self) -> Mapping[str, float]:
-        return {name: float(value) for name, value in zip(self.names(), _figures(self.x[None])[0], strict=True)}
+        return {name: float(value) for name, value in zip(self.names(), self._figures(self.x[None])[0], strict=True)}
 
     def names(self) -> tuple[str, ...]:
         arrows = self.arrows[: len(self.x)]
@@ -99,10 +99,19 @@ class PositioningRuns:
             found += [*("BEM" if self.repeats == 1 else "BRMEA"), "mean B"]
         return tuple(found)
 
-    def spread(self, changes: Floats) -> Mapping[str, float]:
-        """Root mean square change of each figure under changes (N, d, t, n) of the readings: scatter makes ranges larger."""
-        change = _figures(self.x + changes) - _figures(self.x[None])
-        return dict(zip(self.names(), np.sqrt(np.mean(change**2, axis=0)).tolist(), strict=True))
+    def spread(self, common: Floats, each: Floats) -> Mapping[str, float]:
+        """Standard uncertainty of each figure under changes (N, d, t, n) that all readings share, and of each reading.
+
+        Scatter makes ranges larger, and has done so already: a range of nothing but scatter by as much as it grows once four
+        times the variance is there, √3 of the scatter being added; others by less. u is the root mean square of this and of
+        how the figure varies.
+        """
+        at = self._figures(self.x[None])
+        more, varies = (self._figures(self.x + common + n * each) - at for n in (np.sqrt(3), 1.0))
+        return dict(zip(self.names(), np.hypot(more.mean(axis=0), varies.std(axis=0)).tolist(), strict=True))
+
+    def _figures(self, x: Floats) -> Floats:
+        return _figures(x)
 
 
 class MissingReadingError(ValueError):

@@ -203,13 +203,16 @@ def positioned(figure: str) -> Callable[..., Hand]:
 
 @cache
 def spread_by_loops(x: tuple[float, ...], targets: int, figure: str) -> float:
-    """Root mean square change of a figure, µm, under the draws of the program, figure by figure in loops."""
+    """Standard uncertainty of a figure, µm, under the draws of the program, figure by figure in loops."""
     random = np.random.default_rng(np.random.SeedSequence(230, spawn_key=(2,)))
     whole = np.array(x).reshape(2, targets, 5)
     along = 0.08 * random.standard_normal((2000, 1, 1, 1)) * np.linspace(0, 1, targets)[None, None, :, None]
-    changes = along + 0.05 * random.standard_normal((2000, *whole.shape))
-    moved = [by_loops(whole + change)[figure] - by_loops(whole)[figure] for change in changes]
-    return float(np.sqrt(np.mean(np.square(moved))))
+    each = 0.05 * random.standard_normal((2000, *whole.shape))
+    once, more = (
+        [by_loops(whole + change)[figure] - by_loops(whole)[figure] for change in along + times * each]
+        for times in (1.0, 3**0.5)
+    )
+    return float(np.sqrt(np.var(once) + np.mean(more) ** 2))
 
 
 def own(figure: str) -> Callable[[str], Hand]:
@@ -296,9 +299,12 @@ def spread_of_circle(figure: str, paths: tuple[float, ...], targets: int, rounds
     random = np.random.default_rng(np.random.SeedSequence(230, spawn_key=(2,)))
     x = np.repeat(np.array(paths).reshape(2, targets, 1), rounds, axis=2)
     changes = 0.2 * random.standard_normal((2000, 1, 1, 1)) * np.ones((1, 1, targets, 1))
-    changes = changes + 0.05 * random.standard_normal((2000, *x.shape))
-    moved = np.array([of_circle(figure, x + change) - of_circle(figure, x) for change in changes])
-    return float(np.sqrt(np.mean(moved**2, axis=0)).max())
+    each = 0.05 * random.standard_normal((2000, *x.shape))
+    once, more = (
+        np.array([of_circle(figure, x + change) - of_circle(figure, x) for change in changes + times * each])
+        for times in (1.0, 3**0.5)
+    )
+    return float(np.sqrt(np.var(once, axis=0) + np.mean(more, axis=0) ** 2).max())
 
 
 E0 = lengths(SEVEN)

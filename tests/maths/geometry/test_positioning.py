@@ -115,7 +115,7 @@ def test_what_changes_the_readings_changes_the_figures_by_as_much() -> None:
     runs = of(np.zeros((2, 5, 3)))
     part = np.linspace(0, 1, 5)[None, None, :, None]
     draws = np.random.default_rng(3).normal(0, 2.0, (4000, 1, 1, 1))
-    spread = runs.spread(np.broadcast_to(draws * part, (4000, 2, 5, 3)))
+    spread = runs.spread(np.broadcast_to(draws * part, (4000, 2, 5, 3)), np.zeros((1, 2, 5, 3)))
     assert spread["E"] == pytest.approx(float(np.sqrt(np.mean(draws**2))), rel=1e-12)
     assert max(spread["B"], spread["R"]) < 1e-12
 
