@@ -43,6 +43,7 @@ def cap(count: int, half_angle: float = 80.0) -> Floats:
 def scanned_bars(
     random: np.random.Generator, machine: Floats, *, bars: int = 20, count: int = 40, noise_um: float = 9.0,
     form_um: float = 2.0, offset: Floats = OFFSET, attitudes: Sequence[Sequence[float]] = THREE, alike: bool = False,
+    length: float = LENGTH,
 ) -> Floats:  # fmt: skip
     """Rows as in ``HEADER``: both ends of a bar in many places, seen in different attitudes, or (``alike``) in one.
 
@@ -51,7 +52,7 @@ def scanned_bars(
     rows = []
     for bar in range(bars):
         along = random.standard_normal(3)
-        along *= 0.5 * LENGTH / np.linalg.norm(along)
+        along *= 0.5 * length / np.linalg.norm(along)
         middle = MIDDLE + random.uniform(-100, 100, 3)
         for ball, end in ((1, middle - along), (2, middle + along)):
             angles = attitudes[(bar if alike else bar + ball * (1 + bar // 3 % 2)) % len(attitudes)]

@@ -56,7 +56,7 @@ def _own_rule(figure: str, limit_um: float, measurements: int, repeats: int, poi
     return {"standard": "laboratory's own rule", "characteristic": figure, "limit_um": limit_um, "complete": complete}
 
 
-BALLBAR = _kind("ballbar", BallbarFacts, "scanned_ballbar:observe", Beginning(
+BALLBAR = _kind("ballbar", BallbarFacts, "optical.ballbar:observe", Beginning(
     title="Ballbar in twenty positions (ASME B89.4.1)",
     numbering="One measurement is one position of the bar; points 1 and 2 are the centres of its balls.",
     artefact={"name": "Ballbar", "length_mm": 400.0, "u_um": 0.5, "cte_per_k": 11.5e-6},
@@ -333,7 +333,23 @@ ERROR_MAP = Kind(
     refusal="error maps cannot be {}: they are free functions, no points of an artefact",
     instead="cmm-uq diagnose JOB compares them with each other",
 )  # fmt: skip
+
+
+class ScannedPlaneFacts(ArtefactFacts):
+    """Nothing of the planes is certified."""
+
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
+
+    @property
+    def traced(self) -> bool:
+        return False
+
+
+_SCANNED = f"{_HERE}.optical.planes"
+SCANNED_PLANES = Kind(
+    "scanned_planes", ScannedPlaneFacts, f"{_SCANNED}:ScannedPlanes", page=f"{_SCANNED}:PAGE", begin=f"{_SCANNED}:BEGIN"
+)
 BUILT_IN = {kind.name: kind for kind in (
     BALLBAR, BRYAN, STEP_GAUGE, GAUGE_BLOCKS, PLATE, TRIANGLE, SPHERE, PLANE, SHIFT, ERROR_MAP, DIGITIZER, AXIS_RUNS,
-    MULTILATERATION,
+    MULTILATERATION, SCANNED_PLANES,
 )}  # fmt: skip

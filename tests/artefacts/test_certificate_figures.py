@@ -216,6 +216,10 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Offset of the mount": offset,
     "Beside the integrations of the method's source": beside_integrations,
     "Integrations from some of the points": selections,
+    "Euler angles": lambda r: [
+        [pose["pose"], pose[name], indexed] for pose in r["attitudes"]
+        for name, indexed in zip(("alpha_deg", "beta_deg", "gamma_deg"), pose["indexed_deg"], strict=True)
+    ],
     "Centres of the balls": lambda r: [[ball] for ball in r["balls"]],
     "The offset by other ways": offset_by_other_ways,
     "Every attitude": lambda r: [[pose] for pose in r["digitizer"]["poses"]],

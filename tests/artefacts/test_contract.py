@@ -38,6 +38,7 @@ EXAMPLE = {
     "step_gauge": "step-gauge-simulated", "gauge_blocks": "gauge-blocks-simulated", "plate": "plate-simulated",
     "triangle": "triangle-simulated", "sphere": "sphere-simulated", "plane": "plane-simulated",
     "digitizer": "digitizer-simulated", "axis_runs": "axis-runs-simulated", "multilateration": "multilateration-simulated",
+    "scanned_planes": "scanned-planes-simulated",
 }  # fmt: skip
 OUTSIDE = "tracker_length"
 PLUGINS = {OUTSIDE: {"outside-kinds": "0.1.0"}}
@@ -195,6 +196,7 @@ def test_what_report_refuses_of_a_recording_every_command_refuses_alike(name: st
     kind = kind_named(name)
     assert kind is not None
     commands: list[Callable[[], object]] = [lambda: write_plan(job, tmp_path / "plan", power=False)]
+    commands = commands if kind.plan is not None else []
     if kind.observe is not None:
         commands += [lambda: write_diagnosis(job, tmp_path / "diagnosis")]
         commands += [lambda: write_simulation(job, truth, tmp_path / "drawn")]

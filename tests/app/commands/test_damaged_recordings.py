@@ -83,7 +83,7 @@ def test_three_rows_are_too_few_for_any_artefact(example: str, tmp_path: Path) -
 
 @pytest.mark.long(but="plane-simulated")
 @pytest.mark.parametrize(
-    "example", [name for name in KINDS if not name.startswith(("iota", "bryan", "digitizer", "optical"))]
+    "example", [name for name in KINDS if not name.startswith(("iota", "bryan", "digitizer", "optical", "scanned"))]
 )
 def test_a_single_placing_is_diagnosed_by_its_points(example: str, tmp_path: Path) -> None:
     """No placing can be held out, so its points are, each with its repeats."""
@@ -92,7 +92,14 @@ def test_a_single_placing_is_diagnosed_by_its_points(example: str, tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    "example", ["iota-1102-20C", "bryan-simulated", "digitizer-simulated", "optical-ballbar-simulated"]
+    "example",
+    [
+        "iota-1102-20C",
+        "bryan-simulated",
+        "digitizer-simulated",
+        "optical-ballbar-simulated",
+        "scanned-planes-simulated",
+    ],
 )
 def test_one_distance_or_attitude_determines_nothing(example: str, tmp_path: Path) -> None:
     job = job_with(example, one_place, tmp_path)

@@ -32,8 +32,8 @@ from benchmarks.examples.optical_ballbar_job import (
 from cmm_uq.app.commands.jobs.compensate import write_compensated_cloud, write_new_map
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.scanned_ballbar import ScannedBallbar, observe
-from cmm_uq.artefacts.scanned_balls import scanned_ball
+from cmm_uq.artefacts.optical.ballbar import ScannedBallbar, observe
+from cmm_uq.artefacts.optical.balls import scanned_ball
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.machine.model import Noise, RecordingModel

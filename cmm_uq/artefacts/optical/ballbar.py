@@ -24,7 +24,7 @@ from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.digitizer import ANGLES, OFFSET, SCAN, THREE, scan, scan_misfit, scan_of
 from cmm_uq.artefacts.digitizer_page import OffsetFigures
 from cmm_uq.artefacts.kinds import BallbarFacts
-from cmm_uq.artefacts.scanned_balls import BALL, FEWEST, ScannedBall, ball_table, balls_of, carried, scanned_ball
+from cmm_uq.artefacts.optical.balls import BALL, FEWEST, ScannedBall, ball_table, balls_of, carried, scanned_ball
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points

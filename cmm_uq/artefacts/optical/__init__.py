@@ -1,0 +1,1 @@
+"""What a laser digitizer scans: the balls of a bar, and planes."""
