@@ -84,6 +84,11 @@ SIGNED = ("error", "mean error", "angle error")
 _UNSTATED = {EVALUATED: "u_coordinate_um", LENGTH_LINES: "u_um", REPEAT_LINES: "u_repeat_um", FORM_LINES: "form_um"}
 
 
+def titled(standard: str) -> Text:
+    """A standard by its name, the laboratory's own rule in words."""
+    return say("laboratory's own rule") if standard == NAME else Verbatim(standard)
+
+
 def decided(test: Test, *, name: str) -> Statement:
     """One figure of the artefact, everywhere that it has a value."""
     quantity, measured, lines = FIGURES[name]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from cmm_uq.analysis.conformity.own_rule import titled
 from cmm_uq.analysis.conformity.statement import Decided, Statement, least_favourable
 from cmm_uq.analysis.machine.performance import MachinePerformance
 from cmm_uq.base import messages
@@ -93,7 +94,7 @@ def without_noise(statement: Statement, machine: MachinePerformance | None) -> t
 
 
 def named(statement: Statement) -> Text:
-    standard = Verbatim(statement.facts.standard)
+    standard = titled(statement.facts.standard)
     if not statement.characteristic:
         return standard
     return say("{standard}, {characteristic}", standard=standard, characteristic=Verbatim(statement.characteristic))

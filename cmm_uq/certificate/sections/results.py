@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.analysis.conformity.decision import rule_words
+from cmm_uq.analysis.conformity.own_rule import titled
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, listed, names, number, plural, say, semicolons
 from cmm_uq.base.units import unit
@@ -202,7 +203,7 @@ def headlines(result: Stating) -> tuple[wording.Headline, ...]:
 def subject_of(one: Verdict) -> Text:
     """What is decided: standard and characteristic, or a parameter with its tolerance."""
     if one.by:
-        return say("{standard}, {what}", standard=Verbatim(one.by), what=Verbatim(one.name))
+        return say("{standard}, {what}", standard=titled(one.by), what=Verbatim(one.name))
     limit = limit_in_full(one.limit or 0.0)
     return say("{title}, tolerance {limit} {unit}", title=one.title, limit=limit, unit=one.unit)
 

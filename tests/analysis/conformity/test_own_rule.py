@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
-from cmm_uq.analysis.conformity.own_rule import FIGURES, NAME
+from cmm_uq.analysis.conformity.own_rule import FIGURES, NAME, titled
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.app.commands.reading import job_of
@@ -19,6 +19,7 @@ from cmm_uq.artefacts import BUILT_IN, artefact_facts, kind_named
 from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.artefacts.triangle import Triangle
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.languages.translation import translated
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts, TestUncertainty
@@ -107,6 +108,12 @@ def test_without_saying_what_is_complete_nothing_passes(figure: str) -> None:
     for key in ("measurements", "repeats", "points"):
         more = complete.model_copy(update={key: getattr(complete, key) + 1})
         assert decided(artefact, figure, limit, under, more).outcome == "incomplete", key
+
+
+def test_a_certificate_names_the_rule_in_its_language_and_a_standard_as_it_is() -> None:
+    assert translated(titled(NAME), "de") == "eigene Regel des Laboratoriums"
+    assert translated(titled("ISO 10360-2:2009"), "de") == "ISO 10360-2:2009"
+    assert titled(NAME) == NAME
 
 
 @pytest.mark.parametrize("figure", OWN)
