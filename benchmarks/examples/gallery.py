@@ -34,6 +34,7 @@ EXAMPLES = {
     "sphere": "sphere-simulated",
     "plane": "plane-simulated",
     "digitizer": "digitizer-simulated",
+    "scanned_planes": "scanned-planes-simulated",
     "axis_runs": "axis-runs-simulated",
     "multilateration": "multilateration-simulated",
     "shift": "shift-simulated",
@@ -43,7 +44,7 @@ EXAMPLES = {
 }
 PLANNED = {"ballbar": "plan-ballbar", "step_gauge": "plan-step-gauge"}  # jobs that have no recording yet
 LENGTHS = {"bryan": "\n[plan]\nlength_mm = 300.0\n", "gauge_blocks": "\n[plan]\nlengths_mm = [100.0, 300.0, 500.0]\n"}
-NOT_PLANNED = ("plate_two_dates", "shift_plate", "error_map", "part")
+NOT_PLANNED = ("plate_two_dates", "scanned_planes", "shift_plate", "error_map", "part")
 MAIN_FIGURE = {"part": 1}  # of the page, where it is not the first
 
 
