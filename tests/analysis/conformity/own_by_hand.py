@@ -227,12 +227,12 @@ def attitudes(how: str) -> Made:
 
 
 def curve(how: str) -> Made:
-    """The curve of an axis that comes to 27 µm, with u = 1.2 µm, from three series of four points."""
+    """The curve of an axis that comes to 27 µm, with u = 0.4 µm, from three series of four points."""
     xyz = np.array([[100.0 * i + 20.0 * j + 1e-4 * i * j, 200.0, -300.0] for j in range(3) for i in range(4)])
     points = numbered(xyz, how, 1, 4)
-    figure = ArtefactFigure(np.array([27e-3]), np.arange(len(points))[None], np.array([300.0]), np.array([1.2e-3]))
+    figure = ArtefactFigure(np.array([27e-3]), np.arange(len(points))[None], np.array([300.0]), np.array([0.4e-3]))
     asked = CompleteTest(measurements=3, repeats=1, points=4)
-    return ShiftedReadings(points, figure), STATED, 27.0, 1.2, False, asked
+    return ShiftedReadings(points, figure), STATED, 27.0, 0.4, False, asked
 
 
 OWN: Mapping[str, Callable[[str], Made]] = {
