@@ -8,15 +8,18 @@ import numpy as np
 import pytest
 import scipy.optimize
 
+from cmm_uq.analysis.conformity.positioning import conditions, diagonals
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import NOTHING
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.maths.geometry.circular import CircularTest
 from tests.artefacts.constructions import estimated, model
 from tests.artefacts.simulated import results
 from tests.artefacts.test_axis_runs import EXACT, TARGETS, X, Y, Z, joined, read, run
 from tests.conftest import ROOT
+from tests.recordings import TRAVEL
 
 SECOND = np.pi / 180 / 3600
 PROFILE = np.array([0.0, 0.4, -0.3, 0.8, 1.1, -0.2, 0.6, 0.1, -0.5, 0.0])  # of a straightedge at the targets, µm
@@ -202,6 +205,34 @@ def test_a_repeat_with_the_other_sign_is_refused_and_noise_alone_is_not() -> Non
     for seed in range(50):
         rows["reading_um"] = np.random.default_rng(seed).normal(0, 1, 60)
         AxisRuns(EXACT, joined(rows))
+
+
+def along_lines(signs: list[tuple[float, float, float]], part: float) -> AxisRuns:
+    """Runs through the middle of the volume, each over a part of the travel of every axis that moves."""
+    middle, size, runs = TRAVEL.mean(axis=1), np.ptp(TRAVEL, axis=1), []
+    for number, sign in enumerate(signs, 1):
+        line = part * size * np.array(sign)
+        rows = run(number, line / np.linalg.norm(line), at=np.linspace(-0.5, 0.5, 10), repeats=5)
+        rows |= {f"approach_{a}": rows["approach_x"] * np.sign(sign[i]) for i, a in reversed([*enumerate("xyz")])}
+        rows["xyz"] = middle + np.outer(rows["xyz"][:, 0], line)
+        rows["reading_um"] = np.random.default_rng(number).normal(size=len(rows["xyz"]))
+        runs.append(rows)
+    return AxisRuns(EXACT, joined(*runs))
+
+
+BODY = [(1.0, y, z) for y in (1.0, -1.0) for z in (1.0, -1.0)]
+FACES = [(1.0, 1.0, 0.0), (1.0, -1.0, 0.0), (0.0, 1.0, 1.0), (0.0, 1.0, -1.0)]
+
+
+@pytest.mark.parametrize(("signs", "part", "complete"), [
+    (BODY, 0.9, True), (BODY, 0.6, False), (FACES, 0.9, False), (BODY[:3], 0.9, False), ([*BODY[:3], BODY[0]], 0.9, False),
+])  # fmt: skip
+def test_four_body_diagonals_over_most_of_the_travel_make_a_test(
+    signs: list[tuple[float, float, float]], part: float, complete: bool
+) -> None:
+    """Faces' diagonals, short ones, and one that was measured twice do not stand for a missing one."""
+    (condition,) = conditions(along_lines(signs, part), recorded=True, of=diagonals, what=NOTHING)
+    assert condition.met == complete
 
 
 # --- the certificate of the simulated circles ------------------------------------------------------------------------

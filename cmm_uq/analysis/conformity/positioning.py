@@ -26,6 +26,7 @@ from cmm_uq.maths.geometry.positioning import MissingReadingError, PositioningRu
 LINES = ("calibration", "temperature", "alignment", "repeat")
 _DRAWS = 2000
 REPEATS, LEAST_TARGETS, PER_METRE = 5, 5, 5.0  # runs in each direction, targets (ISO 230-2:2014, of axes up to 2 m)
+DIAGONALS, _MOVES, _MOST = 4, 0.1, 2 / 3  # least cosine with each axis, and part of its travel that each crosses
 _APART = 5.0  # degrees between targets of a circle, at most: a path that is recorded as it goes has no targets
 _TITLES = {
     "A": say("bidirectional accuracy of positioning"),
@@ -73,8 +74,9 @@ def circles(artefact: Artefact) -> Runs:
 
 
 def diagonals(artefact: Artefact) -> Runs:
+    """Body diagonals alone: all three axes move."""
     found = artefact.positionings().items()
-    return {number: runs for number, runs in found if not runs.axis and not isinstance(runs, CircularTest)}
+    return {number: runs for number, runs in found if runs.travel and min(np.abs(runs.travel)) > _MOVES}
 
 
 def positioning(test: Test, *, figure: str, of: Callable[[Artefact], Runs], what: str, key: str) -> Statement:
@@ -96,7 +98,7 @@ def positioning(test: Test, *, figure: str, of: Callable[[Artefact], Runs], what
             raise test.error(f"measurement {measurement} has no {figure}, which needs {needs}", "characteristic", fix)
         value, u = max(abs(figures[name]) for name in own), max(spread.get(name, 0.0) for name in own)
         u = test.at_least(u, run.length_mm)
-        test.refuse_without_uncertainty(u, key or "u_bar_um")
+        test.refuse_without_uncertainty(u, key or "u_repeat_um")
         limit = test.limit_um(run.length_mm)
         items.append(test.decided(value, u, limit, signed=False, measurement=measurement, length_mm=run.length_mm))
     worst = least_favourable(tuple(items))
@@ -110,6 +112,12 @@ def positioning(test: Test, *, figure: str, of: Callable[[Artefact], Runs], what
     remarks = [how, _CIRCULAR if of is circles else _FORMULAS]
     items_of = say("circles") if of is circles else say("diagonals") if of is diagonals else say("axes")
     return test.stated(_TITLES[figure], items_of, tuple(items), remarks, signed=False)
+
+
+def _crosses(run: PositioningRuns, artefact: Artefact) -> bool:
+    """Whether a diagonal crosses most of the travel of every axis; of unknown travel none does."""
+    travel = np.ptp(artefact.points.machine.travel_mm, axis=1)
+    return bool(np.all(run.length_mm * np.abs(run.travel) >= _MOST * travel))
 
 
 def _enough(run: PositioningRuns) -> bool:
@@ -127,8 +135,10 @@ def conditions(
     except MissingReadingError:
         runs = {}
     few = []
-    if of is diagonals and len({tuple(np.round(run.travel, 2)) for run in runs.values()}) < 4:
-        few.append(say("{count} of the four body diagonals", count=len(runs)))
+    if of is diagonals:
+        whole = [run for run in runs.values() if _crosses(run, artefact)]
+        count = len({tuple(np.sign(run.travel)) for run in whole})
+        few += [say("{count} of the four body diagonals", count=count)] if count < DIAGONALS else []
     for number, run in runs.items():
         count = len(run.targets)
         if not _enough(run):
@@ -239,7 +249,7 @@ _ISO_230_6 = (
     Clause(
         "targets_and_runs",
         say("targets and runs"),
-        "Four diagonals, each with the runs and targets of ISO 230-2.",
+        "Four diagonals, each over two thirds of the travel of every axis, with the runs and targets of ISO 230-2.",
         CHOSEN,
     ),
     Clause("formulas", say("figures"), "Ed and Bd: E and B of ISO 230-2, the largest of the four.", REPORTED),
