@@ -18,6 +18,7 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.multilateration.artefact import READING, Multilateration, first_station, nearest_station
 from cmm_uq.artefacts.multilateration.free_points import FreePoints, free_points
 from cmm_uq.artefacts.multilateration.page import standpoints
+from cmm_uq.artefacts.multilateration.plan import shape_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model import RecordingModel
@@ -307,6 +308,15 @@ def test_what_no_station_reads_is_refused_with_its_line(points: Any, said: str, 
     assert said in told.value.problem
     assert fix in str(told.value.fix)
     assert "line" in str(told.value.where)
+
+
+def test_readings_in_metres_are_held_against_nothing_before_they_are_refused() -> None:
+    """Positions a thousand times as large would fit them as well, and are not what is wrong."""
+    assert shape_of(KNOWN, recording()) is not None
+    metres = changed(reading_mm=lambda p: p.columns[READING] / 1000)
+    assert shape_of(KNOWN, metres) is None
+    with pytest.raises(CmmUqError, match="off what one station"):
+        Multilateration(KNOWN, metres)
 
 
 @pytest.mark.parametrize(("name", "keys"), [(READING, {}), ("time_s", {"dead_path_drifts": True})])

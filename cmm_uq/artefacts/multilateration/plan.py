@@ -29,7 +29,7 @@ from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.effects.rigid_body import tip_offsets
 
 NEAR_MM = 100.0  # a target nearer to the station is not read: the beam could not follow
-_CLOSE_MM = 1e-3
+_CLOSE_MM, _HARDLY = 1e-3, 0.02
 
 
 def _misfit(xyz: Floats, reference: Floats, _: float) -> Floats:
@@ -50,10 +50,12 @@ def _misfit(xyz: Floats, reference: Floats, _: float) -> Floats:
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
-    """Targets whose distances are those of one station."""
+    """Targets whose distances are those of one station; ``None`` where distances hardly change from target to target."""
     if READING not in points.columns:
         return None
     reference = points.columns[READING][:, None]
+    if np.ptp(reference) < _HARDLY * spread(points.xyz):  # in metres: what is wrong is not where the machine stood
+        return None
     return ArtefactShape(rows_by(points.measurement), _misfit, np.nan, spread(points.xyz), False, (READING,), reference)
 
 
