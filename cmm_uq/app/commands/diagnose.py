@@ -132,7 +132,7 @@ def outcome_of(result: AnalysisResult, seed: int = 0) -> Outcome:
 
 
 def _recipe(job: Job) -> Recipe:
-    if job.facts.simulation is not None and kind_of(job).observe is None:
+    if job.facts.simulation is not None and kind_of(job).own is not None:
         raise CmmUqError(f"a job of kind {job.facts.artefact.kind!r} is compared with no simulation: its analysis is its own",
                          where=f"job.toml {KEY}", fix="Leave the simulation out")  # fmt: skip
 

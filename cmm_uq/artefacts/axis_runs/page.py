@@ -185,7 +185,7 @@ def _circles(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
                 "hysteresis; F radial deviation about the least-squares centre (1996). G(b) bidirectional circular deviation; "
                 "D mean bidirectional radial deviation (2005). Of several rounds the largest."
             ),
-            say("F and D rest on the length of the ballbar: without u_bar_um they are not evaluated."),
+            say("F and D rest on the length of the ballbar, and are evaluated where its uncertainty is stated."),
         ),
     )
 

@@ -66,9 +66,8 @@ def _seen(targets: Points, station: Floats) -> SetUp:
     """Targets as they would be read from a place, in scale readings of the reflector, mm."""
     distance = np.linalg.norm(targets.machine_xyz + tip_offsets(targets) - station, axis=1)
     own = targets.select(distance > NEAR_MM)
-    words = say(
-        "station at ({x}, {y}, {z})", **{a: signed(v, ".0f") for a, v in zip(AXES, station.tolist(), strict=True)}
-    )
+    x, y, z = (signed(each, ".0f") for each in station.tolist())
+    words = say("station at ({x}, {y}, {z})", x=x, y=y, z=z)
     name = IDEAL if IDEAL in targets.columns else READING
     return SetUp(words, replace(own, columns={**own.columns, name: distance[distance > NEAR_MM]}))
 

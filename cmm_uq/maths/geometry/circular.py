@@ -14,7 +14,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize
 
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.positioning import DOWN, UP, PositioningRuns
@@ -54,10 +53,12 @@ class CircularTest(PositioningRuns):
 
     def _least_zone(self, paths: Floats) -> float:
         """Of paths (d, t) about one centre: range of x − a·cos φ − b·sin φ, least over a and b, by linear programming."""
+        from scipy import optimize  # takes longer to import than most commands run
+
         circle = np.tile(self._circle(), (len(paths), 1))
         ones, flat = np.ones((len(circle), 1)), paths.ravel()
         outside, inside = np.hstack([-circle, -ones, 0 * ones]), np.hstack([circle, 0 * ones, ones])
-        least = scipy.optimize.linprog(
+        least = optimize.linprog(
             [0.0, 0.0, 1.0, -1.0],
             A_ub=np.vstack([outside, inside]),
             b_ub=np.concatenate([-flat, flat]),

@@ -24,7 +24,7 @@ DEFINE = {f"machine/physics/effects/{name}.py" for name in (
     "own_errors", "own_states",
 )}  # fmt: skip
 """Modules of the effects' own classes."""
-BEGIN = re.compile(r"jobs/beginning|artefacts/kinds")
+BEGIN = re.compile(r"jobs/beginning|artefacts/(kinds|\w+/(kind|beginning)\.py)")
 """Modules of what a new job names for its reader to change, in text that any job.toml may have."""
 
 FAMILIES = {re.sub(r"(_[xyz]{1,2})+$", "", name) for name in EVERY}
