@@ -1,6 +1,6 @@
 """How often intervals hold of runs along axes: figures of ISO 230-2, named errors, and the map of curves of no known form.
 
-    python -m benchmarks.artefacts.axis_runs_coverage figures|errors|map|references|circles COUNT
+    python -m benchmarks.artefacts.axis_runs_coverage figures|errors|single|map|references|circles COUNT
 
 The machine is simulated here, by its kinematics written out for the chain XYZ, and shares no code with the package.
 """
@@ -91,7 +91,7 @@ class Machine:
 
 def recorded(
     machine: Machine, random: np.random.Generator, folder: Path, runs: list[tuple[int, int]], *, u: float = 0.4,
-    sigma: float = 0.25, targets: int = 7, repeats: int = 3, names: list[str] | None = None,
+    sigma: float = 0.25, targets: int = 7, repeats: int = 3, names: list[str] | None = None, turning: float | None = None,
 ) -> Path:  # fmt: skip
     """A job of runs, each an axis and what is read: 0 … 2 a displacement along it, 3 … 5 a rotation about it."""
     rows, wrong = ["measurement,point,repeat,x_mm,y_mm,z_mm,reading_um,reading_arcsec," + ",".join(
@@ -108,7 +108,11 @@ def recorded(
         zero, slope = random.normal(0, 20), random.normal(0, 5) if sense < 3 and sense != axis else 0.0
         for repeat in range(1, repeats + 1):
             read = (moved[:, sense] if sense < 3 else turned[:, sense - 3]) + zero + slope * at / 1000
-            read = read + (wrong * at / 1000 if sense == axis else 0.0) + sigma * random.normal(size=len(at))
+            read = (
+                read
+                + (wrong * at / 1000 if sense == axis else 0.0)
+                + (sigma if turning is None or sense < 3 else turning) * random.normal(size=len(at))
+            )
             for k, value in enumerate(read):
                 cells = [number, k + 1, repeat, *xyz[k], value if sense < 3 else 0.0, value if sense >= 3 else 0.0]
                 unit = [way[k] * (i == axis) for i in range(3)], [1.0 * (sense == i) for i in range(6)]
@@ -170,6 +174,30 @@ def errors(count: int) -> None:
         print(
             f"| {kind} | {100 * sum(own) / (count * len(own)):.1f} % of {count * len(own)} | {min(own)} … {max(own)} |"
         )
+
+
+def single(count: int) -> None:
+    """The same of runs that were not repeated, rotations read with their own noise, not that of the arm: 0.05″ or 2″."""
+    runs = [(axis, sense) for axis in range(3) for sense in range(6)]
+    for noise in (0.05, 2.0):
+        held = dict.fromkeys(NAMES, 0)
+        for seed in range(count):
+            random = np.random.default_rng([7, seed])
+            machine = Machine(random, smooth=False)
+            with tempfile.TemporaryDirectory() as name:
+                folder = recorded(machine, random, Path(name), runs, repeats=1, targets=9, turning=noise)
+                _, seen = artefact(folder)
+            found = RecordingModel(seen, effects(NAMES)).estimate().least_squares
+            factor = float(stats.t.ppf(0.975, found.degrees_of_freedom))
+            true = [*machine.scale, *machine.gap, *(machine.bow[i, j] for i in range(3) for j in range(3) if i != j),
+                    *machine.turn.ravel()]  # fmt: skip
+            for k, value in enumerate(true):
+                held[NAMES[k]] += abs(found.value[k] - value) <= factor * np.sqrt(found.covariance[k, k])
+        told = []
+        for kind in ("scale", "hysteresis", "straightness", "rotation"):
+            own = [times for name, times in held.items() if name.startswith(kind)]
+            told.append(f"{kind} {100 * sum(own) / (count * len(own)):.1f} %")
+        print(f"| {noise}″ | " + ", ".join(told) + " |")
 
 
 def of_map(count: int) -> None:
@@ -327,5 +355,12 @@ def circles(count: int) -> None:
 
 
 if __name__ == "__main__":
-    studies = {"figures": figures, "errors": errors, "map": of_map, "references": references, "circles": circles}
+    studies = {
+        "figures": figures,
+        "errors": errors,
+        "single": single,
+        "map": of_map,
+        "references": references,
+        "circles": circles,
+    }
     studies[sys.argv[1]](int(sys.argv[2]))

@@ -11,6 +11,7 @@ import pytest
 from cmm_uq.analysis.screening.screening import repeated_figures
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
+from cmm_uq.artefacts.axis_runs.run import roughness
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.maths.uncertainty.air.refractivity import harris_2004
@@ -207,6 +208,29 @@ def test_kinds_of_reading_weigh_as_their_repeats_scatter() -> None:
     assert scale[2] == pytest.approx(0.4 * SECOND * 100.0 / 1e-4, rel=0.1)
     few = AxisRuns(EXACT, joined(run(1, X, repeats=1), run(2, turn=Z, repeats=1))).noise_scale
     assert (few[0], few[-1]) == (1.0, pytest.approx(np.sqrt(2.0)))
+
+
+def test_kinds_that_were_not_repeated_weigh_as_they_are_off_their_neighbours() -> None:
+    """Displacements of 1 µm and rotations of 0.1″, which on an arm of 100 mm are 0.0485 µm: 20.6 to 1."""
+    at, random = np.linspace(0.0, 900.0, 61), np.random.default_rng(5)
+    rows = [read(run(1, X, repeats=1, at=at)), read(run(2, turn=Z, repeats=1, at=at))]
+    rows[0]["reading_um"] = rows[0]["reading_um"] + random.normal(0, 1.0, 122)
+    rows[1]["reading_arcsec"] = rows[1]["reading_arcsec"] + random.normal(0, 0.1, 122)
+    scale = AxisRuns(EXACT, joined(*rows)).noise_scale
+    assert scale[0] / scale[-1] == pytest.approx(1.0 / (1000 * SECOND * 0.1 * 100), rel=0.2)
+
+
+def test_a_cubic_is_no_roughness_and_white_noise_is_all_of_it() -> None:
+    at = np.array([0.0, 70.0, 200.0, 310.0, 333.0, 500.0, 610.0, 790.0, 900.0])
+    points = joined(run(1, X, repeats=2, at=at))
+    (one,) = AxisRuns(EXACT, points).runs
+    x = points.xyz[:, 0] / 100
+    squares, count = roughness(one, 3.0 - x + 0.5 * x**2 - 0.1 * x**3, points.repeat)
+    assert count == 4 * (9 - 4)
+    assert squares < 1e-18 * count
+    every = np.random.default_rng(1).normal(0, 2.0, (400, len(x)))
+    found = [roughness(one, noise, points.repeat)[0] / count for noise in every]
+    assert np.mean(found) == pytest.approx(4.0, rel=0.05)
 
 
 def test_figures_are_those_of_the_readings() -> None:

@@ -227,7 +227,8 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Stations": stations,
     "Errors of the targets along each axis": of_targets,
     "Each direction by itself": runs,
-    "Circles, by ISO 230-4": lambda r: [[run] for run in r["runs"] if "angles_deg" in run],
+    **{f"{name}, by ISO 230-4": lambda r: [[run] for run in r["runs"] if "angles_deg" in run]
+       for name in ("Circles", "Radial deviations")},
     **{f"Measurement {i}: {name}": targets(i) for i, name in enumerate(RUNS, 1)},
     **{f"Measurement {i}: {name}": targets(i) for i, name in ((4, "xty"), (5, "ytx"))},
     **{f"All values decided by ISO 230-2:2014, {one}": decided_as(one) for one in "AB"},

@@ -8,7 +8,7 @@ The zero of a run is free, of a straightness its slope too. Positions are target
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -33,6 +33,7 @@ from cmm_uq.artefacts.axis_runs.run import (
     reference_shape,
     refuse,
     reversed_profile,
+    roughness,
     runs_of,
     scatter,
     senses_of,
@@ -230,20 +231,29 @@ class AxisRuns(Artefact):
             )
 
     def _noise_scale(self) -> Floats:
-        """Of a rotation that of two ends of an arm; where repeats show how the scatter of the kinds compares, as they show."""
-        scale, found = np.where(self._kind == TURNING, np.sqrt(2.0), 1.0), {}
-        for kind in (ALONG, ACROSS, TURNING, CIRCLE):
-            squares, dof = 0.0, 0
-            for run in (each for each in self.runs if each.kind == kind):
-                own, count = scatter(run, self.readings[run.rows], self.repeat[run.rows])
-                squares, dof = squares + own, dof + count
-            if dof >= _LEAST_DOF and squares > 0:
-                found[kind] = float(np.sqrt(squares / dof))
+        """As repeats show that the scatter of the kinds compares; else as readings are off their neighbours.
+
+        Where too few say it, of a rotation that of two ends of an arm.
+        """
+        scale = np.where(self._kind == TURNING, np.sqrt(2.0), 1.0)
+        found = self._compared(scatter)
+        if set(found) != {run.kind for run in self.runs}:
+            found = self._compared(roughness)
         if len(found) > 1:
             first, own = next(iter(found.items()))
             for kind, each in found.items():
                 scale[self._kind == kind] = each / own * scale[self._kind == first][0]
         return scale
+
+    def _compared(self, by: Callable[[Run, Floats, Ints], tuple[float, int]]) -> dict[str, float]:
+        """Standard deviation of a reading, mm, of each kind of which enough say it."""
+        found = {}
+        for kind in (ALONG, ACROSS, TURNING, CIRCLE):
+            every = [by(run, self.readings[run.rows], self.repeat[run.rows]) for run in self.runs if run.kind == kind]
+            squares, count = (sum(each) for each in zip(*every, strict=True)) if every else (0.0, 0)
+            if count >= _LEAST_DOF and squares > 0:
+                found[kind] = float(np.sqrt(squares / count))
+        return found
 
     def _seen(self, displacement: Floats) -> Floats:
         """What the instrument sees, (n, k), of displacements (n + ends, 3, k)."""

@@ -94,7 +94,7 @@ def sections(result: Result) -> list[Section]:
     whole = [(run, found, spread) for run, found, spread in every if isinstance(found, PositioningRuns)]
     straight = [each for each in whole if each[0].kind != CIRCLE]
     round_ = [each for each in whole if each[0].kind == CIRCLE]
-    blocks: list[Block | None] = [_both(straight), _each_way(straight), _circles(round_)]
+    blocks: list[Block | None] = [_both(straight), _each_way(straight), *_circles(round_)]
     blocks += [
         Paragraph(say("{why:capital}.", why=missing_words(run, found)))
         for run, found, _ in every
@@ -173,19 +173,27 @@ def _each_way(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
     return _table(say("Each direction by itself"), names, whole, ())
 
 
-def _circles(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
-    names = ["G↺", "G↻", "H", "G(b)", "Fmax", "Fmin", "D"]
-    return _table(
+def _circles(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Iterator[Table | None]:
+    yield _table(
         say("Circles, by ISO 230-4"),
-        names,
+        ["G↺", "G↻", "H", "G(b)"],
         whole,
         (
             say(
                 "G circular deviation, by the minimum zone, ↺ counter-clockwise about the positive axis; H circular "
-                "hysteresis; F radial deviation about the least-squares centre (1996). G(b) bidirectional circular deviation; "
-                "D mean bidirectional radial deviation (2005). Of several rounds the largest."
+                "hysteresis (1996); G(b) bidirectional circular deviation (2005). Of several rounds the largest."
             ),
-            say("F and D rest on the length of the ballbar, and are evaluated where its uncertainty is stated."),
+        ),
+    )
+    known = [each for each in whole if {"Fmax", "D"} & set(each[1].figures())]
+    yield _table(
+        say("Radial deviations, by ISO 230-4"),
+        ["Fmax", "Fmin", "D"],
+        known,
+        (
+            say(
+                "F radial deviation about the least-squares centre (1996), D mean bidirectional radial deviation (2005)."
+            ),
         ),
     )
 

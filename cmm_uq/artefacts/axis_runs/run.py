@@ -27,6 +27,7 @@ STRAIGHTEDGE, SQUARE = "straightedge", "square"  # columns: +1, and −1 reverse
 _UNIT, _SAME_MM = 0.01, 1e-6
 _ALONG, _ACROSS = 0.999, 0.05  # cosines between what is read and the travel
 _OPPOSITE = 16.0  # how much nearer a repeat is to the others with its sign changed, in squares, to be one turned over
+_CUBIC = 5  # targets of which one lies between two on either side
 _ROUND = 0.02  # of its radius, by which targets may be off a circle
 
 
@@ -74,6 +75,30 @@ def scatter(run: Run, readings: Floats, repeat: Ints) -> tuple[float, int]:
     design = np.hstack([np.eye(block.max() + 1)[block] for block in blocks])
     fitted, _, rank, _ = np.linalg.lstsq(design, readings, rcond=None)
     return float(np.sum((readings - design @ fitted) ** 2)), len(readings) - int(rank)
+
+
+def roughness(run: Run, readings: Floats, repeat: Ints) -> tuple[float, int]:
+    """Sum of squares, and how many, of what readings (k,) of a run are off the cubic through two neighbours on either side.
+
+    Each over what white noise of one makes of it, so that a bow is none.
+    """
+    squares, count = 0.0, 0
+    groups = np.unique(np.column_stack([run.directions, repeat]), axis=0, return_inverse=True)[1].ravel()
+    for own in rows_by(groups):
+        order = own[np.argsort(run.positions[own], kind="stable")]
+        at, read = run.positions[order], readings[order]
+        if len(at) < _CUBIC or np.diff(at).min() < _SAME_MM:
+            continue
+        where = np.arange(2, len(at) - 2)
+        near = where[:, None] + [-2, -1, 1, 2]
+        off = at[near][:, :, None] - at[near][:, None, :]
+        ahead = np.where(np.eye(4, dtype=bool), 1.0, at[where, None, None] - at[near][:, None, :])
+        weight = np.prod(ahead / np.where(np.eye(4, dtype=bool), 1.0, off), axis=2)
+        squares += float(
+            np.sum((read[where] - np.sum(weight * read[near], axis=1)) ** 2 / (1 + np.sum(weight**2, axis=1)))
+        )
+        count += len(where)
+    return squares, count
 
 
 def turned_over(run: Run, readings: Floats, repeat: Ints) -> int | None:

@@ -253,7 +253,7 @@ def diagonals(figure: str) -> Callable[..., Hand]:
 
 
 ROUND = np.radians(np.arange(0, 360, 5))
-LOBES = 2.0 * np.cos(3 * ROUND)  # µm: no shift of the centre makes its zone less than 4
+LOBES = 6.0 * np.cos(3 * ROUND)  # µm: no shift of the centre makes its zone less than 12
 
 
 def circular(figure: str, value: float, counter: Floats, clockwise: Floats) -> Callable[..., Hand]:
@@ -330,10 +330,10 @@ TESTS: Mapping[tuple[str, str], Callable[[str], Hand]] = {
     **{(own_rule.NAME, figure): own(figure) for figure in OWN},
     ("ISO 230-6:2002", "Ed"): diagonals("E"),
     ("ISO 230-6:2002", "Bd"): diagonals("B"),
-    ("ISO 230-4:1996", "G"): circular("G", 4.0, LOBES, 0.5 * LOBES),
+    ("ISO 230-4:1996", "G"): circular("G", 12.0, LOBES, 0.5 * LOBES),
     ("ISO 230-4:1996", "H"): circular("H", 3.0, LOBES, LOBES - 3.0 * (np.arange(72) == 6)),
-    ("ISO 230-4:1996", "F"): circular("F", -7.0, LOBES - 5.0, LOBES - 5.0),
-    ("ISO 230-4:2005", "G(b)"): circular("G(b)", 4.0, LOBES, 0.5 * LOBES),
+    ("ISO 230-4:1996", "F"): circular("F", -11.0, LOBES - 5.0, LOBES - 5.0),
+    ("ISO 230-4:2005", "G(b)"): circular("G(b)", 12.0, LOBES, 0.5 * LOBES),
     ("ISO 230-4:2005", "D"): circular("D", 8.0, LOBES + 8.0, LOBES + 8.0),
     ("VDI/VDE 2617", "E0"): E0,
     ("VDI/VDE 2617-2.1", "U3"): lengths(DIAGONALS),
