@@ -52,7 +52,9 @@ from cmm_uq.maths.geometry.positioning import PositioningRuns
 
 _FAR = {False: 2000.0, True: 3600.0}  # µm or ″ beyond which a reading is in another unit
 _UNITS = {ACROSS: unit("µm"), TURNING: unit("″")}
-_LEAST_DOF = 10  # of the scatter of repeats, from which on it weighs the kinds of reading against each other
+# of the scatter of repeats, and readings off their neighbours, from which on these weigh the kinds of reading against each
+# other; and what ratio of the latter may be chance
+_LEAST_DOF, _LEAST_ROUGH, _ALIKE = 10, 30, 2.0
 _SAME_MM = 1e-6
 
 
@@ -233,25 +235,28 @@ class AxisRuns(Artefact):
     def _noise_scale(self) -> Floats:
         """As repeats show that the scatter of the kinds compares; else as readings are off their neighbours.
 
-        Where too few say it, of a rotation that of two ends of an arm.
+        Where too few say it, or neighbours say about the same, of a rotation that of two ends of an arm.
         """
         scale = np.where(self._kind == TURNING, np.sqrt(2.0), 1.0)
-        found = self._compared(scatter)
-        if set(found) != {run.kind for run in self.runs}:
-            found = self._compared(roughness)
+        found = self._compared(scatter, _LEAST_DOF)
+        if by_neighbours := set(found) != {run.kind for run in self.runs}:
+            found = self._compared(roughness, _LEAST_ROUGH)
         if len(found) > 1:
             first, own = next(iter(found.items()))
             for kind, each in found.items():
-                scale[self._kind == kind] = each / own * scale[self._kind == first][0]
+                usual = scale[self._kind == kind][0]
+                shown = each / own * scale[self._kind == first][0]
+                if not by_neighbours or not 1 / _ALIKE < shown / usual < _ALIKE:
+                    scale[self._kind == kind] = shown
         return scale
 
-    def _compared(self, by: Callable[[Run, Floats, Ints], tuple[float, int]]) -> dict[str, float]:
+    def _compared(self, by: Callable[[Run, Floats, Ints], tuple[float, int]], least: int) -> dict[str, float]:
         """Standard deviation of a reading, mm, of each kind of which enough say it."""
         found = {}
         for kind in (ALONG, ACROSS, TURNING, CIRCLE):
             every = [by(run, self.readings[run.rows], self.repeat[run.rows]) for run in self.runs if run.kind == kind]
             squares, count = (sum(each) for each in zip(*every, strict=True)) if every else (0.0, 0)
-            if count >= _LEAST_DOF and squares > 0:
+            if count >= least and squares > 0:
                 found[kind] = float(np.sqrt(squares / count))
         return found
 
