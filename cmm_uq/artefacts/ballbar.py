@@ -283,7 +283,6 @@ def sections(result: Result) -> list[Section]:
         residuals,
         flagged=lengths.flagged,
         expanded_before_um=expanded,
-        expanded_after_um=expanded,
         reference=say("{name} {length:.4f}\u00a0mm", name=name, length=lengths.reference),
         reference_expanded_um=2 * size.sd / MICROMETRE if size.certified else 0.0,
         caption=say(

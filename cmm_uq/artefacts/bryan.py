@@ -265,7 +265,6 @@ def sections(result: Result) -> list[Section]:
         deviations,
         residuals,
         expanded_before_um=lengths.expanded_um,
-        expanded_after_um=lengths.expanded_um,
         reference=say("mean distance from the best centre"),
         flagged=lengths.flagged,
         position_label=say("Position of the swept ball"),

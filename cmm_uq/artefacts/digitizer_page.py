@@ -248,7 +248,7 @@ def _residuals(result: Result, digitizer: DigitizerArtefact) -> Plot:
     what = radial if digitizer.scanned else each
     low, high, low_after, high_after = alike(before.min(), before.max(), after.min(), after.max())
     return length_plot(
-        digitizer.measurement.astype(float), before, after, expanded_before_um=expanded_um, expanded_after_um=expanded_um,
+        digitizer.measurement.astype(float), before, after, expanded_before_um=expanded_um,
         reference=say("fitted sphere") if digitizer.scanned else say("common centre"), flagged=result.flagged,
         position_label=say("Attitude (its observations side by side)"), before_label=say("With the offset by centres"),
         caption=say(

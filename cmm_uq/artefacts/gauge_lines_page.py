@@ -204,7 +204,6 @@ def _plot(result: Result, gauge: StepGauge) -> Block:
         deviations,
         residuals,
         expanded_before_um=expanded,
-        expanded_after_um=expanded,
         reference=say("certified distance, mean of each line"),
         flagged=result.flagged,
         position_label=say("Certified distance from the first face / mm (lines side by side)"),

@@ -328,7 +328,6 @@ def _by_point(result: Result, plane: PlaneSurface) -> Block:
         off,
         residuals,
         expanded_before_um=expanded,
-        expanded_after_um=expanded,
         reference=say("least-squares plane"),
         flagged=result.flagged,
         position_label=say("Point on the plane"),

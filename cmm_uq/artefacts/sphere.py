@@ -208,7 +208,6 @@ def _by_point(result: Result, sphere: SphereArtefact) -> Plot:
         deviations,
         residuals,
         expanded_before_um=expanded,
-        expanded_after_um=expanded,
         reference=name,
         reference_expanded_um=size.sd / MICROMETRE if size.certified else 0.0,
         flagged=result.flagged,

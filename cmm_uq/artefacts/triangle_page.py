@@ -327,7 +327,6 @@ def _sides(measurement: Ints, sides: Floats, left: Floats, expanded_um: float, k
         before,
         after,
         expanded_before_um=expanded_um,
-        expanded_after_um=expanded_um,
         reference=say("certified side"),
         position_label=say("Placing (its three sides side by side)"),
         caption=say(

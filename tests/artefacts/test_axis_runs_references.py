@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from cmm_uq.analysis.conformity.positioning import conditions, diagonals
+from cmm_uq.analysis.conformity.positioning import axes, circles, conditions, diagonals
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.base.errors import CmmUqError
@@ -233,6 +233,32 @@ def test_four_body_diagonals_over_most_of_the_travel_make_a_test(
     """Faces' diagonals, short ones, and one that was measured twice do not stand for a missing one."""
     (condition,) = conditions(along_lines(signs, part), recorded=True, of=diagonals, what=NOTHING)
     assert condition.met == complete
+
+
+@pytest.mark.parametrize(("angles", "same", "complete"), [
+    (np.arange(0, 360, 5), False, True), (np.arange(0, 320, 5), False, False), (np.arange(0, 360, 6), False, False),
+    (np.arange(0, 360, 5), True, False),
+])  # fmt: skip
+def test_a_circle_with_a_hole_or_one_sense_copied_from_the_other_makes_no_test(
+    angles: np.ndarray, same: bool, complete: bool
+) -> None:
+    """Targets 5° apart from 0° to 315° leave 45° out: the gap from the last to the first counts like any."""
+    there = np.radians(angles)
+    first, second = np.random.default_rng(3).normal(size=(2, len(there)))
+    seen = AxisRuns(EXACT, joined(circle(1, 150.0, np.stack([first, first if same else second]), there)))
+    (condition,) = conditions(seen, recorded=True, of=circles, what=NOTHING)
+    assert condition.met == complete
+
+
+def test_an_axis_read_once_and_written_down_for_both_directions_makes_no_test() -> None:
+    rows = read(run(1, X, repeats=5), 5.0)
+    rows["reading_um"] = rows["reading_um"] + np.tile(np.random.default_rng(1).normal(size=10), 10)
+    there = rows["approach_x"] > 0
+    for repeat in range(1, 6):
+        own = rows["repeat"] == repeat
+        rows["reading_um"][own & ~there] = rows["reading_um"][own & there][::-1]
+    (condition,) = conditions(AxisRuns(EXACT, joined(rows)), recorded=True, of=axes, what=NOTHING)
+    assert "both directions are the same" in " ".join(map(str, condition.missing))
 
 
 # --- the certificate of the simulated circles ------------------------------------------------------------------------

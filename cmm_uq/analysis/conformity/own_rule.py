@@ -33,9 +33,8 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import ArtefactFigure, Indications
 
 NAME = "laboratory's own rule"
-EVALUATED: tuple[
-    str, ...
-] = ()  # lines of a figure whose u is that of its evaluation, with all that is stated of the readings
+# lines of a figure whose u is that of its evaluation, with all that is stated of the readings
+EVALUATED: tuple[str, ...] = ()
 # each figure: what is compared, what is counted of it, and the lines of its uncertainty
 FIGURES: Mapping[str, tuple[Text, Text, tuple[str, ...]]] = {
     "error": (say("error of length, worst against its limit"), say("lengths"), LENGTH_LINES),

@@ -122,7 +122,7 @@ def _crosses(run: PositioningRuns, artefact: Artefact) -> bool:
 
 def _enough(run: PositioningRuns) -> bool:
     if isinstance(run, CircularTest):
-        return run.both and run.full and float(np.diff(run.targets).max()) <= _APART
+        return run.both and run.widest_gap <= _APART
     return run.repeats >= REPEATS and len(run.targets) >= max(LEAST_TARGETS, PER_METRE * run.length_mm / METRE)
 
 
@@ -150,6 +150,8 @@ def conditions(
                     targets=count,
                 )
             )
+        if recorded and run.both and np.array_equal(run.x[0], run.x[1]):
+            few.append(say("measurement {number}: both directions are the same to the last digit", number=number))
         alike = np.all(run.x[..., :, None] == run.x[..., None, :], axis=(0, 1)) & ~np.eye(run.repeats, dtype=bool)
         if recorded and alike.any():
             first, second = np.argwhere(alike)[0] + 1

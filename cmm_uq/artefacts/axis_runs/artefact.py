@@ -224,7 +224,7 @@ class AxisRuns(Artefact):
             if stated is None or edge[run.rows].any():
                 continue
             shape = np.zeros(n)
-            shape[run.rows] = self._factor(turns=run.kind == TURNING) * reference_shape(run)
+            shape[run.rows] = self._factor(turns=run.kind == TURNING) * reference_shape(run, run.positions)
             title = say("Reference of measurement {number}", number=run.measurement)
             symbol = "arcsec" if run.kind == TURNING else "um"
             yield (
@@ -306,29 +306,18 @@ class AxisRuns(Artefact):
             readings = readings * np.sign(run.sense @ run.travel)
         at, repeat = run.positions + run.start, self.repeat[run.rows]
         found = PositioningRuns.of(at, run.directions, repeat, readings, straight=run.kind == ACROSS)
-        span, sd = float(np.ptp(found.targets)), 0.0
-        growth = (found.targets - found.targets[0]) / span
+        growth = reference_shape(run, found.targets)
         if run.kind == ALONG:
-            size = self.sizes[0]
+            size, span = self.sizes[0], float(np.ptp(found.targets))
             sd = size.sd / size.nominal * span / MICROMETRE if size.certified else 0.0
-            return replace(
-                found, axis=run.axis, u_reference=sd, growth=growth, length_mm=span, travel=tuple(run.travel)
-            )
+            travel = tuple(run.travel.tolist())
+            return replace(found, axis=run.axis, u_reference=sd, growth=growth, length_mm=span, travel=travel)
         if run.kind == CIRCLE:
-            known = self._facts.u_bar_um
-            ones, arrows = np.ones(len(found.targets)), found.arrows.replace("↑", "↺").replace("↓", "↻")
-            return CircularTest(
-                found.targets,
-                found.x,
-                arrows,
-                u_reference=known or 0.0,
-                growth=ones,
-                length_mm=run.radius,
-                calibrated=known is not None,
-            )
+            known, arrows = self._facts.u_bar_um, found.arrows.replace("↑", "↺").replace("↓", "↻")
+            of_bar = CircularTest(found.targets, found.x, arrows, calibrated=known is not None)
+            return replace(of_bar, u_reference=known or 0.0, growth=growth, length_mm=run.radius)
         own = [size for size in self.sizes if size.name.startswith(f"reference_{run.measurement}_")]
-        bow = 4 * growth * (1 - growth) if run.kind == ACROSS else growth
-        return replace(found, u_reference=own[0].sd if own else 0.0, growth=bow)
+        return replace(found, u_reference=own[0].sd if own else 0.0, growth=growth)
 
     def positionings(self) -> Mapping[int, PositioningRuns]:
         return {run.measurement: self.positioning(run) for run in self.runs if run.kind in (ALONG, CIRCLE)}

@@ -246,7 +246,6 @@ def _readings(result: Result) -> Block:
         off,
         residuals,
         expanded_before_um=expanded,
-        expanded_after_um=expanded,
         reference=say("mean of the run"),
         flagged=result.flagged,
         position_label=say("Measurement"),

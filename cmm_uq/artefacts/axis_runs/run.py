@@ -120,10 +120,12 @@ def turned_over(run: Run, readings: Floats, repeat: Ints) -> int | None:
     return None
 
 
-def reference_shape(run: Run) -> Floats:
-    """(k,) what an error of 1 of the reference of a run changes of its readings: a bow, or a rotation that grows."""
-    part = run.positions / max(float(run.positions.max()), _SAME_MM)
-    return part if run.kind == TURNING else 4 * part * (1 - part)
+def reference_shape(run: Run, at: Floats) -> Floats:
+    """What an error of 1 of the reference changes of readings at positions of a run: a scale, a rotation, a bow, a radius."""
+    if run.kind == CIRCLE:
+        return np.ones(len(at))
+    part = (at - at.min()) / max(float(np.ptp(at)), _SAME_MM)
+    return np.asarray(4 * part * (1 - part) if run.kind == ACROSS else part)
 
 
 def _beside(points: Points, runs: tuple[Run, ...], column: str) -> dict[tuple[float, ...], list[Run]]:

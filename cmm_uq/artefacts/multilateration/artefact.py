@@ -26,14 +26,10 @@ from cmm_uq.maths.inference.linear_model import Freedoms
 READING, IDEAL = "reading_mm", "_ideal_reading_mm"
 LEAST = 6  # targets of a station: its place, its dead path, a constant of the first solution, and one to see it by
 _ROUNDS, _SETTLED = 30, 1e-9  # mm
-_DEGENERATE = (
-    1e-5  # singular value, over that of a spread of one, below which targets do not say where a station stands
-)
+# singular value, over that of a spread of one, below which targets do not say where a station stands; rms misfit that no
+# machine's errors explain: so many mm, and so much of the volume
+_DEGENERATE, _STRAY_MM, _STRAY_RATIO = 1e-5, 0.5, 5e-3
 _SAME_MM = 1e-3
-_STRAY_MM, _STRAY_RATIO = (
-    0.5,
-    5e-3,
-)  # rms misfit that no machine's errors explain: so many mm, and so much of the volume
 
 
 def first_equations(xyz: Floats, readings: Floats) -> tuple[Floats, Floats]:

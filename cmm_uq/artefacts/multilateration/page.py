@@ -149,7 +149,6 @@ def _readings(result: Result) -> Block:
         off,
         residuals,
         expanded_before_um=expanded,
-        expanded_after_um=expanded,
         reference=say("distance from the best station"),
         flagged=result.flagged,
         position_label=say("Measurement"),

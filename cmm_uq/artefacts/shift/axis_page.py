@@ -146,7 +146,6 @@ def _residuals(result: ShiftResult) -> Section:
         before,
         after,
         expanded_before_um=U,
-        expanded_after_um=U,
         reference=say("the artefact's point"),
         position_label=say("Point of the artefact"),
         before_label=say("Without a curve"),

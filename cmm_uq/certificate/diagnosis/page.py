@@ -194,7 +194,7 @@ def _residuals(result: JobDiagnosis, *models: RecordingModel, caption: Text, alt
     return length_plot(
         artefact.measurement.astype(np.float64),
         *(model.residuals(model.estimate().least_squares.value) / MICROMETRE for model in models),
-        expanded_before_um=expanded, expanded_after_um=expanded, reference=say("no residual"),
+        expanded_before_um=expanded, reference=say("no residual"),
         flagged=np.isin(artefact.measurement, [m for f in result.findings for m in f.measurements]),
         position_label=artefact.set_up, after_label=say("With what was left out"),
         before_label=say("Recorded minus predicted") if result.simulated else say("Residuals of the job's model"),

@@ -28,7 +28,7 @@ _PANELS, _AXES = ((0, 1), (0, 2), (1, 2)), (say("X / mm"), say("Y / mm"), say("Z
 
 def length_plot(
     position: ArrayLike, before_um: ArrayLike, after_um: ArrayLike | None = None, *, expanded_before_um: ArrayLike | float,
-    expanded_after_um: ArrayLike | float = 0.0, reference: Text, reference_expanded_um: float = 0.0,
+    expanded_after_um: ArrayLike | float | None = None, reference: Text, reference_expanded_um: float = 0.0,
     flagged: ArrayLike | None = None, position_label: Text = say("Position of the bar"),
     before_label: Text = say("Before the model"), after_label: Text = say("After the fitted model"), caption: Text,
     alternative: Text,
@@ -37,12 +37,13 @@ def length_plot(
 
     ``position``: (n,) number of each position; repeats carry the same number and are drawn side by side; ``before_um,
     after_um``: (n,) length minus reference, µm, a panel each; ``expanded_before_um, expanded_after_um``: (n,) or one for
-    all, µm; ``reference``: what zero is, with its figure, such as "certified length 404.2357 mm";
-    ``reference_expanded_um``: its U, µm: the half width of the band about zero; ``flagged``: (n,) true where screening
-    flagged the position.
+    all, µm, after as before where it is left out; ``reference``: what zero is, with its figure, such as "certified length
+    404.2357 mm"; ``reference_expanded_um``: its U, µm: the half width of the band about zero; ``flagged``: (n,) true where
+    screening flagged the position.
     """
     from matplotlib.ticker import MaxNLocator, MultipleLocator
 
+    expanded_after_um = expanded_before_um if expanded_after_um is None else expanded_after_um
     given = [(before_label, before_um, expanded_before_um, ACCENT if after_um is None else MUTED)]
     if after_um is not None:
         given.append((after_label, after_um, expanded_after_um, ACCENT))

@@ -28,8 +28,13 @@ class CircularTest(PositioningRuns):
     calibrated: bool = False  # whether the radius is known
 
     @property
+    def widest_gap(self) -> float:
+        """Degrees between neighbouring targets, from the last to the first too."""
+        return float(np.max(np.diff(self.targets, append=self.targets[0] + 360)))
+
+    @property
     def full(self) -> bool:
-        return bool(np.diff(self.targets, append=self.targets[0] + 360).max() <= _FULL)
+        return self.widest_gap <= _FULL
 
     def names(self) -> tuple[str, ...]:
         found = [f"G{arrow}" for arrow in self.arrows]
