@@ -117,11 +117,15 @@ def method(result: Result) -> Section:
         (say("Stated of the artefact"), _stated(result)),
         (say("Calibrated lengths together"), _calibration(result)),
     )  # fmt: skip
+    certified = any(size.certified and size.role == "dimension" for size in result.artefact.sizes)
     text = say(
         "{what} are estimated from the observations with a linear measurement model, by least squares (orthogonal "
-        "factorisation) and as a posterior distribution with priors as wide as physics allows; the certified length enters "
-        "with its uncertainty. The attached job, recording and results.json suffice to run it again.",
+        "factorisation) and as a posterior distribution with priors as wide as physics allows; {length}. The attached job, "
+        "recording and results.json suffice to run it again.",
         what=say("Rigid-body error factors") if result.model.effects else say("Sizes of the artefact"),
+        length=say("the certified length enters with its uncertainty")
+        if certified
+        else say("no certified length enters"),
     )
     return section(say("Method"), Paragraph(text), Facts(tuple(row for row in rows if row[1])))
 
