@@ -15,9 +15,8 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say, s
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, table, text_columns
-from cmm_uq.certificate.plots.residuals import length_plot, positioning_plot, residual_volume
+from cmm_uq.certificate.plots.residuals import positioning_plot, readings_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
-from cmm_uq.certificate.wording import deviating
 from cmm_uq.machine.physics.kinematics import PARAMETRIC_ERRORS
 from cmm_uq.maths.geometry.positioning import MissingReadingError, PositioningRuns
 from cmm_uq.maths.uncertainty.quantity import nominal, rounded
@@ -238,23 +237,17 @@ def _targets(run: Run, found: PositioningRuns) -> Iterator[Block]:
 
 def _readings(result: Result) -> Block:
     artefact = cast("AxisRuns", result.artefact)
-    off, residuals = artefact.about_zero(artefact.readings) / MICROMETRE, result.residuals / MICROMETRE
-    expanded = result.noise.expanded * artefact.noise_scale
-    told = say("{count} readings: as recorded they deviate", count=len(off))
-    return length_plot(
-        artefact.measurement.astype(float),
-        off,
-        residuals,
-        expanded_before_um=expanded,
+    return readings_plot(
+        result,
+        artefact.about_zero(artefact.readings) / MICROMETRE,
+        scale=artefact.noise_scale,
         reference=say("mean of the run"),
-        flagged=result.flagged,
-        position_label=say("Measurement"),
+        from_reference=say("from their zero"),
         caption=say(
             "Readings about the zero of their run, as recorded and after the fitted model, with U (k = {k}); of a rotation "
             "times the arm.",
             k=number(result.noise.coverage_factor, ".2f"),
         ),
-        alternative=deviating(told, say("from their zero"), off, residuals),
     )
 
 

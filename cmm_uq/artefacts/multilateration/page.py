@@ -14,9 +14,8 @@ from cmm_uq.base.messages import Text, Verbatim, number, say, semicolons
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, text_columns
-from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
+from cmm_uq.certificate.plots.residuals import readings_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
-from cmm_uq.certificate.wording import deviating
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.effects.rigid_body import tip_offsets
@@ -141,23 +140,16 @@ def _stations(stations: list[dict[str, Any]], k: float) -> Table:
 def _readings(result: Result) -> Block:
     artefact = cast("Multilateration", result.artefact)
     away = artefact.points.xyz - artefact.found[artefact.stations.index, :3]
-    off = (np.linalg.norm(away, axis=1) - artefact.distances) / MICROMETRE
-    residuals, expanded = result.residuals / MICROMETRE, result.noise.expanded
-    told = say("{count} readings: as recorded they deviate", count=len(off))
-    return length_plot(
-        artefact.measurement.astype(float),
-        off,
-        residuals,
-        expanded_before_um=expanded,
+    return readings_plot(
+        result,
+        (np.linalg.norm(away, axis=1) - artefact.distances) / MICROMETRE,
         reference=say("distance from the best station"),
-        flagged=result.flagged,
-        position_label=say("Measurement"),
+        from_reference=say("from the best station"),
         caption=say(
             "Distances of indicated targets from the best place of their station less what was read, as recorded and after "
             "the fitted model, with U (k = {k}).",
             k=number(result.noise.coverage_factor, ".2f"),
         ),
-        alternative=deviating(told, say("from the best station"), off, residuals),
     )
 
 

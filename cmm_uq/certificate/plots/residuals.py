@@ -16,6 +16,7 @@ from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.plots import style
 from cmm_uq.certificate.plots.style import ACCENT, BAND, DIVERGING, INK, MUTED, RULE, WIDTH_MM
 from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.wording import deviating
 from cmm_uq.maths.uncertainty.quantity import alike
 
 if TYPE_CHECKING:
@@ -195,6 +196,25 @@ def curve_with_band(
         ax.margins(x=0.01)
         ax.set(xlabel=x_label, ylabel=y_label)
         return style.drawn(figure, caption, alternative)
+
+
+def readings_plot(
+    result: Result, off_um: Floats, *, reference: Text, from_reference: Text, caption: Text, scale: Floats | float = 1.0
+) -> Plot:
+    """Readings (n,) against a reference, µm, by measurement, and what the fitted model leaves; ``scale`` of their U."""
+    residuals = result.residuals / MICROMETRE
+    what = say("{count} readings: as recorded they deviate", count=len(off_um))
+    return length_plot(
+        result.artefact.measurement.astype(float),
+        off_um,
+        residuals,
+        expanded_before_um=result.noise.expanded * scale,
+        reference=reference,
+        flagged=result.flagged,
+        position_label=say("Measurement"),
+        caption=caption,
+        alternative=deviating(what, from_reference, off_um, residuals),
+    )
 
 
 def positioning_plot(
