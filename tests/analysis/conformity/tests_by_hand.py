@@ -232,7 +232,9 @@ def diagonals(figure: str) -> Callable[..., Hand]:
         targets = np.linspace(0.0, 800.0, 9)
         turned, runs = 0 if how == "copied" else 1, []
         for number, (y, z) in enumerate([(1, 1), (1, -1), (-1, 1), (-1, -1)][: 3 if how == "incomplete" else 4], 1):
-            x = np.array([[np.roll([-1.0, -1.0, 0.0, 1.0, 1.0], turned * i) for i in range(9)]] * 2)
+            x = np.array(
+                [[np.roll([-1.0, -1.0, 0.0, 1.0, 1.0], turned * (i + way)) for i in range(9)] for way in (0, 2)]
+            )
             x[0, -1] += 6.0 * (number == 1)
             along = np.array([9.0, 5.5 * y, 5.0 * z]) / np.linalg.norm([9.0, 5.5, 5.0])
             rows = run(number, along, at=targets, repeats=5)
@@ -243,7 +245,7 @@ def diagonals(figure: str) -> Callable[..., Hand]:
             rows |= {f"approach_{a}": sense * along[i] for i, a in enumerate("xyz")}
             runs.append(rows)
         facts = artefact_facts(kind="axis_runs", u_scale_um_per_m=0.0 if how == "no u" else 0.1)
-        x = np.array([[np.roll([-1.0, -1.0, 0.0, 1.0, 1.0], turned * i) for i in range(9)]] * 2)
+        x = np.array([[np.roll([-1.0, -1.0, 0.0, 1.0, 1.0], turned * (i + way)) for i in range(9)] for way in (0, 2)])
         x[0, -1] += 6.0
         u = 0.1 if how == "no u" else spread_by_loops(tuple(x.ravel()), 9, figure[0])
         stated = changing(0.0 if how == "no u" else 0.05)
