@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         plan,
         prove,
         read,
+        read_export,
         report,
         simulate,
     )
@@ -34,7 +35,7 @@ __version__ = "0.15.0"
 
 __all__ = [
     "CmmUqError", "__version__", "budget", "check", "compensate", "diagnose", "due", "history", "job", "new", "part",
-    "plan", "prove", "read", "register", "report", "simulate",
+    "plan", "prove", "read", "read_export", "register", "report", "simulate",
 ]  # fmt: skip
 
 

@@ -13,6 +13,7 @@ import pytest
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.certificate.document import Plot
+from cmm_uq.certificate.part.plots import told_apart
 from cmm_uq.certificate.plots.residuals import MOST, budget_bars, curve_with_band, length_plot, shown, told, volume_plot
 from cmm_uq.certificate.plots.style import (
     ACCENT,
@@ -25,7 +26,6 @@ from cmm_uq.certificate.plots.style import (
     house_style,
     narrowed,
     new_figure,
-    told_apart,
 )
 from cmm_uq.certificate.plots.volume import vector_plot
 from tests.certificate.samples import plots

@@ -9,13 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.app.api.outcomes import DiagnosisOutcome, Part, PlanOutcome, ProofOutcome, Report
+from cmm_uq.app.api.pictures import Export
 from cmm_uq.app.commands.diagnose import diagnosis_outcome
+from cmm_uq.app.commands.jobs import exchange
 from cmm_uq.app.commands.jobs.check import JobCheck, check_job, check_read
 from cmm_uq.app.commands.jobs.new import KEPT, PLAN, new_job, new_plan
 from cmm_uq.app.commands.reading import compared_with, compared_with_frame, in_language, job_of, read_job
 from cmm_uq.app.commands.report import report_outcome
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.toml_file import as_toml, checked
 from cmm_uq.base.languages.translation import Code
+from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.job import Job
 
 if TYPE_CHECKING:
@@ -91,6 +95,28 @@ def job(
         "conformity": list(conformity), "effect": list(effect),
     }  # fmt: skip
     return job_from_frames(points, stated, files or {})
+
+
+def read_export(file: str | Path, **keys: Any) -> Export:
+    """Read an export of another program, and say what each of its columns was taken for.
+
+    Parameters
+    ----------
+    file : a spreadsheet, CSV or text, or a report of PC-DMIS, Calypso, DMIS or QIF.
+    keys : what the file leaves open, as in ``[recording]``: ``columns``, ``unit``, ``sheet``, ``decimal``, ``lines``, ….
+
+    Raises
+    ------
+    CmmUqError : the file cannot be read one way alone; it names the key that settles it.
+
+    Examples
+    --------
+    >>> import cmm_uq
+    >>> cmm_uq.read_export("docs/tutorial/ballbar-export.xlsx").columns.loc["x_mm"].tolist()
+    ['X [mm]', 'mm']
+    """
+    where = "cmm_uq.read_export"
+    return Export(exchange.read_export(Path(file), checked(as_toml(keys, where), Path(where), ImportKeys)))
 
 
 def report(job: Job | str | Path, *, seed: int = 0, language: Code | None = None) -> Report:

@@ -5,30 +5,37 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from cmm_uq.app.api.pictures import Diagnosed, Shown, chosen, figures_of
 from cmm_uq.app.commands.diagnose import DIAGNOSE
 from cmm_uq.app.commands.files import Form
-from cmm_uq.app.commands.parts.part import written
+from cmm_uq.app.commands.parts.part import document_of, written
 from cmm_uq.app.commands.plan import PLAN
 from cmm_uq.app.commands.prove import PROVE
 from cmm_uq.app.commands.report import REPORT
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import html_table
 from cmm_uq.base.units import printed_unit
+from cmm_uq.certificate.diagnosis.page import diagnosis_sections
+from cmm_uq.certificate.diagnosis.sections import field_picture
+from cmm_uq.certificate.document import Document
 from cmm_uq.certificate.part.figures import part_summary
 from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
-from cmm_uq.certificate.result import Outcome
+from cmm_uq.certificate.plots.style import lettered_in
+from cmm_uq.certificate.result import Outcome, Result
+from cmm_uq.certificate.sections.ranking import ranking_plot
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.laboratory.records.place import NONE
+from cmm_uq.machine.physics.stated import physics_of
 from cmm_uq.maths.inference.draws import Draws
 from cmm_uq.maths.uncertainty.quantity import rounded
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 QUANTITY = ("value", "u", "lower", "upper", "unit")
 
@@ -69,23 +76,8 @@ def shown(frame: pd.DataFrame) -> Iterator[tuple[str, ...]]:
         yield str(name), f"{text} ± {expanded}", str(unit)
 
 
-class _Shown(Protocol):
-    """What a notebook shows: a line, tables and warnings."""
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What must be known before a figure is used."""
-
-    def _tables(self) -> list[str]:
-        """Tables of HTML."""
-
-    def _repr_html_(self) -> str:
-        warned = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)
-        return f"<p>{escape(repr(self))}</p>{''.join(self._tables())}" + (f"<ul>{warned}</ul>" if warned else "")
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class Found(_Shown):
+class Found(Shown):
     """What a call found, the figures and the document; nothing is written before :meth:`write`."""
 
     outcome: Outcome
@@ -140,6 +132,10 @@ class Found(_Shown):
     def __repr__(self) -> str:
         return f"<{type(self).__name__.removesuffix('Outcome')} of {self.job.facts.job.id}: {self._said()}>"
 
+    def compose(self) -> Document:
+        with lettered_in(self.job.facts.job.language), physics_of(self.job):
+            return self.outcome.composed()
+
     def _said(self) -> str:
         """The outcome in a few words."""
         return "conforming" if self.conforming else "not conforming"
@@ -153,6 +149,7 @@ class Report(Found):
     """What ``report`` found."""
 
     form = REPORT
+    first = ("trumpet", "tolerances", "lengths", "residuals")
 
     @cached_property
     def estimates(self) -> pd.DataFrame:
@@ -195,11 +192,29 @@ class Report(Found):
 
         return pd.DataFrame(list(self.results.get("conformity", [])))
 
+    @cached_property
+    def pictures(self) -> Mapping[str, Figure]:
+        """Every picture of certificate and diagnosis by its name, and ``ranking``: which error makes how much."""
+        return {**self._diagnosed, **super().pictures}
+
+    @cached_property
+    def _diagnosed(self) -> Mapping[str, Figure]:
+        found = self.outcome.found
+        if not isinstance(found, Result):
+            return {}
+        with lettered_in(self.job.facts.job.language), physics_of(self.job):
+            (ranking,) = figures_of(lambda: ranking_plot(found)).values()
+            field = figures_of(lambda: field_picture(found.diagnosed.diagnosis))
+            return {"ranking": ranking, **field, **figures_of(lambda: diagnosis_sections(found.diagnosed))}
+
     @property
-    def diagnosis(self) -> Mapping[str, Any]:
-        """What the model of the job leaves out, as in results.json; empty where the kind has no diagnosis."""
-        found: Mapping[str, Any] = self.results.get("diagnosis", {})
-        return found
+    def diagnosis(self) -> Diagnosed:
+        """What the model of the job leaves out, as in results.json, with a ``plot``; empty where the kind has no diagnosis."""
+
+        def draw(name: str | None) -> Figure:
+            return chosen(self._diagnosed, name, ("field",), f"Diagnosis of {self.job.facts.job.id}")
+
+        return Diagnosed(self.results.get("diagnosis", {}), draw)
 
     def _said(self) -> str:
         decided = [f"{one.by or one.name} {one.outcome}" for one in self.outcome.verdicts]
@@ -223,6 +238,7 @@ class DiagnosisOutcome(Found):
     """What ``diagnose`` found."""
 
     form = DIAGNOSE
+    first = ("field", "lengths")
 
     @property
     def diagnosis(self) -> Mapping[str, Any]:
@@ -292,10 +308,11 @@ class ProofOutcome(Found):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Part(_Shown):
+class Part(Shown):
     """What was found of a part; nothing is written before :meth:`write`."""
 
     found: PartMeasurement
+    first: ClassVar[tuple[str, ...]] = ("limits", "budget", "part")
 
     @property
     def job(self) -> PartJob:
@@ -349,6 +366,9 @@ class Part(_Shown):
         shares = self.results["budget"]
         rows = {each["cause"]: each["total"] for each in shares["causes"]}
         return pd.DataFrame.from_dict(rows, orient="index", columns=shares["characteristics"])
+
+    def compose(self) -> Document:
+        return document_of(self.found)
 
     def write(self, folder: str | Path | None = None, *, force: bool = False) -> dict[str, Path]:
         """Write the files that ``cmm-uq part`` writes, all or none.

@@ -96,7 +96,7 @@ def fleet_plot(
         dots(ax, rate, at, 4.0, ACCENT)
         named_rows(ax, at, names)
         ax.set(xlabel=axis)
-        return drawn(figure, caption, alternative)
+        return drawn(figure, caption, alternative, "rates")
 
 
 MOST_GROUPS = 12  # models and places of a value, those with most machines

@@ -246,7 +246,7 @@ def trend_plot(history: MachineHistory, one: ValueHistory) -> doc.Plot:
             (check.any(), say("hollow: interim checks")), (bool(one.steps), say("shaded: a step")),
         )  # fmt: skip
         note(figure, semicolons([text for is_drawn, text in parts if is_drawn]))
-        return drawn(figure, say("{name} over time.", name=Verbatim(series.quantity)), _told(history, one))
+        return drawn(figure, say("{name} over time.", name=Verbatim(series.quantity)), _told(history, one), "trend")
 
 
 def _years(day: Floats | Ints) -> Floats:

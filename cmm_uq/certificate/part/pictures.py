@@ -196,7 +196,7 @@ def part_picture(plan: Plan, pose: PartPose, names: Sequence[Text]) -> Plot:
             "The part from above, from the front, from the right and obliquely: {features} with {points}.",
             features=features, points=count,
         )  # fmt: skip
-        return style.drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative, "part")
 
 
 def _stems(plan: Plan, pose: PartPose, largest: float) -> tuple[Floats, Floats]:
@@ -253,7 +253,7 @@ def errors_picture(plan: Plan, errors: PointErrors) -> Plot:
             "uncertainties of up to {u} µm.",
             mean=significant(float(size.max(initial=0.0))), u=significant(float(u.max(initial=0.0))),
         )  # fmt: skip
-        return style.drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative, "errors")
 
 
 def form_picture(plan: Plan, deviations: Floats) -> Plot:
@@ -287,7 +287,7 @@ def form_picture(plan: Plan, deviations: Floats) -> Plot:
             "The part in four views with the distances of its measured points from their features: {low} to {high} µm.",
             low=signed(float(sizes.min(initial=0.0)), ".1f"), high=signed(float(sizes.max(initial=0.0)), ".1f"),
         )  # fmt: skip
-        return style.drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative, "form")
 
 
 def _all(plan: Plan, ends: Floats, radius: Floats) -> Floats:

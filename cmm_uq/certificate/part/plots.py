@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmm_uq.base.messages import DASH, Text, commas, number, say, semicolons, signed
+from cmm_uq.base.messages import DASH, Text, Verbatim, commas, number, say, semicolons, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Column, Outcome, Paragraph, Plot, Section, section, table
 from cmm_uq.certificate.part.figures import figures_of
@@ -81,11 +81,11 @@ def margin_plot(rows: Sequence[Margin], part: tuple[int, int] | None = None) -> 
         for place, row in enumerate(rows):
             _band(ax, place, row)
             _interval(ax, place, row)
-        style.named_rows(ax, np.arange(len(rows)), style.told_apart([row.name for row in rows], style.NAMES_MM))
+        style.named_rows(ax, np.arange(len(rows)), told_apart([row.name for row in rows], style.NAMES_MM))
         ax.set_xticks([0.0, 0.5, 1.0], [say("lower limit"), say("middle"), say("upper limit")])
         ax.set(xlim=(-_FARTHEST, 1 + _FARTHEST), ylim=(len(rows) - 0.4, -0.6))
         ax.set_xlabel(means, loc="right")  # towards the names: in some languages it is longer than the axis
-        return style.drawn(figure, caption, _told(rows, measured=measured))
+        return style.drawn(figure, caption, _told(rows, measured=measured), "limits")
 
 
 def _told(rows: Sequence[Margin], *, measured: bool) -> Text:
@@ -129,6 +129,23 @@ def _interval(ax: Axes, place: int, row: Margin) -> None:
                     bbox={"facecolor": "white", "alpha": 0.8, "lw": 0, "pad": 0.5})  # fmt: skip
 
 
+def told_apart(names: Sequence[Text], room_mm: float) -> list[Text]:
+    """Names cut to their room; where the beginnings of two are the same, each with its end in place of its beginning."""
+    short = [style.narrowed(name, room_mm) for name in names]
+    again = list(map(str, short))
+    return [
+        _ending(name, room_mm) if again.count(text) > 1 and text != str(name) else beginning
+        for name, beginning, text in zip(names, short, again, strict=True)
+    ]
+
+
+def _ending(text: Text, room_mm: float) -> Text:
+    """The longest end of a text that has room, with what says that it began before."""
+    whole = str.__str__(style.lettered(text))
+    ends = ("…" + whole[i:].lstrip(" ,") for i in range(1, len(whole)))
+    return Verbatim(next(end for end in ends if style.width_mm(end, style.SMALL) <= room_mm))
+
+
 # neighbours differ in lightness, so that they can be told apart without colour
 _SHADES = ("#0b5c7a", "#86b1c2", "#a84e08", "#e0b48a", "#5a666e", "#c3ccd0", "#3f86a0", "#cc7f3c")
 _DARK = ("#0b5c7a", "#a84e08", "#5a666e")
@@ -162,7 +179,7 @@ def _bars(names: Sequence[Text], causes: Sequence[Text], shares: Floats) -> Plot
                 ax.text(before[row] + 0.5 * shares[g, row], row, number(100 * shares[g, row], ".0f"), fontsize=style.TINY,
                         color="white" if shade in _DARK else style.INK, ha="center", va="center_baseline")  # fmt: skip
             before = before + shares[g]
-        style.named_rows(ax, rows, style.told_apart(names, style.NAMES_MM))
+        style.named_rows(ax, rows, told_apart(names, style.NAMES_MM))
         ax.set(xlim=(0, 1), ylim=(len(names) - 0.4, -0.6), xticks=[])
         ax.spines["bottom"].set_visible(False)
         for line, members in enumerate(lines):
@@ -174,6 +191,7 @@ def _bars(names: Sequence[Text], causes: Sequence[Text], shares: Floats) -> Plot
             figure,
             say("What the variance of each characteristic is made of, %, by cause: total shares over their sum."),
             semicolons(_told_of_budget_plot(name, causes, shares[:, i]) for i, name in enumerate(names)),
+            "budget",
         )
 
 
@@ -236,6 +254,7 @@ def correlation_plot(numbers: Sequence[Text], correlation: Floats) -> Plot:
             say("Correlations between the characteristics, by their numbers: full dots positive, hollow dots negative, the "
                 "larger the stronger; those below {least:g} in size are left out.", least=LEAST),
             _told_of_correlation_plot(numbers, sizes, below, left),
+            "correlation",
         )  # fmt: skip
 
 

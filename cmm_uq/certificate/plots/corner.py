@@ -59,7 +59,7 @@ def corner_plot(
         panels.pairs(middle[chosen])
         panels.frames()
         panels.words(labels)
-        return style.drawn(panels.figure, caption, alternative)
+        return style.drawn(panels.figure, caption, alternative, "posterior")
 
 
 def _most_correlated(draws: Floats) -> NDArray[np.intp]:

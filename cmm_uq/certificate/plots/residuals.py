@@ -87,7 +87,7 @@ def length_plot(
         if style.width_mm(style.lettered(legend), style.TINY) > _NOTE_MM:
             figure.subplots_adjust(top=0.905 if two else 0.86)  # the note has a line of its own
         style.note(figure, legend, 0.995, 0.985)
-        return style.drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative, "lengths")
 
 
 def _side_by_side(position: Floats) -> Floats:
@@ -145,7 +145,7 @@ def volume_plot(
         label = say("{quantity}  (full dot: positive, hollow dot: negative)", quantity=say("Residual / µm"))
         scale_axes.set_xlabel(label, labelpad=2)
         scale_axes.spines[:].set_visible(False)
-        return style.drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative, "residuals")
 
 
 def _projections(spans: Floats) -> tuple[Figure, list[Axes], Axes]:
@@ -195,7 +195,7 @@ def curve_with_band(
         ax.grid(axis="y")
         ax.margins(x=0.01)
         ax.set(xlabel=x_label, ylabel=y_label)
-        return style.drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative, "curve")
 
 
 def readings_plot(
@@ -241,7 +241,7 @@ def positioning_plot(
         ax.grid(axis="y")
         ax.margins(x=0.02)
         ax.set(xlabel=label, ylabel=say("Deviation / {unit}", unit=unit))
-        return style.drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative, "positioning")
 
 
 def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, alternative: Text) -> Plot:
@@ -270,7 +270,7 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
                 ax.annotate(line, (0, place), (left, up * style.SMALL), xycoords=("axes fraction", "data"),
                             textcoords="offset points", ha="right", va="center", fontsize=style.SMALL, color=INK)  # fmt: skip
         ax.spines["bottom"].set_visible(False)
-        return style.drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative, "budget")
 
 
 def residual_volume(result: Result, what: Text) -> Plot:
@@ -314,7 +314,7 @@ def trumpet(
             (say("crosses: not accepted"), marked.any()),
         )
         style.note(figure, semicolons([part for part, drawn in parts if drawn]))
-        return style.drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative, "trumpet")
 
 
 def _limits(ax: Axes, x: Floats, top: Floats, accepted: Floats) -> None:
@@ -362,7 +362,7 @@ def tolerance_plot(
         style.named_rows(ax, rows, names)
         label = say("Parameter over its tolerance (band: inside; cross: outside beyond doubt)")
         ax.set(xlim=(-1.02 * reach, 1.02 * reach), xlabel=label)
-        return style.drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative, "tolerances")
 
 
 MOST = 1500  # marks of one series: more would run into each other, and a page with them would take a browser seconds

@@ -12,7 +12,7 @@ import io
 import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
 from functools import cache
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 JAPANESE = "IPAexGothic"  # family that sets Japanese, under the IPA Font License 1.0, which allows it in documents.
 _PACKAGE = "matplotlib_fontja"  # has it; the package is not imported, since that would change matplotlib's settings
 _LANGUAGE: ContextVar[Code] = ContextVar("language of pictures", default=ENGLISH)
+_KEPT: ContextVar[list[tuple[str, Figure]] | None] = ContextVar("figures kept", default=None)
 
 
 def japanese_font() -> Path:
@@ -57,12 +58,16 @@ def fonts_of(language: Code) -> list[Path]:
 
 
 @contextmanager
-def lettered_in(language: Code) -> Iterator[None]:
-    before = _LANGUAGE.set(language)
+def _within(variable: ContextVar[Any], value: Any) -> Iterator[Any]:
+    before = variable.set(value)
     try:
-        yield
+        yield value
     finally:
-        _LANGUAGE.reset(before)
+        variable.reset(before)
+
+
+def lettered_in(language: Code) -> AbstractContextManager[None]:
+    return _within(_LANGUAGE, language)
 
 
 def lettered(text: Text) -> Text:
@@ -247,10 +252,17 @@ def as_svg(figure: Figure) -> str:
     return svg.replace("<svg ", '<svg font-family="sans-serif" stroke-linejoin="round" ', 1).strip()
 
 
-def drawn(figure: Figure, caption: Text, alternative: Text) -> Plot:
-    """The figure as a block of a document, with the texts that are lettered in it."""
+def figures_kept() -> AbstractContextManager[list[tuple[str, Figure]]]:
+    """What is drawn within, by the names of its sort, besides as blocks of a document."""
+    return _within(_KEPT, [])
+
+
+def drawn(figure: Figure, caption: Text, alternative: Text, name: str) -> Plot:
+    """The figure as a block of a document, with the texts that are lettered in it; ``name`` of its sort."""
     from matplotlib.text import Text as Lettering
 
+    if (kept := _KEPT.get()) is not None:
+        kept.append((name, figure))
     code = _LANGUAGE.get()
     if code != ENGLISH:  # every text, figures of ticks too
         tickers = {id(axis.major): axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)}
@@ -281,7 +293,11 @@ def strokes(ax: Axes, x0: Floats, x1: Floats, y0: Floats, y1: Floats, **style: A
 
 
 def dots(ax: Axes, x: Floats, y: Floats, size: float, colour: str, *, hollow: bool = False, zorder: float = 3) -> None:
-    """Round marks of ``size`` pt: strokes of no length with round ends, which viewers draw as dots."""
+    """Round marks of ``size`` pt: strokes of no length with round ends, which viewers of SVG and PDF alone draw as dots."""
+    if _KEPT.get() is not None:
+        ring = 0.25 * size if hollow else 0.0
+        ax.plot(x, y, "o", ms=size - ring, mew=ring, mec=colour, mfc="white" if hollow else colour, zorder=zorder)
+        return
     strokes(ax, x, x, y, y, lw=size, color=colour, solid_capstyle="round", zorder=zorder)
     if hollow:
         strokes(ax, x, x, y, y, lw=size * 0.5, color="white", solid_capstyle="round", zorder=zorder + 0.01)
@@ -367,23 +383,6 @@ def folded(text: Text, room_mm: float, size: float = SMALL, weight: str = "norma
     rest = whole[ends[-1] :].strip()
     kept = rest if width_mm(rest, size, weight) <= room_mm else _longest(rest, room_mm * SMALL / size)
     return [Translation(line, text) for line in (whole[: ends[-1]], kept)]
-
-
-def told_apart(names: Sequence[Text], room_mm: float) -> list[Text]:
-    """Names cut to their room; where the beginnings of two are the same, each with its end in place of its beginning."""
-    short = [narrowed(name, room_mm) for name in names]
-    again = list(map(str, short))
-    return [
-        _ending(name, room_mm) if again.count(text) > 1 and text != str(name) else beginning
-        for name, beginning, text in zip(names, short, again, strict=True)
-    ]
-
-
-def _ending(text: Text, room_mm: float) -> Text:
-    """The longest end of a text that has room, with what says that it began before."""
-    whole = str.__str__(lettered(text))
-    ends = ("…" + whole[i:].lstrip(" ,") for i in range(1, len(whole)))
-    return Verbatim(next(end for end in ends if width_mm(end, SMALL) <= room_mm))
 
 
 def _longest(text: str, room_mm: float) -> str:

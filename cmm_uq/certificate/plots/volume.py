@@ -63,7 +63,7 @@ def vector_plot(
         axes[-1].plot([x, x + factor * unit], [y, y], color=ACCENT, lw=1.6, solid_capstyle="butt")
         axes[-1].annotate(say("{length:g} µm", length=unit), (x + factor * unit / 2, y), (0, 3),
                           textcoords="offset points", ha="center", va="bottom", fontsize=TINY)  # fmt: skip
-        return style.drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative, "vectors")
 
 
 def _longest(vectors: Sequence[Floats]) -> float:
@@ -153,7 +153,7 @@ def residual_field_plot(
                 if not row:
                     style.panel_title(ax, titles[column], colours[column])
         _key(figure, axes[-1][0], factor, longest, float(np.median(limit)), colours[0])
-        return style.drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative, "field")
 
 
 def _planes(place: Floats, vectors: Floats) -> list[tuple[int, int]]:
@@ -239,7 +239,7 @@ def profile_plot(
         style.panel_title(below, say("What each observation leaves"), DIVERGING[-1])
         below.margins(x=0.02, y=0.1)
         figure.align_ylabels((above, below))
-        return style.drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative, "profile")
 
 
 A_ROW = 3  # pictures side by side
@@ -290,7 +290,7 @@ def _row(placings: Sequence[SetUp], box: Floats, first: int) -> Plot:
         )
         words = [say("{first}: {title}, {ends} mm", first=first + i, title=p.title, ends=p.ends)
                  for i, p in enumerate(placings)]  # fmt: skip
-        return style.drawn(figure, told, semicolons(words))
+        return style.drawn(figure, told, semicolons(words), "set-ups")
 
 
 def _seen(xyz: Floats) -> Floats:
@@ -378,7 +378,7 @@ def gain_plot(
             for label, (a, b) in zip(labels, figures, strict=True)
         )
         both = say("{quantity} with {one} and with {other}.", quantity=quantity, one=names[0], other=names[1])
-        return style.drawn(figure, both, words)
+        return style.drawn(figure, both, words, "gain")
 
 
 def _title(title: Text) -> list[Text]:

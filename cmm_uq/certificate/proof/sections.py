@@ -344,6 +344,7 @@ def strength_plot(in_bins: tuple[tuple[float, float, Rate], ...], curve: Detecti
                 "band; the broken line is nine in ten."),
             say("Share of hidden effects found, growing with their strength from {low:g} to {high:g}.",
                 low=float(curve.strengths[0]), high=float(curve.strengths[-1])),
+            "found",
         )  # fmt: skip
 
 
@@ -363,6 +364,7 @@ def said_plot(each: tuple[Tenth, ...]) -> Plot:
             say("Probability that was said of asserted effects against the share of them that act, by tenths, with 95 % "
                 "intervals."),
             say("Probabilities said and shares right in {count} tenths.", count=len(each)),
+            "said",
         )  # fmt: skip
 
 
