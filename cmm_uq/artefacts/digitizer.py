@@ -29,9 +29,16 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings, Size
 from cmm_uq.machine.model.placed import Radial
 from cmm_uq.machine.model.recorded import columns_needed, expansion, place
-from cmm_uq.machine.physics.digitizer import THREE_ATTITUDES, Alignment, MountOffset, align_on_sphere, mount_offset
+from cmm_uq.machine.physics.digitizer import (
+    THREE_ATTITUDES,
+    Alignment,
+    MountOffset,
+    align_on_sphere,
+    axes_of_scans,
+    mount_offset,
+)
 from cmm_uq.machine.physics.effects.probing import attitudes
-from cmm_uq.machine.physics.kinematics import euler_313
+from cmm_uq.machine.physics.kinematics import axis_directions, euler_313
 from cmm_uq.maths.inference.linear_model import Freedoms
 
 
@@ -98,7 +105,10 @@ class DigitizerArtefact(Artefact):
         refuse_undetermined(self.alignments, where)
         self.start: MountOffset = mount_offset(self.alignments)
         self._refuse_another(facts, points, where)
-        carried = self._carried(self.start.offset)
+        offset = self.start.offset
+        if self.scanned:
+            self.leans, offset = axes_of_scans(points.xyz, self.attitude, self._seen, self.start)
+        carried = self._carried(offset)
         self.points = replace(
             points, machine=replace(points.machine, tip_on_every_carriage=True),
             columns={**points.columns, **{f"tip_{axis}_mm": carried[:, i] for i, axis in enumerate(AXES)}},
@@ -106,7 +116,7 @@ class DigitizerArtefact(Artefact):
         self._tip = carried
         # observations, sizes and place are all seen along the directions of the recorded points: taken anew at fitted
         # ones, they would differ by the noise, and what no recording determines would seem determined
-        self._seen_at = points.xyz + carried
+        self._seen_at = (points.xyz @ axis_directions(self.leans) if self.leans.any() else points.xyz) + carried
         self.target: ScannedSphere | Centre = (
             ScannedSphere(facts, points.at(self._seen_at), where) if self.scanned else Centre(len(points))
         )
@@ -115,7 +125,7 @@ class DigitizerArtefact(Artefact):
         self.u_turn, self.u_shift = facts.u_attitude_arcsec, facts.u_centre_um
         sought = (
             Size(f"{name}_mm", Verbatim(name), unit("mm"), float(value), np.inf, role="sought")
-            for name, value in zip(OFFSET, self.start.offset, strict=True)
+            for name, value in zip(OFFSET, offset, strict=True)
         )
         self.sizes = (*sought, *self.target.sizes, *self._set_up_sizes())
 

@@ -87,6 +87,12 @@ def plate(attitudes: Sequence[Sequence[float]] = FOUR_ATTITUDES, pitch: float = 
     )  # fmt: skip
 
 
+def leaning(arcsec: Sequence[float]) -> Floats:
+    """Unit vectors of the axes as rows that enclose 90° plus these: their scalar products are minus the sines."""
+    xy, yz, zx = -np.sin(np.radians(np.array(arcsec) / 3600))
+    return np.linalg.cholesky(np.array([[1, xy, zx], [xy, 1, yz], [zx, yz, 1]]))
+
+
 def model(facts: ArtefactFacts, points: Points, names: Sequence[str], sigma: float | None = 1e-3) -> RecordingModel:
     return RecordingModel(artefact_of(facts, points), effects(names), sigma)
 

@@ -123,7 +123,8 @@ def _rival(
     versions, effects, model = combinations.by_key[combination].versions, key - frozenset(functions), before
     if effects:
         model = replace(with_effects(result.first, versions, effects), artefact=before.artefact, used=before.used)
-    linear = replace(model.linearised(_about(model, before, result.model)), sigma=None)
+    about, unknowns = _about(model, before, result.model)
+    linear = replace(model.linearised(about), sigma=None, unknowns=unknowns)
     for version in [version for version in versions if version.explanation in functions]:
         columns, sd = explanations[version.explanation].members[version.member].columns, version.amplitude * sigma
         more = tuple(Unknown(("unknown", str(i)), unit("1"), 0.0, sd, sd) for i in range(columns.shape[1]))
@@ -138,12 +139,16 @@ def _rival(
     )  # fmt: skip
 
 
-def _about(model: RecordingModel, *estimated: RecordingModel) -> Floats:
-    """Parameters (k,) that a model is linear about: as the last of others estimates them, else as known beforehand."""
-    values = {unknown.key: unknown.prior_mean for unknown in model.unknowns}
+def _about(model: RecordingModel, *estimated: RecordingModel) -> tuple[Floats, tuple[Unknown, ...]]:
+    """Parameters (k,) that a model is linear about, and their priors: as the last of others has them, else as beforehand."""
+    unknowns = {unknown.key: unknown for unknown in model.unknowns}
+    values = {key: unknown.prior_mean for key, unknown in unknowns.items()}
     for other in estimated:
-        values |= dict(zip((unknown.key for unknown in other.unknowns), other.estimate().about, strict=True))
-    return np.array([values[unknown.key] for unknown in model.unknowns])
+        found = other.estimate()
+        values |= {one.key: value for one, value in zip(found.linear.unknowns, found.about.tolist(), strict=True)}
+        unknowns |= {one.key: one for one in found.linear.unknowns}
+    keys = [unknown.key for unknown in model.unknowns]
+    return np.array([values[key] for key in keys]), tuple(unknowns[key] for key in keys)
 
 
 def _drawn(linear: LinearModel, sigma: float, stated: float | None, seed: int) -> Floats:

@@ -18,7 +18,7 @@ from cmm_uq.base.messages import Text, Verbatim, plural, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.machine.model.artefact import Placings
 from cmm_uq.machine.model.kind import Observed
-from cmm_uq.machine.physics.kinematics import axis_directions
+from cmm_uq.machine.physics.kinematics import MOST_LEAN, axis_directions
 
 MOST = 0.2  # part of the rows that may be left out; with more damage the recording is refused
 _PART, _STRAYS = 0.2, 0.05
@@ -26,7 +26,7 @@ _FEW, _MANY = 16, 60
 _MOST_BALLS = 400
 _SAME_PLACE, _TRAVEL_TOLERANCE = 10.0, 1.0  # mm
 _SEVERAL, _EDGES = 4, 0.05
-_MOST_LEAN, _FOR_ANGLES = 0.175, 10  # rad, 10°; set-ups or points from which on three angles are no mere adaptation
+_FOR_ANGLES = 10  # set-ups or points from which on three angles are no mere adaptation
 _EXPLAINED = 0.25  # part of its misfit that a point has left which other axes explain
 _ABSURD = (1.0, 2e4)  # mm; a bar shorter or longer than this is in another unit
 
@@ -261,7 +261,7 @@ def _leaning_axes(points: Points, shape: ArtefactShape, misfit: Floats) -> Float
     def left(angles: Floats, rows: NDArray[np.bool_]) -> Floats:
         return replace(shape, axes=axis_directions(angles)).misfit(points.xyz, shape.reference)[rows]
 
-    most, fitted = np.full(3, _MOST_LEAN), (~missed if few else every,)
+    most, fitted = np.full(3, MOST_LEAN), (~missed if few else every,)
     fit = partial(scipy.optimize.least_squares, left, np.zeros(3), bounds=(-most, most), x_scale=0.01, loss="cauchy")
     angles = fit(args=fitted, f_scale=0.1 * shape.tolerance).x
     after = left(angles, every)

@@ -28,10 +28,13 @@ from cmm_uq.machine.model.kind import Kind, Observe
 from cmm_uq.machine.model.predicted_errors import SAME, PredictedErrors, maps_named, predicted_errors, tables_otherwise
 from cmm_uq.machine.model.recorded import NANOMETRE, display_step, expansion
 from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.machine.physics.kinematics import SQUARENESSES
 from cmm_uq.maths.inference.linear_model import RANK_TOLERANCE, Freedoms
 
 # observations that the noise is estimated from, beside those that sizes and set-ups could explain
 FEWEST_LEFT = 3
+
+_UNNAMED = 0.03  # rad: a lean beyond this the diagnosis does not find by itself where a recording is taken about it
 
 OVERFLOW_FIX = (  # where figures leave the range of numbers
     "Look for a number that no measurement gives: in the columns of the recording, u_coordinate_um, u_um or travel_mm"
@@ -62,6 +65,18 @@ def model_of(job: Job, artefact: Artefact) -> RecordingModel:
     named = effects(job.facts.model.effects, where="job.toml [model] effects")
     if unfit := next(filter(None, (effect.unfit(artefact.points) for effect in named)), None):
         raise unfit
+    unnamed = {
+        plane: f"{np.degrees(abs(lean)):.1f}° ({plane[0].upper()} and {plane[1].upper()})"
+        for plane, lean in zip(SQUARENESSES, artefact.leans, strict=True)
+        if abs(lean) > _UNNAMED and plane not in {effect.plane for effect in named}
+    }
+    if unnamed:
+        raise CmmUqError(
+            f"the {artefact.title.lower()} fits only on axes that are out of square by {', '.join(unnamed.values())}",
+            where=job.recording_path,
+            fix=f"Name {', '.join(f'squareness_{plane}' for plane in unnamed)} in job.toml [model] effects, or adjust the "
+            "machine and measure again",
+        )
     model = RecordingModel(artefact, named, None if stated is None else stated * MICROMETRE, used)
     _refuse_undetermined(model, job.recording_path)
     return model

@@ -12,7 +12,7 @@ from cmm_uq.certificate.result import RecordingNoise, Result
 from cmm_uq.certificate.sections.regions import regions_warnings
 from cmm_uq.certificate.wording import stated_physics, title_of, with_uncertainty
 from cmm_uq.machine.model.artefact_doubt import CALIBRATION
-from cmm_uq.machine.model.measurement import ARTEFACT
+from cmm_uq.machine.model.measurement import ARTEFACT, IMPLAUSIBLE
 from cmm_uq.maths.inference.ensembles import Chains
 from cmm_uq.maths.inference.posterior import Posterior
 from cmm_uq.maths.uncertainty.quantity import alike, figure, nominal, significant
@@ -158,7 +158,6 @@ def _calibration(result: Result) -> Text:
 
 
 ASSUMED = 0.25  # share of the prior in a parameter's variance from which on the reader is told
-IMPLAUSIBLE = 4.0  # standard deviations of what was known beforehand from which on an estimate is held to be a mistake
 
 
 def warnings(result: Result) -> tuple[Text, ...]:
@@ -228,7 +227,7 @@ def _implausible(result: Result) -> list[Text]:
     """Parameters far beyond what was known of them: a certified length that is wrong looks like scale errors of all axes."""
     texts: list[Text] = []
     means = result.values.mean(axis=0)
-    for unknown, mean in zip(result.posterior.unknowns, means, strict=True):
+    for unknown, taken, mean in zip(result.model.unknowns, result.posterior.unknowns, means, strict=True):
         off = mean - unknown.prior_mean
         if 0 < unknown.prior_sd < abs(off) / IMPLAUSIBLE:
             parameter = title_of(unknown.key, result)
@@ -241,6 +240,16 @@ def _implausible(result: Result) -> list[Text]:
                 parameter=parameter, off=figure(off), unit=unknown.unit, times=abs(off) / unknown.prior_sd,
                 sd=figure(unknown.prior_sd, 3),
             ))  # fmt: skip
+        if taken.prior_sd > unknown.prior_sd:
+            texts.append(
+                say(
+                    "{parameter}: the recording contradicts what was known beforehand so clearly that {sd} {unit} was taken "
+                    "as its standard uncertainty instead.",
+                    parameter=title_of(unknown.key, result),
+                    sd=figure(taken.prior_sd, 3),
+                    unit=unknown.unit,
+                )
+            )
     return texts
 
 

@@ -11,7 +11,7 @@ exact null space.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +23,7 @@ from cmm_uq.base.units import ARCSECOND, Unit
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.recorded import Noise
 from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.kinematics import SQUARENESSES
 from cmm_uq.machine.physics.superposition import About, Superposition
 from cmm_uq.maths.inference.curvature import bend, bent
 from cmm_uq.maths.inference.linear_model import Freedoms, LeastSquares, LinearModel, Unknown, likeliest, solve
@@ -35,6 +36,7 @@ _SMALLEST_NOISE = 1e-6  # mm
 SMALL_LEAN = 100 * ARCSECOND  # rad: squares and products of angles up to this are 0.25 ppm.
 # rad: an axis that leans so is another one; least squares gets there where a recording does not show the angle
 _NO_LEAN = 1.0
+IMPLAUSIBLE = 4.0  # standard deviations of what was known beforehand from which on an estimate contradicts it
 _MOVED = 10 * ARCSECOND  # rad: about an angle this far away a model is as linear
 _NO_SQUARENESS = 0.1  # rad: a squareness of which no more is known than this, six degrees, is not determined
 # condition up to which a design, in typical sizes of the parameters, is not made of the noise of the placings
@@ -156,17 +158,23 @@ class RecordingModel:
             try:
                 return self._iterated(most)
             except (CmmUqError, np.linalg.LinAlgError):
-                first = self._solved(self.linearised(self._beforehand), most)
+                first = self._solved(self.linearised(self._beginning), most)
                 if first.condition <= _ILL_CONDITIONED or first.rank == 1:
                     raise
                 most = first.rank - 1  # what the recording hardly shows led the iteration away from all machines
 
     @property
-    def _beforehand(self) -> Floats:
-        return np.array([u.prior_mean for u in self.unknowns])
+    def _beginning(self) -> Floats:
+        """Parameters (k,) as known beforehand, on axes that lean as those on which the observations were found."""
+        values, open_ = np.array([u.prior_mean for u in self.unknowns]), np.array(self.artefact.leans)
+        for column, effect in self._acting.leaning if open_.any() else ():
+            lean, plane = effect.lean(self.artefact.points), SQUARENESSES.index(str(effect.plane))
+            if np.ndim(lean) == 0:
+                values[column], open_[plane] = open_[plane] / lean, 0.0
+        return values
 
     def _iterated(self, most: int | None) -> Estimate:
-        values = self._beforehand
+        values = self._beginning
         for _ in range(10):
             linear = self.linearised(values)
             result = self._solved(linear, most)
@@ -175,8 +183,29 @@ class RecordingModel:
             values = result.value
             if change.max(initial=0.0) < 1e-9 or self.leans_beyond(values, np.zeros_like(values), _NO_LEAN):
                 break  # nothing but noise says how an angle stands: another step would go farther still
+        linear = replace(linear, unknowns=self._widened(result))
         about = self._likeliest(linear, values, result)
-        return Estimate(result, linear if about is values else self.linearised(about), about)
+        return Estimate(result, linear if about is values else self._anew(linear, about), about)
+
+    def _widened(self, found: LeastSquares) -> tuple[Unknown, ...]:
+        """The unknowns; a lean that the recording shows far beyond its prior has one as wide as itself instead.
+
+        Three axes that lean by twenty of their normal priors would outweigh a recording of some sixty points: a noise of
+        millimetres would be likelier than these angles. What is left is the normal prior whose scale the lean itself sets,
+        likeliest of all scales, and it moves the estimate by the square of its relative uncertainty.
+        """
+        leans = np.append(self._acting.leans, np.zeros(len(self.artefact.sizes), dtype=bool)) & found.determined
+        sizes = np.abs(found.value)
+        wide = leans & (
+            sizes - IMPLAUSIBLE * found.spread > IMPLAUSIBLE * np.array([u.prior_sd for u in self.unknowns])
+        )
+        return tuple(
+            replace(one, prior_sd=float(size)) if far else one
+            for one, far, size in zip(self.unknowns, wide, sizes, strict=True)
+        )
+
+    def _anew(self, linear: LinearModel, about: Floats) -> LinearModel:
+        return replace(self.linearised(about), unknowns=linear.unknowns)
 
     def _solved(self, linear: LinearModel, most: int | None = None) -> LeastSquares:
         """Least squares, without angles that the recording would show only if its placings were known without noise.
@@ -200,7 +229,7 @@ class RecordingModel:
             nearer = likeliest(linear, sigma)
             if not self.leans_beyond(nearer - values, still, _MOVED):
                 break
-            values, linear = nearer, self.linearised(nearer)
+            values, linear = nearer, self._anew(linear, nearer)
         return values
 
     def linearised(self, values: Floats) -> LinearModel:

@@ -16,16 +16,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.machine.physics.compensation import BLOCK, Compensation, PointConditions
-from cmm_uq.machine.physics.kinematics import euler_313, on_leaning_axes
+from cmm_uq.machine.physics.kinematics import MOST_LEAN, axis_directions, euler_313, on_leaning_axes
 from cmm_uq.machine.physics.map_interpolation import LookedUp
 from cmm_uq.machine.physics.point_cloud import COORDINATES, DIGITIZER_COLUMNS
 from cmm_uq.maths.geometry import fit_plane, fit_sphere
 from cmm_uq.maths.geometry.feature import frame_about, minimise
+
+LEANS = 0.01  # part of its radius by which a sphere that was scanned in several attitudes is none, where the axes lean
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,6 +263,29 @@ def mount_offset(alignments: Sequence[Alignment]) -> MountOffset:
     misfit = y - A @ found
     residuals = np.array([a.reading for a in alignments]) - (rows @ found).reshape(-1, 3)
     return MountOffset(found[:3], found[3:], inverse @ inverse.T, residuals, float(misfit @ misfit), len(y) - 6)
+
+
+def axes_of_scans(xyz: Floats, attitude: Floats, seen: Floats, start: MountOffset) -> tuple[Floats, Floats]:
+    """Squarenesses (3,), rad, that make one sphere of all scans, and the offset (3,), mm, with them.
+
+    Zero where those that a machine may have do not. ``xyz``: (n, 3) readings, mm; ``attitude``: (n, 3, 3);
+    ``seen``: (n, 3) in the digitizer's frame, mm; ``start``: by the attitudes one by one, on square axes.
+    """
+
+    def left(p: Floats) -> Floats:
+        true = xyz @ axis_directions(p[:3]) + np.einsum("nij,nj->ni", attitude, seen - p[3:6])
+        return np.asarray(np.linalg.norm(true - p[6:9], axis=1) - p[9])
+
+    about = np.concatenate([np.zeros(3), start.offset, start.sphere, [0.5 * np.ptp(seen)]])
+    about[9] += left(about).mean()
+    scatter = np.sqrt(np.mean(left(about) ** 2))
+    if scatter < LEANS * about[9]:
+        return np.zeros(3), start.offset
+    found = scipy.optimize.least_squares(left, about, x_scale=np.repeat([0.01, 1.0], [3, 7]))
+    lean, remains = np.abs(found.x[:3]).max(), np.sqrt(np.mean(found.fun**2))
+    if lean > MOST_LEAN or remains > 0.1 * scatter:
+        return np.zeros(3), start.offset
+    return found.x[:3], found.x[3:6]
 
 
 def three_alignment_offset(readings: Floats, u: Floats) -> tuple[Floats, Floats]:

@@ -26,6 +26,7 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import AXES, Floats
 
 SQUARENESSES = ("xy", "yz", "zx")  # pairs of axes in the order in which every squareness array here keeps them
+MOST_LEAN = 0.175  # rad, 10°: farther out of square no axis of a machine is believed to be
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ class Superposition:
         if squareness is None:
             return np.asarray(self.derivatives(About(points)) @ coefficients, dtype=np.float64)
         directions = axis_directions(squareness)
-        others = np.where(self._leans, 0.0, coefficients)
+        others = np.where(self.leans, 0.0, coefficients)
         e = self.derivatives(About(replace(points, directions=directions))) @ others
         return np.asarray(e + leaning(points.carriages, directions), dtype=np.float64)
 
@@ -77,13 +77,13 @@ class Superposition:
     def largest_lean(self, points: Points, sizes: Floats) -> float:
         """Largest sum of leans in one plane, rad, where each effect may be as large as its coefficient of ``sizes`` (k,)."""
         total = dict.fromkeys(SQUARENESSES, 0.0)
-        for column, effect in self._leaning:
+        for column, effect in self.leaning:
             total[str(effect.plane)] += float(sizes[column] * np.abs(effect.lean(points)).max(initial=0.0))
         return max(total.values())
 
     def _squareness(self, points: Points, coefficients: Floats) -> Floats | None:
         """Squarenesses (3,) or (n, 3), rad, of all effects that are some; ``None`` where there are none."""
-        acting = [(effect, coefficients[column]) for column, effect in self._leaning if coefficients[column]]
+        acting = [(effect, coefficients[column]) for column, effect in self.leaning if coefficients[column]]
         if not acting:
             return None
         total: list[Floats] = [np.zeros(()) for _ in SQUARENESSES]
@@ -93,12 +93,12 @@ class Superposition:
         return np.stack(np.broadcast_arrays(*total), axis=-1)
 
     @property
-    def _leaning(self) -> list[tuple[int, Effect]]:
+    def leaning(self) -> list[tuple[int, Effect]]:
         first = np.cumsum([0, *(len(effect.coefficients) for effect in self.effects)])
         return [(int(i), effect) for i, effect in zip(first, self.effects, strict=False) if effect.plane]
 
     @property
-    def _leans(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def leans(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """(k,) which coefficients are of a squareness."""
         return np.array([bool(effect.plane) for effect in self.effects for _ in effect.coefficients], dtype=bool)
 
