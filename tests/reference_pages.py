@@ -86,7 +86,7 @@ def job() -> str:
     schema = schema_named("job")
     parts = [
         "A job is a folder with a `job.toml` and the recording that it names. `cmm-uq new KIND` writes one that runs, with "
-        "every key explained; `cmm-uq check JOB` says all that is wrong with it. Numbers in brackets such as 7.8.2.1 e are "
+        "the lines that matter; `cmm-uq check JOB` says all that is wrong with it. Numbers in brackets such as 7.8.2.1 e are "
         "clauses of ISO/IEC 17025:2017.",
         EDITORS.format(name="job"),
         "Units stand at the end of a key's name. A standard uncertainty u has k = 1.",
@@ -107,7 +107,7 @@ def part() -> str:
     schema = schema_named("part")
     parts = [
         "The job of a part is a folder with a `job.toml` and the files that state the machine. `cmm-uq new part` writes one "
-        "with every key explained, or with features and tolerances of a QIF plan or a DMIS program (`--from FILE`); "
+        "with each line explained, or with features and tolerances of a QIF plan or a DMIS program (`--from FILE`); "
         "`cmm-uq check JOB` says all that is wrong with it.",
         EDITORS.format(name="part"),
         "Coordinates of features are those of the part in mm at 20 °C. Units stand at the end of a key's name. A standard "

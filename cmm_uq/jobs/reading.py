@@ -58,8 +58,22 @@ def job_of(files: Mapping[str, bytes], nameable: Nameable, *, recorded: bool = T
     return _read(FilesInMemory(files), nameable, recorded=recorded)
 
 
+def job_toml(folder: Path) -> Path:
+    """job.toml of a job by its folder, or by its own name; what is to be done with another file is said."""
+    if folder.suffix == ".toml":
+        return folder
+    if folder.suffix.lower() in (".pdf", ".xml") and folder.is_file():
+        fix = "cmm-uq verify FILE checks it, cmm-uq read FILE prints a digital one"
+        raise CmmUqError("is a certificate or the like, not a job", where=str(folder), fix=fix)
+    if folder.is_file():
+        problem = "is an export, not a job: which artefact and which limits, it does not say"
+        fix = "cmm-uq new KIND my-job --from FILE makes a job of it, cmm-uq import FILE shows how it is read"
+        raise CmmUqError(problem, where=str(folder), fix=fix)
+    return folder / "job.toml"
+
+
 def _in_folder(folder: Path) -> FilesInFolder:
-    path = folder if folder.suffix == ".toml" else folder / "job.toml"
+    path = job_toml(folder)
     finish_interrupted(path.parent)
     return FilesInFolder(path)
 

@@ -9,14 +9,41 @@ from copy import copy
 from typing import Any
 
 import typer
+from typer.core import TyperGroup
 
 from cmm_uq.app.cli import certificates, evaluations, instruments, jobs, laboratory, records
 from cmm_uq.app.cli.options import examples, flag, with_ending
 from cmm_uq.app.cli.terminal import BAD_INPUT, say
 from cmm_uq.base.errors import CmmUqError
 
+GROUPS = {
+    "First": ("new", "import", "check", "report", "diagnose", "part"),
+    "Make": ("plan", "simulate", "compensate", "budget", "batch", "sign", "keys", "qif", "schema"),
+    "Decide": ("standards", "effects", "prove"),
+    "Records": ("release", "history", "due", "fleet", "affected", "records", "schedule", "serve"),
+    "Check": ("verify", "read", "selftest"),
+    "Instruments": ("acquire", "instruments"),
+}
+"""Of the list of commands, each in one."""
+
+
+class Grouped(TyperGroup):
+    """Commands listed by what they are for."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        listed = {name for names in GROUPS.values() for name in names}
+        further = {"Further": [name for name in self.list_commands(ctx) if name not in listed]}
+        for title, names in (GROUPS | further).items():
+            found = ((name, self.get_command(ctx, name)) for name in names)
+            rows = [(name, command.get_short_help_str()) for name, command in found if command is not None]
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows, col_max=12)
+
+
 app = typer.Typer(
     name="cmm-uq",
+    cls=Grouped,
     help="Uncertainty of coordinate measuring machines, and the certificates that state it.",
     epilog="Exit codes: 0 done; 2 bad input; 3 output impossible; 4 with --strict: done, not conforming or inconsistent; "
     "130, 143 interrupted; 1 with report --scheduled: done, and something needs a person; of verify: 1 not verified, "

@@ -52,7 +52,7 @@ def new(
     line: list[str] | None = LINE,
     end: Ending = opt.BRIEF,
 ) -> None:  # fmt: skip
-    """Begin a job: job.toml with every key explained, and a simulated recording to be replaced by your own.
+    """Begin a job: job.toml with the lines that matter, and a simulated recording to be replaced by your own.
 
     On a terminal it asks for machine, artefact and limits, of a part for the machine's certificate, features, datums and
     tolerances, unless one of the options gives something.
@@ -285,7 +285,7 @@ def _check_summary(check: JobCheck) -> Summary:
     else:
         stops = plural(count, one=say("1 problem"), many=say("{count} problems", count=count))
         verdict = Headline("STOPS", "bad", Verbatim(check.job), (stops,))
-    problems, warnings = (tuple(map(Verbatim, each)) for each in (check.problems, check.warnings))
+    problems, warnings = (tuple(map(Verbatim, each)) for each in check.lines)
     return Summary(verdicts=(verdict,), remarks=problems, warnings=warnings)
 
 

@@ -14,6 +14,7 @@ from typing import Any
 from cmm_uq.base.units import UNITS
 from cmm_uq.jobs.dcc import certificate as dcc
 from cmm_uq.jobs.dcc.certificate import DccQuantity, Element, Measurement, QuantityList, StatementMetadata
+from cmm_uq.maths.uncertainty.quantity import rounded
 
 Covariance = tuple[tuple[tuple[Decimal, ...], ...], str]  # of the values, row by row, and its unit
 
@@ -68,7 +69,7 @@ class QuantityFigures:
     @property
     def shown(self) -> str:
         """Where it stands and what it is, for messages."""
-        return " / ".join(filter(None, (*self.place, self.name)))
+        return " / ".join(dict.fromkeys(filter(None, (*self.place, self.name))))
 
 
 def figures(certificate: dcc.Certificate) -> tuple[QuantityFigures, ...]:
@@ -301,15 +302,30 @@ def _grid(title: str, quantities: Sequence[QuantityFigures]) -> Grid:
 
 
 def _below_each_other(title: str, quantities: Sequence[QuantityFigures]) -> Grid:
-    rows = [("Quantity", "Value", "Unit", "U", "k", "u", "Interval")]
-    for quantity in quantities:
+    """A row a value; the interval of one that is stated as a quantity of its own behind it stands in its row."""
+    rows, U = [("Quantity", "Value", "Unit", "U", "k", "u", "Interval")], None
+    for before, quantity in zip((None, *quantities), quantities, strict=False):
         for value, unit, stated in zip(quantity.values, quantity.units, quantity.uncertainties, strict=True):
-            rows.append((quantity.shown, str(value), unit_shown(unit), *stated.printed))
+            again = before and before.values == quantity.values and quantity.name.startswith(f"{before.name}, ")
+            U = U if again else stated.expanded
+            interval = " to ".join(_printed(U, stated.low, stated.high)) if stated.low else stated.printed[3]
+            if again:
+                rows[-1] = (*rows[-1][:6], interval)
+                continue
+            shown, (k,) = _printed(U, value, U), _printed(stated.factor, stated.factor, digits=3)
+            rows.append((quantity.shown, shown[0], unit_shown(unit), shown[1], k, stated.printed[2], interval))
         if not quantity.values:
             rows.append((quantity.shown, " ".join(quantity.words), "", "", "", "", ""))
     used = [i for i in range(len(rows[0])) if any(row[i] for row in rows[1:])]
     head, *rest = (tuple(row[i] for i in used) for row in rows)
     return Grid(title, head, tuple(rest))
+
+
+def _printed(U: Decimal | None, *numbers: Decimal | None, digits: int = 2) -> list[str]:
+    """Numbers as they are; beside U with a program's many digits, more than four, rounded as a certificate rounds them."""
+    if U is None or len(U.normalize().as_tuple().digits) <= 4:
+        return list(map(_text, numbers))
+    return ["" if one is None else str.__str__(rounded(float(one), float(U), digits)[0]) for one in numbers]
 
 
 def _columns(quantity: QuantityFigures) -> list[tuple[str, list[str]]]:

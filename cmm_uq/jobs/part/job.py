@@ -21,7 +21,7 @@ from cmm_uq.jobs.part.probed import Probed, probed
 from cmm_uq.jobs.part.readings import OtherReadings, measured_points, other_readings
 from cmm_uq.jobs.part.tables import MachineStateFacts, PartFile, Places
 from cmm_uq.jobs.part.values import Reported, reported_values
-from cmm_uq.jobs.reading import PART
+from cmm_uq.jobs.reading import PART, job_toml
 from cmm_uq.jobs.source import RESULTS, FilesInFolder, FilesInMemory, JobFiles
 from cmm_uq.jobs.tables.identification import COMPENSATED, SIMULATED, check_examples, check_mark
 
@@ -65,7 +65,7 @@ def read_part(folder: Path, *, machine: bool = True) -> PartJob:
 
     ``machine``: whether the files that state the machine must be there.
     """
-    path = folder if folder.suffix == ".toml" else folder / "job.toml"
+    path = job_toml(folder)
     finish_interrupted(path.parent)
     return _read(FilesInFolder(path), machine=machine)
 

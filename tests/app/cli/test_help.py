@@ -15,7 +15,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from cmm_uq.app.cli.commands import app
+from cmm_uq.app.cli.commands import GROUPS, app
 from cmm_uq.app.cli.options import job_folders, toml_files
 from cmm_uq.base.errors import CmmUqError
 from tests.app.cli.process import run
@@ -47,8 +47,19 @@ def test_brackets_of_toml_are_not_taken_for_markup() -> None:
 
 def test_the_list_of_commands_is_not_cut() -> None:
     shown = helped()
-    assert "..." not in shown.partition("Commands:")[2]
+    assert "..." not in shown.partition("First:")[2]
     assert "Exit codes: 0 done; 2 bad input" in shown
+
+
+def test_every_command_is_listed_once_in_a_group_and_six_come_first() -> None:
+    listed = [name for names in GROUPS.values() for name in names]
+    assert sorted(listed) == sorted(GROUP.commands)
+    assert len(GROUPS["First"]) == 6
+    shown = helped()
+    places = [shown.index(f"\n{title}:\n") for title in ("First", "Make", "Decide", "Records", "Check", "Instruments")]
+    assert places == sorted(places)
+    for name in listed:
+        assert len(re.findall(rf"(?m)^  {name}  ", shown)) == 1
 
 
 def test_alone_the_command_shows_the_three_most_used_calls() -> None:

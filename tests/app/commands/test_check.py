@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.jobs.check import Problem, check_job
+from cmm_uq.app.commands.jobs.check import Problem, check_job, in_lines
 from cmm_uq.app.commands.jobs.exchange import own_format, read_export, write_job_of_export, write_recording
 from cmm_uq.app.commands.jobs.simulate import simulated_job
 from cmm_uq.app.commands.reading import read_job
@@ -285,3 +285,35 @@ def test_a_copy_of_an_export_keeps_the_keys_that_settled_it(tmp_path: Path) -> N
     recording = read_job(tmp_path / "job").facts.recording
     assert recording.decimal == ","
     assert recording.columns == {"x_mm": "X-Istwert [mm]"}
+
+
+def test_rows_with_the_same_fault_are_told_in_one_line_with_the_rows(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "examples" / "iota-1102-20C", tmp_path / "job")
+    path = tmp_path / "job" / "ballbar.csv"
+    rows = path.read_text(encoding="utf-8").splitlines()
+    for line in (4, 5, 6, 9, 11):
+        cells = rows[line - 1].split(",")
+        cells[2] = f"n/a {line}"
+        rows[line - 1] = ",".join(cells)
+    path.write_text("\n".join(rows), encoding="utf-8")
+    found = check_job(tmp_path / "job")
+    assert [one.line for one in found.problems] == [4, 5, 6, 9, 11]  # each by itself for programs
+    (told,) = in_lines(found.problems)
+    assert told.startswith(f"{path} lines 4–6, 9, 11: ")
+    assert "'n/a 4' is not a number, and 4 more alike. Measure the point again" in told
+
+
+def test_what_differs_stays_apart() -> None:
+    one, other = Problem("'a' is not a number", "r.csv", 4, "x_mm"), Problem("'a' is not a number", "r.csv", 5, "y_mm")
+    key = Problem("unknown key", "job.toml", 4, "[job] a"), Problem("unknown key", "job.toml", 5, "[job] a")
+    assert in_lines((one, other, *key)) == tuple(map(str, (one, other, *key)))
+
+
+@pytest.mark.parametrize(
+    ("name", "told"), [("export.xlsx", "cmm-uq new KIND my-job --from FILE"), ("c.pdf", "cmm-uq verify FILE")]
+)
+def test_a_file_in_the_place_of_a_job_is_answered_with_what_to_do(tmp_path: Path, name: str, told: str) -> None:
+    (tmp_path / name).write_bytes(b"x")
+    with pytest.raises(CmmUqError, match=told):
+        read_job(tmp_path / name)
+    assert told in str(check_job(tmp_path / name).problems[0])

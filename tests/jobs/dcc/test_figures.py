@@ -10,7 +10,16 @@ import pytest
 
 from cmm_uq.jobs.dcc import Certificate, certificate as dcc, read, written
 from cmm_uq.jobs.dcc.certificate import DccQuantity, QuantityList, StatementMetadata
-from cmm_uq.jobs.dcc.figures import QuantityFigures, data, figures, shown, statements, unit_shown
+from cmm_uq.jobs.dcc.figures import (
+    QuantityFigures,
+    ValueUncertainty,
+    _grid,
+    data,
+    figures,
+    shown,
+    statements,
+    unit_shown,
+)  # fmt: skip
 from cmm_uq.jobs.dcc.xml_file import checked_by_schema
 from tests.conftest import ROOT
 from tests.jobs.dcc.artefacts import BALL_BAR, MM, PLATE, SPHERE, STEP_GAUGE, TRIANGLE, issued, value
@@ -98,6 +107,25 @@ def test_quantities_of_one_value_each_stand_below_each_other() -> None:
     ((_, _, (grid,)),) = shown(SPHERE).parts
     assert grid.headings == ("Quantity", "Value", "Unit", "U", "k")
     assert grid.rows == (("Diameter", "25.0012", "mm", "0.0002", "2"), ("Form deviation", "0.10", "µm", "0.05", "2"))
+
+
+def test_of_our_own_certificate_a_row_is_a_factor_rounded_by_its_uncertainty_with_its_interval() -> None:
+    """A program's ten digits, and an interval as a quantity of its own, are read as the certificate prints them."""
+    ppm, U, k = r"\\micro\\metre\\metre\\tothe{-1}", D("41.75428998"), D("2.045335189")
+    quantities = (
+        QuantityFigures(("Scale error of Y",), "Scale error of Y", values=(D("110.4455423"),), units=(ppm,),
+                        uncertainties=(ValueUncertainty(U, k),)),
+        QuantityFigures((), "Scale error of Y, 95 % coverage interval", values=(D("110.4455423"),), units=(ppm,),
+                        uncertainties=(ValueUncertainty(standard=D("20.4"), low=D("72.06276601"), high=D("152.19983")),)),
+        QuantityFigures((), "Length", values=(D("83.00012"),), units=(MM,),
+                        uncertainties=(ValueUncertainty(D("0.0006"), D(2)),)),
+    )  # fmt: skip
+    grid = _grid("Factors", quantities)
+    place = grid.headings.index
+    scale, length = grid.rows
+    assert (scale[place("Quantity")], scale[place("Value")], scale[place("U")]) == ("Scale error of Y", "110", "42")
+    assert (scale[place("k")], scale[place("Interval")]) == ("2.05", "72 to 152")
+    assert (length[place("Value")], length[place("U")], length[place("k")]) == ("83.00012", "0.0006", "2")
 
 
 def test_data_keeps_the_digits_of_the_certificate() -> None:

@@ -8,7 +8,8 @@ from __future__ import annotations
 import contextlib
 import re
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,7 @@ _PLACE = re.compile(
 _KEY_BEHIND = re.compile(r"(?P<file>\S.*?\.toml) (?P<key>\[.*)", re.DOTALL)
 """Where a message names the key behind the file without a colon."""
 
+_ROWS = (".csv", ".txt", ".tsv")  # of a file whose lines are rows
 _TABLE_KEY = re.compile(r"\[+([^\]]+)\]+ ?([\w.]*)")
 
 
@@ -72,6 +74,26 @@ class Problem:
         return {name: getattr(self, name) for name in ("file", "line", "key", "problem", "fix")}
 
 
+def in_lines(problems: Sequence[Problem]) -> tuple[str, ...]:
+    """Each in a line; those that say the same of several rows of a file, but for what stands there, in one with the rows."""
+    together: dict[object, list[Problem]] = {}
+    for one in problems:
+        alike = (one.file, one.key, re.sub(r"'[^']*'|[\d.]+", "…", one.problem), one.fix)
+        together.setdefault(alike if one.line and one.file.endswith(_ROWS) else one, []).append(one)
+    return tuple(str(each[0]) if len(each) == 1 else _of_rows(each) for each in together.values())
+
+
+def _of_rows(every: Sequence[Problem]) -> str:
+    first = every[0]
+    lines = sorted({one.line or 0 for one in every})
+    starts = [line for line in lines if line - 1 not in lines]
+    ends = [line for line in lines if line + 1 not in lines]
+    spans = (f"{a}" if a == b else f"{a}–{b}" for a, b in zip(starts, ends, strict=True))
+    where = f"{first.file} lines {', '.join(spans)}"
+    others = "" if len({one.problem for one in every}) == 1 else f", and {len(every) - 1} more alike"
+    return str(replace(first, file=where, line=None, problem=f"{first.problem}{others}"))
+
+
 @dataclass(frozen=True)
 class JobCheck:
     """What there is to say of a job before it is computed.
@@ -89,6 +111,11 @@ class JobCheck:
     @property
     def sound(self) -> bool:
         return not self.problems
+
+    @property
+    def lines(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Problems and warnings for a person."""
+        return in_lines(self.problems), in_lines(self.warnings)
 
     def as_data(self) -> dict[str, Any]:
         return {

@@ -1,8 +1,8 @@
 """A new job, or a new budget: a folder that can be reported at once, with a simulated recording to be replaced by one's own.
 
 The set-ups are those of the kind's usual plan in the machine's volume, the readings are drawn from the model that the job
-names, and everything that is made of them says that they are simulated. job.toml has every other key as a comment; beside it
-lie its schema, and what to do next.
+names, and everything that is made of them says that they are simulated. job.toml has the lines that matter; beside it lie its
+schema, which has all others, and what to do next.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from cmm_uq.jobs.tables.identification import EXAMPLE, MEASURED, SIMULATED, Orig
 from cmm_uq.machine.model.kind import Kind
 
 RECORDING, SCHEMA, README = "recording.csv", ".cmm-uq/job.schema.json", "README.md"
+REST = "docs/reference/job.md, cmm-uq schema job, or what an editor that knows TOML schemas completes"
 KEPT = (SCHEMA, README)  # files beside those of the job itself
 PLAN, BUDGET = "plan", "budget"  # names beside those of kinds
 Tables = Mapping[str, Mapping[str, Any]]
@@ -45,7 +46,7 @@ def job_files(
     kind: str, tables: Tables, files: Mapping[str, bytes], examples: Collection[str] = (), *,
     begin: Beginning | None = None,
 ) -> dict[str, bytes]:  # fmt: skip
-    """A job's folder around a recording: job.toml with every other key as a comment, its schema, and what to do next."""
+    """A job's folder around a recording: job.toml, its schema, and what to do next."""
     found = kind_or_refused(kind)
     job = read_new(found, tables, files)
     begin = found.beginning(kind) if begin is None else begin
@@ -79,19 +80,13 @@ def example_keys(tables: Mapping[str, Any], given: Tables) -> set[str]:
 
 
 def _job_text(kind: Kind, begin: Beginning, tables: Tables, examples: Collection[str]) -> bytes:
-    """job.toml with a comment for whatever else a job of this kind may say."""
-    tests = {"conformity", "short_gauge", "test_uncertainty", "rated_conditions"} - set(tables)
-    out = {"job.derived_from"}.union(*(keys for keys, needless in (
-        ({"job.as_found"}, SIMULATED in tables["job"].values()), (tests, not kind.tested), ({"plan"}, not kind.plan),
-        ({"recording"}, not kind.table.with_recording),
-        ({"recording.earlier", "recording.earlier_date"}, not kind.table.with_earlier),
-    ) if needless))  # fmt: skip
-    head = f"#:schema ./{SCHEMA}\n# {begin.title}. What stands behind # is the default, or what may be said besides.\n"
+    """job.toml with what a job of this kind must say, and where all else that it may say is found."""
+    head = f"#:schema ./{SCHEMA}\n# {begin.title}. Whatever else may be said: {REST}.\n"
     simulated = (
         "# THE READINGS ARE SIMULATED: put in your own, then take away their first line and origin below. Figures marked "
         f"{EXAMPLE} are nobody's.\n"
     )
-    body = commented(json.loads(shipped("job")), tables, out, kind.name, examples=examples)
+    body = commented(json.loads(shipped("job")), tables, (), kind.name, comment=False, examples=examples)
     return (head + (simulated if tables["job"].get("origin") == SIMULATED else "") + "\n" + body).encode()
 
 

@@ -1,6 +1,6 @@
 """A new job of a part from answers: tables that are held against the readers of a job one by one, and the machine's files.
 
-A new job of a part: every key explained, figures of an example, or features and tolerances of another program's plan.
+A new job of a part: each line explained, figures of an example, or features and tolerances of another program's plan.
 """
 
 from __future__ import annotations
@@ -105,7 +105,6 @@ PART = "part"
 SCHEMA, README = ".cmm-uq/part.schema.json", "README.md"
 _NAMED = ("name", "kind", "what", "features", "datums", "not_measured", "drawing")  # keys whose values are no figures
 _LISTS = ("stylus", "feature", "characteristic")
-_OTHER_METHODS = ("by_calibrated_part", "by_orientations")
 
 
 def part_files(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
@@ -222,32 +221,23 @@ def _files(
 
 
 def _text(tables: Mapping[str, Any], marked: Collection[str], opened: Mapping[str, Collection[str]]) -> str:
-    """job.toml: of several tables of one name the first with every key explained."""
+    """job.toml: of several tables of one name the first with its keys explained."""
     head = (
-        f"#:schema ./{SCHEMA}\n# A part and its uncertainty. What stands behind # is the default, or what may be said "
-        f"besides.\n# Figures marked {EXAMPLE} are nobody's: put in your own, then take the marks and origin below away."
+        f"#:schema ./{SCHEMA}\n# A part and its uncertainty. Whatever else may be said: docs/reference/part.md, cmm-uq schema "
+        "part, or what an editor that knows TOML schemas completes.\n"
+        f"# Figures marked {EXAMPLE} are nobody's: put in your own, then take the marks and origin below away.\n"
     )
     schema, parts = json.loads(shipped(PART)), [head]
     for name, one in schema["properties"].items():
-        alone = {"properties": {name: one}}
-        if name not in _LISTS:
-            given = {name: tables[name]} if name in tables else {}
-            inner = _inner(name, one, given.get(name, {}))
-            parts.append(commented(alone, given, inner, examples=_marks(name, tables.get(name), marked, {})))
-            parts += [commented({"properties": {key: table}}, {}) for key, table in inner.items()]
-            continue
-        for i, said in enumerate(tables[name]):
+        several = name in _LISTS
+        for i, said in enumerate(tables[name] if several else [tables.get(name)]):
             marks = _marks(name, said, marked, opened)
-            parts.append(commented(alone, {name: [said]}, examples=marks) if i == 0 else _short(name, said, marks))
-    return "\n".join([parts[0], "", *parts[1:]])
-
-
-def _inner(name: str, table: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables within one of another method's, by dotted name, whose keys are explained each on a line of its own."""
-    if name not in _OTHER_METHODS:
-        return {}
-    keys = {f"{name}.{key}": one for key, one in table["properties"].items() if key not in given}
-    return {key: one for key, one in keys.items() if "properties" in one.get("items", one)}
+            if i:
+                parts.append(_short(name, said, marks))
+            elif said:
+                given = {name: [said] if several else said}
+                parts.append(commented({"properties": {name: one}}, given, comment=False, examples=marks))
+    return "\n".join(parts)
 
 
 def _marks(name: str, said: Any, marked: Collection[str], opened: Mapping[str, Collection[str]]) -> set[str]:

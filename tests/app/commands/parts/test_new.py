@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -54,21 +55,15 @@ def test_its_examples_are_refused_once_it_says_that_it_was_measured(tmp_path: Pa
     assert "name is still an example's" not in told
 
 
-@pytest.mark.parametrize("name", ["by_calibrated_part", "by_orientations"])
-def test_it_offers_every_key_of_other_methods_as_a_comment(name: str, tmp_path: Path) -> None:
-    """Without the marks of comments they are TOML with each key that there is and its sentence, tables within included."""
+def test_it_has_the_lines_that_matter_and_says_where_the_rest_is(tmp_path: Path) -> None:
+    """Features and characteristics take as many as they are; of all else a line is there only where it says something."""
     text = write_new("part", tmp_path / "plate", {})["job.toml"].read_text(encoding="utf-8")
-    offered = tomllib.loads(text[text.index("# [by_calibrated_part]") :].replace("\n# ", "\n").removeprefix("# "))[name]
-    schema = json.loads(shipped("part"))["properties"][name]["properties"]
-    assert set(offered) == set(schema)
-    inner = {
-        key: one["items"] if one["type"] == "array" else one for key, one in schema.items() if key in TABLES_WITHIN
-    }
-    for key, one in inner.items():
-        (table,) = offered[key] if isinstance(offered[key], list) else [offered[key]]
-        assert set(table) == set(one["properties"])
-        assert all(f"# {each['description']}" in text for each in one["properties"].values())
-    assert inner
+    assert {"docs/reference/part.md", "cmm-uq schema part"} <= set(
+        re.findall(r"docs/reference/part.md|cmm-uq schema part", text)
+    )
+    assert not re.findall(r"(?m)^# *\[?[a-z_]+\]? *=", text)
+    assert len(text.splitlines()) < 120
+    assert set(tomllib.loads(text)) < set(json.loads(shipped("part"))["properties"])
 
 
 def test_it_is_no_job_of_a_machine(tmp_path: Path) -> None:
