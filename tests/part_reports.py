@@ -20,7 +20,7 @@ from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_pa
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.maths.inference.families import FieldModel, FieldSizes, sample_sizes
+from cmm_uq.maths.inference.families import USUAL, Effort, FieldModel, FieldSizes, sample_sizes
 from cmm_uq.maths.inference.noise import Sizes
 from tests.part_machines import by_certificate, plate_of
 
@@ -54,12 +54,14 @@ _AGAIN: dict[tuple[object, ...], PartMeasurement] = {}
 _SIZES: dict[bytes, FieldSizes] = {}
 
 
-def sampled_once(model: FieldModel, draws: int, seed: int, known: Sizes | None = None) -> FieldSizes:
+def sampled_once(
+    model: FieldModel, draws: int, seed: int, known: Sizes | None = None, effort: Effort = USUAL
+) -> FieldSizes:
     """Sizes of a machine's errors and noise, sampled once for all tests that are not about sampling them again."""
     columns = [one.columns for one in model.errors]
-    key = hashlib.sha256(pickle.dumps((model.linear, model.noise, columns, draws, seed, known))).digest()
+    key = hashlib.sha256(pickle.dumps((model.linear, model.noise, columns, draws, seed, known, effort))).digest()
     if key not in _SIZES:
-        _SIZES[key] = sample_sizes(model, draws, seed, known)
+        _SIZES[key] = sample_sizes(model, draws, seed, known, effort)
     return _SIZES[key]
 
 

@@ -108,6 +108,7 @@ RESULTS: Mapping[str, str] = {
     "regions.eighths.EFFECT.PARAMETER": "Ends of the 95 % interval that holds it in all eighths of the measuring range.",
     "regions.disagree": "A factor of which the named model says something else of the recorded set-ups.",
     "regions.axes[]": "An axis of which it is stated how it is read, with keys as of a part's `machine.axes`.",
+    "regions.further[]": "A further certificate of the machine, with keys as of a part's `machine.further`.",
     "regions.families[].family": "A family of errors of one size.",
     "regions.families[].allowed": "Root mean square that physics allows: the width of its half-normal prior.",
     "regions.families[].unit": "Of the sizes beside it.",

@@ -23,6 +23,7 @@ BUILT_IN = {
     "noise_of",
     "observing",
     "contradictions",
+    "together",
 }
 
 

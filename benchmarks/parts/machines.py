@@ -27,7 +27,7 @@ from benchmarks.parts import truth
 from benchmarks.parts.known_noise import joint_posterior
 from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, as_points, joined, plan
 from cmm_uq.analysis.machine.conditional import further_recording, given_recording, own_noise, white
-from cmm_uq.analysis.machine.recordings import FurtherRecording
+from cmm_uq.analysis.machine.recordings import Beside, FurtherRecording
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, unmodelled_errors, with_curves
 from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
@@ -35,7 +35,7 @@ from cmm_uq.analysis.parts.evaluation import Evaluator, Known
 from cmm_uq.analysis.parts.plan import PartPose
 from cmm_uq.analysis.parts.result import evaluated, stated
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
-from cmm_uq.app.commands.parts.further import CONTRADICTED
+from cmm_uq.app.commands.certificates.further import CONTRADICTED
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.points import Machine
@@ -178,7 +178,7 @@ def on_machine(
         chances.append(found.contradiction(state))
         if chances[-1] >= CONTRADICTED:
             taken.append(found)
-            state = given_recording(certificate, model, given, TRIALS, seed, beside=taken)
+            state = given_recording(certificate, model, given, TRIALS, seed, beside=Beside(tuple(taken)))
     growth = (PART.cte_per_k + PART.u_cte_per_k * random.standard_normal()) * (
         PART.temperature_c - 20 + PART.u_temperature_k * random.standard_normal()
     ) - PART.cte_per_k * (PART.temperature_c - 20)

@@ -15,7 +15,7 @@ from typing import Any
 
 from benchmarks.tampering.cases import Case
 from benchmarks.tampering.certificates import ROOT, Good, person, write_good
-from cmm_uq.app.commands.certificates.verification import again
+from cmm_uq.app.commands.certificates.again import again
 from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.base.errors import CmmUqError
 

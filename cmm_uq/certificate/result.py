@@ -23,6 +23,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, at_key, say
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Document, Section
+from cmm_uq.certificate.further import NO_FURTHER, FurtherCertificates
 from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
@@ -214,8 +215,8 @@ class Result:
     causes: tuple[Cause, ...] = ()  # of what is stated to be in doubt about all observations together
     doubt: Doubt = field(default_factory=lambda: Doubt(()))  # what they make of the unknowns; it is in ``values``
     contradictions: tuple[Contradiction, ...] = ()  # what denies averaged estimates, which are then not given
-    # what all errors together, computed once when it is first asked for, say of the factors elsewhere, or why nothing
-    all_errors: Callable[[], FactorRegions | Text] = lambda: NOTHING
+    all_errors: Callable[[], FactorRegions | Text] = lambda: NOTHING  # say, once asked, of the factors; or why nothing
+    further: Callable[[], FurtherCertificates] = lambda: NO_FURTHER  # of the machine, reckoned with in that
 
     @property
     def at_least(self) -> AtLeast:
@@ -238,9 +239,8 @@ class Result:
     def relative_doubt(self) -> float:
         """Standard uncertainty of the size of the artefact as a whole, over its size, by what is stated beside its sizes."""
         along = growth(self.artefact)
-        if along is None:
-            return 0.0
-        return float(np.sqrt(Doubt.of(self.causes, along[None] / (along @ along)).variance(np.ones(1))))
+        doubt = 0.0 if along is None else Doubt.of(self.causes, along[None] / (along @ along)).variance(np.ones(1))
+        return float(np.sqrt(doubt))
 
     @property
     def averaged(self) -> int:
@@ -274,8 +274,8 @@ class Result:
     @cached_property
     def denied(self) -> tuple[tuple[str, str], ...]:
         """Keys of parameters of which all errors together say something else of the recorded set-ups than the named ones."""
-        regions = self.regions
-        effects = {effect for effect, _ in regions.disagree} if isinstance(regions, FactorRegions) else set()
+        found = self.regions
+        effects = {effect for effect, _ in found.disagree} if isinstance(found, FactorRegions) else set()
         return tuple((effect, name) for effect, named in self.parameters.items() if effect in effects for name in named)
 
     @cached_property

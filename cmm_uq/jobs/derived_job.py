@@ -52,9 +52,9 @@ def recording_name(job: Job) -> str:
 def kept_inputs(job: Job) -> dict[str, bytes]:
     """Inputs of a job that one derived from it has too: not job.toml, nor how its recording was taken.
 
-    Nor what stands in the new recording: one that was imported, and certified values of a file.
+    Nor what stands in the new recording, one that was imported and certified values of a file, nor further certificates.
     """
-    left = {"job.toml", provenance_name(job.facts.recording.file), *reference_file(job.facts.artefact)}
+    left = {"job.toml", provenance_name(job.facts.recording.file), *reference_file(job.facts.artefact), *job.further}
     left |= {job.facts.recording.file} if _was_imported(job) else set()
     return {name: content for name, content in job.inputs.items() if name not in left}
 
@@ -95,7 +95,7 @@ def _changed(
     for name, value in changes.items():
         table[name] = _inline(value) if isinstance(document, tomlkit.TOMLDocument) else deepcopy(value)
     _drop(document, OF_THE_RECORDED_MACHINE)
-    _drop(document["machine"], without)
+    _drop(document["machine"], (*without, "further"))  # of the measured machine
     # certified values stand in every recording that is written
     if "file" in document["artefact"].get("certificate", {}):
         _drop(document["artefact"]["certificate"], ("file", *FileKeys.model_fields))

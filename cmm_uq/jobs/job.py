@@ -228,6 +228,7 @@ class Job:
     beside : files that it was read from and that lie outside its folder.
     imported : how files in another format than the project's own were read.
     acquired : how the recording was taken live, where it was.
+    further : names of those of the inputs that are further certificates of the machine.
     certified : keys of ``[artefact]`` that its digital certificate says, and job.toml does not.
     """
 
@@ -245,6 +246,7 @@ class Job:
     acquired: Provenance | None = None
     certified: Mapping[str, Any] = field(default_factory=dict)
     clauses: Mapping[str, ClausesForm] = field(default_factory=dict)
+    further: tuple[str, ...] = ()
 
     @property
     def circumstances(self) -> Circumstances:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -30,12 +30,22 @@ from cmm_uq.jobs.reports import as_found_of, calibration_file, results_named
 from cmm_uq.jobs.source import FilesInFolder, FilesInMemory, JobFiles, check_distinct
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.tables.conformity import ClausesForm, ConformityFacts, Standards, needed, uncertainty_missing
-from cmm_uq.jobs.tables.identification import REPLACED, altered, check_examples, check_mark, is_planned
-from cmm_uq.jobs.tables.machine import MachineFacts, stated_axes
+from cmm_uq.jobs.tables.identification import (
+    COMPENSATED,
+    REPLACED,
+    SIMULATED,
+    altered,
+    check_examples,
+    check_mark,
+    is_planned,
+)
+from cmm_uq.jobs.tables.machine import FurtherFacts, MachineFacts, stated_axes
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.recording.certified import CertifiedValues
 
+WHOLE = (".pdf", ".xml")  # a certificate with its inputs inside
+CERTIFICATES = tuple(f"certificate{origin}.pdf" for origin in ("", f"-{SIMULATED}", f"-{COMPENSATED}"))
 PART = "part"  # the table by which the job of a part is told from others; see :mod:`cmm_uq.jobs.part`
 
 
@@ -109,7 +119,8 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     before = results_named(facts.job.as_found)
     named = None if facts.job.replaces is None else results_named(facts.job.replaces.results)
     others = [*calibrations, *(one for one in (before, named) if one is not None)]
-    inputs |= _contents(source, others, TABLE_BYTES, written=True) | _contents(source, forms, JOB_BYTES)
+    beside = further_named(facts.machine.further, source)
+    inputs |= _contents(source, [*others, *beside], TABLE_BYTES, written=True) | _contents(source, forms, JOB_BYTES)
     clauses = _forms(facts.conformity, inputs, folder, nameable.standards)
     if says is not None:
         inputs |= _contents(source, certificate, TABLE_BYTES)
@@ -154,7 +165,8 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     gauge = _short_gauge(facts, inputs, folder, machine)
     prediction = prediction_of(facts.simulation, inputs, folder)
     return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge, prediction, acquired=acquired,
-               imported=tuple(filter(None, told)), certified={} if says is None else says.table, clauses=clauses)  # fmt: skip
+               imported=tuple(filter(None, told)), certified={} if says is None else says.table, clauses=clauses,
+               further=beside)  # fmt: skip
 
 
 def _forms(
@@ -244,6 +256,7 @@ def _refuse_what_needs_a_recording(facts: JobFile, path: Path) -> None:
     for given, key, fix in (
         (facts.recording.file, "[recording] file", "Leave [recording] out, and name what is measured under [machine]"),
         (facts.machine.temperature_log, LOG, "Leave the log out"),
+        (facts.machine.further, "[[machine.further]]", "Leave the certificates out"),
         (facts.short_gauge, SHORT_GAUGE, "Leave the short gauge out"),
     ):
         if given:
@@ -310,6 +323,18 @@ def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str], list[str
     calibration, log = calibration_file(facts.digitizer), facts.temperature_log
     maps = [name for given in facts.error_map for name in (given.file, given.covariance) if name is not None]
     return maps, [log.file] if log else [], [calibration] if calibration else []
+
+
+def further_named(further: Iterable[FurtherFacts], source: JobFiles) -> tuple[str, ...]:
+    """Files of further certificates, which must have their recordings inside; of a folder that which a report wrote."""
+
+    def file(name: str) -> str:
+        if name.lower().endswith(WHOLE):
+            return name
+        each = [f"{name}/{one}" for one in CERTIFICATES]
+        return next((one for one in each if source.has(one, written=True)), each[0])
+
+    return tuple(file(one.certificate.removesuffix("/")) for one in further)
 
 
 def _model_for(data: dict[str, Any], nameable: Nameable, path: Path) -> type[JobFile]:

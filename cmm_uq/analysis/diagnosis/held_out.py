@@ -29,6 +29,7 @@ def numbered_by_place(model: RecordingModel, group: Ints) -> Ints:
 
 
 MOST = 1000  # observations that candidates are compared on
+_CURVES = 400  # quantities of which none is left out where each set-up reads a curve of its own
 LEAST_OF_SET_UP = 30  # observations that a set-up keeps where it has as many: its freedoms cost six of them at most
 
 
@@ -60,10 +61,15 @@ def thin_out(model: RecordingModel, observe: Observed, seed: int, most: int = MO
     return replace(model, artefact=found, used=~found.unread())
 
 
-def quantities(model: RecordingModel) -> int:
-    """How many different ones are observed: repeats are of one."""
+def with_quantities(model: RecordingModel, observe: Observed, seed: int, most: int) -> RecordingModel:
+    """The model of no more than some different quantities, each with its repeats.
+
+    Where each set-up reads a curve that no other shows, none can be left out of as many as 400.
+    """
     artefact, rows = model.artefact, model.artefact.rows[model.used, 0]
-    return len(np.unique(np.column_stack([artefact.measurement[model.used], artefact.points.point[rows]]), axis=0))
+    count = len(np.unique(np.column_stack([artefact.measurement[model.used], artefact.points.point[rows]]), axis=0))
+    most = max(most, _CURVES) if artefact.curves else most
+    return thin_out(model, observe, seed, most * int(model.used.sum()) // max(count, 1))
 
 
 def _first_of_each(owner: Ints, part: Ints, most: int, random: np.random.Generator) -> NDArray[np.bool_]:

@@ -22,8 +22,11 @@ import numpy as np
 import scipy
 
 from cmm_uq.analysis.machine.recordings import (
+    ALONE,
+    Beside,
     FurtherRecording,
     components_of,
+    doubted,
     mean_noise,
     model_of_machine,
     recorded,
@@ -41,6 +44,8 @@ from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import PeriodicScale
 from cmm_uq.maths.inference.families import (
     HELD,
+    USUAL,
+    Effort,
     FieldErrors,
     FieldModel,
     FieldSizes,
@@ -84,19 +89,19 @@ class RecordedField:
     @classmethod
     def of(
         cls, model: RecordingModel, further: Sequence[Unmodelled], *, learned: bool = True,
-        beside: Sequence[FurtherRecording] = (),
+        beside: Sequence[FurtherRecording] = (), in_doubt: Floats | None = None,
     ) -> RecordedField:  # fmt: skip
         """Of a calibration and of what it left out; what needs columns that were not recorded takes no part.
 
         ``learned``: whether families have sizes to be found; else all are as large as physics allows. ``beside``: further
-        recordings of the machine.
+        recordings of the machine. ``in_doubt``: (m, c) of the calibration's observations for what is stated to be in doubt.
         """
         models = (model, *(one.model for one in beside))
         which = tuple(i for i, one in enumerate(further) if any(recorded(each, one.effect) for each in models))
         # where the artefact stands, not what was read: noise of readings would explain itself
         points = [each.artefact.points.at(each.where(each.estimate().about)) for each in models]
         errors = [_errors(models, further[i].effect, points, learned) for i in which]
-        whole = FieldModel(*stacked(model, beside), (*errors, *_own(models, beside)))
+        whole = FieldModel(*stacked(model, beside), (*errors, *_own(models, beside, in_doubt)))
         effects, sds = list[Effect](), [np.zeros(0)]
         for i, one in zip(which, errors, strict=True):
             effect = further[i].effect
@@ -135,9 +140,13 @@ def _errors(models: Sequence[RecordingModel], effect: Effect, points: Sequence[P
     )
 
 
-def _own(models: Sequence[RecordingModel], beside: Sequence[FurtherRecording]) -> Iterator[FieldErrors]:
-    """What each further recording has alone: its noise, and the machine's change since the calibration."""
+def _own(
+    models: Sequence[RecordingModel], beside: Sequence[FurtherRecording], in_doubt: Floats | None
+) -> Iterator[FieldErrors]:
+    """What one recording has alone: doubt of the first; noise of a further one, and the machine's change between them."""
     ends = np.cumsum([int(each.used.sum()) for each in models])
+    if in_doubt is not None and (count := in_doubt.shape[1]):
+        yield FieldErrors(None, np.vstack([in_doubt, np.zeros((ends[-1] - ends[0], count))]), normal(count))
     for one, start in zip(beside, ends.tolist(), strict=False):
         columns = np.hstack([one.noise, one.changed[:, np.any(one.changed, axis=0)]])
         whole = np.zeros((ends[-1], columns.shape[1]))
@@ -172,10 +181,8 @@ def further_recording(
     observations, which act on them together and, as that is not known, on each block by itself besides.
     """
     model, known = model_of_machine(first.model, other), None if sigma_mm is None else white(sigma_mm)
-    doubted = [cause.common for cause in causes]
-    doubted += [cause.apart.dense() for cause in causes if cause.apart is not None]
     noise = own_noise(model, errors, seed, known, (first,))
-    return FurtherRecording(model, np.hstack([noise, *(each[model.used] for each in doubted)]))
+    return FurtherRecording(model, np.hstack([noise, doubted(model, causes)]))
 
 
 def stated_noise(model: RecordingModel, components: Components, sizes: Sizes) -> StatedNoise:
@@ -223,7 +230,8 @@ def given_recording(
     draws: int = DRAWS,
     seed: int = 0,
     doubt: Doubt = NO_DOUBT,
-    beside: Sequence[FurtherRecording] = (),
+    beside: Beside = ALONE,
+    effort: Effort = USUAL,
 ) -> MachineState:
     """The state of a machine with all of its errors drawn together, given the recording of its calibration.
 
@@ -231,15 +239,16 @@ def given_recording(
     How much the calibration bounds an error that it did not model is of no matter here: its recording says that again.
     ``model``: of the calibration, without the observations that its certificate set aside. ``sigma_mm``: standard deviation
     of one recorded coordinate, where the noise is known and white; else it is sampled. ``doubt``: what is stated to be in
-    doubt about the model's unknowns by causes that all its observations share, as of its certificate. ``beside``: further
-    recordings.
+    doubt about the model's unknowns by causes that all its observations share, as of its certificate. ``beside``: what is
+    taken together with it, with its own part of what is in doubt.
     """
     known = None if sigma_mm is None else white(sigma_mm)
-    others, statements = as_recorded_allows(model, state.unmodelled, known, beside)
+    others, statements = as_recorded_allows(model, state.unmodelled, known, beside.recordings)
     state = replace(state, unmodelled=others, statements=statements)
-    whole, random = RecordedField.of(model, state.unmodelled, beside=beside), np.random.default_rng(seed)
+    whole = RecordedField.of(model, state.unmodelled, beside=beside.recordings, in_doubt=beside.doubted(model))
+    doubt, random = NO_DOUBT if beside.recordings else doubt, np.random.default_rng(seed)
     noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
-    sizes = _sizes(whole, model, draws, seed, known)
+    sizes = _sizes(whole, model, draws, seed, known, effort)
     if known is None:
         noise = stated_noise(model, whole.field.noise, sizes.noise)
     drawn, k = whole.coefficients(sizes.noise, sizes.families, random), whole.modelled
@@ -249,9 +258,11 @@ def given_recording(
     return replace(together, scales=scales, prior_share=_shares(together), family_share=_shares(together, scales))
 
 
-def _sizes(whole: RecordedField, model: RecordingModel, draws: int, seed: int, known: Sizes | None) -> FieldSizes:
+def _sizes(
+    whole: RecordedField, model: RecordingModel, draws: int, seed: int, known: Sizes | None, effort: Effort = USUAL
+) -> FieldSizes:
     """Of noise and families; where any noise would do, it is taken for what the calibration took it for, which is no less."""
-    sizes = sample_sizes(whole.field, draws, seed, known)
+    sizes = sample_sizes(whole.field, draws, seed, known, effort)
     if known is not None:
         return sizes
     low, high = np.quantile(sizes.noise.coordinate, [0.05, 0.95])

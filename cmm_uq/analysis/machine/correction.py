@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.diagnosis.held_out import FOLDS, held_out_groups, predicted
-from cmm_uq.analysis.machine.conditional import RecordedField, doubted_draws
+from cmm_uq.analysis.machine.conditional import NO_DOUBT, doubted_draws
+from cmm_uq.analysis.machine.recordings import ALONE, Beside
 from cmm_uq.analysis.machine.regions import DrawnErrors, Key, columns_of, disagreeing
 from cmm_uq.analysis.machine.state import StatementEvidence, of_machine
 from cmm_uq.base.errors import CmmUqError
@@ -64,18 +65,27 @@ class FieldMap:
     statements: tuple[StatementEvidence, ...]  # what the recording says of what is stated of axes
 
 
-def field_map(model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, observe: Observed, seed: int) -> FieldMap:
+def field_map(
+    model: RecordingModel,
+    posterior: NoisyPosterior,
+    doubt: Doubt,
+    observe: Observed,
+    seed: int,
+    beside: Beside = ALONE,
+) -> FieldMap:
     """Of the errors of a machine that follow from the place alone.
 
     ``model``: of a calibration, and its ``posterior`` with no other errors. ``doubt``: what is stated to be in doubt about
-    its unknowns. Raises ``CmmUqError`` where the machine has other than three straight axes or its travel is not stated, or
+    its unknowns. ``beside``: what is taken together with it. Raises ``CmmUqError`` where the machine has other than three
+    straight axes or its travel is not stated, or
     where the recording does not allow it.
     """
     machine = model.artefact.points.machine
     if machine.axes != tuple(AXES):
         raise CmmUqError("the machine has other axes than three straight ones", where="the machine")
     ends = [machine.travel(axis) for axis in AXES]
-    drawn = DrawnErrors.of(model, observe, seed, _DRAWS)
+    drawn = DrawnErrors.of(model, observe, seed, _DRAWS, beside)
+    doubt = NO_DOUBT if beside.recordings else doubt
     blank = _blank(ends, _temperature(model))
     tables = {one: _figures(one, machine, blank) for one in (*model.effects, *drawn.field.effects) if _of_place(one)}
     held = {one: table for one, table in tables.items() if table is not None}
@@ -91,12 +101,12 @@ def field_map(model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, ob
     figures = figures - rigid @ (np.linalg.pinv(carried @ rigid) @ (carried @ figures))
 
     mean, at = draws.mean(axis=0), carried @ figures
-    beside = _beside(drawn, machine)
+    unresolved = _beside(drawn, machine)
     left = draws - mean
     _, s, V = np.linalg.svd(left / np.sqrt(len(draws) - 1), full_matrices=False)
-    covariance = MapCovariance(figures @ (V.T * s), beside)
-    after = np.mean((left @ at.T) ** 2) + np.mean(beside**2)
-    before = np.mean((draws @ at.T) ** 2) + np.mean(beside**2)
+    covariance = MapCovariance(figures @ (V.T * s), unresolved)
+    after = np.mean((left @ at.T) ** 2) + np.mean(unresolved**2)
+    before = np.mean((draws @ at.T) ** 2) + np.mean(unresolved**2)
     error_map = replace(_filled(blank, figures @ mean), covariance=covariance)
     rms = float(np.sqrt(before) / MICROMETRE), float(np.sqrt(after) / MICROMETRE)
     denied = disagreeing(model, posterior, drawn.recorded(model, posterior))
@@ -208,9 +218,9 @@ def _beside(drawn: DrawnErrors, machine: Machine) -> Floats:
 
 def _held_out(drawn: DrawnErrors, seed: int) -> HeldOutCorrection | None:
     """Of observations that are left out in turn; the errors' sizes, too, are found without them."""
-    model, others = drawn.model, drawn.others
+    model = drawn.model
     estimate = model.estimate()
-    linear, whole = estimate.linear, RecordedField.of(model, others)
+    linear, whole = estimate.linear, drawn.field_of(model)
     smooth = [one for one in whole.effects if isinstance(one, AxisFunction)]
     seen = [model.seen(model.columns(one, (), estimate.about), estimate.about) for one in smooth]
     every = np.hstack([linear.observed[:, None], linear.design[:, : whole.modelled], *seen])
@@ -225,7 +235,7 @@ def _held_out(drawn: DrawnErrors, seed: int) -> HeldOutCorrection | None:
         out = np.isin(groups, numbers[fold::folds])
         try:
             rest = _without(model, out)
-            field = RecordedField.of(rest, others)
+            field = drawn.field_of(rest)
             sizes = sample_sizes(field.field, _FOLD_DRAWS, seed, effort=BRIEF)
             alone = rest.estimate().least_squares
         except (CmmUqError, np.linalg.LinAlgError):

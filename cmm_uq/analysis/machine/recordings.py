@@ -10,7 +10,7 @@ that of the first is sampled together with the errors' sizes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,12 +18,14 @@ import scipy
 
 from cmm_uq.analysis.machine.state import MachineState, of_machine
 from cmm_uq.base.points import Floats
+from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.field import linear as trials
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.linear_model import Freedoms, LeastSquares, LinearModel
 from cmm_uq.maths.inference.noise import Components, Sizes
+from cmm_uq.maths.inference.posterior import Cause
 
 _NO_NOISE = 1e-12  # part of the variance of a reading of the first recording that is none in another
 
@@ -80,6 +82,29 @@ class FurtherRecording:
         whole = float(scipy.special.chdtrc(len(left), size[0]))
         each = scipy.special.chdtrc(1, (left @ gain[:, seen]) ** 2 / size[seen])
         return min(1.0, 2 * min(whole, len(seen) * float(each.min()) if len(seen) else 1.0))
+
+
+def doubted(model: RecordingModel, causes: Iterable[Cause]) -> Floats:
+    """(m, c) of the used observations for what is in doubt about them: of all together and, as that is not known, by block."""
+    each = [part for one in causes for part in (one.common, None if one.apart is None else one.apart.dense())]
+    return np.hstack([np.zeros((int(model.used.sum()), 0)), *(part[model.used] for part in each if part is not None)])
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """What is taken together with the recording of a calibration."""
+
+    recordings: tuple[FurtherRecording, ...] = ()
+    causes: Callable[[Artefact], Iterable[Cause]] = (
+        lambda artefact: ()
+    )  # of doubt about the calibration's own observations
+
+    def doubted(self, model: RecordingModel) -> Floats | None:
+        """As of :func:`doubted`, where others bear on the same errors: else doubt widens what follows from one recording."""
+        return doubted(model, self.causes(model.artefact)) if self.recordings else None
+
+
+ALONE = Beside()
 
 
 def recorded(model: RecordingModel, effect: Effect) -> bool:

@@ -23,10 +23,11 @@ from itertools import product
 import numpy as np
 from scipy.special import ndtri
 
-from cmm_uq.analysis.diagnosis.held_out import thin_out
-from cmm_uq.analysis.machine.conditional import RecordedField, as_recorded_allows, doubted_draws
+from cmm_uq.analysis.diagnosis.held_out import with_quantities
+from cmm_uq.analysis.machine.conditional import NO_DOUBT, RecordedField, as_recorded_allows, doubted_draws
 from cmm_uq.analysis.machine.influence import PriorInfluence, influence_of
 from cmm_uq.analysis.machine.performance import MachinePerformance, performance_of, rows_of
+from cmm_uq.analysis.machine.recordings import ALONE, Beside, recorded, shown_by
 from cmm_uq.analysis.machine.state import StatementEvidence, Unmodelled, of_machine, unmodelled_errors
 from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.base.errors import CmmUqError
@@ -43,9 +44,7 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 DRAWS = 2000
 _ABSENT = 1e-4  # size of a family of errors that are not there
 _ERRORS, _LEAST = 4_000_000, 200  # errors of lengths that are drawn, and how often each at least
-# quantities of a recording, with their repeats: time grows with the cube of what they show; where each set-up reads a curve
-# that no other shows, none can be left out
-_MOST, _CURVES = 100, 400
+_MOST = 100  # quantities of a recording, with their repeats: time grows with the cube of what they show
 _EACH = 4  # points along each axis of a region
 _ANYWHERE = ("ppm", "″", "″/m")  # units of what means the same on a part of a travel; a bow is one of the whole travel
 _HALVES = ((0.0, 0.5), (0.5, 1.0))
@@ -84,19 +83,33 @@ class DrawnErrors:
     further: Floats  # (N, f) of those of the field's effects
     others: tuple[Unmodelled, ...]  # errors beside the named ones
     statements: tuple[StatementEvidence, ...]  # what the recording says of what is stated of axes
+    beside: Beside = ALONE  # that is taken together with it
 
     @classmethod
-    def of(cls, model: RecordingModel, observe: Observed, seed: int, draws: int = DRAWS) -> DrawnErrors:
-        """Raises ``CmmUqError`` where the machine's travel is not stated, or the recording does not allow it."""
-        count, random = int(model.used.sum()), np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(37,)))
-        most = _CURVES if model.artefact.curves else _MOST
-        thinned = thin_out(model, observe, seed, most * count // max(_quantities(model), 1))
-        others, statements = as_recorded_allows(thinned, other_errors(model))
-        field = RecordedField.of(thinned, others)
+    def of(
+        cls,
+        model: RecordingModel,
+        observe: Observed,
+        seed: int,
+        draws: int = DRAWS,
+        beside: Beside = ALONE,
+    ) -> DrawnErrors:
+        """``beside``: what is taken together with it.
+
+        Raises ``CmmUqError`` where the machine's travel is not stated, or the recording does not allow it.
+        """
+        random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(37,)))
+        thinned = with_quantities(model, observe, seed, _MOST)
+        others, statements = as_recorded_allows(thinned, other_errors(model), beside=beside.recordings)
+        field = RecordedField.of(thinned, others, beside=beside.recordings, in_doubt=beside.doubted(thinned))
         sizes = sample_sizes(field.field, draws, seed, effort=BRIEF)
         drawn = field.coefficients(sizes.noise, sizes.families, random)
         own, further = drawn[:, : field.modelled], drawn[:, field.modelled :]
-        return cls(thinned, field, sizes, own, further, others, statements)
+        return cls(thinned, field, sizes, own, further, others, statements, beside)
+
+    def field_of(self, model: RecordingModel) -> RecordedField:
+        """Of some of the observations, with the same errors."""
+        return RecordedField.of(model, self.others, beside=self.beside.recordings, in_doubt=self.beside.doubted(model))
 
     def recorded(self, model: RecordingModel, posterior: NoisyPosterior) -> Floats:
         """Draws (N, k) of the named effects as means over the recorded set-ups, as an estimate of them alone has them."""
@@ -137,9 +150,14 @@ class DrawnErrors:
         def seen(errors: Floats) -> Floats:
             return np.asarray(np.einsum("mi,mik->mk", along, errors[rows[:, 0]] - errors[rows[:, 1]]))
 
+        def points_of(effect: Effect) -> Floats:
+            if recorded(model, effect):
+                return model.columns(effect, (), about)
+            return np.zeros((len(artefact.points), 3, len(effect.coefficients)))  # as other recordings show it
+
         def of_effects(effects: Sequence[Effect]) -> Floats:
             none = np.zeros((len(rows), 0))
-            return np.hstack([none, *(seen(model.columns(one, (), about)) for one in effects)])
+            return np.hstack([none, *(seen(points_of(one)) for one in effects)])
 
         shown, true = (
             np.linalg.norm(np.diff(xyz[rows], axis=1)[:, 0], axis=1)
@@ -158,16 +176,23 @@ def other_errors(model: RecordingModel) -> list[Unmodelled]:
 
 
 def factor_regions(
-    model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, observe: Observed, seed: int
+    model: RecordingModel,
+    posterior: NoisyPosterior,
+    doubt: Doubt,
+    observe: Observed,
+    seed: int,
+    beside: Beside = ALONE,
 ) -> FactorRegions:
     """Of the named errors that need nothing but a place.
 
-    ``posterior``: of the model with no other errors. ``doubt``: what is stated to be in doubt about its unknowns. Raises
+    ``posterior``: of the model with no other errors. ``doubt``: what is stated to be in doubt about its unknowns. ``beside``:
+    further recordings of the machine. Raises
     ``CmmUqError`` where the machine's travel is not stated, or the recording does not allow it.
     """
     if model.artefact.points.machine.axes != tuple(AXES):
         raise CmmUqError("the machine has other axes than three straight ones", where="the machine")
-    drawn = DrawnErrors.of(model, observe, seed)
+    drawn = DrawnErrors.of(model, observe, seed, beside=beside)
+    doubt = NO_DOUBT if beside.recordings else doubt
     field, sizes, own, further = drawn.field, drawn.sizes, drawn.own, drawn.further
 
     named, placed = columns_of(model.effects, _of_place), columns_of(field.effects, lambda one: not one.columns)
@@ -260,7 +285,7 @@ def _moved(
 def as_recorded(model: RecordingModel, field: RecordedField, posterior: NoisyPosterior) -> Floats:
     """(k, j) by which the estimates of the named errors change with a unit of each coefficient of others."""
     estimate = model.estimate()
-    seen = [model.seen(model.columns(one, (), estimate.about), estimate.about) for one in field.effects]
+    seen = [shown_by(model, one) for one in field.effects]
     weights = gain(estimate.linear, float(np.median(posterior.sigma)))
     return np.asarray(weights[: field.modelled] @ np.hstack(seen))
 
@@ -271,9 +296,3 @@ def disagreeing(model: RecordingModel, posterior: NoisyPosterior, recorded: Floa
     off = np.abs(one.mean(axis=0) - recorded.mean(axis=0))
     limit = ndtri(1 - 0.5 * _DISAGREES / max(k, 1)) * np.hypot(one.std(axis=0), recorded.std(axis=0))
     return tuple(model.unknowns[i].key for i in np.flatnonzero(off > limit))
-
-
-def _quantities(model: RecordingModel) -> int:
-    """How many things a recording measures, each with its repeats."""
-    artefact, rows = model.artefact, model.artefact.rows[model.used, 0]
-    return len(np.unique(np.column_stack([artefact.measurement[model.used], artefact.points.point[rows]]), axis=0))

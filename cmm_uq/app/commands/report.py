@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.machine.regions import FactorRegions, factor_regions
+from cmm_uq.app.commands.certificates.further import Together, together_of
 from cmm_uq.app.commands.certificates.release import reissued, with_replaced
 from cmm_uq.app.commands.diagnose import diagnose_model, screened_model
 from cmm_uq.app.commands.estimation import (
@@ -87,8 +88,9 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
     values, doubt = with_doubt(model, estimate, posterior, posterior.draws if averaged is None else averaged, causes)
     denied = () if averaged is None else contradictions(model, estimate, posterior, averaged)
 
-    # all errors of the machine together: where the factors hold, computed once it is asked for
-    all_errors = regions_of(model, posterior, doubt, observe, seed)
+    # all errors of the machine, by further certificates of it too: where the factors hold, computed once it is asked for
+    together = together_of(job, model, posterior, doubt, seed)
+    all_errors = regions_of(model, posterior, doubt, observe, seed, together)
 
     result = Result(
         job, model, findings, estimate, posterior, values,
@@ -96,6 +98,7 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
         parameters(model, values), sizes(model, values),
         noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, statements,
         diagnosis, returning=returning, causes=causes, doubt=doubt, contradictions=denied, all_errors=all_errors,
+        further=lambda: together().told,
     )  # fmt: skip
     for name, quantity in result.quantities():
         figures_of = (quantity.value, quantity.u, *quantity.interval95)
@@ -104,14 +107,19 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
 
 
 def regions_of(
-    model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, observe: Observed, seed: int
+    model: RecordingModel,
+    posterior: NoisyPosterior,
+    doubt: Doubt,
+    observe: Observed,
+    seed: int,
+    together: Callable[[], Together],
 ) -> Callable[[], FactorRegions | Text]:
     """What computes once, when it is first asked for, where the error factors hold, or says why that is not to be had."""
 
     @cache
     def regions() -> FactorRegions | Text:
         try:
-            return factor_regions(model, posterior, doubt, observe, seed)
+            return factor_regions(model, posterior, doubt, observe, seed, together().taken)
         except CmmUqError as error:
             return Verbatim(error.problem)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import degrees, isfinite
 from typing import Any, Literal
@@ -25,6 +25,7 @@ from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
+from cmm_uq.certificate.further import FurtherCertificate, further_data
 from cmm_uq.certificate.origin import NAME
 from cmm_uq.certificate.sections.read_axes import evidence_data, readings_data, shrinking, smaller_by
 from cmm_uq.certificate.sections.regions import families_data, priors_data
@@ -47,23 +48,6 @@ class VerificationCheck:
     what: str  # in words
     count: int = 0  # of things compared; 0 of what was left
     why: str = ""  # it was left; empty where it was done
-
-
-@dataclass(frozen=True)
-class FurtherCertificate:
-    """Another certificate of the machine, whose recording is taken together with that of its calibration."""
-
-    file: str
-    number: str
-    laboratory: str
-    artefact: str
-    date: dt.date
-    verdict: str  # of the verification
-    corrected: bool  # whether the machine then corrected what its calibration found
-    origin: str  # of the recording
-    observations: int = 0  # that are reckoned with
-    chance: float = 1.0  # of a recording that contradicts the machine as much, as its other certificates have it
-    used: bool = True
 
 
 @dataclass(frozen=True)
@@ -308,7 +292,7 @@ def standing_data(one: CertificateStatus) -> dict[str, Any]:
             {"parameter": name, "change": change} for name, change in one.changes.items()
         ],
         "temperature_c": one.temperature_c, "inputs_sha256": dict(one.inputs_sha256),
-        **({"further": [asdict(each) | {"date": each.date.isoformat()} for each in one.further]} if one.further else {}),
+        **further_data(one.further),
     }  # fmt: skip
 
 

@@ -18,9 +18,10 @@ from cmm_uq.base import messages
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, number, plural, say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
+from cmm_uq.certificate.further import further_table
 from cmm_uq.certificate.origin import NAME
 from cmm_uq.certificate.part.figures import ANGLES, LENGTHS, figures_of
-from cmm_uq.certificate.part.measurement import CertificateStatus, FurtherCertificate, PartMeasurement, Source
+from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, Source
 from cmm_uq.certificate.wording import titles
 from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 
@@ -329,19 +330,7 @@ def machine_section(found: PartMeasurement) -> Section:
     )
     told = (Paragraph(text) for text in (standing.path, standing.drift) if text)
     facts = Facts(tuple(row for row in rows if row[1]))
-    return section(say("The machine and its certificate"), facts, *told, _further(standing.further))
-
-
-def _further(certificates: Sequence[FurtherCertificate]) -> Table | None:
-    heads = [say("Certificate"), say("Issued by"), say("Artefact"), say("Calibrated on"), say("Machine")]
-    figures = [say("Observations"), say("Chance of as much contradiction"), say("Reckoned with")]
-    rows = []
-    for one in certificates:
-        seen = say("corrected") if one.corrected else say("not corrected")
-        named = (Verbatim(one.number), Verbatim(one.laboratory), Verbatim(one.artefact), messages.day(one.date), seen)
-        used = say("yes") if one.used else say("no")
-        rows.append((*named, number(one.observations), number(one.chance, ".2g"), used))
-    return table(say("Further certificates of the machine"), [*heads, *figures], rows)
+    return section(say("The machine and its certificate"), facts, *told, further_table(standing.further))
 
 
 def certificate_rows(standing: CertificateStatus) -> tuple[tuple[Text, Text], ...]:

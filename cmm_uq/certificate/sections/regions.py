@@ -9,11 +9,13 @@ import numpy as np
 
 from cmm_uq.analysis.machine.influence import ALL, MATTERS, PriorInfluence
 from cmm_uq.analysis.machine.regions import FactorRegions, Key
-from cmm_uq.base.messages import DASH, NOTHING, Text, listed, number, say, signed
+from cmm_uq.analysis.machine.state import FREE
+from cmm_uq.base.messages import DASH, NOTHING, Text, after, listed, number, say, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
 from cmm_uq.certificate import wording
 from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
+from cmm_uq.certificate.further import further_data, further_table
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.sections.read_axes import readings_data, readings_table, readings_warnings
@@ -25,15 +27,21 @@ _TITLE = say("Where the error factors hold")
 
 
 def over_range(result: Result) -> dict[Key, Quantity]:
-    """Error factors over the whole measuring range, with a U that is not below that of the mean over the recorded set-ups."""
+    """Error factors over the whole measuring range; by this recording alone no better known than over its set-ups."""
     regions = result.regions
     if not isinstance(regions, FactorRegions):
         return {}
-    return {
-        key: quantity.at_least(result.parameters[key[0]][key[1]].expanded)
-        for key, quantity in regions.whole.items()
-        if key not in result.not_given
-    }
+    if not result.further().used:
+        own = result.parameters
+        return {
+            key: one.at_least(own[key[0]][key[1]].expanded)
+            for key, one in regions.whole.items()
+            if key not in result.not_given
+        }
+    # what further recordings show of the range, the recorded set-ups neither bound nor leave free
+    prior = {one.key: FREE * one.prior_sd for one in result.model.unknowns}
+    contradicted = {*result.denied, *(one.key for one in result.contradictions)}
+    return {key: one for key, one in regions.whole.items() if key not in contradicted and one.u < prior[key]}
 
 
 def regions_section(result: Result) -> Section:
@@ -50,7 +58,7 @@ def regions_section(result: Result) -> Section:
     k = np.array([one.coverage_factor or np.inf for one in regions.whole.values()])
     given = [key in ranged for key in regions.whole]
     rests = listed([names[i] for i in resting(regions.influence, k) if given[i]])
-    words = say(
+    words: Text = say(
         "The first figures are means over the recorded set-ups. The machine has other errors besides, taken as large as this "
         "recording shows errors of their kind to be; elsewhere a factor differs by what they do."
     )
@@ -61,8 +69,15 @@ def regions_section(result: Result) -> Section:
     )
     read_by = readings_table(result.model.artefact.points.machine, regions.statements)
     tables = sizes_table(regions.scales), read_by, changes_table(regions.influence, names)
+    further = result.further()
+    words = after(words, further.together)
     return section(
-        _TITLE, Paragraph(words), _table(result, regions, ranged), Paragraph(prior) if rests else None, *tables
+        _TITLE,
+        Paragraph(words),
+        _table(result, regions, ranged),
+        Paragraph(prior) if rests else None,
+        *tables,
+        further_table(further.each),
     )
 
 
@@ -72,7 +87,8 @@ def _table(result: Result, regions: FactorRegions, ranged: dict[Key, Quantity]) 
     rows = []
     for key, quantity in ranged.items():
         # an average over explanations is of each beside other errors, and no mean over the set-ups
-        mean, U, _ = wording.stated(regions.recorded[key] if result.averaged else result.parameters[key[0]][key[1]])
+        own = regions.recorded[key] if result.averaged else result.parameters[key[0]][key[1]]
+        mean, U = (DASH, DASH) if key in result.not_given else wording.stated(own)[:2]
         value, wider = rounded(quantity.value, quantity.expanded)
         ends: Sequence[Text] = [rounded(end, quantity.expanded)[0] for end in regions.eighths.get(key, ())]
         title, ends = wording.title_of(key, result), ends or (NOTHING, NOTHING)
@@ -93,7 +109,7 @@ def regions_warnings(result: Result) -> list[Text]:
     regions, texts, open_there = result.regions, list[Text](), list[Text]()
     if not isinstance(regions, FactorRegions):
         return texts
-    texts += readings_warnings(regions.statements, regions.scales)
+    texts += [*readings_warnings(regions.statements, regions.scales), *result.further().warnings]
     for key in result.denied:
         one, together = result.parameters[key[0]][key[1]], regions.recorded.get(key)
         name, alone = wording.title_of(key, result), wording.with_uncertainty(one)
@@ -162,6 +178,7 @@ def regions_data(result: Result) -> dict[str, Any]:
             "disagree": [".".join(key) for key in regions.disagree],
             "families": families_data(regions.scales),
             **({"axes": read_by} if read_by else {}),
+            **further_data(result.further().each),
             "of_priors": [".".join(key) for key in regions.whole],
             "priors": priors_data(regions.influence),
         },

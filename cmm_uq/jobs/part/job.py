@@ -21,13 +21,11 @@ from cmm_uq.jobs.part.probed import Probed, probed
 from cmm_uq.jobs.part.readings import OtherReadings, measured_points, other_readings
 from cmm_uq.jobs.part.tables import MachineStateFacts, PartFile, Places
 from cmm_uq.jobs.part.values import Reported, reported_values
-from cmm_uq.jobs.reading import PART, job_toml
+from cmm_uq.jobs.reading import CERTIFICATES, PART, WHOLE, further_named, job_toml
 from cmm_uq.jobs.source import RESULTS, FilesInFolder, FilesInMemory, JobFiles
-from cmm_uq.jobs.tables.identification import COMPENSATED, SIMULATED, check_examples, check_mark
+from cmm_uq.jobs.tables.identification import check_examples, check_mark
 
 _FIX = "A part's job is a folder with a job.toml; cmm-uq new part begins one"
-_WHOLE = (".pdf", ".xml")
-_CERTIFICATES = tuple(f"certificate{origin}.pdf" for origin in ("", f"-{SIMULATED}", f"-{COMPENSATED}"))
 POSTERIOR = "posterior.npz"
 
 
@@ -84,26 +82,17 @@ def files_of_the_machine(facts: MachineStateFacts, source: JobFiles) -> tuple[st
     if facts.certificate is None:
         return ()
     name = facts.certificate.removesuffix("/")
-    if name.lower().endswith(_WHOLE):
+    if name.lower().endswith(WHOLE):
         return (name,)
     if name.lower().endswith(".json"):
         folder, results, certificates = name.rpartition("/")[0], name, list[str]()
     else:
         folder, results = name, f"{name}/{RESULTS}"
-        certificates = [each for one in _CERTIFICATES if source.has(each := f"{name}/{one}", written=True)]
+        certificates = [each for one in CERTIFICATES if source.has(each := f"{name}/{one}", written=True)]
     if certificates and not source.has(results, written=True):
         return (certificates[0],)
     drawn = facts.posterior or f"{folder}/{_posterior_named(source, results)}".lstrip("/")
     return (results, drawn, *certificates)
-
-
-def _further_certificate(name: str, source: JobFiles) -> str:
-    """The file of a further certificate, which must have its recording inside; a folder's is that which a report wrote."""
-    name = name.removesuffix("/")
-    if name.lower().endswith(_WHOLE):
-        return name
-    each = [f"{name}/{one}" for one in _CERTIFICATES]
-    return next((one for one in each if source.has(one, written=True)), each[0])
 
 
 def _posterior_named(source: JobFiles, results: str) -> str:
@@ -136,7 +125,7 @@ def _read(source: JobFiles, *, machine: bool) -> PartJob:
     fix = (
         f"Put the machine's certificate (PDF) or its report's files there, or mend its name in {path}: [machine_state]"
     )
-    further = tuple(_further_certificate(one.certificate, source) for one in facts.machine_state.further if machine)
+    further = further_named(facts.machine_state.further, source) if machine else ()
     for name in (*stated_by, *further):
         with wrong.going_on():
             inputs[name] = source.content(name, TABLE_BYTES, fix, written=True)

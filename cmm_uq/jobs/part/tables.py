@@ -17,7 +17,7 @@ from cmm_uq.base.units import REFERENCE_TEMPERATURE
 from cmm_uq.jobs.part.feature import CharacteristicFacts, Count, Degrees, FeatureFacts, FormFacts, Name
 from cmm_uq.jobs.tables.conformity import Prior, Rule, needs_prior
 from cmm_uq.jobs.tables.identification import MEASURED, Identification, Laboratory, Origin
-from cmm_uq.jobs.tables.machine import AxesFacts, Travel, check_carriages
+from cmm_uq.jobs.tables.machine import AxesFacts, FurtherList, Travel, check_carriages
 
 Expansion = Annotated[float, Field(ge=-1e-4, le=1e-3)]  # A coefficient of expansion, 1/K: steel has 11.5e-6.
 SmallExpansion = Annotated[float, Field(ge=0, le=1e-4)]
@@ -59,19 +59,6 @@ class BoundFacts(JobTable):
     source: Name = required("Where that is stated, for the report: datasheet or certificate, with its date.")
 
 
-class FurtherFacts(JobTable):
-    """One ``[[machine_state.further]]``: another certificate of the machine, of another artefact or an earlier day."""
-
-    certificate: Name = required(
-        "The certificate (PDF, or XML with its inputs), or the folder with it, inside the job's."
-    )
-    corrected: bool = key(
-        False,
-        "Whether the machine corrected what its calibration found while that recording was made; the artefact is then "
-        "seen by a corrected machine.",
-    )
-
-
 class MachineStateFacts(JobTable):
     """``[machine_state]``: the machine as its certificate states it, and where its axes go."""
 
@@ -94,7 +81,7 @@ class MachineStateFacts(JobTable):
     axes: AxesFacts = key([], "How axes are read; as the certificate says where left out.")
     bound: Annotated[list[BoundFacts], Field(max_length=LISTED.most)] = []
     """Bounds of errors that the calibration's recording cannot show, with their sources."""
-    further: Annotated[list[FurtherFacts], Field(max_length=8)] = []
+    further: FurtherList = []
     """Further certificates of the machine, whose recordings are taken together with that of its calibration: another
     artefact, other lines, an earlier year."""
 

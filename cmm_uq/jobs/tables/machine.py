@@ -234,6 +234,22 @@ def stated_axes(axes: Iterable[AxisFacts]) -> dict[str, AxisFacts]:
     return {name: one for one in axes if one.reading != "unknown" for name in one.names}
 
 
+class FurtherFacts(JobTable):
+    """One ``further``: another certificate of the machine, of another artefact or of another day."""
+
+    certificate: Annotated[str, Field(min_length=1, max_length=100)] = required(
+        "The certificate (PDF, or XML with its inputs), or the folder with it, inside the job's."
+    )
+    corrected: bool = key(
+        False,
+        "Whether the machine corrected what its calibration found while that recording was made; the artefact is then "
+        "seen by a corrected machine.",
+    )
+
+
+FurtherList = Annotated[list[FurtherFacts], Field(max_length=8)]
+
+
 class MachineFacts(JobTable):
     """``[machine]``."""
 
@@ -254,6 +270,9 @@ class MachineFacts(JobTable):
     temperature_log: TemperatureLogFile | None = None
     """What the scales' thermocouples showed while the recording was made."""
     digitizer: DigitizerFacts | None = key(None, "A laser digitizer on the ram.")
+    further: FurtherList = []
+    """Further certificates of the machine, whose recordings are taken together with this one: for its error factors over the
+    measuring range and for its error map."""
     calibrate: Recalibration | None = key(None, "When the machine is to be calibrated again, for `cmm-uq due`.")
 
     def problems(self) -> Iterator[str]:

@@ -61,7 +61,7 @@ class Effort:
     sampler: bool = True  # whether emcee, which takes minutes, draws them where weighed ones are worth too little
 
 
-BRIEF = Effort(400, 8000, 150.0, 100, sampler=False)
+USUAL, BRIEF = Effort(), Effort(400, 8000, 150.0, 100, sampler=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,7 +308,7 @@ class FieldSizes:
 
 
 def sample_sizes(
-    model: FieldModel, draws: int, seed: int, known: Sizes | None = None, effort: Effort = Effort()
+    model: FieldModel, draws: int, seed: int, known: Sizes | None = None, effort: Effort = USUAL
 ) -> FieldSizes:
     """Posterior of the sizes of noise and families, ``draws`` of them, of which some hundred are different.
 

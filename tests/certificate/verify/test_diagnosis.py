@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.app.commands import diagnose
-from cmm_uq.app.commands.certificates.verification import again
+from cmm_uq.app.commands.certificates.again import again
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.results.contents import false_alarms
@@ -26,7 +25,7 @@ def test_a_diagnosis_is_made_again_with_its_rate_of_false_alarms(monkeypatch: py
     def asked(job: object, **options: Any) -> None:
         raise AskedError(options["seed"], options["alpha"])
 
-    monkeypatch.setattr(diagnose, "diagnosis_outcome", asked)
+    monkeypatch.setattr("cmm_uq.app.commands.certificates.again.diagnosis_outcome", asked)
     data = {"sampling": {"seed": 3}, "diagnosis": {"verdict": "consistent", **false_alarms(alpha)}}
     with pytest.raises(AskedError) as told:
         again(Given(results=("results.json", data, b"")), read_job(JOB))

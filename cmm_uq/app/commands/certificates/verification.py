@@ -8,9 +8,8 @@ what takes part in the computation is installed here.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -19,113 +18,11 @@ from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.verify import given as files, sources, views
 from cmm_uq.certificate.verify.given import AGAIN, NOT_ASKED, RESULTS, Given, Inquiry
-from cmm_uq.laboratory.records.facts import ChainHead, Heads
 from cmm_uq.laboratory.records.opening import open_records
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.files import Stage
-    from cmm_uq.certificate.verify.again import Again
     from cmm_uq.jobs.job import Job
-
-Compute = Callable[["Given", "Job"], "Again"]  # the second computation: of the job that is inside a certificate
-
-
-def compute_again(
-    inquiry: Inquiry, given: Given, compute: Callable[[], Again | None], command: str, job: Job | None = None
-) -> bool:
-    """Compute everything from the inputs and keep what differs: whether the documents are the same to the byte.
-
-    By the version that made it everything is compared; of an earlier one figures and decisions, where no correction since
-    then touches what a ``command`` makes of a ``job``, whatever it is where none is given.
-    """
-    from cmm_uq.certificate.verify.again import compare_again, compare_figures, plugins_missing
-
-    if given.results is None or plugins_missing(inquiry, given.results[1]):
-        return False
-    made = _version(given)
-    if made != __version__ and not _computes_alike(inquiry, made, command, job):
-        return False
-    try:
-        if (computed := compute()) is None:
-            return False
-        if made == __version__:
-            return compare_again(inquiry, given, computed)
-        compare_figures(inquiry, given, computed, made)
-    except CmmUqError as error:
-        inquiry.wrong("again", given.results[0], "", f"cannot be computed again: {error}")
-    return False
-
-
-def _computes_alike(inquiry: Inquiry, made: str, command: str, job: Job | None) -> bool:
-    """Whether this version gives the figures of an earlier one; what was corrected since then is named."""
-    from cmm_uq.app.commands.certificates.affected import JobInputs, between, order, stated_version
-
-    of_job = ("", None) if job is None else (job.facts.artefact.kind, JobInputs.of(job.inputs))
-    why = ": install that" if stated_version(made) >= order(__version__) else ""
-    touching = [one for one in between(made, __version__) if one.concerns(command, *of_job)]
-    inquiry.notes += [f"Version {one.version} corrects: {one.what}" for one in touching]
-    if touching:
-        verb = "correction since then touches" if len(touching) == 1 else "corrections since then touch"
-        why = f"; {len(touching)} {verb} this certificate"
-    if why:
-        inquiry.left(AGAIN, f"made by version {made}, and this is {__version__}{why}")
-    return not why
-
-
-def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Again:
-    from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
-    from cmm_uq.app.commands.diagnose import DIAGNOSE, diagnosis_outcome
-    from cmm_uq.app.commands.report import REPORT, report_outcome
-
-    data = given.results[1] if given.results else {}
-    seed = (data.get("sampling") or {}).get("seed") or 0
-    if not isinstance(seed, int) or seed < 0:
-        raise CmmUqError(f"{seed!r} is no seed", where=f"{RESULTS}: sampling.seed")
-    if "estimates" in data:
-        form, outcome = REPORT, report_outcome(job, seed=seed, stage=stage)
-    else:
-        alpha = (data.get("diagnosis") or {}).get("false_alarms", FALSE_ALARMS)
-        if not isinstance(alpha, float) or not 0.0 < alpha < 1.0:
-            raise CmmUqError(f"{alpha!r} is no rate of false alarms", where=f"{RESULTS}: diagnosis.false_alarms")
-        form, outcome = DIAGNOSE, diagnosis_outcome(job, seed=seed, alpha=alpha, stage=stage)
-    kept: list[str] = []
-    heads = Heads(ChainHead.of_results(data))
-    written = form.contents(outcome, stage, finished=partial(as_attached, given, kept), heads=heads)
-    return recomputed(given, written, kept)
-
-
-def recomputed(given: Given, written: Mapping[str, bytes], kept: Sequence[str], beside: Sequence[str] = ()) -> Again:
-    """Files that were made again, with the PDF where it is set by the program that set the given one."""
-    from cmm_uq.certificate.verify.again import Again
-
-    pdf = next((content for name, content in written.items() if name.endswith(".pdf")), None)
-    files = {name: content for name, content in written.items() if not name.endswith(".pdf")}
-    found = Again(files, None, kept=tuple(kept), beside=tuple(beside))
-    if given.pdf is None or pdf is None:
-        return found
-    creator = re.search(rb"/Creator ?\(([^()]*)\)", pdf)
-    made, here = given.pdf[1].information.get("/Creator", ""), creator[1].decode("latin-1") if creator else ""
-    if made != here:
-        return replace(found, why_no_pdf=f"they were set by {made or 'another program'}, and here is {here}")
-    return replace(found, pdf=pdf)
-
-
-def as_attached(given: Given, kept: list[str], name: str, content: bytes) -> bytes:
-    """A file as it is attached where it is the same but for a signature, or for the platform, which is then kept in mind."""
-    from cmm_uq.certificate.results.provenance import FILE, same_but_for_the_platform
-
-    attached = given.files.get(name)
-    if attached is None or attached == content or not (name == FILE or name.endswith(".xml")):
-        return content
-    try:
-        if name.endswith(".xml"):
-            return attached if views.same_unsigned(attached, content, name) else content
-        if not same_but_for_the_platform(attached, content):
-            return content
-    except (CmmUqError, ValueError):
-        return content
-    kept.append(name)
-    return attached
 
 
 @dataclass(frozen=True)
@@ -147,7 +44,9 @@ class Verification:
 
 
 # the job of the inputs, and what computes all again: whether documents are the same to the byte; ``None`` without sound inputs
-Examined = tuple["Job | None", Callable[[], bool]] | None
+Examined = tuple["Job | None", Callable[[], bool] | None] | None
+# computes all of a certificate's job again: whether its documents are the same to the byte
+Computing = Callable[[Inquiry, Given, "Job"], bool]
 Examine = Callable[[Inquiry, Given], Examined]  # compares figures, decisions and inputs
 
 
@@ -186,14 +85,14 @@ def verify_given(
     forms = " and ".join(form[0] for form in (given.pdf, given.html) if form is not None)
     if forms and not alike:
         why = "they are compared where they are made again to the byte"
-        if rerun and (made := _version(given)) not in ("", __version__):
+        if rerun and (made := version_of(given)) not in ("", __version__):
             why = f"made by version {made}, which alone makes them again to the byte, and this is {__version__}"
         inquiry.left(f"texts and layout of {forms}", why)
     stage("Done", 1.0)
     return Verification(given, inquiry, job)
 
 
-def _version(given: Given) -> str:
+def version_of(given: Given) -> str:
     """Of the package that made a certificate; empty where nothing says it."""
     return "" if given.results is None else str(given.results[1]["software"]["version"])
 
@@ -219,15 +118,11 @@ def _check_schema(inquiry: Inquiry, given: Given) -> None:
                          fix="Give the results.json of cmm-uq report, diagnose or part")  # fmt: skip
 
 
-def examine_certificate(
-    inquiry: Inquiry, given: Given, compute: Compute | None = None, stage: Stage = lambda what, part: None
-) -> Examined:
+def examine_certificate(inquiry: Inquiry, given: Given, computing: Computing | None = None) -> Examined:
     """The certificate of a machine: its job, computed again by ``compute``, by default as ``report`` and ``diagnose`` do."""
     if (job := _compare(inquiry, given)) is None:
         return None
-    computed = partial(compute, given, job) if compute else partial(again, given, job, stage)
-    command = "report" if given.results and "estimates" in given.results[1] else "diagnose"
-    return job, lambda: compute_again(inquiry, given, computed, command, job)
+    return job, None if computing is None else partial(computing, inquiry, given, job)
 
 
 def _compare(inquiry: Inquiry, given: Given) -> Job | None:
@@ -247,12 +142,27 @@ def _compare(inquiry: Inquiry, given: Given) -> Job | None:
     if job is not None:
         sources.check_job(inquiry, job, data, name)
         sources.check_dates(inquiry, job)
-        if given.xml is not None and (made := _version(given)) != __version__:
+        if given.xml is not None and (made := version_of(given)) != __version__:
             inquiry.left(f"{given.xml[0]} element by element", f"made by version {made}, and this is {__version__}")
         else:
             with physics_of(job):
                 views.check_digital(inquiry, given, job)
     return job
+
+
+def merge(inquiry: Inquiry, inner: Inquiry, where: str) -> None:
+    """What was found of the certificate inside, named as such; itself by the name that it has among the inputs."""
+    for one in inner.findings:
+        file = where if where.rpartition("/")[2] == one.file else f"{where}: {one.file}"
+        inquiry.findings.append(
+            files.VerificationFinding(one.check, file, one.place, one.problem, one.stands, one.should)
+        )
+    for left in inner.unchecked:
+        if (left.what, left.why) != (AGAIN, NOT_ASKED):
+            inquiry.left(f"{where}: {left.what}", left.why)
+    inquiry.notes += [f"{where}: {note}" for note in inner.notes]
+    for check, count in inner.done.items():
+        inquiry.looked(check, count)
 
 
 _T = TypeVar("_T")

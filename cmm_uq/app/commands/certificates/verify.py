@@ -6,8 +6,10 @@ from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 
-from cmm_uq.app.commands.certificates import verification
-from cmm_uq.app.commands.certificates.verification import Compute, Examined, Verification
+from cmm_uq.app.commands.certificates import again, verification
+from cmm_uq.app.commands.certificates.again import Compute
+from cmm_uq.app.commands.certificates.further import verify_further
+from cmm_uq.app.commands.certificates.verification import Examined, Verification
 from cmm_uq.app.commands.files import Stage
 from cmm_uq.certificate.verify.given import Given, Inquiry, read_given
 
@@ -21,13 +23,16 @@ def verify(
 
     def examine(inquiry: Inquiry, given: Given) -> Examined:
         if not given.of_part:
-            return verification.examine_certificate(inquiry, given, compute, stage)
+            found = verification.examine_certificate(inquiry, given, again.of_a_machine(compute, stage))
+            for name, inner in verify_further(found[0]) if found and found[0] else ():
+                verification.merge(inquiry, inner.inquiry, name)
+            return found
         from cmm_uq.app.commands.certificates.verify_part import compare_part, part_again
 
         if (job := compare_part(inquiry, given, rerun=rerun, trust=trusted)) is None or given.results is None:
             return None
-        again = partial(part_again, inquiry, given, job, given.results[1], trust=trusted, stage=stage)
-        return None, lambda: verification.compute_again(inquiry, given, again, "part")
+        computed = partial(part_again, inquiry, given, job, given.results[1], trust=trusted, stage=stage)
+        return None, lambda: again.compute_again(inquiry, given, computed, "part")
 
     stage("Opening the files", 0.0)
     given = read_given(tuple(paths))

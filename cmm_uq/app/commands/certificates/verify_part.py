@@ -10,10 +10,10 @@ from typing import Any
 
 from cmm_uq.analysis.parts.reported import measured_of
 from cmm_uq.analysis.parts.setup import plan_of
-from cmm_uq.app.commands.certificates import verification
+from cmm_uq.app.commands.certificates import again, verification
+from cmm_uq.app.commands.certificates.further import further_certificates, verify_further
 from cmm_uq.app.commands.files import Stage
 from cmm_uq.app.commands.parts.drift import FILE as HISTORY
-from cmm_uq.app.commands.parts.further import further_certificates, verify_further
 from cmm_uq.app.commands.parts.machine import CALIBRATION, attached_calibration, standing_of, verified, with_history
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
 from cmm_uq.app.commands.reading import in_language
@@ -27,7 +27,6 @@ from cmm_uq.certificate.verify.given import (
     RESULTS,
     Given,
     Inquiry,
-    VerificationFinding,
     language_of,
 )
 from cmm_uq.jobs.part.job import PartJob, part_of
@@ -88,7 +87,7 @@ def _check_machine(
     inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], file: str, *, rerun: bool, trust: Iterable[Path] | None
 ) -> None:
     """The certificate that states the machine, verified as it would be by itself, and whether it held on the day."""
-    said = data["machine"]
+    said, computing = data["machine"], again.of_a_machine() if rerun else None
     held = bool(said["signatures_held_to_trusted"])
     if job.facts.machine_state.job is not None:
         inquiry.looked("inputs")
@@ -97,8 +96,8 @@ def _check_machine(
             inquiry.wrong("inputs", file, "machine.inputs_sha256", "are not the machine's job inside",
                           said["inputs_sha256"], hashes)  # fmt: skip
         inquiry.notes.append("No certificate states the machine: its job was analysed, and is inside.")
-        for name, one in verify_further(job, rerun=rerun, trust=trust if held else None):
-            _merge(inquiry, one.inquiry, name)
+        for name, one in verify_further(job, computing, trust=trust if held else None):
+            verification.merge(inquiry, one.inquiry, name)
         return
     if held and trust is None:
         inquiry.left(TRUSTED, "it was held to trusted certificates, and none are given (--trust)")
@@ -108,10 +107,10 @@ def _check_machine(
     except CmmUqError as error:
         inquiry.wrong("inputs", where, "", f"is no certificate that states the machine: {error}")
         return
-    _merge(inquiry, found.inquiry, where)
-    further = tuple(verify_further(job, rerun=rerun, trust=trust if held else None))
+    verification.merge(inquiry, found.inquiry, where)
+    further = tuple(verify_further(job, computing, trust=trust if held else None))
     for name, one in further:
-        _merge(inquiry, one.inquiry, name)
+        verification.merge(inquiry, one.inquiry, name)
     if found.inquiry.findings or any(one.inquiry.findings for _, one in further):
         return
     inquiry.looked("dates")
@@ -122,19 +121,6 @@ def _check_machine(
         inquiry.wrong("dates", where, "", f"does not hold for this part: {error.problem}")
         return
     check_standing(inquiry, replace(standing, further=tuple(one.certificate for one in more)), data, file)
-
-
-def _merge(inquiry: Inquiry, inner: Inquiry, where: str) -> None:
-    """What was found of the certificate inside, named as such; itself by the name that it has among the inputs."""
-    for one in inner.findings:
-        file = where if where.rpartition("/")[2] == one.file else f"{where}: {one.file}"
-        inquiry.findings.append(VerificationFinding(one.check, file, one.place, one.problem, one.stands, one.should))
-    for left in inner.unchecked:
-        if (left.what, left.why) != (AGAIN, NOT_ASKED):
-            inquiry.left(f"{where}: {left.what}", left.why)
-    inquiry.notes += [f"{where}: {note}" for note in inner.notes]
-    for check, count in inner.done.items():
-        inquiry.looked(check, count)
 
 
 def part_again(
@@ -155,8 +141,8 @@ def part_again(
         tuple(trust or ()) if held else None, None, history,
     )  # fmt: skip
     found, kept = evaluate_part(job, options, stage), list[str]()
-    files = contents_of(found, stage, finished=partial(verification.as_attached, given, kept))
-    return verification.recomputed(given, files, kept, tuple(found.files))
+    files = contents_of(found, stage, finished=partial(again.as_attached, given, kept))
+    return again.recomputed(given, files, kept, tuple(found.files))
 
 
 def to_rerun(said: Mapping[str, Any]) -> bool:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.analysis.conformity.standards import decidable
+from cmm_uq.app.commands.certificates.further import further_certificates, verify_further
 from cmm_uq.app.commands.model import recorded_model, refuse_unmeasured
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import kind_of
@@ -214,6 +215,8 @@ def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
     model, findings = recorded_model(job)
     with wrong.going_on():
         model.estimate()
+    with wrong.going_on():
+        further_certificates(job, job, verify_further(job))
     lines = ((one, one.lines[0] if one.lines else None) for one in findings)
     return [Problem(str(one.why), job.recording_path, line, one.column or "") for one, line in lines]
 

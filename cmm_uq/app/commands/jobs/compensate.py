@@ -13,6 +13,7 @@ import numpy as np
 
 from cmm_uq.analysis.machine.correction import FieldMap, field_map
 from cmm_uq.analysis.machine.state import of_machine
+from cmm_uq.app.commands.certificates.further import together_of
 from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.jobs.simulate import recording
 from cmm_uq.app.commands.model import refuse_planned
@@ -23,6 +24,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import Owner, sha256_of, staged
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.certificate.further import FurtherCertificates, further_data
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.sections.read_axes import readings_data, readings_warnings
 from cmm_uq.jobs.derived_job import IN_THE_RECORDING, PROGRAM, derived_toml, is_compensated, kept_inputs, recording_name
@@ -120,7 +122,8 @@ def write_new_map(
         stage("Drawing all errors together", 0.4)
         try:
             with physics_of(read):
-                found = field_map(result.model, result.posterior, result.doubt, observe, seed)
+                together = together_of(read, result.model, result.posterior, result.doubt, seed)()
+                found = field_map(result.model, result.posterior, result.doubt, observe, seed, together.taken)
         except CmmUqError as error:
             raise CmmUqError(error.problem, where=error.where or str(read.folder), fix=error.fix) from error
         if found.disagree:
@@ -128,7 +131,7 @@ def write_new_map(
             problem = f"all errors together say something else of {names_of} than the named ones alone"
             fix = f"cmm-uq diagnose {read.folder} says what may be wrong"
             raise CmmUqError(f"{problem}: neither makes a map", where=str(read.folder), fix=fix)
-        return place.write(_map_files(read, found)), found
+        return place.write(_map_files(read, found, together.told)), found
 
 
 def worth_of(found: FieldMap) -> list[str]:
@@ -154,7 +157,7 @@ def worth_of(found: FieldMap) -> list[str]:
     return lines
 
 
-def _map_files(read: Job, found: FieldMap) -> dict[str, bytes]:
+def _map_files(read: Job, found: FieldMap, further: FurtherCertificates) -> dict[str, bytes]:
     error_map, held = found.error_map, found.held_out
     assert error_map.covariance is not None  # noqa: S101 - of its own making
     beside = [round(float(u) / MICROMETRE, 4) for u in error_map.covariance.beside]
@@ -174,6 +177,7 @@ def _map_files(read: Job, found: FieldMap) -> dict[str, bytes]:
         "chain": read.facts.machine.chain,
         "sign": "true = indicated + e", "errors_not_in_it": list(found.omitted),
         **({"axes": readings_data(read.points.machine, found.statements)} if found.statements else {}),
+        **further_data(further.each),
         "range_rms_um": dict(zip(both, map(_figure, found.range_um), strict=True)), "held_out_rms_um": tried,
     }  # fmt: skip
     return {

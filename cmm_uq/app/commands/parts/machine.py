@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import datetime as dt
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -13,28 +14,24 @@ from typing import Any
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.analysis.machine.conditional import given_recording
-from cmm_uq.analysis.machine.state import Change, MachineState, machine_stated, with_bounds, with_curves
+from cmm_uq.analysis.machine.state import MachineState, machine_stated, with_bounds
 from cmm_uq.analysis.machine.statements import with_readings
-from cmm_uq.app.commands.certificates.verification import Verification, examine_certificate, verify_given
-from cmm_uq.app.commands.estimation import doubt_of
-from cmm_uq.app.commands.files import Stage, silent
-from cmm_uq.app.commands.parts.drift import FILE as HISTORY, known_of, with_drift
-from cmm_uq.app.commands.parts.further import (
-    VerifiedCertificate,
+from cmm_uq.app.commands.certificates.again import of_a_machine
+from cmm_uq.app.commands.certificates.further import (
     further_certificates,
-    given_together,
-    recording_of,
+    given_recordings,
     refuse_adjusted,
     verify_further,
 )
+from cmm_uq.app.commands.certificates.verification import Verification, examine_certificate, verify_given
+from cmm_uq.app.commands.files import Stage, silent
+from cmm_uq.app.commands.parts.drift import FILE as HISTORY, known_of, with_drift
 from cmm_uq.app.commands.reading import job_of, read_job
-from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, day, listed, names, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, say
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.certificate.clauses import draft
-from cmm_uq.certificate.part.measurement import CertificateStatus, FurtherCertificate, Source, VerificationCheck
+from cmm_uq.certificate.part.measurement import CertificateStatus, Source, VerificationCheck
 from cmm_uq.certificate.sections.read_axes import readings_warnings
 from cmm_uq.certificate.verify.given import CHECKS, Given, given_of
 from cmm_uq.jobs.job import Job
@@ -42,7 +39,6 @@ from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.source import sha256 as hashes
 from cmm_uq.jobs.tables.identification import COMPENSATED, MEASURED, SIMULATED
 from cmm_uq.jobs.tables.machine import stated_axes
-from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.machine.physics.stated import physics_of
 from cmm_uq.maths.inference.draws import Draws
 
@@ -165,14 +161,15 @@ def state_machine(
     since = with_drift(state, serial, job.facts.job.date, records, _where(job), kept=history)
     state = since.state
     stage("The machine's errors, given the recording of its calibration", 0.15)
-    more = further_certificates(job, stated.job, verify_further(job, rerun=rerun, trust=trust))
+    more = further_certificates(job, stated.job, verify_further(job, of_a_machine() if rerun else None, trust=trust))
     known = None if since.history is None else known_of(since.history)
     refuse_adjusted(more, known.adjusted if known else (), standing.date)
-    state, path, given, further, warned = _given(state, stated.job, more, known.change if known else None, seed)
+    state, path, given, further = given_recordings(state, stated.job, more, known.change if known else None, seed)
     standing = replace(
-        standing, path=path, drift=since.told, given_recording=given, changes=since.changes, further=further
+        standing, path=path, drift=since.told, given_recording=given, changes=since.changes, further=further.each
     )
-    told = [*warned, *machine_warnings(job, standing, stated.job), *readings_warnings(state.statements, state.scales)]
+    told = [*further.warnings, *machine_warnings(job, standing, stated.job)]
+    told += readings_warnings(state.statements, state.scales)
     if rerun and stated.not_again:
         told = [stated.not_again, *told]
     return StatedMachine(state, standing, stated.job, tuple(told), since.history)
@@ -208,7 +205,7 @@ def verified(job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None 
     if given.of_part:
         raise CmmUqError("is of a part, and states no machine", where=where,
                          fix="Give the certificate of the machine that measured the part")  # fmt: skip
-    return verify_given(given, examine_certificate, rerun=rerun, trust=trust)
+    return verify_given(given, partial(examine_certificate, computing=of_a_machine()), rerun=rerun, trust=trust)
 
 
 def _certified(job: PartJob, found: Verification, *, rerun: bool) -> _Stated:
@@ -364,37 +361,3 @@ def _machine(job: PartJob, calibrated: Job | None) -> Machine:
             raise CmmUqError(f"the machine's certificate says otherwise of how axis {axis} is read", where=f"{WHERE} axes",
                              fix="Leave it out, or mend the job that is wrong")  # fmt: skip
     return Machine(name, chain, travel, np.array(origin, dtype=np.float64), read_by=read_by)
-
-
-def _given(
-    state: MachineState, job: Job | None, more: Sequence[VerifiedCertificate], change: Change | None, seed: int
-) -> tuple[MachineState, Text, bool, tuple[FurtherCertificate, ...], tuple[Text, ...]]:
-    """The state given the recordings that are at hand; how its errors are drawn, in a sentence; what of further recordings."""
-    apart = say("errors that it did not model are each drawn on its own, which makes most uncertainties too large")
-    if job is None:
-        return state, say("The recording of the calibration is not at hand: {apart}.", apart=apart), False, (), ()
-    if not kind_of(job).by_effects:
-        told = say("The calibration is of another sort than one by named errors: {apart}.", apart=apart)
-        return state, told, False, (), ()
-    try:
-        whole, model = recording_of(job, seed)
-        estimate, count, curved = whole.estimate(), int(whole.used.sum()), with_curves(state)
-        sigma = float(np.sqrt(np.mean(state.noise.usual_mm**2))) or estimate.least_squares.sigma_of_residuals
-        doubt = doubt_of(whole, estimate, sigma, causes_of(whole.artefact, job.circumstances))
-        together = given_recording(curved, model, seed=seed, doubt=doubt)
-        together, further, warned = given_together(curved, together, model, doubt, more, change, seed)
-    except CmmUqError as error:
-        why = Verbatim(error.problem)
-        told = say("The errors could not be drawn given the recording ({why}): {apart}.", why=why, apart=apart)
-        return state, told, False, (), ()
-    text: Text = say(
-        "All errors are drawn together, given the recording of the calibration, those included that it did not model."
-    )
-    if together.scales:
-        text = after(text, say("Errors of each kind are as large as the recording shows that kind to be."))
-    if (some := int(model.used.sum())) < count:
-        text = after(text, say("{some} of its {count} observations are reckoned with.", some=some, count=count))
-    if used := [one for one in further if one.used]:
-        numbers = listed(names([one.number for one in used]))
-        text = after(text, say("The recordings of {certificates} are taken together with it.", certificates=numbers))
-    return together, text, True, further, warned

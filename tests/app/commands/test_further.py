@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import cmm_uq
+from cmm_uq.app.commands.certificates.further import VerifiedCertificate, refuse_adjusted
 from cmm_uq.app.commands.certificates.verify import verify
-from cmm_uq.app.commands.parts.further import VerifiedCertificate, refuse_adjusted
 from cmm_uq.app.commands.parts.machine import StatedMachine, refuse_machine, state_machine
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
 from cmm_uq.app.commands.reading import read_job
@@ -119,7 +119,7 @@ def test_what_a_further_certificate_shows_is_known_of_the_machine() -> None:
 @pytest.mark.long
 def test_a_certificate_of_a_machine_that_has_moved_is_told_and_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     """What the machine is said to have corrected while the gauge was measured makes it another one."""
-    monkeypatch.setattr("cmm_uq.app.commands.parts.further.CONTRADICTED", 1.1)
+    monkeypatch.setattr("cmm_uq.app.commands.certificates.further.CONTRADICTED", 1.1)
     found = state_machine(plate_of({**by_certificate(), **GAUGE}, **state("gauge.pdf")))
     (one,) = found.standing.further
     assert not one.used
