@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from io import StringIO
+from time import monotonic
 from typing import TYPE_CHECKING, Any, TextIO
 
 from rich.cells import cell_len
@@ -173,6 +174,20 @@ def tell(error: CmmUqError, code: int) -> None:
         print(text, file=sys.stderr, flush=True)  # noqa: T201
 
 
+ROOMY = 80  # columns from which on there is room for how long it will take
+SOON = 5.0  # s, before which nothing is said of how long a command will take
+
+
+def time_left(elapsed: float, part: float) -> str:
+    """How long a command that has done a part of its work will go on, in a few letters; nothing before that can be said."""
+    if elapsed < SOON or not 0.02 < part < 1.0:
+        return ""
+    left = elapsed * (1 - part) / part
+    if left < 90:
+        return f"~{left:.0f} s left"
+    return f"~{left / 60:.0f} min left" if left < 5400 else f"~{left / 3600:.1f} h left"
+
+
 @contextmanager
 def progress(*, quiet: bool, verbose: bool) -> Iterator[Stage]:
     """The stages of a command on standard error: a bar on a terminal; elsewhere a line each when asked for, else nothing.
@@ -186,19 +201,25 @@ def progress(*, quiet: bool, verbose: bool) -> Iterator[Stage]:
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
         from rich.table import Column
 
-        width = columns() // 6
-        column = Column(no_wrap=True, overflow="ellipsis", max_width=columns() - width - len(" 0:00:00 "))
+        width, times = columns() // 6, " 0:00:00 ~99 min left " if columns() >= ROOMY else " 0:00:00 "
+        column = Column(no_wrap=True, overflow="ellipsis", max_width=columns() - width - len(times))
         what, bar = TextColumn("{task.description}", markup=False, table_column=column), BarColumn(bar_width=width)
         console = Console(stderr=True)
 
         def silence() -> None:
             console.file = StringIO()
 
-        bars = Progress(what, bar, TimeElapsedColumn(), console=console, transient=True, redirect_stdout=False,
-                        redirect_stderr=False)  # fmt: skip
+        beside = [TimeElapsedColumn(), *([TextColumn("{task.fields[left]}")] if columns() >= ROOMY else [])]
+        bars = Progress(
+            what, bar, *beside, console=console, transient=True, redirect_stdout=False, redirect_stderr=False
+        )
         with speaking(silence), bars as shown:
-            task = shown.add_task("Starting", total=1.0)
-            yield lambda what, part: shown.update(task, description=what, completed=part)
+            task, begun = shown.add_task("Starting", total=1.0, left=""), monotonic()
+
+            def update(what: str, part: float) -> None:
+                shown.update(task, description=what, completed=part, left=time_left(monotonic() - begun, part))
+
+            yield update
     else:
         before: set[str] = set()
 

@@ -42,7 +42,7 @@ def opened(
 
     ``create``: whether a place that has nothing in it is made records.
     """
-    place = place_of(where, DEFAULT if out is None else beside(out.absolute()))
+    place = place_of(where, of_folder(out))
     if place is None or not (make or is_url(place) or Path(place).exists()):
         yield None
         return

@@ -17,7 +17,7 @@ from rich.cells import cell_len
 
 from cmm_uq.app.cli import terminal as encoding
 from cmm_uq.app.cli.summary import COLOURS, Layout
-from cmm_uq.app.cli.terminal import Line, folded, progress
+from cmm_uq.app.cli.terminal import Line, folded, progress, time_left
 from cmm_uq.app.commands.plan import plan_summary
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.units import Unit
@@ -180,3 +180,18 @@ def test_the_screen_in_the_documentation_is_what_is_printed() -> None:
     lines = [line.replace("\u00a0", " ") for line in text(screen("iota-1102-20C", 80))]
     assert shown.splitlines() == lines[: shown.count("\n")]
     assert shown.count("\n") > 5
+
+
+@pytest.mark.parametrize(
+    ("elapsed", "part", "told"),
+    [
+        (60.0, 0.25, "~3 min left"),  # three times as long again
+        (10.0, 0.5, "~10 s left"),
+        (3600.0, 0.25, "~3.0 h left"),
+        (4.0, 0.5, ""),  # of what is soon done nothing is said
+        (60.0, 0.01, ""),
+        (60.0, 1.0, ""),
+    ],
+)
+def test_how_long_it_will_go_on_is_told_by_what_is_done(elapsed: float, part: float, told: str) -> None:
+    assert time_left(elapsed, part) == told
