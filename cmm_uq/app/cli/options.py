@@ -199,7 +199,7 @@ ENDS = {
 }  # fmt: skip
 END, BRIEF, ONLY_JSON, FORCED = map(ending, ("quiet verbose json", "quiet json", "json", "force quiet verbose json"))
 _KEPT_IN = "Records that it is kept in: a file, a postgresql:// URL, or none."
-RECORDS = of_environment(_KEPT_IN, "WHERE", "--records", "CMM_UQ_RECORDS", "records.db beside the reports")
+RECORDS = of_environment(_KEPT_IN, "WHERE", "--records", "CMM_UQ_RECORDS", "reports/records.db")
 _READ = "The records: a file, or the URL of a PostgreSQL database."
 READ_RECORDS = option(None, _READ, "WHERE", "CMM_UQ_RECORDS, or reports/records.db", "--records")
 ON = option(None, "The day asked about; later recordings do not count.", "DATE", "today", "--on")

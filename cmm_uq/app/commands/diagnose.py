@@ -170,7 +170,7 @@ def write_diagnosis(
 
     Where further set-ups would tell more, ``next_plan.csv`` comes with them. ``against``: file of a simulation's prediction
     that the recording is compared with, whatever the job names; ``records``: file, URL, ``none``, or ``None`` for those of
-    the environment, else beside the folder.
+    the environment, else ``reports/records.db``.
     """
     read = in_language(read_job(job), language)
     if against is not None:

@@ -22,7 +22,7 @@ from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.content import certificate_content, folder_from, kind_of_entry
 from cmm_uq.laboratory.records.facts import KEY, Heads
-from cmm_uq.laboratory.records.place import DEFAULT, NONE, beside, is_url, place_of
+from cmm_uq.laboratory.records.place import NONE, is_url, of_folder, place_of
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.stated import physics_of, with_own_physics
@@ -146,7 +146,7 @@ class Form:
     ) -> Written[Outcome]:  # fmt: skip
         """Make sure of the folder, then compute, render and write, all or none, and record it with that.
 
-        ``records``: file or URL; ``none`` for none, ``None`` for those of the environment, else beside the folder.
+        ``records``: file or URL; ``none`` for none, ``None`` for those of the environment, else ``reports/records.db``.
         """
         fonts_of(job.facts.job.language)  # refused before anything is computed
         owner = self.owner(job)

@@ -15,7 +15,7 @@ APPLICATION = 0x434D4D55  # ``application_id`` of the SQLite file: CMMU
 ENVIRONMENT = "CMM_UQ_RECORDS"  # variable that names the records where no option does
 NONE = "none"  # in place of a file or URL: no records
 FILE = "records.db"
-DEFAULT = Path("reports") / FILE  # beside the folders of the reports
+DEFAULT = Path("reports") / FILE  # of the working folder
 
 
 def is_url(where: str | Path) -> bool:
@@ -34,6 +34,18 @@ def place_of(where: str | Path | None, default: Path = DEFAULT) -> str | Path | 
 def beside(folder: Path) -> Path:
     """The records beside a report's folder."""
     return folder.parent / FILE
+
+
+def of_folder(out: Path | None) -> Path:
+    """The records of a report, wherever it is written to: ``reports/records.db`` of the working folder.
+
+    Those beside its folder, which versions up to 0.15 made, go on where they are there; else they are only made where nothing
+    can be written in the working folder.
+    """
+    if out is None:
+        return DEFAULT
+    former, there = beside(out.absolute()), next(path for path in (DEFAULT, *DEFAULT.parents) if path.exists())
+    return former if former.is_file() or not os.access(there, os.W_OK) else DEFAULT
 
 
 def shown(where: str | Path) -> str:

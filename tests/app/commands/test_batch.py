@@ -131,14 +131,15 @@ def test_a_report_that_was_asked_for_in_another_language_is_made_again(
 @pytest.mark.usefixtures("canned")
 def test_every_report_is_recorded_with_its_files_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("CMM_UQ_RECORDS", raising=False)
+    monkeypatch.chdir(tmp_path)
     jobs, out = tmp_path / "jobs", tmp_path / "out"
     for name in "abc":
         small_job(jobs, name, "refuse" if name == "b" else "")
     asked = BatchOptions(workers=2, resume=True)
     found = write_batch([jobs], out, asked, records=None)
-    assert found.records == str(out / "records.db")
+    assert found.records == str(Path("reports") / "records.db")
     assert write_batch([jobs], out, asked, records=None).already == 2
-    with open_records(out / "records.db") as records:
+    with open_records(tmp_path / "reports" / "records.db") as records:
         kept = records.certificates(origin="simulated")
         assert sorted((one.job, Path(one.folder).name, one.values[0].value) for one in kept) == [
             ("a", "a", 1.5),

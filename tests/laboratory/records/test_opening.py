@@ -15,7 +15,7 @@ from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.laboratory.records import open_records, opening as openings
 from cmm_uq.laboratory.records.backup import migrate
 from cmm_uq.laboratory.records.opening import KNOWN, REVISION, engine_of
-from cmm_uq.laboratory.records.place import place_of, shown
+from cmm_uq.laboratory.records.place import of_folder, place_of, shown
 from tests.laboratory.records.histories import history, take_back
 
 AS_ROOT = hasattr(os, "geteuid") and os.geteuid() == 0
@@ -162,6 +162,20 @@ def test_the_option_goes_before_the_environment_and_the_environment_before_the_d
     assert place_of(None) is None
     with pytest.raises(CmmUqError, match="no records are asked for"):
         open_records()
+
+
+def test_the_records_are_in_one_place_whatever_out_is_and_former_ones_go_on(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert of_folder(None) == of_folder(Path("a/x")) == of_folder(tmp_path / "b" / "x") == Path("reports/records.db")
+    former = tmp_path / "b" / "records.db"
+    former.parent.mkdir()
+    open_records(former, create=True).close()
+    assert of_folder(tmp_path / "b" / "x") == former  # made beside the folder by a version up to 0.15
+    assert of_folder(tmp_path / "c" / "x") == Path("reports/records.db")
+    monkeypatch.setattr("os.access", lambda path, mode: False)
+    assert of_folder(tmp_path / "c" / "x") == tmp_path / "c" / "records.db"  # nothing can be written here
 
 
 def test_writers_at_the_same_time_make_one_chain(tmp_path: Path) -> None:

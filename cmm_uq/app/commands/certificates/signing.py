@@ -100,7 +100,7 @@ def sign_files(
 
     Gives the files that have a signature now, and the records that know of it, as they are shown; empty where none do.
     ``records`` that are told of it where the certificate is recorded in them: file, URL, ``none``, or ``None`` for those
-    of the environment, else beside the folder.
+    of the environment, else ``reports/records.db``.
     """
     folder = _folder_of(paths)
     if out is not None:

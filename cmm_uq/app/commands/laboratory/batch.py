@@ -278,8 +278,8 @@ def write_batch(
 ) -> Batch:  # fmt: skip
     """Report every job in folders and below them, as :func:`~cmm_uq.app.commands.report.write_report` reports one.
 
-    ``records``: that reports are recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside
-    them. Gives what came of it; a job that fails never stops the others.
+    ``records``: that reports are recorded in: file, URL, ``none``, or ``None`` for those of the environment, else
+    ``reports/records.db``. Gives what came of it; a job that fails never stops the others.
     """
     options, place = options or BatchOptions(), out or REPORTS
     if parquet is not None:
