@@ -145,7 +145,7 @@ class Cell:
     @property
     def key(self) -> tuple[int, ...]:
         """Seeds of its own."""
-        return SORTS.index(self.sort), *machines.Cell(self.artefact, self.noise, 0.0).key
+        return SORTS.index(self.sort), *machines.Cell(self.artefact.partition(" and ")[0], self.noise, 0.0).key
 
 
 CELLS = tuple(

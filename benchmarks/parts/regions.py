@@ -19,7 +19,9 @@ import numpy as np
 from benchmarks.coverage.measuring import counted, kept
 from benchmarks.parts import machines, truth
 from benchmarks.parts.curved import CELLS, SORTS, Cell, drawn, study
-from cmm_uq.analysis.machine.regions import factor_regions
+from cmm_uq.analysis.machine.conditional import further_recording, own_noise
+from cmm_uq.analysis.machine.recordings import ALONE, Beside, FurtherRecording
+from cmm_uq.analysis.machine.regions import factor_regions, other_errors
 from cmm_uq.app.commands.estimation import with_noise
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import noise_of
@@ -30,6 +32,7 @@ NOISE_MM, EACH = 0.7e-3, 9
 EVERY = (
     *CELLS,
     *(Cell(sort, artefact, "set-up") for artefact in ("step gauge", "bars") for sort in (SORTS[0], SORTS[-1])),
+    *(Cell(sort, one, "white") for one in ("bars", "bars and step gauge") for sort in (SORTS[0], SORTS[-1])),
 )
 KINDS = {"scale": slice(0, 3), "squareness": slice(3, 6)}
 ENDS = (((0.0, 1.0),) * 3, *product(((0.0, 0.5), (0.5, 1.0)), repeat=3))
@@ -64,7 +67,7 @@ def calibrated(
     cell: Cell, hidden: truth.Truth, random: np.random.Generator
 ) -> tuple[RecordingModel, NoisyPosterior, int]:
     """The machine calibrated with the cell's artefact and noise: the named model, its posterior, and a seed for more."""
-    one = machines.Cell(cell.artefact, cell.noise, 0.0)
+    one = machines.Cell(cell.artefact.partition(" and ")[0], cell.noise, 0.0)
     offset = NOISE_MM * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
     artefact = machines.calibrated(one, hidden, NOISE_MM, offset, random)
     model = RecordingModel(artefact, machines.NAMED, NOISE_MM if cell.noise == "stated" else None)
@@ -75,7 +78,13 @@ def calibrated(
 
 def _measured(cell: Cell, hidden: truth.Truth, random: np.random.Generator) -> list[list[float]]:
     model, posterior, seed = calibrated(cell, hidden, random)
-    regions = factor_regions(model, posterior, Doubt(()), lambda points: model.artefact, seed)
+    beside = ALONE
+    if further := cell.artefact.partition(" and ")[2]:  # calibrated on the same day with another artefact
+        errors = other_errors(model)
+        gauge = machines.calibrated(machines.Cell(further, cell.noise, 0.0), hidden, NOISE_MM, 0.0, random)
+        first = FurtherRecording(model, own_noise(model, errors, seed))
+        beside = Beside((further_recording(first, RecordingModel(gauge, machines.NAMED), errors, seed),))
+    regions = factor_regions(model, posterior, Doubt(()), lambda points: model.artefact, seed, beside)
     whole, *eighths = (factors(hidden, ends) for ends in ENDS)
     rows = []
     for i, name in enumerate(truth.SIX):

@@ -119,7 +119,9 @@ class RecordedField:
     def coefficients(self, sizes: Sizes, scales: Floats, random: np.random.Generator) -> Floats:
         """Exact draws (N, k + f) of the calibration's effects, then of what it left out, for N sizes of noise and families."""
         drawn, start = self.field.draw(sizes, scales, random), len(self.field.linear.unknowns)
-        return np.hstack([drawn[:, : self.modelled], drawn[:, start : start + len(self.sd)] * self.sd])
+        others = drawn[:, start : start + len(self.sd)]
+        others *= self.sd
+        return np.hstack([drawn[:, : self.modelled], others])
 
 
 def _readings(points: Iterable[Points], effect: PeriodicScale) -> Floats:

@@ -21,7 +21,7 @@ from itertools import product
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes.cause import Drawn, PartCause
+from cmm_uq.analysis.parts.causes.cause import Drawn, PartCause, Rows
 from cmm_uq.analysis.parts.causes.machine import MACHINE, NOISE, STYLUS
 from cmm_uq.analysis.parts.causes.surroundings import FIXTURE, FORM, OPERATOR, ROUNDING, TEMPERATURE
 from cmm_uq.analysis.parts.plan import PartPose, Plan
@@ -170,9 +170,7 @@ def variance_shares(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Vari
     # the second sample stands in other places, so that nothing of it is that of the first
     elsewhere = [places[i] for i in random.permutation(len(places))]
     several = [cause for cause in causes if len(set(cause.factors)) > 1]
-    # filled block by block: with thousands of coefficients, lists of blocks would be held twice when they are joined
-    drawn, found = [np.empty((each * len(places), len(cause.factors))) for cause in several], list[list[Floats]]()
-    filled = 0
+    drawn, found = [list[Drawn]() for _ in several], list[list[Floats]]()
     for part in in_parts(virtual.plan, each):
         A = [place.drawn(random, part) for place in places]
         B = [place.drawn(random, part) for place in places]
@@ -187,8 +185,7 @@ def variance_shares(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Vari
         ])  # fmt: skip
         by_cause = zip(causes, zip(*A, strict=True), strict=True)
         for whole, own in zip(drawn, (own for cause, own in by_cause if cause in several), strict=True):
-            np.concatenate(own, out=whole[filled : filled + part * len(places)])
-        filled += part * len(places)
+            whole += own
     yA, yB, *mixed = (np.concatenate(each) for each in zip(*found, strict=True))
     both = np.vstack([yA, yB])
     variance = np.maximum(both.var(axis=0), np.finfo(np.float64).tiny)
@@ -204,14 +201,16 @@ def _errors(places: Sequence[AtPose], coefficients: Sequence[Sequence[Drawn]], e
     return np.concatenate([place.errors(given, exact=exact) for place, given in zip(places, coefficients, strict=True)])
 
 
-def _within(causes: Sequence[PartCause], drawn: Sequence[Floats], y: Floats) -> tuple[tuple[str, ...], Floats]:
+def _within(causes: Sequence[PartCause], drawn: Sequence[Sequence[Drawn]], y: Floats) -> tuple[tuple[str, ...], Floats]:
     """Names of factors of causes, and their shares (f, c)."""
     names, shares = list[str](), list[Floats]()
     centred = y - y.mean(axis=0)
     variance = np.maximum(y.var(axis=0), np.finfo(np.float64).tiny)
-    for cause, coefficients in zip(causes, drawn, strict=True):
+    for cause, blocks in zip(causes, drawn, strict=True):
         for factor in dict.fromkeys(cause.factors):
-            own = coefficients[:, [i for i, name in enumerate(cause.factors) if name == factor]]
+            columns = np.flatnonzero([name == factor for name in cause.factors])
+            each = [one.of(columns) if isinstance(one, Rows) else one[:, columns] for one in blocks]
+            own = np.asfortranarray(np.concatenate(each))
             own -= own.mean(axis=0)
             explained = own @ np.linalg.lstsq(own, centred, rcond=None)[0]
             chance = own.shape[1] / len(own)  # what as many columns explain of anything

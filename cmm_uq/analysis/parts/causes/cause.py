@@ -49,6 +49,10 @@ class Rows:
     def __len__(self) -> int:
         return len(self.rows)
 
+    def of(self, columns: Ints) -> Floats:
+        """(N, k) of some coefficients."""
+        return np.asarray(self.table[np.ix_(self.rows, columns)])
+
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Floats:
         return np.asarray(self.table[self.rows], dtype=dtype)
 
