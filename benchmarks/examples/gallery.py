@@ -2,6 +2,9 @@
 
     python -m benchmarks.examples.gallery [KIND ...]
 
+Besides, for the README and the first page of the documentation: of the ballbar all pages of its certificate as one picture,
+and figures of Python.
+
 The artefact stands where a plan would put it first; a kind that is not planned is shown by its main figure. Needs pdftoppm.
 """
 
@@ -14,7 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from PIL import Image
+from PIL import Image, ImageDraw
 
 import cmm_uq
 
@@ -22,6 +25,7 @@ ROOT = Path(__file__).parents[2]
 PICTURES = ROOT / "docs" / "images" / "gallery"
 DOTS_PER_INCH = 60
 COLOURS = 24
+CERTIFICATE, HEIGHT, GAP = ROOT / "docs" / "images" / "certificate.png", 720, 8  # all pages of one, px
 LARGEST_BYTES = 60_000
 EXAMPLES = {
     "ballbar": "iota-1102-20C",
@@ -42,6 +46,7 @@ EXAMPLES = {
     "error_map": "iota-1102-maps",
     "part": "part-plate-simulated",
 }
+FIGURES = {"ballbar": "ranking", "step_gauge": "trumpet"}
 PLANNED = {"ballbar": "plan-ballbar", "step_gauge": "plan-step-gauge"}  # jobs that have no recording yet
 LENGTHS = {"bryan": "\n[plan]\nlength_mm = 300.0\n", "gauge_blocks": "\n[plan]\nlengths_mm = [100.0, 300.0, 500.0]\n"}
 NOT_PLANNED = ("plate_two_dates", "scanned_planes", "shift_plate", "error_map", "part")
@@ -59,6 +64,8 @@ def first_page(kind: str, folder: Path) -> None:
         cmm_uq.report(ROOT / "examples" / EXAMPLES[kind]).write(folder)
     (pdf,) = (*folder.glob("certificate*.pdf"), *folder.glob("part*.pdf"))
     first_page_of(pdf, PICTURES / f"{kind}.png")
+    if kind == "ballbar":
+        every_page_of(pdf, CERTIFICATE)
 
 
 def first_page_of(pdf: Path, target: Path) -> None:
@@ -66,6 +73,34 @@ def first_page_of(pdf: Path, target: Path) -> None:
     picture = ["-r", str(DOTS_PER_INCH), "-f", "1", "-l", "1", "-png", "-singlefile"]
     subprocess.run(["pdftoppm", *picture, str(pdf), str(target.with_suffix(""))], check=True)
     Image.open(target).quantize(COLOURS).save(target, optimize=True)
+
+
+def every_page_of(pdf: Path, target: Path) -> None:
+    """A whole certificate as one picture: its first page large, the others beside it, in few colours."""
+    with tempfile.TemporaryDirectory() as name:
+        for size, root in ((HEIGHT, "large"), (HEIGHT // 2 - GAP // 2, "small")):
+            subprocess.run(["pdftoppm", "-scale-to", str(size), "-png", str(pdf), str(Path(name) / root)], check=True)
+        first = Image.open(sorted(Path(name).glob("large*"))[0])
+        others = [Image.open(path) for path in sorted(Path(name).glob("small*"))[1:]]
+        width, height = others[0].size
+        columns = -(-len(others) // 2)
+        sheet = Image.new("RGB", (first.width + columns * (width + GAP) + 2, HEIGHT + 2), "white")
+        places = [(0, 0, first)] + [
+            (first.width + GAP + (i % columns) * (width + GAP), (i // columns) * (height + GAP), page)
+            for i, page in enumerate(others)
+        ]
+        for left, top, page in places:
+            sheet.paste(page, (left + 1, top + 1))
+            ImageDraw.Draw(sheet).rectangle(
+                (left, top, left + page.width + 1, top + page.height + 1), outline="#c3ccd0"
+            )
+        sheet.quantize(COLOURS).save(target, optimize=True)
+
+
+def figure(kind: str, name: str) -> None:
+    target = CERTIFICATE.with_name(f"{name}.png")
+    cmm_uq.report(ROOT / "examples" / EXAMPLES[kind]).plot(name).savefig(target, dpi=110)
+    Image.open(target).convert("RGB").quantize(2 * COLOURS).save(target, optimize=True)
 
 
 def placings(kind: str, folder: Path) -> None:
@@ -94,6 +129,8 @@ def main(kinds: list[str]) -> None:
         with tempfile.TemporaryDirectory() as name:
             first_page(kind, Path(name))
             placings(kind, Path(name))
+        if kind in FIGURES:
+            figure(kind, FIGURES[kind])
         sizes = {path.name: path.stat().st_size for path in sorted(PICTURES.glob(f"{kind}.*"))}
         assert max(sizes.values()) <= LARGEST_BYTES, sizes
         print(kind, sizes)
