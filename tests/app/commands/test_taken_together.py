@@ -126,7 +126,7 @@ def test_what_is_simulated_from_a_job_has_none() -> None:
 
 
 @pytest.mark.long
-def test_a_report_of_several_recordings_is_computed_again_to_the_byte_and_an_altered_one_inside_is_found(
+def test_a_report_of_several_recordings_is_computed_again_to_the_byte_with_those_inside(
     tmp_path: Path,
 ) -> None:
     files = beside(PLATE, gauge=certificate(read_job(GAUGE)))
@@ -135,6 +135,7 @@ def test_a_report_of_several_recordings_is_computed_again_to_the_byte_and_an_alt
     assert b"taken together with it" in made["certificate-simulated.html"]
     found = verify([put(tmp_path / "good", made) / "certificate-simulated.pdf"])
     assert not found.inquiry.findings, found.inquiry.findings
+    assert found.inquiry.word == "VERIFIED"
 
 
 @pytest.mark.long

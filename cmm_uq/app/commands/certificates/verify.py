@@ -24,7 +24,8 @@ def verify(
     def examine(inquiry: Inquiry, given: Given) -> Examined:
         if not given.of_part:
             found = verification.examine_certificate(inquiry, given, again.of_a_machine(compute, stage))
-            for name, inner in verify_further(found[0]) if found and found[0] else ():
+            computing = again.of_a_machine() if rerun else None
+            for name, inner in verify_further(found[0], computing) if found and found[0] else ():
                 verification.merge(inquiry, inner.inquiry, name)
             return found
         from cmm_uq.app.commands.certificates.verify_part import compare_part, part_again
