@@ -315,7 +315,7 @@ SHIFT = Kind(
     begin_also={"shift_plate": f"{_HERE}.shift.beginning:PLANE_SHIFTED"},
     check=f"{_HERE}.shift.analysis:refuse_unfit", own=f"{_HERE}.shift.analysis:OWN",
     refusal="a shift job cannot be {}: its machine error is a free function, no list of effects",
-    instead="cmm-uq report JOB estimates it", tested=("linearity",),
+    instead="cmm-uq report JOB estimates it", tested=("linearity", "straightness", "squareness"),
 )  # fmt: skip
 
 

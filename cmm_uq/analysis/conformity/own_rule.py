@@ -26,9 +26,9 @@ from cmm_uq.analysis.conformity.uncertainty import (
     temperatures,
     u_of_repeats,
 )
-from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, signed
 from cmm_uq.base.points import Points
-from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import ArtefactFigure, Indications
 
@@ -78,8 +78,19 @@ FIGURES: Mapping[str, tuple[Text, Text, tuple[str, ...]]] = {
         REPEAT_LINES,
     ),
     "linearity": (say("linearity error of the axis, peak to valley"), say("curves"), EVALUATED),
+    "straightness": (
+        say("straightness of a motion, peak to valley, worst against its limit"),
+        say("curves"),
+        EVALUATED,
+    ),
+    "squareness": (
+        say("squareness of two axes, as an arc over the shorter of their travels"),
+        say("angles"),
+        EVALUATED,
+    ),
 }
-SIGNED = ("error", "mean error", "angle error")
+ANGLES = ("angle error", "squareness")
+SIGNED = ("error", "mean error", *ANGLES)
 _UNSTATED = {EVALUATED: "u_coordinate_um", LENGTH_LINES: "u_um", REPEAT_LINES: "u_repeat_um", FORM_LINES: "form_um"}
 
 
@@ -113,6 +124,7 @@ def decided(test: Test, *, name: str) -> Statement:
             measurement=int(of[i, 0]) if one[i] else None,
             repeat=int(repeats[i, 0]) if one[i] and same[i] else None,
             length_mm=float(found.lengths[i]),
+            position=found.names[i] if found.names else NOTHING,
             set_aside=bool(aside[i]),
         )
         for i in range(len(found.values))
@@ -124,6 +136,16 @@ def decided(test: Test, *, name: str) -> Statement:
         degrees = REFERENCE_TEMPERATURE if recorded is None else float(recorded[i])
         budget = length_budget(float(found.lengths[i]), float(found.u[i]), degrees, test.circumstances)
     remarks = [_SAID[lines] if worst.u_um > 0 else NOT_STATED]
+    if test.facts.limit_arcsec is not None and worst.length_mm:
+        arc = worst.length_mm * ARCSECOND / MICROMETRE  # µm of one arcsecond
+        remarks.append(
+            say(
+                "As an angle this is {value} ″ with U = {U} ″ (k = 2), against {limit} ″.",
+                value=signed(worst.error_um / arc, ".3g"),
+                U=number(2 * worst.u_um / arc, ".2g"),
+                limit=number(test.facts.limit_arcsec, "g"),
+            )
+        )
     return test.stated(quantity, measured, items, remarks, signed=name in SIGNED,
                        causes=causes if len(items) > 1 else None, budget=budget)  # fmt: skip
 
@@ -212,6 +234,7 @@ STANDARD = Standard(
             asks=enough,
             needs="u_repeat_um" if lines == REPEAT_LINES else None,
             lines=lines,
+            angle=name in ANGLES,
         )
         for name, (_, _, lines) in FIGURES.items()
     ),

@@ -18,7 +18,7 @@ from cmm_uq.analysis.conformity.statement import Clause, Decided, Statement, cla
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.jobs.recording.beside import ShortGauge
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts, TestUncertainty, needed
@@ -60,6 +60,7 @@ class Characteristic:
     # how a short gauge recorded beside the artefact enters; not at all where left out
     beside: Callable[[Artefact, ShortGauge | None], Artefact] | None = None
     lines: tuple[str, ...] = ()  # of the test uncertainty that apply; see cmm_uq.analysis.conformity.uncertainty
+    angle: bool = False  # whether its values are arcs over their lengths, so that it may have a limit in arcsec
 
 
 @dataclass(frozen=True)
@@ -143,8 +144,10 @@ class Test:
         return found
 
     def limits_um(self, lengths_mm: Floats) -> Floats:
-        """The limit of each of some lengths (m,), µm: ``limit_um``, A + L/K, B, or the lesser of these two."""
-        mpe = self.facts.mpe
+        """The limit of each of some lengths (m,), µm: ``limit_um``, an arc, A + L/K, B, or the lesser of these two."""
+        mpe, angle = self.facts.mpe, self.facts.limit_arcsec
+        if angle is not None:
+            return np.asarray(angle * ARCSECOND * lengths_mm / MICROMETRE, dtype=np.float64)
         if mpe is None:
             return np.full(len(lengths_mm), self.facts.limit_um, dtype=np.float64)
         most = np.full(len(lengths_mm), np.inf if mpe.b_um is None else mpe.b_um)

@@ -15,12 +15,13 @@ import numpy as np
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.artefacts.kinds import KnownLength, ShiftFacts
 from cmm_uq.artefacts.shift import result as shared
-from cmm_uq.artefacts.shift.decisions import decided, refuse_undecidable
+from cmm_uq.artefacts.shift.decisions import OF_AN_AXIS, decided, figure_of, refuse_undecidable
 from cmm_uq.artefacts.shift.integration import IntegratedCurve, KnownSpan, Method, integrated
 from cmm_uq.artefacts.shift.result import Curve, Reported, ShiftFound
 from cmm_uq.artefacts.shift.series import RepeatedDrift, ShiftedSeries, Undetermined, shifted_series, undetermined
 from cmm_uq.artefacts.shift.smooth import FINEST, SmoothFunction, SmoothModel, sampled
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import NOTHING
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import HOUR, MICROMETRE, PPM, unit
 from cmm_uq.jobs.job import Job
@@ -257,7 +258,10 @@ class ShiftResult(ShiftFound):
 
     @cached_property
     def statements(self) -> tuple[Statement, ...]:
-        return decided(self.job, self.linearity, float(np.ptp(self.estimate.series.span)))
+        found = [(self.linearity, MICROMETRE, NOTHING)]
+        return decided(
+            self.job, {OF_AN_AXIS: figure_of(self.job.points, found, [float(np.ptp(self.estimate.series.span))])}
+        )
 
     @cached_property
     def reported(self) -> Reported:

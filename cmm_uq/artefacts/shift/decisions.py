@@ -1,6 +1,8 @@
-"""The linearity error of a shifted axis against the limits of a laboratory."""
+"""Errors of a shifted axis, or of the two axes of a plane, against the limits of a laboratory."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,22 +12,23 @@ from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.artefacts.kinds import SHIFT
 from cmm_uq.artefacts.shift.result import shift_facts
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Verbatim
+from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
+OF_AN_AXIS = "linearity"
+
 
 class ShiftedReadings(Artefact):
-    """The recording of an axis with what its curve comes to, for decisions: no list of effects moves its points."""
+    """The recording with what its curves and angles come to, for decisions: no list of effects moves its points."""
 
     kind = "shift"
     title = Verbatim("shift")
 
-    def __init__(self, points: Points, linearity: ArtefactFigure) -> None:
-        self.points, self._linearity = points, linearity
+    def __init__(self, points: Points, figures: Mapping[str, ArtefactFigure]) -> None:
+        self.points, self._figures = points, figures
         self.sizes, self.noise_scale, self.rows = (), np.ones(len(points)), np.arange(len(points))[:, None]
         self.measurement, self.repeat = points.measurement, points.repeat
 
@@ -38,17 +41,25 @@ class ShiftedReadings(Artefact):
     def size_change(self) -> Floats:
         return np.zeros((len(self.rows), 0))
 
-    def figures(self, counts: NDArray[np.bool_]) -> dict[str, ArtefactFigure]:
-        return {"linearity": self._linearity}
+    def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
+        return self._figures
 
 
-def decided(job: Job, linearity: Quantity, span_mm: float) -> tuple[Statement, ...]:
-    """What the job wishes of a linearity error, µm: u is half the longer side of its interval."""
-    low, high = linearity.interval95
-    value = MICROMETRE * np.array([linearity.value])
-    u = MICROMETRE * np.array([0.5 * max(linearity.value - low, high - linearity.value)])
-    figure = ArtefactFigure(value, np.arange(len(job.points))[None], np.array([span_mm]), u)
-    readings = ShiftedReadings(job.points, figure)
+def figure_of(
+    points: Points, each: Sequence[tuple[Quantity, float, Text]], lengths_mm: Sequence[float]
+) -> ArtefactFigure:
+    """Some quantities, each with its unit in mm and what it is of: u is half the longer side of its interval."""
+    size = np.array([mm for _, mm, _ in each])
+    value = np.array([found.value for found, _, _ in each])
+    ends = np.array([found.interval95 for found, _, _ in each]).reshape(-1, 2)
+    u = 0.5 * np.maximum(value - ends[:, 0], ends[:, 1] - value)
+    rows = np.tile(np.arange(len(points)), (len(each), 1))
+    return ArtefactFigure(size * value, rows, np.array(lengths_mm), size * u, tuple(name for _, _, name in each))
+
+
+def decided(job: Job, figures: Mapping[str, ArtefactFigure]) -> tuple[Statement, ...]:
+    """What the job wishes of these figures."""
+    readings = ShiftedReadings(job.points, figures)
     return tuple(
         statement(wish, readings, {}, f"[[conformity]] {i}", SHIFT.tested, None, job.circumstances)
         for i, wish in enumerate(job.facts.conformity, 1)
@@ -56,8 +67,10 @@ def decided(job: Job, linearity: Quantity, span_mm: float) -> tuple[Statement, .
 
 
 def refuse_undecidable(job: Job) -> None:
-    if job.facts.conformity and shift_facts(job).plane is not None:
-        raise CmmUqError("no rule here decides on errors of a plane", where="job.toml [[conformity]]",
-                         fix="Leave it out; the certificate states the errors with their uncertainty")  # fmt: skip
     for i, wish in enumerate(job.facts.conformity, 1):
-        decidable(wish, SHIFT.name, f"[[conformity]] {i}", SHIFT.tested, job.circumstances)
+        _, characteristic = decidable(wish, SHIFT.name, f"[[conformity]] {i}", SHIFT.tested, job.circumstances)
+        if shift_facts(job).plane is None and characteristic.name != OF_AN_AXIS:
+            raise CmmUqError(
+                f"the {characteristic.name} is none of an axis by itself", where=f"job.toml [[conformity]] {i} characteristic",
+                fix=f'Decide "{OF_AN_AXIS}", or shift a plate in a plane',
+            )  # fmt: skip

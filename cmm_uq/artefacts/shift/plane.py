@@ -12,18 +12,21 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.artefacts.kinds import KnownLength
 from cmm_uq.artefacts.shift import result as shared
 from cmm_uq.artefacts.shift.axis import check_facts, check_known, known_points
+from cmm_uq.artefacts.shift.decisions import decided, figure_of
 from cmm_uq.artefacts.shift.integration import KnownSpan
 from cmm_uq.artefacts.shift.placed_plate import PlacedPlate, placed_plate
-from cmm_uq.artefacts.shift.plane_model import FreeInPlane, PlaneModel, free_in_plane, plane_model
+from cmm_uq.artefacts.shift.plane_model import FreeInPlane, PlaneModel, free_in_plane, plane_model, title
 from cmm_uq.artefacts.shift.result import Curve, Reported, ShiftFound
 from cmm_uq.artefacts.shift.smooth import sampled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, Unit, unit
 from cmm_uq.jobs.job import Job
+from cmm_uq.machine.model.artefact import ArtefactFigure
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.machine.physics.error_map import ErrorMap
 from cmm_uq.machine.physics.kinematics import carried_offset
@@ -220,6 +223,19 @@ class PlaneShiftResult(ShiftFound):
         for name, sized in self._sized.items():
             found.setdefault(name, {})[PEAK_TO_VALLEY] = shared.peak_to_valley(sized)
         return {name: self.stating.all(name, quantities) for name, quantities in found.items()}
+
+    @cached_property
+    def statements(self) -> tuple[Statement, ...]:
+        spans = [float(np.ptp(x)) for x in self.estimate.positions]
+        square, found = SQUARENESS[self.plane], dict[str, ArtefactFigure]()
+        for figure, names in (("linearity", list(self.curves)[:2]), ("straightness", list(self.curves)[2:])):
+            known = [i for i, name in enumerate(names) if PEAK_TO_VALLEY in self.scalars.get(name, {})]
+            each = [(self.scalars[names[i]][PEAK_TO_VALLEY], MICROMETRE, title(names[i])) for i in known]
+            found[figure] = figure_of(self.job.points, each, [spans[i] for i in known])
+        if angle := self.scalars.get(square.name, {}).get("angle_arcsec"):
+            arm = min(spans)
+            found["squareness"] = figure_of(self.job.points, [(angle, ARCSECOND * arm, title(square.name))], [arm])
+        return decided(self.job, found)
 
     @cached_property
     def reported(self) -> Reported:

@@ -103,6 +103,8 @@ def named(statement: Statement) -> Text:
 def formula(facts: ConformityFacts) -> Text:
     """The maximum permissible error as the job states it; L in mm, the result in µm."""
     mpe = facts.mpe
+    if facts.limit_arcsec is not None:
+        return say("{limit} ″", limit=limit_in_full(facts.limit_arcsec))
     if mpe is None:
         return say("{limit} µm", limit=limit_in_full(facts.limit_um or 0.0))
     if mpe.a_um is None or mpe.k is None:
@@ -115,11 +117,13 @@ def formula(facts: ConformityFacts) -> Text:
 
 def _limit(statement: Statement) -> Text:
     here = say("{limit} µm", limit=limit_in_full(statement.limit_um))
-    if statement.facts.mpe is None:
+    if statement.facts.mpe is None and statement.facts.limit_arcsec is None:
         return here
     length = statement.named.length_mm
     if length is not None:
         here = say("{limit} at L = {length} mm", limit=here, length=nominal(length))
+    if statement.facts.limit_arcsec is not None:
+        return say("{here}; {formula}", here=here, formula=formula(statement.facts))
     return say("{here}; MPE = {formula}", here=here, formula=formula(statement.facts))
 
 

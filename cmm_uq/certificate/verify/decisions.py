@@ -27,6 +27,7 @@ from cmm_uq.analysis.conformity.limits import Limits, accepted_by, outcome_of
 from cmm_uq.analysis.conformity.standards import BUILT_IN
 from cmm_uq.analysis.conformity.statement import Decided, Statement
 from cmm_uq.base.messages import NOTHING, Verbatim
+from cmm_uq.base.units import ARCSECOND, MICROMETRE
 from cmm_uq.certificate.verify.figures import Wrong, inside_of, is_zone
 from cmm_uq.certificate.verify.given import Inquiry
 from cmm_uq.jobs.tables import conformity as table
@@ -131,9 +132,15 @@ def _error(error: Mapping[str, Any], decided: Decided, entry: Mapping[str, Any])
         yield "probability_conforming", "does not follow from value, uncertainty and limit", stands, should
     if not _same(error["guard_band_um"], decision.guard_band, error["limit_um"]):
         yield "guard_band_um", "does not follow from the rule", error["guard_band_um"], decision.guard_band
-    limit = _limit(entry["mpe"], error["length_mm"])
+    angle = entry.get("limit_arcsec")
+    limit = (
+        _limit(entry["mpe"], error["length_mm"])
+        if angle is None
+        else angle * ARCSECOND * error["length_mm"] / MICROMETRE
+    )
     if limit is not None and not _same(error["limit_um"], limit):
-        yield "limit_um", "does not follow from the maximum permissible error", error["limit_um"], f"{limit:.10g}"
+        what = "maximum permissible error" if angle is None else "limit of the angle"
+        yield "limit_um", f"does not follow from the {what}", error["limit_um"], f"{limit:.10g}"
 
 
 def _limit(mpe: Any, length: float | None) -> float | None:

@@ -123,8 +123,7 @@ class TestUncertainty(JobTable):
     u_fixturing_um: Uncertainty = key(0.0, "Standard uncertainty of a length by what the clamping does to it.")
     u_form_um: Uncertainty = key(0.0, "Standard uncertainty of the calibrated form deviation of a test sphere.")
     u_repeat_um: Uncertainty = 0.0
-    """Standard uncertainty of a range or difference of repeated readings, by what of the artefact changed between
-    them."""
+    """Standard uncertainty of a range or difference of repeated readings, by what of the artefact changed between."""
     negligible: NegligibleLines = key(NegligibleLines(), "Lines that are declared negligible, by whom and why.")
     machine: MachineLines = key(MachineLines(), "Lines that are declared the machine's own, by whom and why.")
 
@@ -282,6 +281,7 @@ class ConformityFacts(JobTable):
     """Which of the standard's characteristics, where it has several: E0, R0, E150, P_FTU …, or a figure of the laboratory's
     own rule: span, error, flatness …; the first where it is left out."""
     limit_um: Limit | None = key(None, "Limit of the quantity.")
+    limit_arcsec: Positive | None = key(None, "Limit of a figure that is an angle, decided as an arc over its length.")
     mpe: Permissible | None = None
     """Maximum permissible error: `"3 + L/300"` (L in mm, the error in µm), or a table of `a_um`, `k`, `b_um`."""
     rule: Rule = key("ISO 14253-1", "Decision rule, by name or by its figure.")
@@ -315,8 +315,8 @@ class ConformityFacts(JobTable):
         return data
 
     def problems(self) -> Iterator[str]:
-        if (self.limit_um is None) == (self.mpe is None):
-            yield 'give either limit_um, or mpe = "3 + L/300" with L in mm and the error in µm'
+        if sum(limit is not None for limit in (self.limit_um, self.limit_arcsec, self.mpe)) != 1:
+            yield 'give either limit_um, or mpe = "3 + L/300" with L in mm and the error in µm, or of an angle limit_arcsec'
         if needs_prior(self.rule) and self.prior is None:
             yield (
                 f"the rule {_key_of(self.rule)} goes by what is known of such machines beforehand: "

@@ -61,6 +61,7 @@ class ArtefactFigure:
     lengths: Floats  # (m,) length that each belongs to, mm
     # (m,) standard uncertainty by the certificate, mm; ``None``: it cancels, and what of the artefact changes remains
     u: Floats | None = None
+    names: tuple[Text, ...] = ()  # m, what each is of, where it is of no measurement
 
 
 def figures_of_errors(found: Indications) -> dict[str, ArtefactFigure]:

@@ -232,7 +232,23 @@ def curve(how: str) -> Made:
     points = numbered(xyz, how, 1, 4)
     figure = ArtefactFigure(np.array([27e-3]), np.arange(len(points))[None], np.array([300.0]), np.array([0.4e-3]))
     asked = CompleteTest(measurements=3, repeats=1, points=4)
-    return ShiftedReadings(points, figure), STATED, 27.0, 0.4, False, asked
+    return ShiftedReadings(points, {"linearity": figure}), STATED, 27.0, 0.4, False, asked
+
+
+def of_plane(figure: str, value_um: float, u_um: float) -> Callable[[str], Made]:
+    """A figure of each of two axes, or of the angle between them, beside one of half the size; four placings of nine balls."""
+
+    def made(how: str) -> Made:
+        balls = np.array([[100.0 * (i % 3), 100.0 * (i // 3), -300.0] for i in range(9)])
+        xyz = np.vstack([balls + np.array([20.0 * j, 15.0 * j, 1e-4 * j]) for j in range(4)])
+        points = numbered(xyz, how, 1, 9)
+        size = np.array([0.5, 1.0])[1 if figure == "squareness" else 0 :]
+        rows = np.tile(np.arange(len(points)), (len(size), 1))
+        found = ArtefactFigure(value_um * 1e-3 * size, rows, np.array([420.0, 380.0])[-len(size) :], u_um * 1e-3 * size)
+        asked = CompleteTest(measurements=4, repeats=1, points=9)
+        return ShiftedReadings(points, {figure: found}), STATED, value_um, u_um, figure == "squareness", asked
+
+    return made
 
 
 OWN: Mapping[str, Callable[[str], Made]] = {
@@ -243,4 +259,6 @@ OWN: Mapping[str, Callable[[str], Made]] = {
     "flatness": surface,
     "closure": attitudes,
     "linearity": curve,
+    "straightness": of_plane("straightness", 4.0, 0.1),
+    "squareness": of_plane("squareness", -9.0, 0.5),
 }  # fmt: skip

@@ -289,9 +289,9 @@ def _tables(kind: Kind, begin: Beginning, given: Tables, id: str, origin: Origin
         whole[table] = [{**begun, **keys}] if listed else {**begun, **keys}
     if "U_um" in given.get("artefact", {}):
         whole["artefact"].pop("u_um", None)
-    for one, other in (("limit_um", "mpe"), ("mpe", "limit_um")):
-        if one in conformity and other not in conformity:
-            whole["conformity"][0].pop(other, None)
+    limits = {"limit_um", "limit_arcsec", "mpe"}
+    for other in limits - set(conformity) if limits & set(conformity) else ():
+        whole["conformity"][0].pop(other, None)
     return whole
 
 
