@@ -26,7 +26,7 @@ MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.pr
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
     "": 140, "base": 2_735, "maths": 10_852, "jobs": 13_150, "machine": 6_747, "analysis": 19_470, "laboratory": 14_120,
-    "certificate": 16_263, "artefacts": 11_606, "app": 15_095,
+    "certificate": 16_263, "artefacts": 11_606, "app": 15_113,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1495

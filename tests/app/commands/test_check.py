@@ -317,3 +317,14 @@ def test_a_file_in_the_place_of_a_job_is_answered_with_what_to_do(tmp_path: Path
     with pytest.raises(CmmUqError, match=told):
         read_job(tmp_path / name)
     assert told in str(check_job(tmp_path / name).problems[0])
+
+
+def test_what_a_certificate_lacks_is_told_in_one_line_with_every_key() -> None:
+    found = check_job(ROOT / "examples" / "iota-1102-20C")
+    lacking = [one for one in found.warnings if one.problem.startswith("not stated: ")]
+    (told,) = [line for line in found.lines[1] if "not stated: " in line]
+    assert len(lacking) > 5
+    assert len(found.lines[1]) == len(found.warnings) - len(lacking) + 1
+    for one in lacking:
+        table, _, key = one.key.partition(" ")
+        assert re.search(rf"{re.escape(table)} [^;]*\b{key}\b", told)

@@ -41,6 +41,7 @@ _PLACE = re.compile(
 _KEY_BEHIND = re.compile(r"(?P<file>\S.*?\.toml) (?P<key>\[.*)", re.DOTALL)
 """Where a message names the key behind the file without a colon."""
 
+_NOT_STATED = "not stated: "
 _ROWS = (".csv", ".txt", ".tsv")  # of a file whose lines are rows
 _TABLE_KEY = re.compile(r"\[+([^\]]+)\]+ ?([\w.]*)")
 
@@ -76,12 +77,29 @@ class Problem:
 
 
 def in_lines(problems: Sequence[Problem]) -> tuple[str, ...]:
-    """Each in a line; those that say the same of several rows of a file, but for what stands there, in one with the rows."""
+    """Each in a line; in one those that say the same of several rows of a file, and what a certificate lacks."""
     together: dict[object, list[Problem]] = {}
     for one in problems:
-        alike = (one.file, one.key, re.sub(r"'[^']*'|[\d.]+", "…", one.problem), one.fix)
-        together.setdefault(alike if one.line and one.file.endswith(_ROWS) else one, []).append(one)
-    return tuple(str(each[0]) if len(each) == 1 else _of_rows(each) for each in together.values())
+        alike: object = one
+        if one.problem.startswith(_NOT_STATED):
+            alike = one.file
+        elif one.line and one.file.endswith(_ROWS):
+            alike = (one.file, one.key, re.sub(r"'[^']*'|[\d.]+", "…", one.problem), one.fix)
+        together.setdefault(alike, []).append(one)
+    return tuple(
+        str(each[0]) if len(each) == 1 else _not_stated(alike, each) if isinstance(alike, str) else _of_rows(each)
+        for alike, each in together.items()
+    )
+
+
+def _not_stated(file: str, every: Sequence[Problem]) -> str:
+    tables: dict[str, list[str]] = {}
+    for one in every:
+        table, _, key = one.key.partition(" ")
+        tables.setdefault(table, []).append(key)
+    keys = "; ".join(f"{table} {', '.join(dict.fromkeys(keys))}" for table, keys in tables.items())
+    fix = "Give them for a certificate; cmm-uq check JOB --clauses says what each is"
+    return str(Problem(f"{_NOT_STATED}what ISO/IEC 17025:2017, 7.8 asks for: {keys}", file, fix=fix))
 
 
 def _of_rows(every: Sequence[Problem]) -> str:
@@ -228,7 +246,7 @@ def _to_be_known(job: Job, path: Path) -> list[Problem]:
     content = job.inputs["job.toml"].decode("utf-8-sig")
     problems = [Problem(str(text), str(path)) for text in contradictions(job)]
     for one in missing(job) if certifies(job) else ():
-        text = f"not stated: {one.asks} ({one.clause}), which ISO/IEC 17025:2017 asks for"
+        text = f"{_NOT_STATED}{one.asks} ({one.clause}), which ISO/IEC 17025:2017 asks for"
         problems.append(Problem(text, str(path), _line_of(one.key, content), one.key, f"Give {one.key}"))
     return problems
 
