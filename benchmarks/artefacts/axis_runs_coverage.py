@@ -24,8 +24,10 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.model.noise import noise_of as components_of
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.geometry.circular import CircularTest
+from cmm_uq.maths.inference.posterior import sample_with_noise
 
 TRAVEL = np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]])
 MIDDLE, SECOND = TRAVEL.mean(axis=1), np.pi / 180 / 3600
@@ -241,15 +243,17 @@ def of_map(count: int) -> None:
 
 
 def against(key: str, rows: dict[str, np.ndarray], names: list[str], **facts: float) -> tuple[np.ndarray, np.ndarray]:
-    """Estimates and half-widths of 95 % intervals of a recording of runs that stands in the memory."""
+    """Middles and half-widths of a certificate's 95 % intervals, of a recording of runs that stands in the memory."""
     xyz, numbers = rows.pop("xyz"), [rows.pop(name).astype(np.int64) for name in ("measurement", "point", "repeat")]
     points = Points(
         xyz, *numbers, MachineFacts("of this study", "XYZ", TRAVEL), {k: v.astype(float) for k, v in rows.items()}
     )
     seen = artefact_of(artefact_facts(kind="axis_runs", **{key: facts.pop(key), **facts}), points)
-    found = RecordingModel(seen, effects(names)).estimate().least_squares
-    half = float(stats.t.ppf(0.975, found.degrees_of_freedom)) * np.sqrt(np.diag(found.covariance))
-    return found.value[: len(names)], half[: len(names)]
+    model = RecordingModel(seen, effects(names))
+    about = model.estimate()
+    posterior = sample_with_noise(about.linear, components_of(model, in_turn=True), about.least_squares, 1)
+    low, high = np.percentile(posterior.draws[:, : len(names)], [2.5, 97.5], axis=0)
+    return 0.5 * (low + high), 0.5 * (high - low)
 
 
 def runs_of(
@@ -278,6 +282,9 @@ def noise_of(kind: str, random: np.random.Generator, shape: tuple[int, int], sig
     return sigma * white
 
 
+NOISES = ("white", "slow", "tails")
+
+
 def joined(parts: list[dict[str, np.ndarray]], **columns: list[float]) -> dict[str, np.ndarray]:
     whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     count = [len(part["xyz"]) for part in parts]
@@ -287,7 +294,7 @@ def joined(parts: list[dict[str, np.ndarray]], **columns: list[float]) -> dict[s
 def references(count: int) -> None:
     """Squareness by a square (its angle drawn of its u) and straightness by a straightedge turned over, by noise."""
     at = np.linspace(100.0, 800.0, 8)
-    for kind in ("white", "slow", "tails"):
+    for kind in NOISES:
         held = np.zeros(2)
         for seed in range(count):
             random = np.random.default_rng([4, seed])
@@ -308,7 +315,9 @@ def references(count: int) -> None:
                 edges.append(runs_of(0, 1, straight + sign * profile + line + off[i], at, i, 2))
             value, half = against("arm_mm", joined(edges, straightedge=[1.0, -1.0]), ["straightness_x_y"], arm_mm=100.0)
             held[1] += abs(value[0] - bow) <= half[0]
-        print(f"| {kind} | squareness {100 * held[0] / count:.1f} % | straightness {100 * held[1] / count:.1f} % |")
+        print(
+            f"| {kind} | {count} | squareness {100 * held[0] / count:.1f} % | straightness {100 * held[1] / count:.1f} % |"
+        )
 
 
 def circles(count: int) -> None:
@@ -317,7 +326,7 @@ def circles(count: int) -> None:
     outward = np.column_stack([np.cos(angle), np.sin(angle)])
     tangent = np.column_stack([-np.sin(angle), np.cos(angle)])
     names = ["squareness_xy", "scale_x", "scale_y", "hysteresis_x", "hysteresis_y"]
-    for kind in ("white", "slow", "tails"):
+    for kind in NOISES:
         held, figures_held = np.zeros(5), {}
         for seed in range(count):
             random = np.random.default_rng([5, seed])
@@ -351,7 +360,7 @@ def circles(count: int) -> None:
                 figures_held[figure] = figures_held.get(figure, 0) + (abs(found[figure] - exact[figure]) <= 2 * u)
         told = [f"{name} {100 * one / count:.1f}" for name, one in zip(names, held, strict=True)]
         told += [f"{figure} {100 * times / count:.1f}" for figure, times in figures_held.items()]
-        print(f"| {kind} | " + ", ".join(told) + " |")
+        print(f"| {kind} | {count} | " + ", ".join(told) + " |", flush=True)
 
 
 if __name__ == "__main__":

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from cmm_uq.analysis.conformity.positioning import axes, circles, conditions, diagonals
+from cmm_uq.analysis.conformity.positioning import axes, circles, conditions, diagonals, uncertainty_of_figures
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING
 from cmm_uq.base.points import Floats, Points
+from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
 from cmm_uq.maths.geometry.circular import CircularTest
 from tests.artefacts.constructions import estimated, model
 from tests.artefacts.simulated import results
@@ -153,6 +154,32 @@ def test_figures_of_a_circular_test_by_hand() -> None:
     assert figures["D"] == pytest.approx(6.0 + 2.5 / 72)
     assert figures["G(b)"] == pytest.approx(zone(np.concatenate([off, back])), abs=1e-6)
     assert figures["G↻"] == pytest.approx(zone(back), abs=1e-6)
+
+
+def test_a_reading_far_off_says_how_much_scatter_made_of_a_hysteresis() -> None:
+    """A smooth path with noise 0.3, and one reading 3 µm off: about the median of five readings the figure is by so much less.
+
+    By loops, other draws; without the one far off the figure's growth by scatter once more is the larger, and stands.
+    """
+    random, count = np.random.default_rng(4), 72
+    targets = np.arange(0, 360, 5.0)
+    path = np.stack([np.cos(np.radians(targets)), -np.cos(np.radians(targets))]) + 0.3 * random.normal(size=(2, count))
+    for far in (3.0, 0.0):
+        x = path.copy()
+        x[0, 20] += far * np.sign(x[0, 20] - x[1, 20])
+        test = CircularTest(targets, x[:, :, None], "↺↻", u_reference=0.0, length_mm=150.0)
+        found = uncertainty_of_figures(test, Circumstances(uncertainty=TestUncertainty(u_repeat_um=0.3)))["H"]
+        plain = np.empty_like(x)
+        for side in range(2):
+            near = [np.median([x[side, (k + j) % count] for j in range(-2, 3)]) for k in range(count)]
+            off = x[side] - near
+            plain[side] = near + np.sqrt(max(0.0, 1 - 0.09 / np.mean(off**2))) * off
+        draws = [0.3 * random.standard_t(4, (2, count)) / np.sqrt(2) for _ in range(4000)]
+        H = [np.abs(np.diff(each, axis=0)).max() for each in (x, plain)]
+        once, more = ([np.abs(np.diff(x + n * each, axis=0)).max() for each in draws] for n in (1.0, np.sqrt(3)))
+        added = max(abs(np.mean(more) - H[0]), abs(H[0] - H[1]))
+        assert (abs(H[0] - H[1]) > abs(np.mean(more) - H[0])) == (far > 0)
+        assert found == pytest.approx(np.hypot(added, np.std(once)), rel=0.08)
 
 
 def zone(values: Floats, there: Floats = ANGLE) -> float:

@@ -25,6 +25,9 @@ from cmm_uq.maths.geometry.positioning import MissingReadingError, PositioningRu
 
 LINES = ("calibration", "temperature", "alignment", "repeat")
 _DRAWS = 2000
+# degrees of freedom of Student's t by which readings on a circle change. What is stated is a standard uncertainty: the
+# largest of many single readings goes by their tails, of which it says nothing; these are the tails that a diagnosis looks for
+_DOF = 4
 REPEATS, LEAST_TARGETS, PER_METRE = 5, 5, 5.0  # runs in each direction, targets (ISO 230-2:2014, of axes up to 2 m)
 DIAGONALS, _MOVES, _MOST = 4, 0.1, 2 / 3  # least cosine with each axis, and part of its travel that each crosses
 _APART = 5.0  # degrees between targets of a circle, at most: a path that is recorded as it goes has no targets
@@ -54,7 +57,10 @@ def uncertainty_of_figures(runs: PositioningRuns, under: Circumstances) -> dict[
         return {}
     random = np.random.default_rng(np.random.SeedSequence(230, spawn_key=(2,)))
     common = whole * random.standard_normal((_DRAWS, 1, 1, 1)) * growth[None, None, :, None]
-    return dict(runs.spread(common, repeat * random.standard_normal((_DRAWS, *runs.x.shape))))
+    shape = (_DRAWS, *runs.x.shape)
+    tails = isinstance(runs, CircularTest)
+    each = np.sqrt((_DOF - 2) / _DOF) * random.standard_t(_DOF, shape) if tails else random.standard_normal(shape)
+    return dict(runs.spread(common, repeat * each))
 
 
 _BOTH = {"G": ("G↺", "G↻"), "F": ("Fmax", "Fmin")}  # figures of which the larger is decided

@@ -33,7 +33,7 @@ from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap
 from cmm_uq.machine.physics.kinematics import SQUARENESSES, KinematicChain, carried_offset
 from cmm_uq.machine.physics.map_covariance import MapCovariance
-from cmm_uq.maths.inference.families import BRIEF, sample_sizes
+from cmm_uq.maths.inference.families import FOLD, sample_sizes
 from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior
 
@@ -236,7 +236,7 @@ def _held_out(drawn: DrawnErrors, seed: int) -> HeldOutCorrection | None:
         try:
             rest = _without(model, out)
             field = drawn.field_of(rest)
-            sizes = sample_sizes(field.field, _FOLD_DRAWS, seed, effort=BRIEF)
+            sizes = sample_sizes(field.field, _FOLD_DRAWS, seed, effort=FOLD)
             alone = rest.estimate().least_squares
         except (CmmUqError, np.linalg.LinAlgError):
             return None

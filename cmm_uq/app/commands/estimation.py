@@ -194,7 +194,7 @@ def contradictions(
     linear, along = estimate.linear, growth(model.artefact)
     if along is None:
         return ()
-    components, mean = noise_of(model), averaged.mean(axis=0)
+    components, mean = noise_of(model, in_turn=True), averaged.mean(axis=0)
     sizes = posterior.sizes.at(evenly(len(posterior.draws), _LINES))
     lines: dict[int, list[tuple[float, float, Contradiction]]] = {}
     along_axis = (1 - 2 * ALIGNED**2) * PPM

@@ -67,7 +67,7 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
 
     # estimate: least squares, a stated noise held against the residuals (χ²), then the posterior with the noise unknown
     model, estimate, p_value = with_noise(screened)
-    components = noise_of(model)
+    components = noise_of(model, in_turn=True)
     draws = sample_with_noise(estimate.linear, components, estimate.least_squares, seed, progress)
     posterior = with_curvature(model, components, draws)
     causes = causes_of(model.artefact, job.circumstances)

@@ -286,6 +286,10 @@ class AxisRuns(Artefact):
         whole = self._base[:, None] / self.sizes[0].nominal if self._length else np.zeros((len(self.rows), 0))
         return np.hstack([whole, self._shapes])
 
+    def passes(self) -> Ints:
+        """Each repeat of a measurement: its points are numbered as they are read."""
+        return np.unique(np.column_stack([self.measurement, self.repeat]), axis=0, return_inverse=True)[1].ravel()
+
     def placing(self, xyz: Floats) -> Floats:
         return self._freedoms
 

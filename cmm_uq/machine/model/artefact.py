@@ -232,6 +232,10 @@ class Artefact(ABC):
         """Form errors of a test sphere; ``None`` when they have no meaning here."""
         return None
 
+    def passes(self) -> Ints | None:
+        """(m,) which observations are read one after the other, by the order of their points; ``None`` of no known order."""
+        return None
+
     def placing(self, xyz: Floats) -> Floats | Freedoms:
         """Change of the observations, (m, q), for each freedom of the artefact's placing that they do not cancel.
 

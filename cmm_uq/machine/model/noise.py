@@ -8,7 +8,7 @@ import scipy
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.recorded import Display, display_step, distances_in_placing
-from cmm_uq.maths.inference.noise import AXES, FREQUENCIES, GROWTH, PLACING, SLOW, Components
+from cmm_uq.maths.inference.noise import AXES, FEWER, FREQUENCIES, GROWTH, PLACING, SLOW, Components
 
 # part of the observations' variance that each of two axes must have for their noises to be told apart
 _LEAST_SHARE = 0.15
@@ -21,8 +21,10 @@ _LEAST_SPREAD = 1.45
 _NO_LENGTH = 1e-3  # part of the longest length that is none
 
 
-def noise_of(model: RecordingModel, used: np.ndarray | None = None, values: Floats | None = None) -> Components:
-    """The noise of a model's observations.
+def noise_of(
+    model: RecordingModel, used: np.ndarray | None = None, values: Floats | None = None, *, in_turn: bool = False
+) -> Components:
+    """The noise of a model's observations; ``in_turn``: slow noise by the order of readings too, where their kind has one.
 
     ``used``: (m,) which observations; by default those that the model uses. ``values``: (k,) of the model's parameters, of a
     recording yet to be made; by default those that it is estimated to have.
@@ -49,6 +51,10 @@ def noise_of(model: RecordingModel, used: np.ndarray | None = None, values: Floa
     )
     shares = np.column_stack([axes, reading * count, growth, reading])
     slow, frequency, gap, part = _slow(model, chosen, sensitivity, along, block)
+    if in_turn and not slow.shape[1] and (passes := artefact.passes()) is not None:
+        slow, frequency, gap, part = _in_turn(
+            passes[chosen], artefact.points.point[rows[:, 0]], artefact.noise_scale[chosen]
+        )
     possible = {
         AXES: _axes_differ(axes), PLACING: bool(np.any(np.bincount(block) > 1)),
         GROWTH: _lengths_differ(length), SLOW: slow.shape[1] > 0,
@@ -234,6 +240,20 @@ def _slow(
         columns = (seen[:, axes, None] * cosines[:, None, :]).reshape(len(part), -1)
         return columns, np.tile(frequency, len(axes)), gap, part
     return artefact.noise_scale[chosen, None] * cosines, frequency, gap, part
+
+
+def _in_turn(passes: Ints, order: Ints, scale: Floats) -> tuple[Floats, Floats, float, Floats]:
+    """As :func:`_slow`, of readings evenly in time in each of the passes (m,), whose slow noise begins anew."""
+    each, index = np.unique(passes, return_inverse=True)
+    part, count = np.zeros(len(passes)), np.bincount(index.ravel())
+    for rows in (np.flatnonzero(passes == one) for one in each):
+        part[rows[np.argsort(order[rows], kind="stable")]] = np.linspace(0, 1, len(rows))
+    frequency = np.arange(min(FEWER, int(count.max()) - 1) + 1, dtype=np.float64)
+    if len(frequency) < _LEAST_TIMES:
+        return np.zeros((len(passes), 0)), np.zeros(0), 0.0, np.zeros(0)
+    cosines = np.where(frequency > 0, np.sqrt(2.0), 1.0) * np.cos(np.pi * frequency * part[:, None])
+    columns = np.hstack([np.where(passes == one, scale, 0.0)[:, None] * cosines for one in each])
+    return columns, np.tile(frequency, len(each)), 1 / float(count.max() - 1), part
 
 
 def _turning(seen: Floats, measurement: Ints, quantity: Ints) -> bool:

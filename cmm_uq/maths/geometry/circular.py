@@ -52,6 +52,20 @@ class CircularTest(PositioningRuns):
             found["G(b)"] = max(map(self._least_zone, rounds))
         return found
 
+    def _without(self, each: Floats) -> Floats:
+        """Of what a reading is off the median of itself and two neighbours on either side, as much is left as is no scatter.
+
+        A reading far off that makes a figure large hides by that how large scatter has made it, and the largest is one such.
+        """
+        if not self.full:
+            return super()._without(each)
+        t = self.x.shape[1]
+        near = np.median(np.take(self.x, np.arange(t)[:, None] + np.arange(-2, 3), axis=1, mode="wrap"), axis=2)
+        off = self.x - near
+        squares = np.maximum(np.mean(off**2, axis=1, keepdims=True), 1e-300)
+        kept = np.sqrt(np.maximum(0.0, 1 - np.mean(each**2) / squares))
+        return np.asarray(self._figures((near + kept * off)[None])[0])
+
     def _circle(self) -> Floats:
         angle = np.radians(self.targets)
         return np.column_stack([np.cos(angle), np.sin(angle)])

@@ -108,7 +108,12 @@ class PositioningRuns:
         """
         at = self._figures(self.x[None])
         more, varies = (self._figures(self.x + common + n * each) - at for n in (np.sqrt(3), 1.0))
-        return dict(zip(self.names(), np.hypot(more.mean(axis=0), varies.std(axis=0)).tolist(), strict=True))
+        added = np.maximum(np.abs(more.mean(axis=0)), np.abs(at[0] - self._without(each)))
+        return dict(zip(self.names(), np.hypot(added, varies.std(axis=0)).tolist(), strict=True))
+
+    def _without(self, each: Floats) -> Floats:
+        """Figures without scatter as large as ``each``, where neighbours say what that is; else as they are."""
+        return np.asarray(self._figures(self.x[None])[0])
 
     def _figures(self, x: Floats) -> Floats:
         return _figures(x)

@@ -27,7 +27,7 @@ from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel, reach
 from cmm_uq.maths.inference.marginal import SIGMA_BOUNDS, Marginal, cholesky
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import start
-from cmm_uq.maths.inference.proposals import NEVER, LogDensity, weighed, weights
+from cmm_uq.maths.inference.proposals import Fall, LogDensity, by_steps, laplace, weighed, weights
 
 Drawn = Callable[[np.random.Generator, int], Floats]
 
@@ -46,7 +46,7 @@ _NUMBERS = 2_000_000  # in the matrices that are factorised at once
 _LEAST_WORTH = 50.0  # of weighed draws of sizes, below which a sampler draws them
 _EFFECTIVE, _STEPS = 400, 40  # sizes are few and smooth: what follows from them needs no more of them
 HELD = 250  # sizes that all draws of a part's machine have among them
-_STEP, _MOST_STEPS, _FLATTEST, _WIDER = 0.05, 60, 0.5, 1.3
+_WIDER = 1.3
 _SMALLEST = 1e-4  # of a family's size
 
 
@@ -59,9 +59,11 @@ class Effort:
     worth: float = 200.0  # independent draws that all are worth, with which that ends
     held: int = HELD  # sizes that all draws have among them
     sampler: bool = True  # whether emcee, which takes minutes, draws them where weighed ones are worth too little
+    slopes: bool = False  # whether the likeliest are looked for by slopes, and not by steps
 
 
 USUAL, BRIEF = Effort(), Effort(400, 8000, 150.0, 100, sampler=False)
+FOLD = Effort(200, 8000, 60.0, 100, sampler=False, slopes=True)  # of one of many parts of a recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,9 +155,9 @@ class FieldModel:
 
     @cached_property
     def _parts(self) -> Floats:
-        """(c + F + 1, n²) covariances for unit variances of each class of noise, of each family, and what has a known size."""
+        """(6 + F + 1, n²) covariances for unit variances of the noise, of each family, and what has a known size."""
         index, shares = self.noise.classes
-        each = [np.where((index == c)[:, None], self.into, 0.0) for c in range(len(shares))]
+        each = [np.sqrt(share)[index, None] * self.into for share in shares.T]
         own = self._seen[:, : len(self._known)]
         sized = dict.fromkeys((*self.families, None), np.zeros_like(own @ own.T))
         sized[None] = own @ own.T
@@ -185,8 +187,7 @@ class FieldModel:
 
     def _noise(self, sizes: Sizes, more: Floats | None = None) -> Floats:
         """(w, n, n) of noise in them, mm², and ``more`` (w, F + 1): variances of families, and of what has a known size."""
-        n, weights = self.into.shape[1], self.noise.variances(sizes)[0] @ self.noise.classes[1].T
-        weights = weights if more is None else np.hstack([weights, more])
+        n, weights = self.into.shape[1], np.hstack([self.noise.variances(sizes)[0], *([] if more is None else [more])])
         found = (weights @ self._parts[: weights.shape[1]]).reshape(-1, n, n)
         if self.noise.slow.shape[1]:
             variances = self.noise.variances(sizes)[1]
@@ -217,6 +218,12 @@ class FieldModel:
             diagonal, last = np.einsum("wii->wi", factor), factor[:, n, :n]  # K = L·Lᵀ; L⁻¹·n, without any difference
             found[part] -= np.log(diagonal[:, :n]).sum(axis=1) + 0.5 * np.einsum("wi,wi->w", last, last)
         return np.where(np.isfinite(found), found, -np.inf)
+
+    def slopes(self, sizes: Sizes, scales: Floats) -> Floats:
+        """(F,) of :meth:`log_likelihood` by squares of the families' sizes, of one draw (Rasmussen, Williams 2006, 5.9)."""
+        inverse, parts = np.linalg.inv(self._covariance(sizes, scales)[0]), self._parts[-1 - len(self.families) : -1]
+        weight = inverse @ self._seen[:, -1]
+        return np.asarray(0.5 * (parts @ (np.outer(weight, weight) - inverse).ravel()))
 
     def draw(self, sizes: Sizes, scales: Floats, random: np.random.Generator) -> Floats:
         """Exact draws (N, k + …), one for each of N sizes of noise and families (N, F), of which many may be the same.
@@ -319,23 +326,21 @@ def sample_sizes(
     if known is not None and not count:
         return FieldSizes(known.at(np.zeros(draws, dtype=np.int64)), np.zeros((draws, 0)), np.inf, None)
     density, sizes, d, begin = _density(model, known)
-    centre, factor = _laplace(density, np.append(begin, np.zeros(count)))
+    begin, fall = np.append(begin, np.zeros(count)), _fall(model, density, sizes, d)
+    centre, factor = laplace(density, begin, fall if effort.slopes else None)
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(29,))))
     latent, log, proposal = weighed(density, centre, _WIDER * factor, random, effort.each, effort.worth, effort.most)
     weight = weights(log)
     worth, chains = float(1 / np.sum(weight**2)), None
-    if worth >= _LEAST_WORTH:
-        # as many of each as its weight says, evenly spread
+    if worth >= _LEAST_WORTH:  # as many of each as its weight says, evenly spread
         place = np.searchsorted(np.cumsum(weight), (np.arange(effort.held) + 0.5) / effort.held * (1 - 1e-12))
         latent = latent[np.minimum(place, len(latent) - 1)]
     elif not effort.sampler:
         raise CmmUqError("how large its errors are cannot be drawn in a short time", where="the recording")
     else:
         chains = run_ensembles(density, proposal, seed, effective_samples=_EFFECTIVE, steps_at_once=_STEPS)
-        latent, worth = (
-            chains.draws[np.linspace(0, len(chains.draws) - 1, effort.held).astype(np.int64)],
-            chains.ess_min,
-        )
+        held = np.linspace(0, len(chains.draws) - 1, effort.held).astype(np.int64)
+        latent, worth = chains.draws[held], chains.ess_min
     latent = latent[np.arange(draws) % len(latent)]
     return FieldSizes(sizes(latent), size_of(latent[:, d:]), worth, chains)
 
@@ -349,7 +354,7 @@ def log_evidence(model: FieldModel, seed: int, known: Sizes | None = None, effor
     density, _, _, begin = _density(model, known)
     if not len(begin) + count:
         return float(density(np.zeros((1, 0)))[0])
-    centre, factor = _laplace(density, np.append(begin, np.zeros(count)))
+    centre, factor = laplace(density, np.append(begin, np.zeros(count)))
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(41,))))
     _, log, _ = weighed(density, centre, _WIDER * factor, random, effort.each, effort.worth, effort.most)
     return float(np.logaddexp.reduce(log) - np.log(len(log)) - 0.5 * count * np.log(2 * np.pi))
@@ -366,9 +371,8 @@ def _density(model: FieldModel, known: Sizes | None) -> tuple[LogDensity, Callab
         noise = latent[:, :d]
         prior = -0.5 * np.sum(latent[:, d:] ** 2, axis=1)
         if known is None:
-            inside = (noise[:, 0] > np.log(max(SIGMA_BOUNDS[0], model.noise.least))) & (
-                noise[:, 0] < np.log(SIGMA_BOUNDS[1])
-            )
+            low, high = np.log(max(SIGMA_BOUNDS[0], model.noise.least)), np.log(SIGMA_BOUNDS[1])
+            inside = (noise[:, 0] > low) & (noise[:, 0] < high)
             prior = np.where(inside, prior, -np.inf)
             noise = np.where(inside[:, None], noise, inside_of)
             prior = prior + model.noise.log_prior(noise, model.noise.sizes(noise))
@@ -382,16 +386,15 @@ def _density(model: FieldModel, known: Sizes | None) -> tuple[LogDensity, Callab
     return density, sizes, d, inside_of
 
 
-def _laplace(density: LogDensity, start_at: Floats) -> tuple[Floats, Floats]:
-    """Where a density is largest (d,), and a factor (d, d) of its covariance there, nowhere much wider than the prior."""
-    d, steps = len(start_at), _STEP * np.eye(len(start_at))
+def _fall(model: FieldModel, density: LogDensity, sizes: Callable[[Floats], Sizes], d: int) -> Fall:
+    """Of families by the slopes of the likelihood; of the noise, whose components come and go, by steps."""
 
     def fall(at: Floats) -> tuple[float, Floats]:
-        values = np.maximum(density(np.vstack([at, at + steps, at - steps])), NEVER)
-        return -float(values[0]), -(values[1 : d + 1] - values[d + 1 :]) / (2 * _STEP)
+        value, of_noise = by_steps(density, at, d)
+        scale = size_of(at[None, d:])  # its square grows by s·φ(z)/φ(s)·dz
+        of_families = (
+            model.slopes(sizes(at[None]), scale) * (scale * np.exp(0.5 * (scale**2 - at[d:] ** 2)))[0] - at[d:]
+        )
+        return value, np.append(of_noise, -of_families)
 
-    found = scipy.optimize.minimize(fall, start_at, jac=True, method="L-BFGS-B", options={"maxiter": _MOST_STEPS})
-    each = np.array([fall(found.x + step)[1] - fall(found.x - step)[1] for step in steps]) / (2 * _STEP)
-    values, vectors = np.linalg.eigh(0.5 * (each + each.T))
-    spread = (vectors / np.maximum(values, _FLATTEST)) @ vectors.T
-    return np.asarray(found.x), np.linalg.cholesky(spread)
+    return fall

@@ -19,6 +19,7 @@ from cmm_uq.base.points import Floats
 
 Numbers = tuple[NDArray[Any], ...]  # random numbers, of which the first axis are draws
 LogDensity = Callable[[Floats], Floats]  # of (w, d) parameters, up to a constant: (w,)
+Fall = Callable[[Floats], tuple[float, Floats]]  # minus a logarithm of a density at (d,), and its slopes (d,)
 _DOF = 6.0
 # times the curvature's width at which a skewed density is first looked at: too wide costs draws, too narrow misses a tail
 _WIDER, _LOOKS = 2.0, 3
@@ -29,6 +30,8 @@ _STUCK = 1.01  # times the power from round to round below which one distributio
 # distributions of a mixture; weight of one more as wide as all; their variance over that of all to begin with
 _PARTS, _WIDE, _NARROWER = 8, 0.1, 0.3
 _REFITS, _RECALLED, _LEAST_ENOUGH = 5, 3, 0.02
+# of a logarithm's slopes; iterations, fewer where few draws find where the density is for themselves; least curvature
+_STEP, _MOST_STEPS, _FEWER_STEPS, _FLATTEST = 0.05, 60, 25, 0.5
 _FITS = 8  # mixtures fitted to the density itself from which the best is taken
 
 
@@ -291,3 +294,26 @@ def weighed(
         power = highest_power(log, np.zeros(len(log)), 0.0, _COUNT * each)
         centre, covariance = moments(latent, weights(power * log))
         factor = np.linalg.cholesky(covariance + 1e-9 * np.trace(covariance) * np.eye(len(centre)))
+
+
+def by_steps(density: LogDensity, at: Floats, d: int) -> tuple[float, Floats]:
+    """Minus the logarithm of a density, and its slopes by the first d numbers, by differences over steps."""
+    steps = _STEP * np.eye(len(at))[:d]
+    values = np.maximum(density(np.vstack([at, at + steps, at - steps])), NEVER)
+    return -float(values[0]), -(values[1 : d + 1] - values[d + 1 :]) / (2 * _STEP)
+
+
+def laplace(density: LogDensity, start_at: Floats, fall: Fall | None = None) -> tuple[Floats, Floats]:
+    """Where a density is largest (d,), and a factor (d, d) of its covariance there, nowhere much wider than the prior.
+
+    ``fall``: what has slopes, where that is to be had for less; it is followed for fewer steps.
+    """
+    d = len(start_at)
+    falling, most = (fall, _FEWER_STEPS) if fall else (lambda at: by_steps(density, at, d), _MOST_STEPS)
+    found = scipy.optimize.minimize(falling, start_at, jac=True, method="L-BFGS-B", options={"maxiter": most})
+    each = np.array([falling(found.x + step)[1] - falling(found.x - step)[1] for step in _STEP * np.eye(d)]) / (
+        2 * _STEP
+    )
+    values, vectors = np.linalg.eigh(0.5 * (each + each.T))
+    spread = (vectors / np.maximum(values, _FLATTEST)) @ vectors.T
+    return np.asarray(found.x), np.linalg.cholesky(spread)

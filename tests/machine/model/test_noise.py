@@ -72,6 +72,27 @@ def test_the_order_of_the_rows_says_nothing_without_a_time() -> None:
     assert noise_of(model).slow.shape[1] == 0
 
 
+def test_the_order_of_runs_says_when_they_were_read() -> None:
+    """Each round of a circle by itself, from its first point to its last, however the rows are sorted; a time goes before."""
+    model = example("circles-simulated")
+    assert noise_of(model).slow.shape[1] == 0
+    found = noise_of(model, in_turn=True)
+    rounds = np.unique(np.column_stack([model.artefact.measurement, model.artefact.repeat]), axis=0)
+    assert SLOW in found.possible
+    assert found.slow.shape[1] == 25 * len(rounds)
+    own = (model.artefact.measurement == 1) & (model.artefact.repeat == 1)
+    order = model.artefact.points.point[model.artefact.rows[own, 0]]
+    place = np.argsort(np.argsort(order)) / (own.sum() - 1)
+    seen = found.slow[own]
+    used = np.flatnonzero(np.any(seen != 0, axis=0))
+    for k, column in enumerate(used):
+        wave = np.sqrt(2.0 if k else 1.0) * np.cos(np.pi * k * place) * model.artefact.noise_scale[own]
+        np.testing.assert_allclose(seen[:, column], wave, atol=1e-12)
+    assert np.all(found.slow[~own][:, used] == 0)
+    timed = example("circles-simulated", timed=True)
+    np.testing.assert_array_equal(noise_of(timed, in_turn=True).slow, noise_of(timed).slow)
+
+
 @pytest.mark.parametrize(("name", "cosines"), [("plate-simulated", 3 * 73), ("sphere-simulated", 3 * 25)])
 def test_observations_along_one_axis_each_see_more_cosines_than_those_along_several(name: str, cosines: int) -> None:
     assert noise_of(example(name, 2, timed=True)).slow.shape[1] == cosines

@@ -78,6 +78,29 @@ def test_the_density_is_that_of_differences_within_placings() -> None:
     np.testing.assert_allclose(np.diff(found), np.diff(direct), rtol=1e-6)
 
 
+def test_slopes_are_those_of_the_density() -> None:
+    """By differences of it; a family of columns and one whose covariance is that of its columns."""
+    found = families(observed((0.2, 1.0), 1))
+    scale = np.array([[0.4, 1.3]])
+    by_steps = []
+    for step in 1e-5 * np.eye(2):
+        up, down = (found.log_likelihood(white(SIGMA), np.sqrt(scale**2 + way * step))[0] for way in (1, -1))
+        by_steps.append((up - down) / 2e-5)
+    assert found.slopes(white(SIGMA), scale) == pytest.approx(by_steps, rel=1e-5)
+
+
+def test_sizes_by_slopes_are_those_by_steps() -> None:
+    found = families(observed((0.2, 1.0), 3))
+    by_slopes, by_steps = (
+        sample_sizes(
+            found, 4000, 2, white(SIGMA), replace(room.Effort(worth=2000.0, held=4000), slopes=slopes)
+        ).families
+        for slopes in (True, False)
+    )
+    assert by_slopes.mean(axis=0) == pytest.approx(by_steps.mean(axis=0), rel=0.06)
+    assert by_slopes.std(axis=0) == pytest.approx(by_steps.std(axis=0), rel=0.12)
+
+
 def test_draws_are_those_of_the_normal_distribution_given_all_sizes() -> None:
     """By the other algebra, in the space of coefficients with the offsets among them: (Σ⁻¹ + XᵀX/σ²)⁻¹. 200 000 draws."""
     y, scale = observed((0.2, 1.0), 2), np.array([0.3, 0.9])
