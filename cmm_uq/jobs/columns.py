@@ -62,7 +62,7 @@ _OF_SOME_MACHINES = re.compile(r"temp_(bridge|ram)_.*|depth_mm|turned_deg")
 OPTIONAL = tuple(name for name in COLUMNS if name not in REQUIRED and not _OF_SOME_MACHINES.fullmatch(name))
 # what instruments read, which the kinds that go by it describe
 READINGS = (
-    *("reading_um", "reading_mm", "reading_arcsec", "straightedge", "square", "u_mm", "v_mm"),
+    *("reading_um", "reading_mm", "reading_arcsec", "straightedge", "square", "u_mm", "v_mm", "alpha_deg", "beta_deg"),
     *(f"{name}_{a}" for name in ("read", "turn") for a in AXES),
 )
 LARGEST_NUMBER = 1e9  # of a measurement, point or repeat

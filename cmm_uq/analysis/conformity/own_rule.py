@@ -30,6 +30,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, signed
 from cmm_uq.base.points import Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import CompleteTest
 from cmm_uq.machine.model.artefact import ArtefactFigure, Indications
 
 NAME = "laboratory's own rule"
@@ -189,10 +190,14 @@ def _counting(points: Points) -> NDArray[np.bool_]:
 
 def enough(test: Test) -> tuple[Condition, ...]:
     """What the laboratory says of a complete test, held against what was recorded and is no copy."""
-    asked, points = test.facts.complete, test.recorded.points
-    if asked is None:
+    if test.facts.complete is None:
         what = say("what a complete test consists of, by the laboratory's own rule")
         return (Condition(what, (what,), Verbatim("complete = { measurements, repeats, points } in [[conformity]]")),)
+    return whole(test.facts.complete, test.recorded.points)
+
+
+def whole(asked: CompleteTest, points: Points) -> tuple[Condition, ...]:
+    """How many measurements, repeats and points there are, recorded or planned, of those that are asked for."""
     own = _counting(points)
     runs: dict[int, list[int]] = {}
     for group in np.unique(points.group[own]).tolist():

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cmm_uq.analysis.conformity import own_rule
 from cmm_uq.analysis.conformity.plan_conditions import conditions
 from cmm_uq.analysis.conformity.plans import READY, Condition
 from cmm_uq.analysis.conformity.standards import standard_named
@@ -49,6 +50,7 @@ def of_standards(job: Job, setting: Setting, name: str, points: Points, recorded
         asked = standard.characteristic(wish.characteristic)
         if asked.observed in tested:
             found += asked.conditions(artefact, recorded=recorded > 0)
+            found += own_rule.whole(wish.complete, artefact.points) if wish.complete else ()
     return tuple({condition.what: condition for condition in found}.values())
 
 

@@ -71,6 +71,7 @@ COVERAGE = re.compile(r"[\[(,;]?\s*\bk\s*=\s*(\d+(?:[.,]\d+)?)\s*[\])]?", re.IGN
 # what certificates print above a column, beside its unit or its coverage factor
 _SYMBOLS: Mapping[str, str] = {"U": "reference_U_um", "U95": "reference_U_um", "u": "reference_u_um"}
 _FIGURES = frozenset("0123456789+-−.,")
+_BALL = "ball"  # column of scanned balls: which of its bar
 _OWN = frozenset((*REQUIRED, *OPTIONAL, *READINGS))
 _IN_BRACKETS = re.compile(r"\s*[\[(<{]\s*([^\])>}]*?)\s*[\])>}]\s*$")
 _AFTER_SIGN = re.compile(r"\s*(?:/|\bin\b|,|:)\s*([^\s/,:]+)\s*$", re.IGNORECASE)
@@ -213,6 +214,10 @@ def assigned(
     taken = {place for own in columns.values() for _, place in own}
     for i, heading in enumerate(headings):
         meaning = meaning_of(heading.strip()) if heading else Heading()
+        if (
+            heading.strip() == _BALL and "point" in headings
+        ):  # beside the points of its scan it is no other word for these
+            meaning = Heading(_BALL)
         if meaning.column and meaning.column not in named and i not in taken:
             columns.setdefault(meaning.column, []).append((meaning.index, i))
     return columns
