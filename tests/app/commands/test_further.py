@@ -154,3 +154,17 @@ def test_a_report_with_a_further_certificate_is_computed_again_to_the_byte(
     )
     found = verify([put(tmp_path / "forged", contents_of(forged)) / "part-simulated.pdf"], rerun=False)
     assert {each.place for each in found.inquiry.findings} == {"machine.further[0].number", "machine.further[0].date"}
+
+
+def test_a_part_takes_over_what_its_machines_calibration_was_taken_together_with(tmp_path: Path) -> None:
+    """Named again by the part it would count twice."""
+    example = ROOT / "examples" / MACHINE
+    toml = (example / "job.toml").read_text().replace(
+        "[artefact]", '[[machine.further]]\ncertificate = "gauge.pdf"\n\n[artefact]', 1
+    )  # fmt: skip
+    recording = (example / "recording.csv").read_bytes()
+    put(tmp_path / "machine", {"job.toml": toml.encode(), "recording.csv": recording, **GAUGE})
+    refuse_machine(read_part(put(tmp_path / "plate", plate_files({}, machine_state={"job": "../machine"}))))
+    again = {"job": "../machine", "further": [{"certificate": "gauge.pdf"}]}
+    with pytest.raises(CmmUqError, match="is of a recording that is reckoned with already"):
+        refuse_machine(read_part(put(tmp_path / "twice", {**plate_files({}, machine_state=again), **GAUGE})))
