@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from cmm_uq import __version__
 from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
-from cmm_uq.app.commands.certificates import affected, verification
+from cmm_uq.app.commands.certificates import again as computed_again, verification
 from cmm_uq.app.commands.certificates.verification import Verification
 from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.certificate.verify.again import Again, beyond_sampling, by_other_kernels, differences
@@ -197,7 +197,7 @@ def test_another_version_says_which_corrections_touch_it(certificate: Path, agai
 
 @pytest.fixture
 def uncorrected(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(affected, "between", lambda first, last: ())
+    monkeypatch.setattr(computed_again, "between", lambda first, last: ())
 
 
 @pytest.mark.usefixtures("uncorrected")
@@ -265,7 +265,8 @@ def test_a_page_of_another_version_is_held_to_the_hash_inside_the_pdf(
     certificate: Path, again: Again, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """provenance.json, attached, has the hash of every file that was made with it."""
-    monkeypatch.setattr(verification, "__version__", "99.0.0")
+    for module in (verification, computed_again):
+        monkeypatch.setattr(module, "__version__", "99.0.0")
     assert checked(certificate, again).inquiry.findings == []
     spoil(certificate / "certificate.html", lambda content: content.replace(b">404.2051<", b">404.2061<", 1))
     (finding,) = [one for one in checked(certificate, again).inquiry.findings if one.file == "certificate.html"]
