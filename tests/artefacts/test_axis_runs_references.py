@@ -234,6 +234,37 @@ def test_a_repeat_with_the_other_sign_is_refused_and_noise_alone_is_not() -> Non
         AxisRuns(EXACT, joined(rows))
 
 
+@pytest.mark.parametrize(("axis", "factor", "words"), [
+    ("read", -1.0, "with the other sign"), ("turn", -1.0, "with the other sign"),
+    ("turn", 1 / (1e-6 * 3600 * 180 / np.pi), "4.85 times as large"), ("turn", 1e-6 * 3600 * 180 / np.pi, "0.206 times"),
+])  # fmt: skip
+def test_a_line_that_was_read_before_shows_a_wrong_sign_and_a_wrong_unit(axis: str, factor: float, words: str) -> None:
+    """All repeats of the later measurement are wrong; a line beside it is another one."""
+
+    def line(number: int, times: float, place: tuple[float, float] = (0.0, 0.0)) -> dict[str, Floats]:
+        rows = read(run(number, X, place=place) if axis == "read" else run(number, turn=Z, place=place), 3.0)
+        noise = np.random.default_rng(number).normal(0, 1e-3, len(rows["xyz"]))
+        for name in ("reading_um", "reading_arcsec"):
+            if rows[name].any():
+                rows[name] = times * rows[name] + noise
+        return rows
+
+    AxisRuns(EXACT, joined(line(1, 1.0), line(2, 1.0)))
+    AxisRuns(EXACT, joined(line(1, 1.0), line(2, factor, (90.0, 0.0))))
+    with pytest.raises(CmmUqError, match=f"line 42.*measurement 2 reads the line of measurement 1 {words}"):
+        AxisRuns(EXACT, joined(line(1, 1.0), line(2, factor)))
+
+
+def test_noise_alone_of_a_line_read_twice_is_no_contradiction() -> None:
+    for seed in range(300):
+        rows = [run(number, turn=Z) for number in (1, 2)]
+        for one in rows:
+            one["reading_arcsec"] = np.random.default_rng([seed, int(one["measurement"][0])]).normal(
+                0, 1, len(one["xyz"])
+            )
+        AxisRuns(EXACT, joined(*rows))
+
+
 def along_lines(signs: list[tuple[float, float, float]], part: float) -> AxisRuns:
     """Runs through the middle of the volume, each over a part of the travel of every axis that moves."""
     middle, size, runs = TRAVEL.mean(axis=1), np.ptp(TRAVEL, axis=1), []

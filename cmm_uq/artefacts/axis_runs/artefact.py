@@ -30,6 +30,7 @@ from cmm_uq.artefacts.axis_runs.run import (
     circle_axes,
     kinds_of,
     profiles,
+    read_otherwise,
     reference_shape,
     refuse,
     reversed_profile,
@@ -128,6 +129,10 @@ class AxisRuns(Artefact):
                 wrong = (points.measurement == run.measurement) & (points.repeat == one)
                 problem = f"repeat {one} of measurement {run.measurement} reads as the others do with the other sign"
                 refuse(points, wrong, where, problem, "Turn its readings over, or leave it out")
+        if len(points.lines) and (found := read_otherwise(points, runs, readings)):
+            number, other, what = found
+            problem = f"measurement {number} reads the line of measurement {other} {what}"
+            refuse(points, points.measurement == number, where, problem, "Mend the one that is wrong, or leave it out")
         zero = self._zeros_of(points).means(readings)
         if self._facts.u_bar_um is not None:
             zero[kind == CIRCLE] = 0.0

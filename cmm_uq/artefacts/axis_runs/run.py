@@ -15,7 +15,7 @@ from cmm_uq.artefacts.axis_runs.kind import APPROACHES, READ, TURN
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
-from cmm_uq.base.units import METRE
+from cmm_uq.base.units import ARCSECOND, METRE
 from cmm_uq.machine.model.recorded import place
 
 ALONG, ACROSS, TURNING, CIRCLE = "along", "across", "turning", "circle"
@@ -27,6 +27,7 @@ STRAIGHTEDGE, SQUARE = "straightedge", "square"  # columns: +1, and −1 reverse
 _UNIT, _SAME_MM = 0.01, 1e-6
 _ALONG, _ACROSS = 0.999, 0.05  # cosines between what is read and the travel
 _OPPOSITE = 16.0  # how much nearer a repeat is to the others with its sign changed, in squares, to be one turned over
+_COMMON, _SLOPE = 8, 1e-6 / ARCSECOND  # targets by which two runs of one line are compared; 1 µm/m in ″
 _CUBIC = 5  # targets of which one lies between two on either side
 _ROUND = 0.02  # of its radius, by which targets may be off a circle
 
@@ -117,6 +118,43 @@ def turned_over(run: Run, readings: Floats, repeat: Ints) -> int | None:
         own, others = own - own.mean(), others - others.mean()
         if np.sum((own - others) ** 2) > _OPPOSITE * np.sum((own + others) ** 2):
             return int(one)
+    return None
+
+
+def read_otherwise(points: Points, runs: tuple[Run, ...], readings: Floats) -> tuple[int, int, str] | None:
+    """Two measurements of one line of which the later reads as the first does with the other sign, or in another unit.
+
+    Of eight targets in common at least; readings against a straightedge or a square may differ so.
+    """
+    names = tuple(f"tip_{a}_mm" for a in AXES)
+    against = np.any([points.columns.get(name, np.zeros(len(points))) != 0 for name in (STRAIGHTEDGE, SQUARE)], axis=0)
+    first: dict[tuple[float, ...], tuple[Run, dict[tuple[float, float], float]]] = {}
+    for run in runs:
+        if run.kind == CIRCLE or against[run.rows].any():
+            continue
+        beside = points.xyz[run.rows[0]] - (points.xyz[run.rows[0]] @ run.travel) * run.travel
+        line = np.concatenate([run.travel, run.sense, beside, _vectors(points, names)[run.rows[0]]])
+        key = (run.kind == TURNING, *(np.round(line, 2) + 0.0).tolist())
+        at: dict[tuple[float, float], list[float]] = {}
+        for target, way, value in zip(run.positions + run.start, run.directions, readings[run.rows], strict=True):
+            at.setdefault((round(float(target), 2), float(way)), []).append(float(value))
+        means = {where: float(np.mean(each)) for where, each in at.items()}
+        other, those = first.setdefault(key, (run, means))
+        common = sorted(set(means) & set(those))
+        if other is run or len(common) < _COMMON:
+            continue
+        own, before = (np.array([each[where] for where in common]) for each in (means, those))
+        free = np.vander([target for target, _ in common], 2 if run.kind == ACROSS else 1)
+        own, before = (each - free @ np.linalg.lstsq(free, each, rcond=None)[0] for each in (own, before))
+        words = {-1.0: "with the other sign"}
+        if run.kind == TURNING:
+            words |= {
+                1 / _SLOPE: "4.85 times as large, as µm/m are",
+                _SLOPE: "0.206 times as large, as ″ against µm/m are",
+            }
+        for factor, what in words.items():
+            if np.sum((own - before) ** 2) > _OPPOSITE * np.sum((own - factor * before) ** 2):
+                return run.measurement, other.measurement, what
     return None
 
 
