@@ -27,7 +27,7 @@ from cmm_uq.machine.model.artefact import LAST_DIGIT, Artefact
 from cmm_uq.machine.model.kind import Kind, Observe
 from cmm_uq.machine.model.predicted_errors import SAME, PredictedErrors, maps_named, predicted_errors, tables_otherwise
 from cmm_uq.machine.model.recorded import NANOMETRE, display_step, expansion
-from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.machine.physics.catalogue import effects, every
 from cmm_uq.machine.physics.kinematics import SQUARENESSES
 from cmm_uq.maths.inference.linear_model import RANK_TOLERANCE, Freedoms
 
@@ -71,11 +71,11 @@ def model_of(job: Job, artefact: Artefact) -> RecordingModel:
         if abs(lean) > _UNNAMED and plane not in {effect.plane for effect in named}
     }
     if unnamed:
+        lacking = [name for name, one in every().items() if one.everywhere and one.plane in unnamed]
         raise CmmUqError(
             f"the {artefact.title.lower()} fits only on axes that are out of square by {', '.join(unnamed.values())}",
             where=job.recording_path,
-            fix=f"Name {', '.join(f'squareness_{plane}' for plane in unnamed)} in job.toml [model] effects, or adjust the "
-            "machine and measure again",
+            fix=f"Name {', '.join(lacking)} in job.toml [model] effects, or adjust the machine and measure again",
         )
     model = RecordingModel(artefact, named, None if stated is None else stated * MICROMETRE, used)
     _refuse_undetermined(model, job.recording_path)

@@ -301,12 +301,27 @@ def spread_of_circle(figure: str, paths: tuple[float, ...], targets: int, rounds
     random = np.random.default_rng(np.random.SeedSequence(230, spawn_key=(2,)))
     x = np.repeat(np.array(paths).reshape(2, targets, 1), rounds, axis=2)
     changes = 0.2 * random.standard_normal((2000, 1, 1, 1)) * np.ones((1, 1, targets, 1))
-    each = 0.05 * random.standard_normal((2000, *x.shape))
+    each = (
+        0.05 * 0.5**0.5 * random.standard_t(4, (2000, *x.shape))
+    )  # of the standard deviation 0.05 µm, with long tails
     once, more = (
         np.array([of_circle(figure, x + change) - of_circle(figure, x) for change in changes + times * each])
         for times in (1.0, 3**0.5)
     )
-    return float(np.sqrt(np.var(once, axis=0) + np.mean(more, axis=0) ** 2).max())
+    added = np.abs(np.mean(more, axis=0))
+    made = np.abs(of_circle(figure, x) - of_circle(figure, without_scatter(x, float(np.mean(each**2)))))
+    return float(np.sqrt(np.var(once, axis=0) + np.maximum(added, made) ** 2).max())
+
+
+def without_scatter(x: Floats, variance: float) -> Floats:
+    """Each reading as near to the median of five as leaves, of what it is off, what is more than its scatter."""
+    found = x.copy()
+    for path in np.ndindex(x.shape[0], x.shape[2]):
+        read = x[path[0], :, path[1]]
+        near = np.array([np.median([read[(i + k) % len(read)] for k in (-2, -1, 0, 1, 2)]) for i in range(len(read))])
+        square = float(np.mean((read - near) ** 2))
+        found[path[0], :, path[1]] = near + (max(0.0, 1 - variance / square) ** 0.5 if square else 0.0) * (read - near)
+    return found
 
 
 E0 = lengths(SEVEN)
