@@ -25,7 +25,7 @@ SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
 MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.reference\.")
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
-    "": 140, "base": 2_735, "maths": 10_900, "jobs": 13_153, "machine": 6_771, "analysis": 19_481, "laboratory": 14_120,
+    "": 140, "base": 2_735, "maths": 10_899, "jobs": 13_153, "machine": 6_771, "analysis": 19_481, "laboratory": 14_120,
     "certificate": 16_263, "artefacts": 11_653, "app": 15_115,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""

@@ -46,8 +46,8 @@ _NUMBERS = 2_000_000  # in the matrices that are factorised at once
 _LEAST_WORTH = 50.0  # of weighed draws of sizes, below which a sampler draws them
 _EFFECTIVE, _STEPS = 400, 40  # sizes are few and smooth: what follows from them needs no more of them
 HELD = 250  # sizes that all draws of a part's machine have among them
-_WIDER = 1.3
-_SMALLEST = 1e-4  # of a family's size
+_WIDER, _SMALLEST = 1.3, 1e-4  # than the curvature says; of a family's size
+_CLASSES = 60  # of observations alike in their noise; of more, a matrix a component of the noise is less work
 
 
 @dataclass(frozen=True)
@@ -155,10 +155,10 @@ class FieldModel:
 
     @cached_property
     def _parts(self) -> Floats:
-        """(6 + F + 1, n²) covariances for unit variances of the noise, of each family, and what has a known size."""
+        """(c + F + 1, n²) covariances for unit variances of the noise, of each family, and what has a known size."""
         index, shares = self.noise.classes
-        each = [np.sqrt(share)[index, None] * self.into for share in shares.T]
-        own = self._seen[:, : len(self._known)]
+        apart = np.sqrt(shares) if len(shares) > _CLASSES else np.eye(len(shares))
+        each, own = [own[index, None] * self.into for own in apart.T], self._seen[:, : len(self._known)]
         sized = dict.fromkeys((*self.families, None), np.zeros_like(own @ own.T))
         sized[None] = own @ own.T
         for one, seen in zip(self.errors, self._each, strict=True):
@@ -187,7 +187,8 @@ class FieldModel:
 
     def _noise(self, sizes: Sizes, more: Floats | None = None) -> Floats:
         """(w, n, n) of noise in them, mm², and ``more`` (w, F + 1): variances of families, and of what has a known size."""
-        n, weights = self.into.shape[1], np.hstack([self.noise.variances(sizes)[0], *([] if more is None else [more])])
+        n, own, shares = self.into.shape[1], self.noise.variances(sizes)[0], self.noise.classes[1]
+        weights = np.hstack([own if len(shares) > _CLASSES else own @ shares.T, *([] if more is None else [more])])
         found = (weights @ self._parts[: weights.shape[1]]).reshape(-1, n, n)
         if self.noise.slow.shape[1]:
             variances = self.noise.variances(sizes)[1]
@@ -392,9 +393,7 @@ def _fall(model: FieldModel, density: LogDensity, sizes: Callable[[Floats], Size
     def fall(at: Floats) -> tuple[float, Floats]:
         value, of_noise = by_steps(density, at, d)
         scale = size_of(at[None, d:])  # its square grows by s·φ(z)/φ(s)·dz
-        of_families = (
-            model.slopes(sizes(at[None]), scale) * (scale * np.exp(0.5 * (scale**2 - at[d:] ** 2)))[0] - at[d:]
-        )
-        return value, np.append(of_noise, -of_families)
+        grows = (scale * np.exp(0.5 * (scale**2 - at[d:] ** 2)))[0]
+        return value, np.append(of_noise, at[d:] - model.slopes(sizes(at[None]), scale) * grows)
 
     return fall
