@@ -325,13 +325,13 @@ def test_a_certificate_of_another_version_is_computed_again_but_where_a_correcti
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """This version may compute what an earlier one did, not what one after it may have corrected."""
-    for module in ("certificates.verification", "parts.machine"):
+    for module in ("certificates.verification", "certificates.again", "parts.machine"):
         monkeypatch.setattr(f"cmm_uq.app.commands.{module}.__version__", "99.0.0")
     job = plate_of(by_certificate())
     after = state_machine(job, rerun=True)
     assert not any("computed again" in one for one in after.warnings)
     assert any(one.count and one.what.startswith("computed again") for one in after.standing.checked)
-    for module in ("certificates.verification", "parts.machine"):
+    for module in ("certificates.verification", "certificates.again", "parts.machine"):
         monkeypatch.setattr(f"cmm_uq.app.commands.{module}.__version__", "0.1.0")
     (first, *_) = state_machine(job, rerun=True).warnings
     assert "was to be computed again and was not: version " in first
