@@ -196,7 +196,7 @@ def stated(
     else:
         artefact = StepGauge(ReferencedFacts(kind="step_gauge", u_um=0.4), points)
     model, estimate, _ = with_noise(RecordingModel(artefact, effects(truth.SIX)))
-    found = DrawnErrors.of(model, lambda points: model.artefact, seed).performance(model, Doubt(()), seed)
+    found = DrawnErrors.of(model, Doubt(()), lambda points: model.artefact, seed).performance(model)
     assert found is not None
     if cell.artefact != "bars":
         return {LARGEST: rows({LARGEST: found.largest(np.ones(len(found.rows), dtype=bool))})[LARGEST]}, {}

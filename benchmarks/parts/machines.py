@@ -27,7 +27,7 @@ from benchmarks.parts import truth
 from benchmarks.parts.known_noise import joint_posterior
 from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, as_points, joined, plan
 from cmm_uq.analysis.machine.conditional import further_recording, given_recording, own_noise, white
-from cmm_uq.analysis.machine.recordings import Beside, FurtherRecording
+from cmm_uq.analysis.machine.recordings import FurtherRecording, FurtherRecordings
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, unmodelled_errors, with_curves
 from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
@@ -178,7 +178,7 @@ def on_machine(
         chances.append(found.contradiction(state))
         if chances[-1] >= CONTRADICTED:
             taken.append(found)
-            state = given_recording(certificate, model, given, TRIALS, seed, beside=Beside(tuple(taken)))
+            state = given_recording(certificate, model, given, TRIALS, seed, beside=FurtherRecordings(tuple(taken)))
     growth = (PART.cte_per_k + PART.u_cte_per_k * random.standard_normal()) * (
         PART.temperature_c - 20 + PART.u_temperature_k * random.standard_normal()
     ) - PART.cte_per_k * (PART.temperature_c - 20)

@@ -20,7 +20,7 @@ from benchmarks.coverage.measuring import counted, kept
 from benchmarks.parts import machines, truth
 from benchmarks.parts.curved import CELLS, SORTS, Cell, drawn, study
 from cmm_uq.analysis.machine.conditional import further_recording, own_noise
-from cmm_uq.analysis.machine.recordings import ALONE, Beside, FurtherRecording
+from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecording, FurtherRecordings
 from cmm_uq.analysis.machine.regions import factor_regions, other_errors
 from cmm_uq.app.commands.estimation import with_noise
 from cmm_uq.machine.model.measurement import RecordingModel
@@ -83,7 +83,7 @@ def _measured(cell: Cell, hidden: truth.Truth, random: np.random.Generator) -> l
         errors = other_errors(model)
         gauge = machines.calibrated(machines.Cell(further, cell.noise, 0.0), hidden, NOISE_MM, 0.0, random)
         first = FurtherRecording(model, own_noise(model, errors, seed))
-        beside = Beside((further_recording(first, RecordingModel(gauge, machines.NAMED), errors, seed),))
+        beside = FurtherRecordings((further_recording(first, RecordingModel(gauge, machines.NAMED), errors, seed),))
     regions = factor_regions(model, posterior, Doubt(()), lambda points: model.artefact, seed, beside)
     whole, *eighths = (factors(hidden, ends) for ends in ENDS)
     rows = []

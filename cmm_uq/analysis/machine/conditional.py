@@ -23,8 +23,9 @@ import scipy
 
 from cmm_uq.analysis.machine.recordings import (
     ALONE,
-    Beside,
+    NO_DOUBT,
     FurtherRecording,
+    FurtherRecordings,
     components_of,
     doubted,
     mean_noise,
@@ -222,9 +223,6 @@ def white(sigma_mm: float) -> Sizes:
     return Sizes(np.full((1, 3), sigma_mm), none, none, none, none + 1)
 
 
-NO_DOUBT = Doubt(())
-
-
 def given_recording(
     state: MachineState,
     model: RecordingModel,
@@ -232,7 +230,7 @@ def given_recording(
     draws: int = DRAWS,
     seed: int = 0,
     doubt: Doubt = NO_DOUBT,
-    beside: Beside = ALONE,
+    beside: FurtherRecordings = ALONE,
     effort: Effort = USUAL,
 ) -> MachineState:
     """The state of a machine with all of its errors drawn together, given the recording of its calibration.
@@ -248,7 +246,7 @@ def given_recording(
     others, statements = as_recorded_allows(model, state.unmodelled, known, beside.recordings)
     state = replace(state, unmodelled=others, statements=statements)
     whole = RecordedField.of(model, state.unmodelled, beside=beside.recordings, in_doubt=beside.doubted(model))
-    doubt, random = NO_DOUBT if beside.recordings else doubt, np.random.default_rng(seed)
+    doubt, random = beside.left_of(doubt), np.random.default_rng(seed)
     noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
     sizes = _sizes(whole, model, draws, seed, known, effort)
     if known is None:

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.diagnosis.held_out import FOLDS, held_out_groups, predicted
-from cmm_uq.analysis.machine.conditional import NO_DOUBT, doubted_draws
-from cmm_uq.analysis.machine.recordings import ALONE, Beside
+from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecordings
 from cmm_uq.analysis.machine.regions import DrawnErrors, Key, columns_of, disagreeing
 from cmm_uq.analysis.machine.state import StatementEvidence, of_machine
 from cmm_uq.base.errors import CmmUqError
@@ -71,26 +70,24 @@ def field_map(
     doubt: Doubt,
     observe: Observed,
     seed: int,
-    beside: Beside = ALONE,
+    beside: FurtherRecordings = ALONE,
 ) -> FieldMap:
     """Of the errors of a machine that follow from the place alone.
 
     ``model``: of a calibration, and its ``posterior`` with no other errors. ``doubt``: what is stated to be in doubt about
     its unknowns. ``beside``: what is taken together with it. Raises ``CmmUqError`` where the machine has other than three
-    straight axes or its travel is not stated, or
-    where the recording does not allow it.
+    straight axes or its travel is not stated, or where the recording does not allow it.
     """
     machine = model.artefact.points.machine
     if machine.axes != tuple(AXES):
         raise CmmUqError("the machine has other axes than three straight ones", where="the machine")
     ends = [machine.travel(axis) for axis in AXES]
-    drawn = DrawnErrors.of(model, observe, seed, _DRAWS, beside)
-    doubt = NO_DOUBT if beside.recordings else doubt
+    drawn = DrawnErrors.of(model, doubt, observe, seed, _DRAWS, beside)
     blank = _blank(ends, _temperature(model))
     tables = {one: _figures(one, machine, blank) for one in (*model.effects, *drawn.field.effects) if _of_place(one)}
     held = {one: table for one, table in tables.items() if table is not None}
     named, smooth = columns_of(model.effects, held.__contains__), columns_of(drawn.field.effects, held.__contains__)
-    own = doubted_draws(doubt, len(model.unknowns), named, seed, drawn.own[:, named])
+    own = drawn.doubted(model, named, drawn.own[:, named])
     draws = np.hstack([own, drawn.further[:, smooth]])
 
     grid = np.array(list(product(*(np.linspace(*each, _EACH) for each in ends))))

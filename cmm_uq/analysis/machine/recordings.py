@@ -25,7 +25,7 @@ from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.linear_model import Freedoms, LeastSquares, LinearModel
 from cmm_uq.maths.inference.noise import Components, Sizes
-from cmm_uq.maths.inference.posterior import Cause
+from cmm_uq.maths.inference.posterior import Cause, Doubt
 
 _NO_NOISE = 1e-12  # part of the variance of a reading of the first recording that is none in another
 
@@ -91,7 +91,7 @@ def doubted(model: RecordingModel, causes: Iterable[Cause]) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Beside:
+class FurtherRecordings:
     """What is taken together with the recording of a calibration."""
 
     recordings: tuple[FurtherRecording, ...] = ()
@@ -103,8 +103,13 @@ class Beside:
         """As of :func:`doubted`, where others bear on the same errors: else doubt widens what follows from one recording."""
         return doubted(model, self.causes(model.artefact)) if self.recordings else None
 
+    def left_of(self, doubt: Doubt) -> Doubt:
+        """What of a doubt about one recording is still to widen what follows: nothing where others are weighed against it."""
+        return NO_DOUBT if self.recordings else doubt
 
-ALONE = Beside()
+
+ALONE = FurtherRecordings()
+NO_DOUBT = Doubt(())
 
 
 def recorded(model: RecordingModel, effect: Effect) -> bool:

@@ -24,10 +24,10 @@ import numpy as np
 from scipy.special import ndtri
 
 from cmm_uq.analysis.diagnosis.held_out import with_quantities
-from cmm_uq.analysis.machine.conditional import NO_DOUBT, RecordedField, as_recorded_allows, doubted_draws
+from cmm_uq.analysis.machine.conditional import RecordedField, as_recorded_allows, doubted_draws
 from cmm_uq.analysis.machine.influence import PriorInfluence, influence_of
 from cmm_uq.analysis.machine.performance import MachinePerformance, performance_of, rows_of
-from cmm_uq.analysis.machine.recordings import ALONE, Beside, recorded, shown_by
+from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecordings, recorded, shown_by
 from cmm_uq.analysis.machine.state import StatementEvidence, Unmodelled, of_machine, unmodelled_errors
 from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.base.errors import CmmUqError
@@ -83,18 +83,21 @@ class DrawnErrors:
     further: Floats  # (N, f) of those of the field's effects
     others: tuple[Unmodelled, ...]  # errors beside the named ones
     statements: tuple[StatementEvidence, ...]  # what the recording says of what is stated of axes
-    beside: Beside = ALONE  # that is taken together with it
+    beside: FurtherRecordings  # that is taken together with it
+    doubt: Doubt  # what is in doubt about the unknowns beside that
+    seed: int
 
     @classmethod
     def of(
         cls,
         model: RecordingModel,
+        doubt: Doubt,
         observe: Observed,
         seed: int,
         draws: int = DRAWS,
-        beside: Beside = ALONE,
+        beside: FurtherRecordings = ALONE,
     ) -> DrawnErrors:
-        """``beside``: what is taken together with it.
+        """``doubt``: what is stated to be in doubt about the unknowns. ``beside``: what is taken together with the recording.
 
         Raises ``CmmUqError`` where the machine's travel is not stated, or the recording does not allow it.
         """
@@ -105,7 +108,11 @@ class DrawnErrors:
         sizes = sample_sizes(field.field, draws, seed, effort=BRIEF)
         drawn = field.coefficients(sizes.noise, sizes.families, random)
         own, further = drawn[:, : field.modelled], drawn[:, field.modelled :]
-        return cls(thinned, field, sizes, own, further, others, statements, beside)
+        return cls(thinned, field, sizes, own, further, others, statements, beside, beside.left_of(doubt), seed)
+
+    def doubted(self, model: RecordingModel, which: Ints, draws: Floats) -> Floats:
+        """Draws (N, k) of some of the unknowns, with what is in doubt about them."""
+        return doubted_draws(self.doubt, len(model.unknowns), which, self.seed, draws)
 
     def field_of(self, model: RecordingModel) -> RecordedField:
         """Of some of the observations, with the same errors."""
@@ -115,7 +122,7 @@ class DrawnErrors:
         """Draws (N, k) of the named effects as means over the recorded set-ups, as an estimate of them alone has them."""
         return np.asarray(self.own + self.further @ as_recorded(model, self.field, posterior).T)
 
-    def performance(self, model: RecordingModel, doubt: Doubt, seed: int) -> MachinePerformance | None:
+    def performance(self, model: RecordingModel) -> MachinePerformance | None:
         """Figures of the recorded lengths without noise; ``None`` of an artefact that has no lengths.
 
         Whether what the named errors leave is noise, or errors of the field, a recording says by how smooth it is, and hardly
@@ -127,14 +134,14 @@ class DrawnErrors:
         each = np.linspace(0, len(self.own) - 1, min(len(self.own), max(_LEAST, _ERRORS // len(rows)))).astype(np.int64)
         try:
             none = tuple(one for one in self.field.field.errors if one.family is None)
-            noise = sample_sizes(replace(self.field.field, errors=none), len(each), seed, effort=BRIEF).noise
+            noise = sample_sizes(replace(self.field.field, errors=none), len(each), self.seed, effort=BRIEF).noise
         except CmmUqError:  # where the factors hold is stated all the same
             return None
-        random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(41,)))
+        random = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(41,)))
         absent = np.full((len(each), len(self.field.field.families)), _ABSENT)
         drawn, k = self.field.coefficients(noise, absent, random), self.field.modelled
         whole = np.where(np.arange(len(each))[:, None] % 2, drawn, np.hstack([self.own, self.further])[each])
-        own = doubted_draws(doubt, len(model.unknowns), np.arange(k), seed, whole[:, :k])
+        own = self.doubted(model, np.arange(k), whole[:, :k])
         return performance_of(model, self.of_lengths(model, rows, own, whole[:, k:]))
 
     def of_lengths(self, model: RecordingModel, rows: Ints, own: Floats, further: Floats) -> Floats:
@@ -181,18 +188,17 @@ def factor_regions(
     doubt: Doubt,
     observe: Observed,
     seed: int,
-    beside: Beside = ALONE,
+    beside: FurtherRecordings = ALONE,
 ) -> FactorRegions:
     """Of the named errors that need nothing but a place.
 
     ``posterior``: of the model with no other errors. ``doubt``: what is stated to be in doubt about its unknowns. ``beside``:
-    further recordings of the machine. Raises
-    ``CmmUqError`` where the machine's travel is not stated, or the recording does not allow it.
+    what is taken together with the recording. Raises ``CmmUqError`` where the machine's travel is not stated, or the
+    recording does not allow it.
     """
     if model.artefact.points.machine.axes != tuple(AXES):
         raise CmmUqError("the machine has other axes than three straight ones", where="the machine")
-    drawn = DrawnErrors.of(model, observe, seed, beside=beside)
-    doubt = NO_DOUBT if beside.recordings else doubt
+    drawn = DrawnErrors.of(model, doubt, observe, seed, beside=beside)
     field, sizes, own, further = drawn.field, drawn.sizes, drawn.own, drawn.further
 
     named, placed = columns_of(model.effects, _of_place), columns_of(field.effects, lambda one: not one.columns)
@@ -208,7 +214,7 @@ def factor_regions(
     def within(change: Floats) -> Floats:
         return np.asarray(own[:, named] + further[:, placed] @ change[same].T)
 
-    doubted = partial(doubted_draws, doubt, len(model.unknowns), named, posterior.seed)
+    doubted = partial(drawn.doubted, model, named)
     over_all, parts = doubted(within(whole)), np.stack([doubted(within(one)) for one in eighths])
     low, high = np.quantile(parts.min(axis=0), 0.025, axis=0), np.quantile(parts.max(axis=0), 0.975, axis=0)
     recorded = drawn.recorded(model, posterior)
@@ -228,7 +234,7 @@ def factor_regions(
         influence,
         (int(drawn.model.used.sum()), int(model.used.sum())),
         drawn.statements,
-        drawn.performance(model, doubt, seed),
+        drawn.performance(model),
     )
 
 

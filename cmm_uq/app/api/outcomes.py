@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from cmm_uq.app.api.pictures import Diagnosed, Shown, chosen, figures_of
+from cmm_uq.app.api.pictures import DiagnosisResults, NotebookView, chosen, figures_of
 from cmm_uq.app.commands.diagnose import DIAGNOSE
 from cmm_uq.app.commands.files import Form
 from cmm_uq.app.commands.parts.part import document_of, written
@@ -77,7 +77,7 @@ def shown(frame: pd.DataFrame) -> Iterator[tuple[str, ...]]:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Found(Shown):
+class Found(NotebookView):
     """What a call found, the figures and the document; nothing is written before :meth:`write`."""
 
     outcome: Outcome
@@ -208,13 +208,13 @@ class Report(Found):
             return {"ranking": ranking, **field, **figures_of(lambda: diagnosis_sections(found.diagnosed))}
 
     @property
-    def diagnosis(self) -> Diagnosed:
+    def diagnosis(self) -> DiagnosisResults:
         """What the model of the job leaves out, as in results.json, with a ``plot``; empty where the kind has no diagnosis."""
 
         def draw(name: str | None) -> Figure:
             return chosen(self._diagnosed, name, ("field",), f"Diagnosis of {self.job.facts.job.id}")
 
-        return Diagnosed(self.results.get("diagnosis", {}), draw)
+        return DiagnosisResults(self.results.get("diagnosis", {}), draw)
 
     def _said(self) -> str:
         decided = [f"{one.by or one.name} {one.outcome}" for one in self.outcome.verdicts]
@@ -308,7 +308,7 @@ class ProofOutcome(Found):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Part(Shown):
+class Part(NotebookView):
     """What was found of a part; nothing is written before :meth:`write`."""
 
     found: PartMeasurement

@@ -61,7 +61,7 @@ def _plain(heading: Text, unit: Text = NOTHING) -> str:
     return " / ".join(str.__str__(text) for text in (heading, unit) if text)
 
 
-class Shown(Protocol):
+class NotebookView(Protocol):
     """A line, tables, pictures and warnings."""
 
     first: ClassVar[tuple[str, ...]] = ()  # names of the picture that ``plot`` gives of itself, the first that there is
@@ -139,7 +139,7 @@ class Export:
         return html_table(repr(self)[1:-1], (), self.reading.items()) + str(self.points.head(10).to_html())
 
 
-class Diagnosed(dict[str, Any]):
+class DiagnosisResults(dict[str, Any]):
     """What the model of a job leaves out, as in results.json; ``plot`` draws it."""
 
     def __init__(self, found: Mapping[str, Any], draw: Callable[[str | None], Figure]) -> None:

@@ -27,7 +27,7 @@ GROUPS = {
 """Of the list of commands, each in one."""
 
 
-class Grouped(TyperGroup):
+class CommandGroups(TyperGroup):
     """Commands listed by what they are for."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -43,7 +43,7 @@ class Grouped(TyperGroup):
 
 app = typer.Typer(
     name="cmm-uq",
-    cls=Grouped,
+    cls=CommandGroups,
     help="Uncertainty of coordinate measuring machines, and the certificates that state it.",
     epilog="Exit codes: 0 done; 2 bad input; 3 output impossible; 4 with --strict: done, not conforming or inconsistent; "
     "130, 143 interrupted; 1 with report --scheduled: done, and something needs a person; of verify: 1 not verified, "

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.machine.regions import FactorRegions, factor_regions
-from cmm_uq.app.commands.certificates.further import Together, together_of
+from cmm_uq.app.commands.certificates.further import JointRecordings, together_of
 from cmm_uq.app.commands.certificates.release import reissued, with_replaced
 from cmm_uq.app.commands.diagnose import diagnose_model, screened_model
 from cmm_uq.app.commands.estimation import (
@@ -112,7 +112,7 @@ def regions_of(
     doubt: Doubt,
     observe: Observed,
     seed: int,
-    together: Callable[[], Together],
+    together: Callable[[], JointRecordings],
 ) -> Callable[[], FactorRegions | Text]:
     """What computes once, when it is first asked for, where the error factors hold, or says why that is not to be had."""
 

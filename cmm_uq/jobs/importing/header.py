@@ -214,9 +214,7 @@ def assigned(
     taken = {place for own in columns.values() for _, place in own}
     for i, heading in enumerate(headings):
         meaning = meaning_of(heading.strip()) if heading else Heading()
-        if (
-            heading.strip() == _BALL and "point" in headings
-        ):  # beside the points of its scan it is no other word for these
+        if heading.strip() == _BALL and "point" in headings:  # then it is no other word for the points of its scan
             meaning = Heading(_BALL)
         if meaning.column and meaning.column not in named and i not in taken:
             columns.setdefault(meaning.column, []).append((meaning.index, i))

@@ -130,9 +130,8 @@ class Artefact(ABC):
     # and what is found predicts other points, not other set-ups
     curves: ClassVar[bool] = False
     form: float = 0.0  # deviation of its own form by its certificate, mm; 0 where it is not stated
-    leans: Floats = np.zeros(
-        3
-    )  # Sxy, Syz, Szx, rad, of axes on which its observations were found: where estimates begin
+    # Sxy, Syz, Szx, rad, of axes on which its observations were found: where estimates begin
+    leans: Floats = np.zeros(3)
     key_of_u: ClassVar[str] = "u_um"  # of ``[artefact]``, that says how uncertain its lengths are
 
     @property

@@ -25,7 +25,7 @@ from cmm_uq.certificate.sections.performance import performance, returning_figur
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.noise import noise_of
-from cmm_uq.maths.inference.posterior import sample_with_noise
+from cmm_uq.maths.inference.posterior import Doubt, sample_with_noise
 from tests.artefacts.simulated import analysed, outcome
 
 JOBS = ("iota-1102-20C", "step-gauge-simulated")
@@ -65,7 +65,7 @@ def test_errors_of_lengths_are_those_of_the_machine_that_indicates_them(job: str
 
     result = analysed(job)
     model, about = result.model, result.estimate.about
-    drawn = DrawnErrors.of(model, lambda points: observe(result, points), 0, 10)
+    drawn = DrawnErrors.of(model, Doubt(()), lambda points: observe(result, points), 0, 10)
     rows, k = rows_of(model.artefact), drawn.field.modelled
     assert rows is not None
     errors = drawn.of_lengths(model, rows, about[None, :k], np.zeros((1, drawn.further.shape[1])))[0]

@@ -10,7 +10,7 @@ from scipy.stats import binom
 
 import cmm_uq
 from cmm_uq.analysis.machine.conditional import RecordedField, further_recording, given_recording, own_noise, white
-from cmm_uq.analysis.machine.recordings import Beside, FurtherRecording, mean_noise, model_of_machine
+from cmm_uq.analysis.machine.recordings import FurtherRecording, FurtherRecordings, mean_noise, model_of_machine
 from cmm_uq.analysis.machine.state import MachineState, Unmodelled
 from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.artefacts.ballbar import Ballbar
@@ -133,7 +133,9 @@ def test_what_a_further_recording_says_goes_less_far_the_more_the_machine_may_ha
     u = []
     for change in (0.0, 20.0, 1e6):
         every = {one.key: change for one in first.unknowns[:6]}
-        given = given_recording(state, first, SIGMA, 4000, 5, beside=Beside((replace(second, change=every),)))
+        given = given_recording(
+            state, first, SIGMA, 4000, 5, beside=FurtherRecordings((replace(second, change=every),))
+        )
         u.append(given.draws[:, :6].std(axis=0))
     assert np.all(u[0] < 0.95 * u[2])
     assert np.all(u[0] < 1.02 * u[1])

@@ -149,4 +149,4 @@ def test_a_map_of_several_recordings_is_better_known_than_of_one(
     assert '"number": "step-gauge-simulated"' in (tmp_path / "map-both" / "compensation.json").read_text()
     spread = [np.linalg.norm(one.error_map.covariance.factor) for one in (alone, both)]  # type: ignore[union-attr]
     assert spread[1] < spread[0]
-    assert files
+    assert files["compensation.json"].is_file()

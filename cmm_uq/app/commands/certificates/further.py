@@ -16,7 +16,7 @@ import numpy as np
 
 from cmm_uq.analysis.diagnosis.held_out import with_quantities
 from cmm_uq.analysis.machine.conditional import further_recording, given_recording, own_noise
-from cmm_uq.analysis.machine.recordings import ALONE, Beside, FurtherRecording
+from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecording, FurtherRecordings
 from cmm_uq.analysis.machine.regions import other_errors
 from cmm_uq.analysis.machine.state import Change, MachineState, StatedNoise, changes, of_machine, with_curves
 from cmm_uq.app.commands.certificates.verification import Computing, Verification, examine_certificate, verify_given
@@ -31,12 +31,11 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.tables.identification import MEASURED, SIMULATED
 from cmm_uq.jobs.tables.machine import FurtherFacts
-from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.physics.stated import with_own_physics
 from cmm_uq.maths.inference.families import BRIEF
-from cmm_uq.maths.inference.posterior import Cause, Doubt, NoisyPosterior
+from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior
 
 # quantities of a recording, with their repeats, by which a machine's errors are drawn: time grows with the cube of what they
 # show of errors left out. Those of all further recordings together.
@@ -55,10 +54,10 @@ class VerifiedCertificate:
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
+class JointRecordings:
     """Recordings that are taken together with that of a machine's calibration, and what became of each certificate."""
 
-    taken: Beside = ALONE  # that do not contradict it
+    taken: FurtherRecordings = ALONE  # that do not contradict it
     told: FurtherCertificates = NO_FURTHER
 
 
@@ -167,26 +166,25 @@ def recording_of(job: Job, seed: int, most: int = MOST) -> tuple[RecordingModel,
 
 def given_together(
     state: MachineState,
-    alone: MachineState,
-    again: Callable[[Beside], MachineState],
+    given: Callable[[FurtherRecordings], MachineState],
     model: RecordingModel,
-    doubting: Callable[[Artefact], Iterable[Cause]],
+    job: Job,
     further: Sequence[VerifiedCertificate],
     change: Change | None,
     seed: int,
-) -> Together:
+) -> JointRecordings:
     """Further recordings of a machine, those left out that contradict it as its others have it.
 
-    ``state``: as its own certificate states it. ``alone``: given the recording of that one, and ``again``: given others too.
-    ``doubting``: of which what is stated to be in doubt. ``change``: by the records.
+    ``state``: as its own certificate states it; ``given``: the same by the recording of ``job``, its calibration, with
+    others. ``change``: by the records.
     """
     taken, told, warned = list[FurtherRecording](), list[FurtherCertificate](), list[Text]()
     if not further:
-        return Together()
-    known, most = alone, _MOST_FURTHER // len(further)
+        return JointRecordings()
+    beside, most = ALONE, _MOST_FURTHER // len(further)
     first = FurtherRecording(model, own_noise(model, state.unmodelled, seed))
     keys = [(effect.name, one.name) for effect in state.effects for one in effect.coefficients]
-    for number_of, one in enumerate(further, 1):
+    for one in further:
         _, other = recording_of(one.job, seed, most)
         causes = causes_of(other.artefact, one.job.circumstances)
         days = abs((one.certificate.date - state.calibrated).days) if state.calibrated else 0
@@ -196,7 +194,7 @@ def given_together(
             change={key: size for key, size in zip(keys, each, strict=True) if size},
             corrections=dict(zip(keys, state.corrects.tolist(), strict=True)) if one.corrected else {},
         )
-        chance = found.contradiction(known)
+        chance = found.contradiction(given(beside))
         used = chance >= CONTRADICTED
         told.append(replace(one.certificate, observations=int(found.model.used.sum()), chance=chance, used=used))
         named = Verbatim(one.certificate.number)
@@ -220,18 +218,18 @@ def given_together(
             )
             warned.append(unknown)
         taken.append(found)
-        known = again(Beside(tuple(taken), doubting)) if number_of < len(further) else known
-    return Together(Beside(tuple(taken), doubting), FurtherCertificates(tuple(told), tuple(warned)))
+        beside = FurtherRecordings(tuple(taken), partial(causes_of, circumstances=job.circumstances))
+    return JointRecordings(beside, FurtherCertificates(tuple(told), tuple(warned)))
 
 
-def doubts_of(job: Job) -> Callable[[Artefact], Iterable[Cause]]:
-    """What a job states to be in doubt, of its artefact or a part of it."""
-    return lambda artefact: causes_of(artefact, job.circumstances)
+def once_each(given: Callable[..., MachineState]) -> Callable[[FurtherRecordings], MachineState]:
+    """The machine given other recordings beside its calibration's, computed once for the same ones."""
+    return cache(lambda beside: given(beside=beside))
 
 
 def together_of(
     job: Job, model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, seed: int
-) -> Callable[[], Together]:
+) -> Callable[[], JointRecordings]:
     """What takes a calibration's recording together with those of its further certificates, once it is first asked for.
 
     These are verified at once. ``model``: of the calibration; its ``posterior`` knows of no errors beside the named ones.
@@ -239,9 +237,9 @@ def together_of(
     further = further_certificates(job, job, verify_further(job))
 
     @cache
-    def together() -> Together:
+    def together() -> JointRecordings:
         if not further:
-            return Together()
+            return JointRecordings()
         acting = [(effect, of_machine(effect)) for effect in model.effects]
         own = np.flatnonzero([machine for effect, machine in acting for _ in effect.coefficients])
         state = MachineState(
@@ -254,10 +252,8 @@ def together_of(
         )
         observe = partial(kind_of(job).observing("reported"), job.facts.artefact, where=job.recording_path)
         thinned = with_quantities(model, observe, seed, MOST)
-        given = partial(given_recording, state, thinned, seed=seed, doubt=doubt, effort=BRIEF)
-        return given_together(
-            state, given(), lambda taken: given(beside=taken), thinned, doubts_of(job), further, None, seed
-        )
+        given = once_each(partial(given_recording, state, thinned, seed=seed, doubt=doubt, effort=BRIEF))
+        return given_together(state, given, thinned, job, further, None, seed)
 
     return together
 
@@ -277,12 +273,9 @@ def given_recordings(
         estimate, count, curved = whole.estimate(), int(whole.used.sum()), with_curves(state)
         sigma = float(np.sqrt(np.mean(state.noise.usual_mm**2))) or estimate.least_squares.sigma_of_residuals
         doubt = doubt_of(whole, estimate, sigma, causes_of(whole.artefact, job.circumstances))
-        given = partial(given_recording, curved, model, seed=seed, doubt=doubt)
-        together = given()
-        others = given_together(
-            curved, together, lambda taken: given(beside=taken), model, doubts_of(job), more, change, seed
-        )
-        together = given(beside=others.taken) if others.taken.recordings else together
+        given = once_each(partial(given_recording, curved, model, seed=seed, doubt=doubt))
+        others = given_together(curved, given, model, job, more, change, seed)
+        together = given(others.taken)
     except CmmUqError as error:
         why = Verbatim(error.problem)
         told = say("The errors could not be drawn given the recording ({why}): {apart}.", why=why, apart=apart)
