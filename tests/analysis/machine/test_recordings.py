@@ -10,10 +10,18 @@ from scipy.stats import binom
 
 import cmm_uq
 from cmm_uq.analysis.machine.conditional import RecordedField, further_recording, given_recording, own_noise, white
-from cmm_uq.analysis.machine.recordings import FurtherRecording, FurtherRecordings, mean_noise, model_of_machine
+from cmm_uq.analysis.machine.recordings import (
+    ALONE,
+    NO_DOUBT,
+    FurtherRecording,
+    FurtherRecordings,
+    mean_noise,
+    model_of_machine,
+)
 from cmm_uq.analysis.machine.state import MachineState, Unmodelled
 from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.artefacts.ballbar import Ballbar
+from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.field import curves
@@ -21,6 +29,7 @@ from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.model.recorded import Noise
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.noise import Sizes
+from cmm_uq.maths.inference.posterior import Cause, Doubt
 from tests.analysis.machine.test_conditional import BARS, JOB, MODELLED, left_out, repeated
 from tests.conftest import ROOT
 
@@ -56,6 +65,35 @@ def test_two_halves_of_a_recording_together_say_what_all_of_it_says() -> None:
     u = np.sqrt(np.diag(spread)[:own])
     np.testing.assert_allclose(mean[:own], expected[:own], atol=2e-3 * u.min())
     np.testing.assert_allclose(covariance[:own, :own] / np.outer(u, u), spread[:own, :own] / np.outer(u, u), atol=2e-3)
+
+
+def test_what_is_in_doubt_about_the_first_recording_is_weighed_as_its_certified_length_would_be() -> None:
+    """5 µm of the bar's length: as uncertainty of its certificate in one model, in the other a cause of doubt beside it."""
+    first, second, length_mm = of(FIRST), of(~FIRST), SIGMA
+    beside = (FurtherRecording(second, SIGMA * np.sqrt(2) * np.eye(int(second.used.sum()))),)
+    facts = EXACT.model_copy(update={"u_um": 1e3 * length_mm})
+    certified = replace(first, artefact=Ballbar(facts, first.artefact.points))
+    every = Cause(say("length"), np.full((len(first.used), 1), length_mm))
+    taken = FurtherRecordings(beside, lambda artefact: [every])
+    in_doubt, none = (one.doubted(first) for one in (taken, replace(taken, recordings=())))
+    assert none is None
+    doubted, expected, exact = (
+        RecordedField.of(model, further(), beside=beside, in_doubt=columns).field
+        for model, columns in ((first, in_doubt), (certified, None), (first, None))
+    )
+    scale, own = np.full(len(exact.families), 0.1), len(MODELLED)
+    found = [one.normal(white(SIGMA), scale) for one in (doubted, expected, exact)]
+    u, other, without = (np.sqrt(np.diag(spread)[:own]) for _, spread in found)
+    np.testing.assert_allclose(u, other, rtol=1e-3)
+    np.testing.assert_allclose(found[0][0][:own], found[1][0][:own], atol=1e-3 * u.min())
+    assert np.max(u / without) > 1.01  # ten times what the two may differ by
+
+
+def test_doubt_that_others_are_weighed_against_widens_nothing_again() -> None:
+    doubt = Doubt(())  # one of its own
+    taken = FurtherRecordings((known(of(~FIRST)),))
+    assert taken.left_of(doubt) is NO_DOUBT
+    assert ALONE.left_of(doubt) is doubt
 
 
 def simulated(coefficients: Floats, seed: int) -> Floats:
