@@ -33,6 +33,7 @@ EVERY = (
     *CELLS,
     *(Cell(sort, artefact, "set-up") for artefact in ("step gauge", "bars") for sort in (SORTS[0], SORTS[-1])),
     *(Cell(sort, one, "white") for one in ("bars", "bars and step gauge") for sort in (SORTS[0], SORTS[-1])),
+    *(Cell(sort, "bars and step gauge", "set-up") for sort in (SORTS[0], SORTS[-1])),
 )
 KINDS = {"scale": slice(0, 3), "squareness": slice(3, 6)}
 ENDS = (((0.0, 1.0),) * 3, *product(((0.0, 0.5), (0.5, 1.0)), repeat=3))
@@ -63,13 +64,17 @@ def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
     return counted(cell, seed, number, lambda random: {"factors": _measured(cell, drawn(cell.sort, random), random)}, 7)
 
 
+def offset(cell: Cell, random: np.random.Generator) -> float:
+    """Standard deviation, mm, of what a set-up adds to each of its points."""
+    return NOISE_MM * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
+
+
 def calibrated(
     cell: Cell, hidden: truth.Truth, random: np.random.Generator
 ) -> tuple[RecordingModel, NoisyPosterior, int]:
     """The machine calibrated with the cell's artefact and noise: the named model, its posterior, and a seed for more."""
     one = machines.Cell(cell.artefact.partition(" and ")[0], cell.noise, 0.0)
-    offset = NOISE_MM * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
-    artefact = machines.calibrated(one, hidden, NOISE_MM, offset, random)
+    artefact = machines.calibrated(one, hidden, NOISE_MM, offset(cell, random), random)
     model = RecordingModel(artefact, machines.NAMED, NOISE_MM if cell.noise == "stated" else None)
     model, estimate, _ = with_noise(model)
     seed = int(random.integers(2**31))
@@ -81,7 +86,9 @@ def _measured(cell: Cell, hidden: truth.Truth, random: np.random.Generator) -> l
     beside = ALONE
     if further := cell.artefact.partition(" and ")[2]:  # calibrated on the same day with another artefact
         errors = other_errors(model)
-        gauge = machines.calibrated(machines.Cell(further, cell.noise, 0.0), hidden, NOISE_MM, 0.0, random)
+        gauge = machines.calibrated(
+            machines.Cell(further, cell.noise, 0.0), hidden, NOISE_MM, offset(cell, random), random
+        )
         first = FurtherRecording(model, own_noise(model, errors, seed))
         beside = FurtherRecordings((further_recording(first, RecordingModel(gauge, machines.NAMED), errors, seed),))
     regions = factor_regions(model, posterior, Doubt(()), lambda points: model.artefact, seed, beside)
