@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT))
 from cmm_uq import __version__  # noqa: E402
 
 CONTENTS: dict[str, list[str]] = {
-    "Start here": ["tutorial", "overview", "gallery"],
+    "Start here": ["tutorial", "desk", "overview", "gallery"],
     "How to": [
         "howto/laboratory", "howto/service", "howto/auditor", "howto/part", "howto/scheduled", "howto/python", "notebooks/*",
         "import/index", "import/*", "instruments/index", "instruments/*",

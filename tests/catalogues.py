@@ -20,7 +20,7 @@ from tests.conftest import ROOT
 
 PACKAGE = ROOT / "cmm_uq"
 SHOWN_ELSEWHERE = (
-    "app/cli/", "app/commands/budget.py", "app/serve/", "laboratory/live/", "laboratory/schedule/", "jobs/dcc/",
+    "app/cli/", "app/commands/budget.py", "app/serve/", "app/desk/", "laboratory/live/", "laboratory/schedule/", "jobs/dcc/",
     "certificate/sign/", "certificate/verify/",
 )  # fmt: skip
 """Rooms whose texts no document shows: those of a terminal, of the pages of records, and of messages that are sent."""

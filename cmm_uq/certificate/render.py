@@ -18,7 +18,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import chain
 from math import ceil
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.base.errors import CmmUqError
@@ -26,20 +26,12 @@ from cmm_uq.base.languages.translation import Code, code_of, translated as said_
 from cmm_uq.base.messages import Message, Plural, Text, Verbatim, commas, say, sentences
 from cmm_uq.certificate import document as doc
 from cmm_uq.certificate.document import WORDS, Document, Facts, Plot, Section, Table, letters
-from cmm_uq.certificate.plots.style import COLOURS, JAPANESE, fonts_of
+from cmm_uq.certificate.look import COLOURS, template_folder
+from cmm_uq.certificate.plots.style import JAPANESE, fonts_of
 from cmm_uq.certificate.sign import TEST_NOTE, Seal, Signer
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-
-
-def template_folder() -> Path:
-    package = Path(__file__).resolve().parents[1]
-    for folder in (package / "templates", package.parent / "templates"):
-        if (folder / "document.html").is_file():
-            return folder
-    raise CmmUqError("the templates of the certificate are missing", where=str(package),
-                     fix="Install cmm-uq again, from a whole wheel")  # fmt: skip
 
 
 def render_html(document: Document) -> str:

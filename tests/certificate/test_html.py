@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate import render as templates
+from cmm_uq.certificate import look as templates
 from cmm_uq.certificate.document import Column, Document, Section, Table
 from cmm_uq.certificate.render import render_html
 from tests.certificate.samples import HOSTILE, document_of, plots

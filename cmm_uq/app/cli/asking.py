@@ -5,7 +5,6 @@ Of a part each answer is held against what the readers of a job would say of it,
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ import typer
 
 from cmm_uq.app.cli.terminal import say
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.content import value_of
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.parts.new import Answers
@@ -27,14 +27,6 @@ CHAIN = {
 }  # fmt: skip
 _TEXTS = ("name", "serial", "customer", "mpe", *(f"certificate_{key}" for key in CHAIN if key not in ("date", "due")))
 InstrumentAnswers = tuple[str, dict[int, str], dict[str, tuple[float, float]], str, str, dict[str, str | int]]
-
-
-def value_of(text: str) -> Any:
-    """A value as TOML has it; a text without quotes as it is."""
-    try:
-        return tomllib.loads(f"x = {text}")["x"]
-    except tomllib.TOMLDecodeError:
-        return text
 
 
 def job_answers(name: str) -> dict[str, dict[str, Any]]:

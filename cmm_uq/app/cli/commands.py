@@ -11,14 +11,14 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from cmm_uq.app.cli import certificates, evaluations, instruments, jobs, laboratory, records
+from cmm_uq.app.cli import certificates, desk, evaluations, instruments, jobs, laboratory, records
 from cmm_uq.app.cli.options import examples, flag, with_ending
 from cmm_uq.app.cli.terminal import BAD_INPUT, say
 from cmm_uq.base.errors import CmmUqError
 
 GROUPS = {
     "First": ("new", "import", "check", "report", "diagnose", "part"),
-    "Make": ("plan", "simulate", "compensate", "budget", "batch", "sign", "keys", "qif", "schema"),
+    "Make": ("desk", "plan", "simulate", "compensate", "budget", "batch", "sign", "keys", "qif", "schema"),
     "Decide": ("standards", "effects", "prove"),
     "Records": ("release", "history", "due", "fleet", "affected", "records", "schedule", "serve"),
     "Check": ("verify", "read", "selftest"),
@@ -54,6 +54,7 @@ app = typer.Typer(
 )
 
 COMMANDS: dict[str, tuple[Callable[..., None], str, *tuple[str, ...]]] = {
+    "desk": (desk.desk, "Certificates made in a browser, on this machine.", "desk", "desk jobs --no-open"),
     "new": (jobs.new, "A job folder that runs at once, to be filled with your own figures.", "new", "new step_gauge my-gauge",
         "new ballbar --machine 'CMM 3' --set artefact.length_mm=500"),
     "import": (jobs.import_export, "What is recognised of a laboratory's export.", "import export.xlsx",

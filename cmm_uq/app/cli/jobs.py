@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.app.cli import options as opt
-from cmm_uq.app.cli.asking import job_answers, part_answers, value_of
+from cmm_uq.app.cli.asking import job_answers, part_answers
 from cmm_uq.app.cli.options import Ending, argument, flag, job_folder, option
 from cmm_uq.app.cli.summary import conclude_derived, put_manifest, screen_layout
 from cmm_uq.app.cli.terminal import BAD_INPUT, can_answer, put, say, show
 from cmm_uq.base.errors import CmmUqError, printable
+from cmm_uq.base.files.content import value_of
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.jobs.check import JobCheck

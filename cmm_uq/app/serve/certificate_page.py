@@ -13,10 +13,9 @@ from http import HTTPStatus
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
-from urllib.parse import quote
 
 from cmm_uq.app.serve import page as p
-from cmm_uq.app.serve.exchange import OWN, RECORDED, RefusedRequest, WebRequest, WebResponse
+from cmm_uq.app.serve.exchange import MEDIA, RefusedRequest, WebRequest, WebResponse, sent_file
 from cmm_uq.app.serve.page import Block, Cell, PageNotice, PageParagraph, PageTable, address
 from cmm_uq.app.serve.trends import values_table
 from cmm_uq.app.serve.view import SiteView, machine_cell
@@ -72,7 +71,7 @@ def recorded_file(view: SiteView, request: WebRequest) -> WebResponse:
     one, entry = _named(view, request)
     for file in files_of(entry, Path(one.folder), view.records.signed(one.entry)):
         if file.name == name:
-            return sent(file, content_of(file, Path(one.folder)), keep=keep)
+            return sent_file(file.name, content_of(file, Path(one.folder)), keep=keep)
     problem = say("the certificate {number} has no file of that name", number=Verbatim(one.number))
     raise RefusedRequest(HTTPStatus.NOT_FOUND, problem)
 
@@ -203,15 +202,6 @@ def _list(value: Any) -> list[Any]:
 
 LARGEST = 128 * 2**20  # bytes of a file that the page hands out
 
-# a browser's own viewer of PDF does not work in a sandbox
-PDF = "default-src 'none'; object-src 'self'; style-src 'unsafe-inline'; base-uri 'none'; frame-ancestors 'none'"
-
-MEDIA: Mapping[str, tuple[str, str]] = {  # what a browser may show, by the end of the name; all else it may only keep
-    ".html": ("text/html; charset=utf-8", RECORDED), ".pdf": ("application/pdf", PDF),
-    ".json": ("application/json", RECORDED), ".csv": ("text/plain; charset=utf-8", RECORDED),
-    ".toml": ("text/plain; charset=utf-8", RECORDED), ".svg": ("image/svg+xml", RECORDED),
-}  # fmt: skip
-
 
 class RecordedFile(NamedTuple):
     """One file of a certificate: its name, and the SHA-256 that was recorded of it."""
@@ -286,11 +276,3 @@ def results_of(files: tuple[RecordedFile, ...], folder: Path) -> dict[str, Any]:
                 return {}
             return results if isinstance(results, dict) else {}
     return {}
-
-
-def sent(file: RecordedFile, content: bytes, *, keep: bool) -> WebResponse:
-    media, policy = MEDIA.get(Path(file.name).suffix.lower(), ("application/octet-stream", OWN))
-    how = "attachment" if keep or not file.shown else "inline"
-    name = quote(file.name.rpartition("/")[2], safe="")
-    headers = {"Content-Disposition": f"{how}; filename*=UTF-8''{name}"}
-    return WebResponse(content, media, policy=policy, headers=headers)

@@ -10,17 +10,19 @@ from __future__ import annotations
 import datetime as dt
 import hashlib
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from http import HTTPStatus
+from pathlib import PurePosixPath
 from typing import BinaryIO
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl, quote, urlsplit
 
 from cmm_uq.base.errors import printable, shortened, suggestion
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 
 LONGEST_VALUE = 300  # characters of one value of a query: the longest serial or job id that the records take is shorter
 MOST_VALUES = 20
+MOST_FIELDS, LONGEST_FORM = 1000, 4_000_000  # of a form; job.toml has a million characters at most
 LAST_PAGE = 10**6
 
 
@@ -143,12 +145,34 @@ class WebResponse:
     policy: str = OWN
     referrer: str = "no-referrer"
     headers: Mapping[str, str] = field(default_factory=dict)
+    stream: Iterable[bytes] | None = None  # what follows the body as it comes about
 
     def all_headers(self) -> dict[str, str]:
+        length = {} if self.stream is not None else {"Content-Length": str(len(self.body))}
         return {
-            "Content-Type": self.media, "Content-Length": str(len(self.body)), **SECURITY,
+            "Content-Type": self.media, **length, **SECURITY,
             "Content-Security-Policy": self.policy, "Referrer-Policy": self.referrer, **self.headers,
         }  # fmt: skip
+
+
+# a browser's own viewer of PDF does not work in a sandbox
+PDF = "default-src 'none'; object-src 'self'; style-src 'unsafe-inline'; base-uri 'none'; frame-ancestors 'none'"
+
+MEDIA: Mapping[str, tuple[str, str]] = {  # what a browser may show, by the end of the name; all else it may only keep
+    ".html": ("text/html; charset=utf-8", RECORDED), ".pdf": ("application/pdf", PDF),
+    ".json": ("application/json", RECORDED), ".csv": ("text/plain; charset=utf-8", RECORDED),
+    ".toml": ("text/plain; charset=utf-8", RECORDED), ".md": ("text/plain; charset=utf-8", RECORDED),
+    ".txt": ("text/plain; charset=utf-8", RECORDED), ".svg": ("image/svg+xml", RECORDED),
+}  # fmt: skip
+
+
+def sent_file(name: str, content: bytes, *, keep: bool) -> WebResponse:
+    """A file to be looked at in a sandbox, or to be kept."""
+    ending = PurePosixPath(name).suffix.lower()
+    media, policy = MEDIA.get(ending, ("application/octet-stream", RECORDED))
+    how = "attachment" if keep or ending not in MEDIA else "inline"
+    place = f"{how}; filename*=UTF-8''{quote(name.rpartition('/')[2], safe='')}"
+    return WebResponse(content, media, policy=policy, headers={"Content-Disposition": place})
 
 
 LARGEST = 256 * 2**20  # bytes of a file that is looked up; a certificate with its inputs has a hundredth
@@ -173,21 +197,52 @@ class UploadedFile:
     content: bytes | None
 
 
-def read_dropped(asked: WebRequest) -> UploadedFile:
+def read_form(request: WebRequest) -> dict[str, str]:
+    """Fields of a form that was sent, each once."""
+    media = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if media != "application/x-www-form-urlencoded" or request.body is None:
+        raise RefusedRequest(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, say("this page takes its own forms only"))
+    if request.length > LONGEST_FORM:
+        raise RefusedRequest(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, say("the form holds more than any job"))
+    content = request.body.read(request.length)
+    if len(content) < request.length:
+        raise bad(say("the form did not come whole"), say("Send it again"))
+    try:
+        pairs = parse_qsl(content.decode("ascii"), keep_blank_values=True, errors="strict", max_num_fields=MOST_FIELDS)
+    except ValueError:
+        raise bad(say("the form cannot be read")) from None
+    fields = {name: value.replace("\r\n", "\n") for name, value in pairs}
+    if len(fields) < len(pairs) or any("\0" in value for value in fields.values()):
+        raise bad(say("the form cannot be read"))
+    return fields
+
+
+def read_dropped(asked: WebRequest, into: BinaryIO | None = None, most: int = LARGEST) -> UploadedFile:
+    """``into``: where the bytes are written as they come; ``most``: of them that are taken."""
     found = _BOUNDARY.fullmatch(asked.headers.get("content-type", "").strip())
     if found is None or asked.body is None:
         raise RefusedRequest(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, say("this page takes a file from its own form only"))
-    if asked.length > LARGEST + _HEAD:
+    if asked.length > most + _HEAD:
+        fix = say("No certificate is; check that it is the right file")
+        if into is not None:
+            fix = say("Export the part that is needed")
         raise RefusedRequest(
-            HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
-            say("the file is larger than {most} MB", most=LARGEST // 2**20),
-            say("No certificate is; check that it is the right file"),
+            HTTPStatus.REQUEST_ENTITY_TOO_LARGE, say("the file is larger than {most} MB", most=most // 2**20), fix
         )
-    return _read(asked.body, asked.length, found[1].rstrip().encode())
+    held = bytearray()
+
+    def keep(part: bytes) -> None:
+        if into is not None:
+            into.write(part)
+        elif len(held) + len(part) <= HELD:
+            held.extend(part)
+
+    name, size, sha256 = _read(asked.body, asked.length, found[1].rstrip().encode(), keep)
+    return UploadedFile(name, size, sha256, bytes(held) if len(held) == size else None)
 
 
-def _read(body: BinaryIO, length: int, boundary: bytes) -> UploadedFile:
-    """Hash all but the end mark as it comes, and keep the beginning as far as it may be held."""
+def _read(body: BinaryIO, length: int, boundary: bytes, keep: Callable[[bytes], None]) -> tuple[str, int, str]:
+    """Name, size and SHA-256 of the file, all of it but the end mark kept as it comes."""
     left = length
 
     def some() -> bytes:
@@ -208,14 +263,13 @@ def _read(body: BinaryIO, length: int, boundary: bytes) -> UploadedFile:
     name = re.split(r"[/\\]", named[1].decode("utf-8", "replace"))[-1]
     if not name:
         raise bad(say("no file was chosen"), say("Choose a file, or drop one on the field"))
-    sha256, size, held = hashlib.sha256(), 0, bytearray()
+    sha256, size = hashlib.sha256(), 0
     reserve = len(end) + 2  # the end mark may be cut by the end of a block
 
     def take(part: bytes) -> None:
         nonlocal size
         sha256.update(part)
-        if size + len(part) <= HELD:
-            held.extend(part)
+        keep(part)
         size += len(part)
 
     while left:
@@ -225,4 +279,4 @@ def _read(body: BinaryIO, length: int, boundary: bytes) -> UploadedFile:
     if not closed or rest not in (b"", b"\r\n"):
         raise bad(say("the file did not come whole"), say("Drop it again"))
     take(content)
-    return UploadedFile(name, size, sha256.hexdigest(), bytes(held) if len(held) == size else None)
+    return name, size, sha256.hexdigest()

@@ -10,11 +10,13 @@ import datetime as dt
 import re
 from collections.abc import Mapping
 from http import HTTPStatus
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 from urllib.parse import urlencode
 
 from cmm_uq.base.messages import DASH, NOTHING, Day, Text, Verbatim, day, say
-from cmm_uq.certificate.document import Standing
+
+if TYPE_CHECKING:
+    from cmm_uq.certificate.document import Standing
 
 
 def address(path: str, **query: object) -> str:
@@ -134,6 +136,9 @@ class Pager(NamedTuple):
     after: Cell | None = None
 
 
+CHART = 340, 150  # width and height of a picture, CSS pixels at its natural size
+
+
 class Chart(NamedTuple):
     """A picture with the sentence that replaces it for whoever cannot see it."""
 
@@ -173,7 +178,88 @@ class Press(NamedTuple):
     button: Text
 
 
-Block = PageTable | PageFacts | Tally | PageNotice | PageParagraph | Chooser | Pager | Charts | Drop | Links | Press
+class FormEntry(NamedTuple):
+    """A field that is filled in: a line, a date, a text of many lines, or one of several options; ``hint``: below it."""
+
+    name: str
+    label: Text
+    value: str = ""
+    sort: Literal["text", "date", "area", "select"] = "text"
+    options: tuple[tuple[str, Text], ...] = ()
+    hint: Text = NOTHING
+    example: str = ""
+
+
+class GridColumn(NamedTuple):
+    """A column of a file as it stands: its heading, what it is taken for, and the options that correct it."""
+
+    heading: Text
+    meaning: str  # by which it is coloured
+    field: FormEntry
+
+
+class CellGrid(NamedTuple):
+    """Rows of a file as it stands, each with its line, its cells, and whether it belongs to the head."""
+
+    caption: Text
+    columns: tuple[GridColumn, ...]
+    rows: tuple[tuple[int, tuple[str, ...], bool], ...]
+
+
+class PageForm(NamedTuple):
+    """A form that is sent.
+
+    ``buttons``: the value that ``then`` has with each, and its text; ``hidden``: what goes with it; ``check``: address
+    that says while somebody types what is wrong; ``legend``: what its fields have in common.
+    """
+
+    path: str
+    fields: tuple[FormEntry, ...]
+    buttons: tuple[tuple[str, Text], ...]
+    hidden: tuple[tuple[str, str], ...] = ()
+    grid: CellGrid | None = None
+    check: str = ""
+    legend: Text = NOTHING
+
+
+class Choices(NamedTuple):
+    """Pictures to choose from: each its address, its title, and its drawing."""
+
+    title: Text
+    choices: tuple[tuple[str, Text, str], ...]
+
+
+class SourceText(NamedTuple):
+    """A text as it stands: a command, a file, a difference."""
+
+    title: Text
+    text: str
+
+
+class SandboxFrame(NamedTuple):
+    """Another document, shown in a sandbox."""
+
+    title: Text
+    address: str
+
+
+class Running(NamedTuple):
+    """Work under way: its events, what is being done, and the part in hundredths that is done."""
+
+    events: str
+    what: Text
+    percent: int
+
+
+class Turnable(NamedTuple):
+    """Vectors in a volume, drawn and turned by the site's script; ``alternative``: a sentence that replaces them."""
+
+    data: str
+    alternative: Text
+
+
+ReadBlock = PageTable | PageFacts | Tally | PageNotice | PageParagraph | Chooser | Pager | Charts | Links | SourceText
+Block = ReadBlock | Drop | Press | PageForm | Choices | SandboxFrame | Running | Turnable
 Section = tuple[Text, tuple[Block, ...]]  # a titled part of a page
 
 
@@ -194,7 +280,7 @@ class WebPage(NamedTuple):
     status: HTTPStatus = HTTPStatus.OK
 
 
-Word = tuple[Text, Standing | None]
+Word: TypeAlias = "tuple[Text, Standing | None]"
 
 STATES: Mapping[str, Word] = {
     "draft": (say("Draft, not released"), "open"), "released": (say("Released"), "good"),

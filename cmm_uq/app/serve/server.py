@@ -234,6 +234,8 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
         if self.command != "HEAD":
             self.wfile.write(answer.body)
+            for part in answer.stream or ():
+                self.wfile.write(part)
         if self.command == "POST" and answer.status >= HTTPStatus.BAD_REQUEST:
             self._let_go()
 

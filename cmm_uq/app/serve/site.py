@@ -10,78 +10,23 @@ import contextlib
 import datetime as dt
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from http import HTTPStatus
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from cmm_uq import __version__
-from cmm_uq.app.serve import trends as drawing
 from cmm_uq.app.serve.certificate_page import certificate_page, recorded_file
 from cmm_uq.app.serve.checks_page import dropped_page, file_page, integrity_page
 from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse
 from cmm_uq.app.serve.lists import artefacts_page, certificates_page, diagnoses_page, machine_page, machines_page
-from cmm_uq.app.serve.page import Cell, Chart, PageNotice, WebPage, kind
+from cmm_uq.app.serve.page import WebPage
+from cmm_uq.app.serve.rendering import fault, refusal, render_page, style
 from cmm_uq.app.serve.view import ChainComparing, DueDates, MachineStanding, SiteView, by_rule, overview, problem_of
-from cmm_uq.base.errors import CmmUqError, printable
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
-from cmm_uq.certificate.plots import style as plot_style
-from cmm_uq.certificate.render import template_folder
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Verbatim, say
+from cmm_uq.certificate.look import template_folder
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.place import shown
 from cmm_uq.laboratory.records.store import Records
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
-    from markupsafe import Markup
-
-
-CONTENTS: tuple[tuple[str, Text], ...] = (
-    ("/", say("Machines")), ("/certificates", say("Certificates")), ("/diagnoses", say("Diagnoses")),
-    ("/artefacts", say("Artefacts")), ("/file", say("Check a file")), ("/integrity", say("Integrity")),
-)  # fmt: skip
-WORDS: dict[str, Text] = {  # what stands around every page
-    "site": say("Calibration records"), "skip": say("To the content"), "contents": say("Contents"),
-    "above": say("Belongs to"),
-}  # fmt: skip
-
-
-def render_page(page: WebPage, foot: Sequence[Text]) -> bytes:
-    template = _environment().get_template("page.html")
-    return template.render(page=page, foot=foot, contents=CONTENTS, words=WORDS).encode()
-
-
-@cache
-def style() -> bytes:
-    """The style sheet, in the colours of the documents."""
-    colours = {**plot_style.COLOURS, "band": plot_style.BAND}
-    return _environment().get_template("style.css").render(colour=colours).encode()
-
-
-@cache
-def _environment() -> Environment:
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(template_folder() / "serve"), autoescape=True, undefined=StrictUndefined,
-        finalize=_visible, trim_blocks=True, lstrip_blocks=True, auto_reload=False,
-    )  # fmt: skip
-    environment.filters |= {"picture": _picture, "kind": kind}
-    return environment
-
-
-def _visible(value: Any) -> Any:
-    """A text with what would turn it round, or hide in it, written as an escape."""
-    return printable(str.__str__(value)) if isinstance(value, str) and not hasattr(value, "__html__") else value
-
-
-def _picture(chart: Chart) -> Markup:
-    """A picture with its alternative text; its elements were drawn here, of numbers and escaped words."""
-    from markupsafe import Markup, escape
-
-    size, label = f"0 0 {drawing.WIDTH} {drawing.HEIGHT}", escape(printable(chart.alternative))
-    return Markup(f'<svg viewBox="{size}" role="img" aria-label="{label}">{chart.svg}</svg>')  # noqa: S704 - nothing in it is from elsewhere
-
 
 PAGES: Mapping[str, Callable[[SiteView, WebRequest], WebPage | WebResponse]] = {  # what is looked at, by path
     "/": machines_page, "/machine": machine_page, "/certificates": certificates_page, "/certificate": certificate_page,
@@ -94,15 +39,20 @@ WITH_FORM = ("/file", "/integrity")
 
 
 class Site:
-    """Answers requests; ``where`` as :func:`~cmm_uq.laboratory.records.opening.open_records` takes it."""
+    """Answers requests; ``where`` as :func:`~cmm_uq.laboratory.records.opening.open_records` takes it; ``desk``: of a desk."""
 
     def __init__(
-        self, where: str | Path | None = None, *, due: DueDates = by_rule, today: Callable[[], dt.date] = dt.date.today
+        self,
+        where: str | Path | None = None,
+        *,
+        due: DueDates = by_rule,
+        today: Callable[[], dt.date] = dt.date.today,
+        desk: bool = False,
     ) -> None:
         with open_records(where, read_only=True) as records:  # what is wrong with them is told before anybody looks
             self._where = records.place
         self.place = shown(self._where)  # without a password
-        self._due, self._today = due, today
+        self._due, self._today, self._desk = due, today, desk
         self._lock = threading.Lock()
         self._kept: tuple[tuple[int, str, dt.date], Sequence[MachineStanding]] | None = None
         self.checking = ChainComparing(self.opened)
@@ -129,14 +79,8 @@ class Site:
         except TimeoutError:
             refused = RefusedRequest(HTTPStatus.REQUEST_TIMEOUT, say("the request took too long to come"))
         except Exception as error:  # a fault is told on its page; the others go on
-            told = say("a fault of the program: {what}", what=Verbatim(f"{type(error).__name__}: {error}"))
-            refused = RefusedRequest(HTTPStatus.INTERNAL_SERVER_ERROR, told, say("Please report it"))
-        titles = {HTTPStatus.NOT_FOUND: say("Not found"), HTTPStatus.INTERNAL_SERVER_ERROR: say("A fault")}
-        head = title or titles.get(refused.status, say("This cannot be shown"))
-        problem = say("{problem:capital}.", problem=refused.problem)
-        lines = (Cell(say("{fix}.", fix=refused.fix)),) if refused.fix else ()
-        notice = PageNotice(problem, "bad", lines)
-        return self._rendered(WebPage(head, "", lead=NOTHING, blocks=(notice,), status=refused.status))
+            refused = fault(error)
+        return self._rendered(refusal(refused, title))
 
     def _answer(self, request: WebRequest) -> WebResponse:
         if request.method == "POST":
@@ -183,4 +127,4 @@ class Site:
             say("cmm-uq {version}", version=Verbatim(__version__)),
         )
         referrer = "same-origin" if page.place in WITH_FORM else "no-referrer"
-        return WebResponse(render_page(page, foot), status=page.status, referrer=referrer)
+        return WebResponse(render_page(page, foot, desk=self._desk), status=page.status, referrer=referrer)

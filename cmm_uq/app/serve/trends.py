@@ -13,7 +13,7 @@ from html import escape
 from itertools import pairwise
 from math import ceil, floor, isfinite, log10
 
-from cmm_uq.app.serve.page import Block, Cell, Chart, Charts, PageParagraph, PageTable, columns, shown
+from cmm_uq.app.serve.page import CHART, Block, Cell, Chart, Charts, PageParagraph, PageTable, columns, shown
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, day, number, say
 from cmm_uq.certificate.document import Standing
 from cmm_uq.laboratory.records.facts import RecordedMachine, RecordedValue
@@ -21,7 +21,7 @@ from cmm_uq.laboratory.records.listing import Course, CourseValue, courses
 from cmm_uq.laboratory.records.store import Records
 from cmm_uq.maths.uncertainty.quantity import rounded
 
-WIDTH, HEIGHT = 340, 150
+WIDTH, HEIGHT = CHART
 RIGHT, TOP, BOTTOM = 8, 8, 20
 """Of the picture and its margins, CSS pixels at its natural size; the left one is as wide as the figures in it."""
 

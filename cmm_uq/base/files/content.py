@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import stat
+import tomllib
 from pathlib import Path
+from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import Limit
@@ -65,6 +67,14 @@ def text_of(content: bytes, where: str, fix: str = "Save it as UTF-8") -> str:
     if "\0" in text:
         raise CmmUqError("contains zero bytes: it is no text file", where=where, fix=fix)
     return text
+
+
+def value_of(text: str) -> Any:
+    """A value as TOML has it; a text without quotes as it is."""
+    try:
+        return tomllib.loads(f"x = {text}")["x"]
+    except tomllib.TOMLDecodeError:
+        return text
 
 
 def _refuse_other_than_a_file(mode: int, where: str, fix: str) -> None:

@@ -27,6 +27,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import ENGLISH, LANGUAGES, Code, Translation, translated as said_in
 from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.points import Floats
+from cmm_uq.certificate import look
 from cmm_uq.certificate.document import Plot
 
 if TYPE_CHECKING:
@@ -121,19 +122,9 @@ def _localised() -> Callable[[Formatter, Code], Formatter]:
     return Localised
 
 
-INK = "#1b2328"  # text and outlines; 15.9 : 1 on white.
-MUTED = "#5a666e"  # secondary text, and what was before; 5.9 : 1 on white.
-RULE = "#d3dade"  # hairlines
-TINT = "#eef4f6"  # A wash of the accent behind text
-ACCENT = "#0b5c7a"  # the one accent colour; 7.4 : 1 on white.
-BAND = "#d5e4ea"  # A stronger wash, for bands behind data
-GOOD, OPEN, BAD = "#1f6b3a", "#8a5300", "#9c2420"
-"""A verdict: nothing to do, something to do, something wrong; white on them at least 6 : 1. A sign and words go with them."""
-COLOURS = {
-    "ink": INK, "muted": MUTED, "rule": RULE, "tint": TINT, "accent": ACCENT, "good": GOOD, "open": OPEN, "bad": BAD,
-    "unknown": MUTED,
-}  # fmt: skip
-"""The same, for the templates."""
+ACCENT, BAD, BAND = look.ACCENT, look.BAD, look.BAND
+GOOD, INK, MUTED = look.GOOD, look.INK, look.MUTED
+OPEN, RULE, TINT = look.OPEN, look.RULE, look.TINT
 DIVERGING = ("#0b5c7a", "#3f86a0", "#86b1c2", "#c3ccd0", "#e0b48a", "#cc7f3c", "#a84e08")
 """Negative to positive, parted by blue and orange, which every common kind of colour vision tells apart."""
 

@@ -236,6 +236,16 @@ def _lengths(
     return ImportedTable(columns, np.array(lines), replace(recognised, facts=(*facts, *of_lines)))
 
 
+def tables_in(content: bytes, where: str, keys: ImportKeys) -> tuple[list[Sheet], list[tuple[Sheet, Header]]]:
+    """Sheets of a file as they stand, and its tables with their headers; none where they are not understood."""
+    sheets = [_with_unit(sheet) for sheet in format_of(content, where).read(content, where, keys)]
+    try:
+        found = _chosen(sheets, keys, where, POINTS)
+    except CmmUqError:
+        return sheets, []
+    return sheets, found if isinstance(found, list) else [found]
+
+
 def _with_unit(sheet: Sheet) -> Sheet:
     """With the unit that a line ahead of its table says, as ``Units: mm``."""
     for row in sheet.rows[:LINES_BEFORE] if sheet.unit is None and not sheet.listed else ():

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.app.serve.certificate_page import RecordedFile, content_of, files_of, results_of, sent
+from cmm_uq.app.serve.certificate_page import RecordedFile, content_of, files_of, results_of
 from cmm_uq.app.serve.checks_page import FileMatch, look_up, number_in, verdict
-from cmm_uq.app.serve.exchange import RefusedRequest, UploadedFile
+from cmm_uq.app.serve.exchange import RefusedRequest, UploadedFile, sent_file
 from cmm_uq.app.serve.view import MachineStanding, groups, in_order
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.render import render_html, render_pdf
@@ -205,20 +205,18 @@ def test_a_manifest_is_believed_only_with_the_recorded_results(folder: Path) -> 
     ("page.xhtml", "application/octet-stream", "attachment"),
 ])  # fmt: skip
 def test_a_browser_shows_only_what_it_can_show_safely(name: str, media: str, how: str) -> None:
-    answer = sent(RecordedFile(name, HASH), b"", keep=False)
+    answer = sent_file(name, b"", keep=False)
     assert (answer.media, answer.headers["Content-Disposition"].partition(";")[0]) == (media, how)
     assert "default-src 'none'" in answer.policy
     assert "script-src" not in answer.policy
-    assert sent(RecordedFile(name, HASH), b"", keep=True).headers["Content-Disposition"].startswith("attachment")
+    assert sent_file(name, b"", keep=True).headers["Content-Disposition"].startswith("attachment")
 
 
 def test_a_recorded_page_can_run_nothing_here() -> None:
     """Not of this origin (sandbox), and without scripts."""
-    assert sent(RecordedFile("certificate.html", HASH), b"", keep=False).policy.startswith(
-        "sandbox; default-src 'none'"
-    )
+    assert sent_file("certificate.html", b"", keep=False).policy.startswith("sandbox; default-src 'none'")
 
 
 def test_a_name_in_a_header_stays_a_name() -> None:
-    answer = sent(RecordedFile('a"\r\nSet-Cookie: b=ü.pdf', HASH), b"", keep=False)
+    answer = sent_file('a"\r\nSet-Cookie: b=ü.pdf', b"", keep=False)
     assert answer.headers["Content-Disposition"] == "inline; filename*=UTF-8''a%22%0D%0ASet-Cookie%3A%20b%3D%C3%BC.pdf"

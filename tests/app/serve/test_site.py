@@ -363,7 +363,9 @@ def test_every_text_of_every_page_is_a_message_or_of_the_records(
 
     seen: list[WebPage] = []
     render = site.render_page
-    monkeypatch.setattr(site, "render_page", lambda page, foot: [seen.append(page), render(page, foot)][1])
+    monkeypatch.setattr(
+        site, "render_page", lambda page, foot, **how: [seen.append(page), render(page, foot, **how)][1]
+    )
     for address in every_address(looked):
         looked.get(address)
     with open_records(looked.place, read_only=True) as records:
@@ -377,7 +379,7 @@ def test_every_text_of_every_page_is_a_message_or_of_the_records(
 
 
 def test_the_template_has_no_word_of_its_own() -> None:
-    from cmm_uq.certificate.render import template_folder
+    from cmm_uq.certificate.look import template_folder
 
     template = (template_folder() / "serve" / "page.html").read_text(encoding="utf-8")
     bare = re.sub(r"\{#.*?#\}|\{%.*?%\}|\{\{.*?\}\}", "", template, flags=re.DOTALL)

@@ -1,0 +1,326 @@
+"""The desk's pages by address: what each shows, what each form does, and the records' pages behind the same guard.
+
+A form that changes something is answered with a redirect, so that reload and back are safe; a GET changes nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Mapping
+from functools import partial
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+
+from cmm_uq import __version__
+from cmm_uq.app.desk import export_pages, job_pages
+from cmm_uq.app.desk.drafts import Draft, DraftFolder
+from cmm_uq.app.desk.export_pages import ARTEFACT, FIELDS, READ
+from cmm_uq.app.desk.guard import POLICY, Guard
+from cmm_uq.app.desk.job_pages import CANCEL, CERTIFICATE, FILE, JOB, REPORTS, RUN, JobState, state_of
+from cmm_uq.app.desk.place import ChangedError, below, jobs_in, safe_name, sha256, write_over
+from cmm_uq.app.desk.shown import OWN_FILES, own_file, records_page, shown_file
+from cmm_uq.app.desk.workers import ReportRun, Worker
+from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse, read_form
+from cmm_uq.app.serve.page import WebPage, address
+from cmm_uq.app.serve.rendering import DESK, fault, refusal, render_page
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.content import content_of
+from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
+from cmm_uq.base.messages import Text, Verbatim, say
+
+AT_ONCE = 2  # reports under way
+
+
+class Desk:
+    """Answers the requests of one start; ``root``: the folder that it works in."""
+
+    def __init__(self, root: Path, tell: Callable[[str], None] = lambda line: None) -> None:
+        self.root, self.tell = root.resolve(), tell
+        self.drafts, self.reader = DraftFolder(self.root), Worker(self.root)
+        self.runs: dict[str, ReportRun] = {}
+        self._lock = threading.Lock()
+        self.guard: Guard | None = None
+        self.url = ""
+
+    def open_at(self, url: str, port: int) -> str:
+        """Begin with a link that is opened once."""
+        self.url, self.guard = url, Guard(self.tell, port)
+        return self.guard.link(url)
+
+    def begin(self) -> None:
+        """Load in the worker what is slow to load, so that no page waits for it."""
+        self.reader.ask("ready")
+
+    def close(self) -> None:
+        for run in self.runs.values():
+            run.cancel()
+        self.reader.end()
+
+    def answer(self, request: WebRequest | RefusedRequest) -> WebResponse:
+        try:
+            if isinstance(request, RefusedRequest):
+                raise request
+            admitted = self.guard.admit(request, self.url) if self.guard is not None else None
+            return admitted or self._answer(request)
+        except RefusedRequest as error:
+            refused = error
+        except CmmUqError as error:
+            told: Text = Verbatim(error.problem)
+            if error.where:
+                told = say("{problem} ({where})", problem=told, where=Verbatim(error.where))
+            refused = RefusedRequest(HTTPStatus.CONFLICT, told, Verbatim(error.fix or ""))
+        except TimeoutError:
+            refused = RefusedRequest(HTTPStatus.REQUEST_TIMEOUT, say("the request took too long to come"))
+        except Exception as error:  # a fault is told on its page; the others go on
+            refused = fault(error)
+        return self._rendered(refusal(refused))
+
+    def _answer(self, request: WebRequest) -> WebResponse:
+        if request.path in OWN_FILES and request.method != "POST":
+            return own_file(request.path)
+        if not (request.path + "/").startswith(DESK + "/"):
+            return records_page(self.reader, request)
+        pages = self._forms() if request.method == "POST" else self._pages()
+        if request.path not in pages:
+            known = request.path in self._pages()
+            if request.method == "POST" and known:
+                raise RefusedRequest(HTTPStatus.METHOD_NOT_ALLOWED, say("this page can only be looked at"))
+            raise RefusedRequest(HTTPStatus.NOT_FOUND, say("there is no page of that address"))
+        found = pages[request.path](request)
+        return found if isinstance(found, WebResponse) else self._rendered(found)
+
+    def _pages(self) -> Mapping[str, Callable[[WebRequest], WebPage | WebResponse]]:
+        return {
+            DESK: self.home,
+            READ: self.reading,
+            ARTEFACT: self.artefact,
+            FIELDS: self.fields,
+            JOB: self.job,
+            RUN: self.running,
+            CERTIFICATE: self.certificate,
+            FILE: partial(shown_file, self.root),
+            f"{DESK}/events": self.events,
+            f"{DESK}/field.json": self.field,
+        }
+
+    def _forms(self) -> Mapping[str, Callable[[WebRequest], WebPage | WebResponse]]:
+        return {
+            f"{DESK}/drop": self.drop,
+            READ: self.correct,
+            FIELDS: self.fill_in,
+            JOB: self.save,
+            RUN: self.run,
+            CANCEL: self.cancel,
+            f"{DESK}/check": self.check,
+            f"{DESK}/delete": self.delete,
+        }
+
+    def home(self, request: WebRequest) -> WebPage:
+        request.only(())
+        states = (state_of(self.root, folder) for folder in jobs_in(self.root))
+        return job_pages.home_page(self.root, states, self.drafts.every())
+
+    def drop(self, request: WebRequest) -> WebResponse:
+        request.only(())
+        one = self.drafts.take(request)
+        try:
+            one.keys = self.reader.ask("first_keys", path=one.export)
+            self.drafts.write(one)
+        except CmmUqError:  # told where it is read
+            pass
+        return to(READ, draft=one.id)
+
+    def delete(self, request: WebRequest) -> WebResponse:
+        self.drafts.delete(self.drafts.read(read_form(request).get("draft", "")))
+        return to(DESK)
+
+    def reading(self, request: WebRequest) -> WebPage:
+        request.only(("draft",))
+        one = self.drafts.read(request.text("draft"))
+        return export_pages.read_page(one, self.reader.ask("read", path=one.export, keys=one.keys))
+
+    def correct(self, request: WebRequest) -> WebPage | WebResponse:
+        form = read_form(request)
+        one = self.drafts.read(form.get("draft", ""))
+        one.seen = form.get("seen", "")
+        chosen, said = export_pages.said_in(form)
+        one.keys = self.reader.ask("corrected", path=one.export, keys=one.keys, chosen=chosen, said=said)
+        self.drafts.write(one)
+        return to(ARTEFACT if form.get("then") == "on" else READ, draft=one.id)
+
+    def artefact(self, request: WebRequest) -> WebPage:
+        request.only(("draft",))
+        return export_pages.artefact_page(self.drafts.read(request.text("draft")), self.reader.ask("kinds"))
+
+    def fields(self, request: WebRequest) -> WebPage:
+        request.only(("draft", "kind"))
+        one, kind = self.drafts.read(request.text("draft")), request.text("kind")
+        return self._fields(one, kind)
+
+    def _fields(self, one: Draft, kind: str, refused: CmmUqError | None = None) -> WebPage:
+        fields = self.reader.ask("fields", kind=kind)
+        values = {each["key"]: one.values.get(each["key"], "") for each in fields}
+        found = None
+        if refused is not None:
+            found = {"problems": [str(refused)], "warnings": []}
+        elif one.values:
+            found = self.reader.ask("check_answers", kind=kind, export=one.export, keys=one.keys, values=values)
+        page = export_pages.fields_page(one, kind, fields, self.drafts.last(), found)
+        return page if refused is None else page._replace(status=HTTPStatus.CONFLICT)
+
+    def fill_in(self, request: WebRequest) -> WebPage | WebResponse:
+        form = read_form(request)
+        one, kind = self.drafts.read(form.get("draft", "")), form.get("kind", "")
+        one.seen = form.get("seen", "")
+        one.values = {name: value for name, value in form.items() if name not in ("draft", "kind", "seen", "then")}
+        self.drafts.write(one)
+        if form.get("then") != "create":
+            return to(FIELDS, draft=one.id, kind=kind)
+        folder = one.values.get("folder", "").strip()
+        values = {name: value for name, value in one.values.items() if name != "folder"}
+        try:
+            if not folder or safe_name(folder) != folder or folder == REPORTS:
+                raise CmmUqError(
+                    f"{folder!r} is no name of a folder on every system",
+                    fix="Use letters, digits, - and _, such as K-2026-115",
+                )
+            self.reader.ask("create", kind=kind, export=one.export, keys=one.keys, values=values, folder=folder)
+        except CmmUqError as error:
+            return self._fields(one, kind, error)
+        self.drafts.remember(one.values)
+        self.drafts.delete(one)
+        return to(JOB, name=folder)
+
+    def check(self, request: WebRequest) -> WebResponse:
+        """What is wrong with what is being typed; nothing is written."""
+        form = read_form(request)
+        if "text" in form:
+            found = self.reader.ask("check", job=self._folder(form.get("name", "")), text=form["text"])
+        else:
+            one = self.drafts.read(form.get("draft", ""))
+            values = {
+                name: value for name, value in form.items() if name not in ("draft", "kind", "seen", "then", "folder")
+            }
+            found = self.reader.ask(
+                "check_answers", kind=form.get("kind", ""), export=one.export, keys=one.keys, values=values
+            )
+        return WebResponse(json.dumps(found).encode(), "application/json", policy=POLICY)
+
+    def _folder(self, name: str) -> str:
+        folder = below(self.root, name)
+        below(self.root, f"{name}/job.toml")
+        return folder.relative_to(self.root).as_posix()
+
+    def job(self, request: WebRequest) -> WebPage:
+        request.only(("name",))
+        name = self._folder(request.text("name"))
+        content = content_of(self.root / name / "job.toml", JOB_BYTES, "")
+        return self._job(name, content.decode("utf-8", "replace"), sha256(content))
+
+    def _job(self, name: str, text: str, seen: str, above: tuple[Any, ...] = (), draft: str | None = None) -> WebPage:
+        check = self.reader.ask("check", job=name, text=draft)
+        return job_pages.job_page(self.root, state_of(self.root, self.root / name), check, text, seen, above)
+
+    def save(self, request: WebRequest) -> WebPage | WebResponse:
+        form = read_form(request)
+        name, text = self._folder(form.get("name", "")), form.get("text", "")
+        if form.get("then") != "save":
+            return self._job(name, text, form.get("seen", ""), draft=text)
+        try:
+            write_over(self.root / name / "job.toml", text.encode(), form.get("seen", ""))
+        except ChangedError as changed:
+            page = self._job(
+                name, text, sha256(changed.now), export_pages.difference(changed.now, text.encode()), draft=text
+            )
+            return page._replace(status=HTTPStatus.CONFLICT)
+        return to(JOB, name=name)
+
+    def run(self, request: WebRequest) -> WebResponse:
+        name = self._folder(read_form(request).get("name", ""))
+        with self._lock:
+            under_way = [one for one in self.runs.values() if not one.over]
+            if not any(one.job == name for one in under_way):
+                if len(under_way) >= AT_ONCE:
+                    raise RefusedRequest(
+                        HTTPStatus.CONFLICT,
+                        say("{count} certificates are under way", count=len(under_way)),
+                        say("Wait for one of them, or cancel it"),
+                    )
+                self.runs[name] = ReportRun(self.root, name, self._keep_field)
+        return to(RUN, name=name)
+
+    def _run_of(self, request: WebRequest) -> ReportRun | None:
+        request.only(("name",))
+        return self.runs.get(request.text("name"))
+
+    def running(self, request: WebRequest) -> WebPage | WebResponse:
+        run = self._run_of(request)
+        if run is None:  # of an earlier start
+            return to(JOB, name=self._folder(request.text("name")))
+        if run.found is not None:
+            return to(CERTIFICATE, name=run.job)
+        return job_pages.run_page(run)
+
+    def cancel(self, request: WebRequest) -> WebResponse:
+        name = read_form(request).get("name", "")
+        if name in self.runs:
+            self.runs[name].cancel()
+        return to(RUN, name=name)
+
+    def events(self, request: WebRequest) -> WebResponse:
+        run = self._run_of(request)
+        if run is None:
+            raise RefusedRequest(HTTPStatus.NOT_FOUND, say("nothing of that name is under way"))
+        return WebResponse(b"retry: 1000\n\n", "text/event-stream", policy=POLICY, stream=run.events())
+
+    def certificate(self, request: WebRequest) -> WebPage:
+        request.only(("name",))
+        one = self._state(request.text("name"))
+        said = self.reader.ask("results", path=one.file("results.json"))
+        warnings = self.reader.ask("check", job=one.name, text=None)["warnings"]
+        return job_pages.certificate_page(one, said, self._field_of(one).is_file(), warnings)
+
+    def _state(self, name: str) -> JobState:
+        one = state_of(self.root, self.root / self._folder(name))
+        if one.made is None:
+            raise RefusedRequest(
+                HTTPStatus.NOT_FOUND, say("this job has no certificate yet"), say("Make it on the page of the job")
+            )
+        return one
+
+    def _field_of(self, one: JobState) -> Path:
+        """The residual field, kept for the certificate that it came with."""
+        return (
+            self.drafts.folder
+            / "fields"
+            / f"{sha256(below(self.root, one.file('results.json')).read_bytes())[:32]}.json"
+        )
+
+    def _keep_field(self, found: Mapping[str, Any]) -> None:
+        """Once a report is done."""
+        if found["field"] is not None:
+            path = self.drafts.folder / "fields" / f"{found['sha256'][:32]}.json"
+            if not path.exists():
+                write_over(path, json.dumps(found["field"]).encode(), "")
+
+    def field(self, request: WebRequest) -> WebResponse:
+        request.only(("name",))
+        path = self._field_of(self._state(request.text("name")))
+        return WebResponse(
+            content_of(path, TABLE_BYTES, "Make the certificate again"), "application/json", policy=POLICY
+        )
+
+    def _rendered(self, page: WebPage) -> WebResponse:
+        foot = (
+            say("Folder: {root}", root=Verbatim(str(self.root))),
+            say("cmm-uq {version}", version=Verbatim(__version__)),
+        )
+        body = render_page(page._replace(place=page.place or DESK), foot, desk=True)
+        return WebResponse(body, status=page.status, policy=POLICY, referrer="same-origin")
+
+
+def to(path: str, **query: str) -> WebResponse:
+    """After a form: a page to be got, so that reload sends nothing again."""
+    return WebResponse(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": address(path, **query)})

@@ -1,0 +1,267 @@
+"""From a dropped export to a job: how it was read, every column correctable; the artefact; the dozen things a job states."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from difflib import unified_diff
+from typing import Any, Literal
+
+from cmm_uq.app.desk.drafts import Draft
+from cmm_uq.app.desk.pictures import drawing
+from cmm_uq.app.serve import page as p
+from cmm_uq.app.serve.page import (
+    Block,
+    Cell,
+    FormEntry,
+    GridColumn,
+    PageForm,
+    PageNotice,
+    PageParagraph,
+    WebPage,
+    address,
+)
+from cmm_uq.app.serve.rendering import DESK
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
+
+READ, ARTEFACT, FIELDS = f"{DESK}/read", f"{DESK}/artefact", f"{DESK}/fields"
+MEANINGS: Mapping[str, Text] = {
+    "": say("not used"),
+    "x_mm": say("x"),
+    "y_mm": say("y"),
+    "z_mm": say("z"),
+    "length_mm": say("measured length"),
+    "nominal_mm": say("nominal length"),
+    "reference_mm": say("calibrated length"),
+    "deviation_um": say("deviation, µm"),
+    "deviation_mm": say("deviation, mm"),
+    "line": say("line"),
+    "repeat": say("repeat (run)"),
+    "measurement": say("set-up"),
+    "point": say("point"),
+    "name": say("name"),
+    "temp_artefact_c": say("temperature of the artefact"),
+    "temp_air_c": say("temperature of the air"),
+    "time_s": say("time"),
+}
+COLOURED = {
+    "x_mm": "x",
+    "y_mm": "y",
+    "z_mm": "z",
+    "length_mm": "length",
+    "nominal_mm": "nominal",
+    "reference_mm": "nominal",
+    "deviation_um": "length",
+    "deviation_mm": "length",
+    "repeat": "repeat",
+    "line": "repeat",
+    "measurement": "repeat",
+    "point": "repeat",
+    "name": "repeat",
+    "ignored": "ignored",
+    "unknown": "unknown",
+}
+"""Classes of the style sheet."""
+_UNITS = ("mm", "um", "inch", "m", "cm", "mil")
+_HERE = {
+    r"^Say (which|by which column|it is|which column).*columns": say("Choose what it is in the table below"),
+    r"^Say which column is which": say("Choose x, y and z, or the lengths, in the table below"),
+    r"lines = ": say("Fill in below where the lines lie"),
+    r"^Say (which: )?sheet": say("Choose the sheet below"),
+    r"\bunit = ": say("Choose the unit below"),
+    r"\bdecimal = ": say("Choose the decimal sign below"),
+    r"points_per_measurement = ": say("Choose the column of the set-up, or say below how many rows in turn are one"),
+}
+"""What a remedy in words of job.toml is on this page."""
+
+
+def steps(done: int, draft: str = "") -> p.Links:
+    """Where on the way to a certificate a page stands, with links to what is done already."""
+    names = (say("1 Export"), say("2 Artefact"), say("3 Facts"), say("4 Certificate"))
+    places = (address(READ, draft=draft), address(ARTEFACT, draft=draft), "", "")
+    links = (place if draft and i < done else "" for i, place in enumerate(places))
+    return p.Links(tuple(map(Cell, names, links)))
+
+
+def here(fix: str) -> Text:
+    """A remedy, in terms of the page where that can be said."""
+    return next((text for pattern, text in _HERE.items() if re.search(pattern, fix)), Verbatim(fix))
+
+
+def read_page(draft: Draft, found: Mapping[str, Any]) -> WebPage:
+    """The reading of an export, whole, and the form that corrects it."""
+    problem, lines = found["problem"], found["lines"]
+    where = [Cell(Verbatim(problem[0]))] if problem and problem[0] != draft.name and problem[0] else []
+    if problem is None:
+        head = PageNotice(
+            say("Read whole"), "good", (Cell(say("First: {example}", example=Verbatim(found["example"]))),)
+        )
+    elif lines:
+        asked = say(
+            "Only where the lines lie is open: errors of a machine depend on it, and no table of lengths says it"
+        )
+        head = PageNotice(asked, "open", (Cell(say("First: {example}", example=Verbatim(found["example"]))),))
+    else:
+        head = PageNotice(Verbatim(problem[1]), "bad", (*where, *((Cell(here(problem[2])),) if problem[2] else ())))
+    form = PageForm(
+        READ,
+        (*_settings(draft, found), *_lines(draft, lines)),
+        _buttons(problem),
+        (("draft", draft.id), ("seen", draft.seen)),
+        _grid(found),
+        legend=say("Another unit, decimal sign or sheet"),
+    )
+    facts = tuple((Verbatim(label), Cell(Verbatim(text))) for label, text in found["facts"])
+    return WebPage(
+        say("How it was read"),
+        DESK,
+        lead=Verbatim(draft.name),
+        above=(Cell(say("Desk"), DESK),),
+        blocks=(steps(1, draft.id), head, form),
+        sections=(
+            *(((say("What was recognised"), (p.PageFacts(facts),)),) if facts else ()),
+            (say("The same by a command"), (p.SourceText(say("Command"), found["command"]),)),
+        ),
+    )
+
+
+def _buttons(problem: Any) -> tuple[tuple[str, Text], ...]:
+    again = ("read", say("Read it so"))
+    return (again,) if problem else (("on", say("It is right: choose the artefact")), again)
+
+
+def _grid(found: Mapping[str, Any]) -> p.CellGrid:
+    columns = []
+    for i, (heading, meaning) in enumerate(found["columns"]):
+        value = "" if meaning in ("ignored", "unknown") else meaning
+        options = dict(MEANINGS) if value in MEANINGS else {**MEANINGS, value: Verbatim(value)}
+        if value != "name":
+            options.pop("name")
+        if meaning == "unknown":
+            options[""] = say("not understood")
+        label = say("What {heading} is", heading=Verbatim(heading or "—"))
+        field = FormEntry(f"c{i}", label, value, "select", tuple(options.items()))
+        columns.append(GridColumn(Verbatim(heading), COLOURED.get(meaning, "other"), field))
+    more = say("{count} rows more", count=number(found["more"], ",d")) if found["more"] > 0 else say("All rows")
+    rows = tuple((line, tuple(cells), head) for line, cells, head in found["rows"])
+    return p.CellGrid(more, tuple(columns), rows)
+
+
+def _settings(draft: Draft, found: Mapping[str, Any]) -> tuple[FormEntry, ...]:
+    recognised = ("", say("as recognised"))
+    units = tuple((one, Verbatim(one)) for one in _UNITS)
+    signs = ((".", say("point: 120.0012")), (",", say("comma: 120,0012")))
+    said = draft.keys
+    fields = [
+        FormEntry("unit", say("Unit of lengths"), str(said.get("unit", "")), "select", (recognised, *units)),
+        FormEntry("decimal", say("Decimal sign"), str(said.get("decimal", "")), "select", (recognised, *signs)),
+    ]
+    if len(found["sheets"]) > 1 or said.get("sheet"):
+        sheets = tuple((one, Verbatim(one)) for one in found["sheets"])
+        fields.append(FormEntry("sheet", say("Sheet"), str(said.get("sheet", "")), "select", (recognised, *sheets)))
+    rows = str(said.get("points_per_measurement", ""))
+    if rows or (found["problem"] and "points_per_measurement" in found["problem"][2]):
+        hint = say("A number, or all")
+        fields.append(FormEntry("points_per_measurement", say("Rows of one measurement"), rows, hint=hint))
+    return tuple(fields)
+
+
+def _lines(draft: Draft, names: Any) -> tuple[FormEntry, ...]:
+    places, hint = draft.keys.get("lines", {}), say("Direction and start in mm, or: from 0,0,0 to 300,400,0")
+    return tuple(
+        FormEntry(
+            f"line:{name}",
+            say("Where line {name} lies", name=Verbatim(name)),
+            places.get(name, ""),
+            hint=hint,
+            example=f"along {name if name in ('X', 'Y', 'Z') else 'X'} from 100,200,300",
+        )
+        for name in names
+    )
+
+
+def said_in(form: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
+    """Meanings of columns by index, and the other keys of an import, as a form has them."""
+    chosen = {name[1:]: value for name, value in form.items() if re.fullmatch(r"c\d+", name)}
+    names = ("unit", "decimal", "sheet", "points_per_measurement")
+    others: dict[str, Any] = {name: form[name].strip() for name in names if form.get(name, "").strip()}
+    lines = {name[5:]: value.strip() for name, value in form.items() if name.startswith("line:") and value.strip()}
+    return chosen, others | {"lines": lines}
+
+
+def artefact_page(draft: Draft, kinds: list[list[str]]) -> WebPage:
+    """What was measured, to be chosen by a picture."""
+    choices = tuple(
+        (address(FIELDS, draft=draft.id, kind=name), Verbatim(title), drawing(name)) for name, title in kinds
+    )
+    return WebPage(
+        say("What was measured"),
+        DESK,
+        lead=say("Choose the artefact, or the kind of measurement."),
+        above=(Cell(say("Desk"), DESK), Cell(Verbatim(draft.name), address(READ, draft=draft.id))),
+        blocks=(steps(2, draft.id), p.Choices(say("Kinds of measurement"), choices)),
+    )
+
+
+def fields_page(
+    draft: Draft, kind: str, fields: list[dict[str, str]], last: Mapping[str, str], found: Mapping[str, Any] | None
+) -> WebPage:
+    """The dozen things that a job states, with what was filled in last; ``found``: what a check of them says."""
+    filled = draft.values if draft.values else last
+    folder = draft.values.get("folder", "")
+    entries = [
+        FormEntry(
+            "folder",
+            say("Name of the job, and of its folder"),
+            folder,
+            example="K-2026-115",
+            hint=say("Its certificate has this name too"),
+        )
+    ]
+    for one in fields:
+        sort: Literal["date", "text"] = "date" if one["sort"] == "date" else "text"
+        value = filled.get(one["key"], "")
+        entries.append(FormEntry(one["key"], Verbatim(one["label"]), value, sort, example=one["example"]))
+    form = PageForm(
+        FIELDS,
+        tuple(entries),
+        (("create", say("Make the job")), ("check", say("Check"))),
+        (("draft", draft.id), ("kind", kind), ("seen", draft.seen)),
+        check=f"{DESK}/check",
+    )
+    remembered = (
+        (PageParagraph(say("Filled in as last time: look at each."), "note"),) if last and not draft.values else ()
+    )
+    return WebPage(
+        say("What the job states"),
+        DESK,
+        lead=say("What is left empty is not stated. In grey stands an example."),
+        above=(
+            Cell(say("Desk"), DESK),
+            Cell(Verbatim(draft.name), address(READ, draft=draft.id)),
+            Cell(say("Artefact"), address(ARTEFACT, draft=draft.id)),
+        ),
+        blocks=(steps(3, draft.id), *remembered, *(check_blocks(found) if found else ()), form),
+    )
+
+
+def check_blocks(found: Mapping[str, Any]) -> tuple[Block, ...]:
+    """What ``cmm-uq check`` says."""
+    problems, warnings = (tuple(Cell(Verbatim(one)) for one in found[name]) for name in ("problems", "warnings"))
+    if problems:
+        return (PageNotice(say("This would stop a certificate"), "bad", problems),)
+    if warnings:
+        return (PageNotice(say("Nothing would stop a certificate; to be known"), "open", warnings),)
+    return (PageNotice(say("Sound: nothing would stop a certificate"), "good"),)
+
+
+def difference(theirs: bytes, mine: bytes) -> tuple[Block, ...]:
+    """What another tab, editor or command changed, against what was to be written."""
+    before, after = (content.decode("utf-8", "replace").splitlines() for content in (theirs, mine))
+    lines = list(unified_diff(before, after, "as it is now", "as it was to be", lineterm=""))[:400]
+    head = PageNotice(say("Not written: it was changed meanwhile, by another tab, an editor or a command"), "bad")
+    return (
+        (head, p.SourceText(say("Difference"), "\n".join(lines) or "(none)"), PageParagraph(NOTHING))
+        if lines
+        else (head,)
+    )

@@ -1,0 +1,189 @@
+"""The dozen things that a new job states, as the worker asks and reads them: fields of a form, and the tables of job.toml."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import chdir
+from pathlib import Path
+from typing import Any
+
+from cmm_uq.app.commands.forms import shipped
+from cmm_uq.app.commands.jobs.check import Problem, check_job, in_lines
+from cmm_uq.app.commands.jobs.exchange import write_job_of_export
+from cmm_uq.app.commands.jobs.new import BUDGET, PLAN, job_id, job_of_export, kind_or_refused, known, titles, usual
+from cmm_uq.app.commands.parts.new import PART
+from cmm_uq.app.desk.exports import keys_of
+from cmm_uq.base.errors import CmmUqError, Gathered
+from cmm_uq.base.files.content import content_of, value_of
+from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
+
+_PAIR = re.compile(r"\s*([-+−]?\d+(?:[.,]\d+)?)\s*(?:to|…|\.\.\.?|;|/|\s)\s*([-+−]?\d+(?:[.,]\d+)?)\s*")
+_COMMA = re.compile(r"[-+−]?\d+,\d+")
+_LABELS = {
+    "job.date": "Date of the measurement",
+    "job.customer": "Customer",
+    "machine.name": "Machine",
+    "machine.serial": "Serial number of the machine",
+    "artefact.name": "Artefact",
+    "artefact.serial": "Serial number of the artefact",
+    "artefact.U_um": "U (k = 2) by the artefact's certificate, µm",
+    "artefact.cte_per_k": "Its coefficient of expansion, 1/K",
+    "artefact.length_mm": "Certified length or diameter, mm",
+    "conformity.standard": "Standard to decide by",
+    "conformity.mpe": "Maximum permissible error, µm (L in mm)",
+    "conformity.limit_um": "Limit, µm",
+    "conformity.rule": "Decision rule",
+    "rated_conditions.temperature_c": "Rated temperatures, °C",
+}
+_EXAMPLES = {"job.date": "2026-05-31", "job.customer": "", "machine.serial": "9.12.6", "artefact.serial": "SG-4711"}
+_PAIRS = ("machine.travel_mm.x", "machine.travel_mm.y", "machine.travel_mm.z", "rated_conditions.temperature_c")
+LAID_OUT = (BUDGET, PART, PLAN)
+
+
+def kinds() -> list[list[str]]:
+    """Names and titles of kinds that an export can be a recording of."""
+    kind = known()
+    return [
+        [name, title]
+        for name, title in titles().items()
+        if name not in LAID_OUT and kind_or_refused(kind[name]).table.with_recording
+    ]
+
+
+def _wanted(name: str) -> Iterator[tuple[str, Any]]:
+    """Dotted keys with the example of each."""
+    begun = usual(name)
+    artefact = {key: value for key, value in begun["artefact"].items() if key != "kind"}
+    yield from ((key, _EXAMPLES[key]) for key in ("job.date", "job.customer"))
+    yield "machine.name", begun["machine"]["name"]
+    yield "machine.serial", _EXAMPLES["machine.serial"]
+    yield from ((f"machine.travel_mm.{axis}", span) for axis, span in begun["machine"].get("travel_mm", {}).items())
+    for key, value in artefact.items():
+        if key == "u_um":
+            yield "artefact.U_um", round(2 * value, 6) if isinstance(value, int | float) else "0.2 + 0.5·L/1000"
+        else:
+            yield f"artefact.{key}", value
+        if key == "name":
+            yield "artefact.serial", _EXAMPLES["artefact.serial"]
+    for key, value in (begun.get("conformity") or [{}])[0].items():
+        yield f"conformity.{key}", value
+    for table in ("test_uncertainty", "rated_conditions"):
+        yield from ((f"{table}.{key}", value) for key, value in begun.get(table, {}).items())
+
+
+def _schema_of(schema: Mapping[str, Any], dotted: str) -> Mapping[str, Any]:
+    table, key, *_ = dotted.split(".")
+    found = schema["properties"].get(table, {})
+    found = found.get("items", found)
+    return found.get("properties", {}).get(key, {}) or {}
+
+
+def fields(kind: str) -> list[dict[str, str]]:
+    """Fields of the form of a kind: key, label, example, sort."""
+    schema, found = json.loads(shipped("job")), []
+    for dotted, value in _wanted(kind):
+        known = _schema_of(schema, dotted)
+        said = str(known.get("description", "")).partition(". Unit:")[0].partition(":")[0].rstrip(".")
+        unit = f", {known['x-unit']}" if "x-unit" in known else ""
+        label = _LABELS.get(dotted) or f"{said}{unit}" or dotted
+        if dotted.startswith("machine.travel_mm."):
+            label = f"Travel of {dotted[-1].upper()}, lowest to highest reading, mm"
+        example = " to ".join(f"{one:g}" for one in value) if isinstance(value, list) else str(value)
+        sort = "date" if dotted == "job.date" else "text"
+        found.append({"key": dotted, "label": label, "example": example, "sort": sort})
+    return found
+
+
+def tables_of(values: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+    """Tables of job.toml from fields as they were filled in; what is empty is not stated."""
+    schema, tables = json.loads(shipped("job")), dict[str, dict[str, Any]]()
+    for dotted, text in values.items():
+        table, _, key = dotted.partition(".")
+        if not (text := text.strip()):
+            continue
+        known = _schema_of(schema, dotted)
+        plain = known.get("type") == "string" and known.get("format") != "date"
+        value = text if plain else value_of(_point(text))
+        if dotted in _PAIRS:
+            if (pair := _PAIR.fullmatch(text)) is None:
+                raise CmmUqError(
+                    f"{text!r} is no lowest and highest value", where=f"[{table}] {key}", fix='Write it as "0 to 700"'
+                )
+            value = [float(_point(one)) for one in pair.groups()]
+        key, dot, axis = key.partition(".")
+        tables.setdefault(table, {})
+        if dot:
+            tables[table].setdefault(key, {})[axis] = value
+        else:
+            tables[table][key] = value
+    if "U_um" in tables.get("artefact", {}):
+        tables["artefact"]["k"] = 2.0
+    if not tables.get("conformity", {}).get("standard"):
+        tables.pop("conformity", None)
+    return tables
+
+
+def _point(text: str) -> str:
+    """A number with a decimal point, where it is one with a comma."""
+    text = text.replace("−", "-")
+    return text.replace(",", ".") if _COMMA.fullmatch(text) else text
+
+
+def check_answers(kind: str, export: str, keys: Mapping[str, Any], values: Mapping[str, str]) -> dict[str, Any]:
+    """What would be wrong with the job that a form begins, as ``cmm-uq check`` says it."""
+    wrong, path = Gathered(), Path(export)
+    content = content_of(path, TABLE_BYTES, "Drop it again")
+    with wrong.going_on():
+        given = tables_of(values)
+        if not given.get("machine", {}).get("name"):
+            wrong.add(CmmUqError("the machine that was measured has no name", where="[machine] name", fix="Fill it in"))
+        said = {key: value for key, value in keys_of(keys).model_dump().items() if value not in (None, {})}
+        tables = {
+            **given,
+            "machine": {"name": "?", **given.get("machine", {})},
+            "recording": {"file": path.name, **said},
+        }
+        files = job_of_export(kind, tables, {path.name: content}, id="job")
+        if not wrong.problems:
+            return _checked("job", files)
+    return {"problems": list(in_lines([Problem.of(one) for one in wrong.problems])), "warnings": [], "sound": False}
+
+
+def _checked(name: str, files: Mapping[str, bytes]) -> dict[str, Any]:
+    """What check says of a job of these files, in a folder of that name, which is laid out for it."""
+    with tempfile.TemporaryDirectory(prefix="cmm-uq-") as place, chdir(place):
+        for file, content in files.items():
+            target = Path(name) / file
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(content)
+        found = check_job(Path(name))
+    problems, warnings = found.lines
+    return {"problems": list(problems), "warnings": list(warnings), "sound": found.sound, "command": found.command}
+
+
+def check_text(job: str, text: str | None) -> dict[str, Any]:
+    """What check says of a job's folder, or of what it would be with another job.toml."""
+    folder = Path(job)
+    if text is None:
+        found = check_job(folder)
+        problems, warnings = found.lines
+        return {"problems": list(problems), "warnings": list(warnings), "sound": found.sound, "command": found.command}
+    files = {
+        path.relative_to(folder).as_posix(): content_of(path, TABLE_BYTES, "")
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and not path.is_symlink() and path.name != "job.toml"
+    }
+    if len(text.encode()) > JOB_BYTES.most:
+        raise CmmUqError("is longer than any job", where="job.toml", fix="Shorten it")
+    return _checked(job, {**files, "job.toml": text.encode()})
+
+
+def create(kind: str, export: str, keys: Mapping[str, Any], values: Mapping[str, str], folder: str) -> dict[str, Any]:
+    """Write the new job around its export; see :func:`~cmm_uq.app.commands.jobs.exchange.write_job_of_export`."""
+    given = tables_of(values)
+    files = write_job_of_export(kind, Path(export), Path(folder), given, keys_of(keys))
+    return {"files": sorted(files), "id": job_id(Path(folder), given), "cwd": os.getcwd()}  # noqa: PTH109

@@ -1,0 +1,186 @@
+"""What the desk's worker does: one line of JSON in says what, lines of JSON out say how far it is and what it found.
+
+Run by the server as ``python -P -m cmm_uq.app.desk.work BYTES`` in the root folder; BYTES of memory are the most it takes, 0
+is no limit. It ends with the server, whose pipe it reads.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import io
+import json
+import os
+import sys
+import warnings
+from collections.abc import Callable, Mapping
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from cmm_uq.analysis.diagnosis.location import residual_field
+from cmm_uq.app.commands.files import Written
+from cmm_uq.app.commands.report import write_report
+from cmm_uq.app.desk import exports, questions
+from cmm_uq.app.serve import page as p
+from cmm_uq.app.serve.certificate_page import diagnosis_section
+from cmm_uq.app.serve.exchange import WebRequest
+from cmm_uq.app.serve.site import Site
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.output.interruption import done, watch
+from cmm_uq.certificate.result import Outcome, Result
+from cmm_uq.laboratory.records.place import is_url, of_folder, place_of
+
+MOST_VECTORS = 1500
+Tell = Callable[[Mapping[str, Any]], None]
+
+
+def report(job: str, tell: Tell) -> dict[str, Any]:
+    """``cmm-uq report`` of a job in the root folder, with its residuals as vectors where it has some."""
+    written = write_report(Path(job), stage=lambda what, part: tell({"what": what, "part": part}), records=None)
+    digest = sha256(written.results).hexdigest()
+    return {"id": written.name, "recorded": written.recorded, "sha256": digest, "field": vectors(written)}
+
+
+def vectors(written: Written[Outcome]) -> dict[str, Any] | None:
+    """Places, mm, and residuals, µm, before and after what was left out, with U of their lengths."""
+    found = written.found.found
+    if not isinstance(found, Result):
+        return None
+    diagnosis = found.diagnosed.diagnosis
+    field = residual_field(diagnosis.before, diagnosis.after)
+    if field is None or len(field.place) > MOST_VECTORS:
+        return None
+    rounded = {
+        "place": np.round(field.place, 3),
+        "before": np.round(field.before, 4),
+        "after": np.round(field.after, 4),
+    }
+    limit = np.round(field.expanded(diagnosis.noise.coordinate), 4).tolist()
+    return {name: values.tolist() for name, values in rounded.items()} | {
+        "limit": limit,
+        "found": bool(diagnosis.effects),
+    }
+
+
+def results(path: str) -> dict[str, Any]:
+    """Decisions and diagnosis of a results.json, in words."""
+    data = json.loads(Path(path).read_bytes())
+    verdicts = data.get("verdicts") or {}
+    decided = [
+        [
+            f"{one.get('by') or ''} {one.get('name') or one.get('title') or ''}".strip(),
+            one.get("outcome", ""),
+            one.get("value"),
+            one.get("U"),
+            one.get("limit"),
+            one.get("unit", ""),
+            one.get("missing") or [],
+        ]
+        for one in verdicts.get("statements", [])
+    ]
+    sections = diagnosis_section(data.get("diagnosis") or {})
+    said: list[list[Any]] = []
+    for _, blocks in sections:
+        for block in blocks:
+            if isinstance(block, p.PageFacts):
+                said += [["fact", str.__str__(label), str.__str__(one.text), one.standing] for label, one in block.rows]
+            elif isinstance(block, p.PageTable):
+                rows = [[str.__str__(one.text) for one in row] for row in block.rows]
+                said.append(
+                    ["table", str.__str__(block.caption), [str.__str__(one.heading) for one in block.columns], rows]
+                )
+            elif isinstance(block, p.PageParagraph):
+                said.append(["text", str.__str__(block.text)])
+    return {"overall": verdicts.get("overall", "none"), "decided": decided, "diagnosis": said}
+
+
+@cache
+def _site() -> Site:
+    where = place_of(None, of_folder(None))
+    if where is None:
+        raise CmmUqError("no records are kept here", fix="Start the desk without CMM_UQ_RECORDS=none to keep them")
+    if not is_url(where) and not Path(where).exists():
+        raise CmmUqError("no certificate is recorded here yet", fix="Make the first one on the desk")
+    return Site(where, desk=True)
+
+
+def page(
+    method: str, path: str, query: Mapping[str, str], headers: Mapping[str, str], body: str | None
+) -> dict[str, Any]:
+    """An answer of the records' pages; ``body``: file that holds what was sent."""
+    content = Path(body).read_bytes() if body else b""
+    answer = _site().answer(
+        WebRequest(method, path, query, headers, io.BytesIO(content) if body else None, len(content))
+    )
+    return {
+        "status": int(answer.status),
+        "media": answer.media,
+        "policy": answer.policy,
+        "referrer": answer.referrer,
+        "headers": dict(answer.headers),
+        "body": base64.b64encode(answer.body).decode(),
+    }
+
+
+DOES: Mapping[str, Callable[..., Any]] = {
+    "first_keys": exports.first_keys,
+    "read": exports.read,
+    "corrected": exports.corrected,
+    "kinds": questions.kinds,
+    "fields": questions.fields,
+    "check_answers": questions.check_answers,
+    "check": questions.check_text,
+    "create": questions.create,
+    "report": report,
+    "results": results,
+    "page": page,
+    "ready": lambda: True,
+}
+
+
+def answer(line: str, tell: Tell) -> dict[str, Any]:
+    try:
+        asked = json.loads(line)
+        function = DOES[asked.pop("do")]
+        further = {"tell": tell} if function is report else {}
+        return {"found": function(**asked, **further)}
+    except CmmUqError as error:
+        return {"refused": [error.where or "", error.problem, error.fix or ""]}
+    except MemoryError:
+        return {"refused": ["", "needs more memory than the desk gives to a file", "Export the part that is needed"]}
+    except Exception as error:  # a fault is told on the page; the worker goes on
+        return {"fault": f"{type(error).__name__}: {error}"}
+
+
+def limit_memory(most: int) -> None:
+    """Where the system can: elsewhere the limits of readers alone hold."""
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+
+
+def main() -> None:
+    watch()
+    warnings.simplefilter("ignore")
+    out: TextIO = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # whatever a library prints is no answer
+    if most := int(sys.argv[1]):
+        limit_memory(most)
+
+    def tell(said: Mapping[str, Any]) -> None:
+        out.write(json.dumps(said) + "\n")
+        out.flush()
+
+    with contextlib.suppress(BrokenPipeError):
+        for line in sys.stdin:
+            tell(answer(line, tell))
+    done()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,119 @@
+"""Exports on the desk: every cell with its meaning, every correction a command that reads the same."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmm_uq.app.cli.jobs import import_keys
+from cmm_uq.app.desk.exports import corrected, keys_of, read
+from cmm_uq.jobs.importing.format import ImportKeys
+from cmm_uq.jobs.importing.recording import imported
+from tests.jobs.importing.laboratory import EXPORTS
+
+
+def laid_out(folder: Path, name: str) -> tuple[Path, dict[str, Any]]:
+    file, made = EXPORTS[name]
+    export = made()
+    path = folder / file
+    path.write_bytes(export.content)
+    return path, dict(export.keys)
+
+
+def placed(found: dict[str, Any], keys: dict[str, Any]) -> dict[str, Any]:
+    return (
+        keys | {"lines": {name: f"along X from 0,{100 * i},0" for i, name in enumerate(found["lines"])}}
+        if found["lines"]
+        else keys
+    )
+
+
+def as_said(command: str) -> ImportKeys:
+    """Keys of a command as the command line reads it."""
+    options: dict[str, list[str]] = {"--column": [], "--key": [], "--line": []}
+    words = shlex.split(command)[3:]
+    for option, value in zip(words[::2], words[1::2], strict=True):
+        options[option].append(value)
+    return import_keys(*options.values())
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_the_command_on_the_page_reads_the_same(name: str, tmp_path: Path) -> None:
+    path, keys = laid_out(tmp_path, name)
+    keys = placed(read(str(path), keys), keys)
+    found = read(str(path), keys)
+    assert found["problem"] is None, found["problem"]
+    assert found["example"]
+    content = path.read_bytes()
+    here, there = (imported(content, path.name, one) for one in (keys_of(keys), as_said(found["command"])))
+    assert here.columns.keys() == there.columns.keys()
+    assert all(np.array_equal(here.columns[one], there.columns[one]) for one in here.columns)
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_every_column_that_is_used_is_coloured_where_it_stands(name: str, tmp_path: Path) -> None:
+    path, keys = laid_out(tmp_path, name)
+    found = read(str(path), placed(read(str(path), keys), keys))
+    meanings = {meaning for _, meaning in found["columns"]}
+    assert {"x_mm", "y_mm", "z_mm"} <= meanings or meanings & {"length_mm", "deviation_um", "deviation_mm"}
+    figures = [cells for _, cells, head in found["rows"] if not head]
+    assert figures
+    column = next(
+        i
+        for i, (_, meaning) in enumerate(found["columns"])
+        if meaning in ("x_mm", "length_mm", "deviation_um", "deviation_mm")
+    )
+    assert any(char.isdigit() for cells in figures[:2] for char in cells[column])
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_a_form_that_changes_nothing_says_nothing(name: str, tmp_path: Path) -> None:
+    path, keys = laid_out(tmp_path, name)
+    found = read(str(path), keys)
+    chosen = {str(i): meaning for i, (_, meaning) in enumerate(found["columns"])}
+    lines = {"lines": keys.get("lines", {})}
+    others = {one: str(value) for one, value in keys.items() if one not in ("columns", "lines")}
+    assert corrected(str(path), keys, chosen, others | lines) == keys_of(keys).model_dump(exclude_defaults=True)
+
+
+EXCHANGED = "n;Messpunkt;Achse A;Achse B;Achse C\n1;1;10,0;20,0;30,0\n1;2;110,0;20,5;30,5\n"
+EXCHANGED += "2;1;12,0;22,0;33,0\n2;2;112,0;22,5;33,5\n"
+
+
+def test_columns_nobody_understands_are_named_by_choosing_them(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(EXCHANGED, encoding="utf-8")
+    found = read(str(path), {})
+    assert found["problem"] is not None
+    assert not found["understood"]
+    chosen = {"0": "measurement", "1": "point", "2": "y_mm", "3": "x_mm", "4": "z_mm"}
+    keys = corrected(str(path), {}, chosen, {"unit": "mm"})
+    found = read(str(path), keys)
+    assert found["problem"] is None, found["problem"]
+    table = imported(path.read_bytes(), path.name, as_said(found["command"]))
+    assert table.columns["x_mm"].tolist() == [20.0, 20.5, 22.0, 22.5]
+    assert table.columns["y_mm"].tolist() == [10.0, 110.0, 12.0, 112.0]
+    back = corrected(str(path), keys, {**chosen, "2": "x_mm", "3": "y_mm"}, {"unit": "mm"})
+    assert imported(path.read_bytes(), path.name, keys_of(back)).columns["x_mm"].tolist() == [10.0, 110.0, 12.0, 112.0]
+
+
+def test_a_column_taken_for_another_is_corrected_by_its_heading(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("measurement;point;X [mm];Y [mm];Z [mm];X corr [mm]\n" + "".join(
+        f"{m};{p};{100 * p}.5;0.5;{m}.5;{100 * p}.7\n" for m in (1, 2) for p in (1, 2)), encoding="utf-8")  # fmt: skip
+    taken = {str(i): meaning for i, (_, meaning) in enumerate(read(str(path), {})["columns"])}
+    keys = corrected(str(path), {}, {**taken, "2": "", "5": "x_mm"}, {})
+    assert keys == {"columns": {"x_mm": "X corr [mm]"}}
+    found = read(str(path), keys)
+    assert found["columns"][5][1] == "x_mm"
+    assert "--column 'x_mm=X corr [mm]'" in found["command"]
+    assert imported(path.read_bytes(), path.name, keys_of(keys)).columns["x_mm"].tolist() == [
+        100.7,
+        200.7,
+        100.7,
+        200.7,
+    ]

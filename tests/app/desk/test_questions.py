@@ -1,0 +1,70 @@
+"""The dozen things a job states: fields of every kind, and the tables that are made of them."""
+
+from __future__ import annotations
+
+import datetime as dt
+from pathlib import Path
+
+import pytest
+
+from cmm_uq.app.desk.pictures import DRAWINGS
+from cmm_uq.app.desk.questions import check_answers, check_text, create, fields, kinds, tables_of
+from cmm_uq.base.errors import CmmUqError
+from tests.conftest import ROOT
+
+EXPORT = ROOT / "docs" / "tutorial" / "ballbar-export.xlsx"
+ANSWERS = {
+    "job.date": "2026-05-31", "machine.name": "CMM 3", "machine.serial": "1102", "machine.travel_mm.x": "-600 to 900",
+    "machine.travel_mm.y": "-700 1200", "machine.travel_mm.z": "−800 to 400,5", "artefact.U_um": "0,8",
+    "artefact.length_mm": "404.205", "conformity.standard": "ASME B89.4.1-1997", "conformity.limit_um": "400",
+    "job.customer": "",
+}  # fmt: skip
+
+
+def test_every_kind_of_an_export_has_a_picture_and_its_dozen() -> None:
+    found = kinds()
+    assert [name for name, _ in found if name not in DRAWINGS] == []
+    for name, _ in found:
+        asked = fields(name)
+        assert 4 <= len(asked) <= 24, name
+        assert len({one["key"] for one in asked}) == len(asked)
+        assert all(one["label"] for one in asked)
+
+
+def test_answers_are_tables_of_job_toml() -> None:
+    found = tables_of(ANSWERS)
+    assert found["job"] == {"date": dt.date(2026, 5, 31)}
+    assert found["machine"]["serial"] == "1102", "a number that is a name stays one"
+    assert found["machine"]["travel_mm"] == {"x": [-600.0, 900.0], "y": [-700.0, 1200.0], "z": [-800.0, 400.5]}
+    assert found["artefact"] == {"U_um": 0.8, "k": 2.0, "length_mm": 404.205}
+    assert found["conformity"] == {"standard": "ASME B89.4.1-1997", "limit_um": 400}
+
+
+def test_a_standard_that_is_not_named_decides_nothing() -> None:
+    assert "conformity" not in tables_of({**ANSWERS, "conformity.standard": " "})
+
+
+def test_a_travel_that_is_none_is_told_with_its_key() -> None:
+    with pytest.raises(CmmUqError, match="no lowest and highest value") as refused:
+        tables_of({**ANSWERS, "machine.travel_mm.x": "about a metre"})
+    assert refused.value.where == "[machine] travel_mm.x"
+
+
+def test_what_is_typed_is_checked_as_the_command_checks_the_job(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / EXPORT.name).write_bytes(EXPORT.read_bytes())
+    assert "name" in check_answers("ballbar", EXPORT.name, {}, {})["problems"][0]
+    assert "when it was measured" in check_answers("ballbar", EXPORT.name, {}, {"machine.name": "CMM 3"})["problems"][0]
+    wrong = check_answers("ballbar", EXPORT.name, {}, {**ANSWERS, "artefact.length_mm": "399"})
+    assert "404.205" in wrong["problems"][0]
+    right = check_answers("ballbar", EXPORT.name, {}, ANSWERS)
+    assert right["sound"]
+    create("ballbar", EXPORT.name, {}, ANSWERS, "K-1")
+    found = check_text("K-1", None)
+    assert [one.replace("job/", "K-1/") for one in right["warnings"]] == found["warnings"]
+    text = (tmp_path / "K-1" / "job.toml").read_text(encoding="utf-8")
+    assert check_text("K-1", text) == found
+    assert not check_text("K-1", text.replace("404.205", "399"))["sound"]
+    assert check_text("K-1", None) == found, "what was only tried was written"
