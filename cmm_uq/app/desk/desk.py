@@ -6,6 +6,7 @@ A form that changes something is answered with a redirect, so that reload and ba
 from __future__ import annotations
 
 import json
+import tempfile
 import threading
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -15,12 +16,26 @@ from typing import Any
 
 from cmm_uq import __version__
 from cmm_uq.app.desk import export_pages, job_pages
-from cmm_uq.app.desk.drafts import Draft, DraftFolder
+from cmm_uq.app.desk.drafts import Draft, DraftFolder, received
 from cmm_uq.app.desk.export_pages import ARTEFACT, FIELDS, READ
 from cmm_uq.app.desk.guard import POLICY, Guard
-from cmm_uq.app.desk.job_pages import CANCEL, CERTIFICATE, FILE, JOB, REPORTS, RUN, JobState, state_of
+from cmm_uq.app.desk.job_pages import (
+    CANCEL,
+    CERTIFICATE,
+    DELETE,
+    FILE,
+    JOB,
+    PART,
+    POINTS,
+    REPORTS,
+    RUN,
+    JobState,
+    state_of,
+)
+from cmm_uq.app.desk.part_pages import PLAN, part_page, with_points
 from cmm_uq.app.desk.place import ChangedError, below, jobs_in, safe_name, sha256, write_over
 from cmm_uq.app.desk.shown import OWN_FILES, own_file, records_page, shown_file
+from cmm_uq.app.desk.verify_page import VERIFY, verify_page
 from cmm_uq.app.desk.workers import ReportRun, Worker
 from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse, read_form
 from cmm_uq.app.serve.page import WebPage, address
@@ -30,6 +45,7 @@ from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
 from cmm_uq.base.messages import Text, Verbatim, say
 
+VERIFY_S = 180.0  # s that reading and comparing a certificate may take
 AT_ONCE = 2  # reports under way
 
 
@@ -101,6 +117,8 @@ class Desk:
             RUN: self.running,
             CERTIFICATE: self.certificate,
             FILE: partial(shown_file, self.root),
+            PART: self.part,
+            VERIFY: lambda request: verify_page(),
             f"{DESK}/events": self.events,
             f"{DESK}/field.json": self.field,
         }
@@ -114,7 +132,11 @@ class Desk:
             RUN: self.run,
             CANCEL: self.cancel,
             f"{DESK}/check": self.check,
-            f"{DESK}/delete": self.delete,
+            DELETE: self.delete,
+            PLAN: self.plan,
+            PART: self.create_part,
+            POINTS: self.points,
+            VERIFY: self.verify,
         }
 
     def home(self, request: WebRequest) -> WebPage:
@@ -181,17 +203,61 @@ class Desk:
         folder = one.values.get("folder", "").strip()
         values = {name: value for name, value in one.values.items() if name != "folder"}
         try:
-            if not folder or safe_name(folder) != folder or folder == REPORTS:
-                raise CmmUqError(
-                    f"{folder!r} is no name of a folder on every system",
-                    fix="Use letters, digits, - and _, such as K-2026-115",
-                )
+            self._check_folder(folder)
             self.reader.ask("create", kind=kind, export=one.export, keys=one.keys, values=values, folder=folder)
         except CmmUqError as error:
             return self._fields(one, kind, error)
         self.drafts.remember(one.values)
         self.drafts.delete(one)
         return to(JOB, name=folder)
+
+    def part(self, request: WebRequest) -> WebPage:
+        request.only(("draft",))
+        draft = self.drafts.read(request.text("draft")) if request.text("draft") else None
+        return part_page(draft, (state_of(self.root, folder) for folder in jobs_in(self.root)))
+
+    def plan(self, request: WebRequest) -> WebResponse:
+        one = self.drafts.take(request)
+        one.values = {"part": "plan"}
+        self.drafts.write(one)
+        return to(PART, draft=one.id)
+
+    def create_part(self, request: WebRequest) -> WebResponse:
+        form = read_form(request)
+        one, folder = self.drafts.read(form.get("draft", "")), form.get("folder", "").strip()
+        self._check_folder(folder)
+        certificate = below(self.root, form.get("certificate", "")).relative_to(self.root).as_posix()
+        self.reader.ask(
+            "create_part",
+            plan=one.export,
+            certificate=certificate,
+            folder=folder,
+            date=form.get("date", ""),
+            not_measured=form.get("not_measured") == "yes",
+        )
+        self.drafts.delete(one)
+        return to(JOB, name=folder)
+
+    def points(self, request: WebRequest) -> WebResponse:
+        """Measured points of a part, into its folder and its job.toml."""
+        request.only(("name",))
+        name = self._folder(request.text("name"))
+        path = self.root / name / "job.toml"
+        content = content_of(path, JOB_BYTES, "")
+        points = received(request, path.parent)
+        write_over(path, with_points(content.decode(), points).encode(), sha256(content))
+        return to(JOB, name=name)
+
+    def verify(self, request: WebRequest) -> WebPage:
+        request.only(())
+        with tempfile.TemporaryDirectory(prefix="cmm-uq-") as folder:
+            name = received(request, Path(folder))
+            return verify_page(name, self.reader.ask("verification", seconds=VERIFY_S, path=str(Path(folder) / name)))
+
+    def _check_folder(self, name: str) -> None:
+        if not name or safe_name(name) != name or name == REPORTS:
+            fix = "Use letters, digits, - and _, such as K-2026-115"
+            raise CmmUqError(f"{name!r} is no name of a folder on every system", fix=fix)
 
     def check(self, request: WebRequest) -> WebResponse:
         """What is wrong with what is being typed; nothing is written."""

@@ -16,13 +16,14 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.app.desk.place import OWN, safe_name, sha256, write_over
-from cmm_uq.app.serve.exchange import UploadedFile, WebRequest, read_dropped
+from cmm_uq.app.serve.exchange import WebRequest, read_dropped
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
 
 ANSWERS, LAST = "answers.json", "last.json"
 MOST_DRAFTS = 50
+OF_ONE = ("folder", "job.date", "job.issued")  # answers that are of one job
 _ID = re.compile(r"[0-9a-f]{16}")
 
 
@@ -39,6 +40,11 @@ class Draft:
     @property
     def name(self) -> str:
         return Path(self.export).name
+
+    @property
+    def part(self) -> bool:
+        """Whether it is the plan of a part."""
+        return "part" in self.values
 
 
 @dataclass(frozen=True)
@@ -63,10 +69,7 @@ class DraftFolder:
         folder = self.folder / one.id
         folder.mkdir(parents=True)
         try:
-            with (folder / ".unfinished-export").open("wb") as file:
-                dropped: UploadedFile = read_dropped(request, file, TABLE_BYTES.most)
-            name = safe_name(dropped.name)
-            (folder / ".unfinished-export").rename(folder / name)
+            name = received(request, folder)
         except BaseException:
             shutil.rmtree(folder, ignore_errors=True)
             raise
@@ -110,9 +113,24 @@ class DraftFolder:
     def remember(self, values: Mapping[str, str]) -> None:
         """For the next job: all but what is of one measurement."""
         path = self.folder / LAST
-        kept = {**self.last(), **{key: value for key, value in values.items() if key not in ("job.date", "folder")}}
+        kept = {**self.last(), **{key: value for key, value in values.items() if key not in OF_ONE}}
         with contextlib.suppress(CmmUqError, OSError):
             write_over(path, as_json(kept), sha256(path.read_bytes()) if path.exists() else "")
+
+
+def received(request: WebRequest, folder: Path) -> str:
+    """Name of a file that was dropped, once it lies in a folder, whole, and over nothing."""
+    unfinished = folder / f".unfinished-{secrets.token_hex(8)}"
+    try:
+        with unfinished.open("wb") as file:
+            dropped = read_dropped(request, file, TABLE_BYTES.most)
+        name = safe_name(dropped.name)
+        if (folder / name).exists():
+            raise CmmUqError("is there already", where=name, fix="Give the file another name")
+        unfinished.rename(folder / name)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return name
 
 
 def as_json(data: Mapping[str, Any]) -> bytes:

@@ -109,7 +109,6 @@ def read_page(draft: Draft, found: Mapping[str, Any]) -> WebPage:
         _buttons(problem),
         (("draft", draft.id), ("seen", draft.seen)),
         _grid(found),
-        legend=say("Another unit, decimal sign or sheet"),
     )
     facts = tuple((Verbatim(label), Cell(Verbatim(text))) for label, text in found["facts"])
     return WebPage(
@@ -120,6 +119,10 @@ def read_page(draft: Draft, found: Mapping[str, Any]) -> WebPage:
         blocks=(steps(1, draft.id), head, form),
         sections=(
             *(((say("What was recognised"), (p.PageFacts(facts),)),) if facts else ()),
+            (
+                say("Not wanted"),
+                (PageForm(f"{DESK}/delete", (), (("delete", say("Delete this export")),), (("draft", draft.id),)),),
+            ),
             (say("The same by a command"), (p.SourceText(say("Command"), found["command"]),)),
         ),
     )
@@ -218,17 +221,16 @@ def fields_page(
             hint=say("Its certificate has this name too"),
         )
     ]
+    further = list[FormEntry]()
     for one in fields:
         sort: Literal["date", "text"] = "date" if one["sort"] == "date" else "text"
         value = filled.get(one["key"], "")
-        entries.append(FormEntry(one["key"], Verbatim(one["label"]), value, sort, example=one["example"]))
-    form = PageForm(
-        FIELDS,
-        tuple(entries),
-        (("create", say("Make the job")), ("check", say("Check"))),
-        (("draft", draft.id), ("kind", kind), ("seen", draft.seen)),
-        check=f"{DESK}/check",
-    )
+        entry = FormEntry(one["key"], Verbatim(one["label"]), value, sort, example=one["example"])
+        (further if one["further"] else entries).append(entry)
+    buttons = (("create", say("Make the job")), ("check", say("Check")))
+    hidden = (("draft", draft.id), ("kind", kind), ("seen", draft.seen))
+    legend = say("What ISO/IEC 17025 asks for besides: without it the certificate is a draft")
+    form = PageForm(FIELDS, tuple(entries), buttons, hidden, None, f"{DESK}/check", legend, tuple(further))
     remembered = (
         (PageParagraph(say("Filled in as last time: look at each."), "note"),) if last and not draft.values else ()
     )

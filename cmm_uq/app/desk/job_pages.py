@@ -13,6 +13,7 @@ from typing import Any
 from cmm_uq.app.desk.drafts import Draft
 from cmm_uq.app.desk.export_pages import READ, check_blocks, steps
 from cmm_uq.app.desk.place import sha256
+from cmm_uq.app.desk.verify_page import VERIFY
 from cmm_uq.app.desk.workers import ReportRun
 from cmm_uq.app.serve import page as p
 from cmm_uq.app.serve.page import (
@@ -31,9 +32,10 @@ from cmm_uq.app.serve.rendering import DESK
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 
 JOB, RUN, CANCEL, CERTIFICATE, FILE = (f"{DESK}/{name}" for name in ("job", "run", "cancel", "certificate", "file"))
+PART, POINTS, DELETE = f"{DESK}/part", f"{DESK}/points", f"{DESK}/delete"
 RESULTS, REPORTS = "results.json", "reports"
 MOST_FILES = 100
 
@@ -79,7 +81,8 @@ def state_of(root: Path, folder: Path) -> JobState:
         keys = data.get(table)
         named[table] = str(keys.get(key, "")) if isinstance(keys, dict) else ""
     own, of = named["job"], named["machine"]
-    part = "part" in data
+    part = isinstance(data.get("part"), dict)
+    of = of or (str(data["part"].get("name", "")) if part else "")
     report = root / REPORTS / own
     if not own or "/" in own or own[0] == "." or not (report / RESULTS).is_file() or report.is_symlink():
         return JobState(name, own, of, part)
@@ -108,7 +111,7 @@ def home_page(root: Path, jobs: Iterable[JobState], drafts: Iterable[Draft]) -> 
         for one in jobs
     )
     headings = p.columns(say("Job"), say("Machine"), say("State"), say("Result"))
-    begun = tuple(Cell(Verbatim(one.name), address(READ, draft=one.id)) for one in drafts)
+    begun = tuple(Cell(Verbatim(one.name), address(PART if one.part else READ, draft=one.id)) for one in drafts)
     hint = say(
         "CSV, text, .xlsx, .ods, PC-DMIS, Calypso, DMIS, QIF, I++: as the measuring program wrote it; at most {most} MB.",
         most=number(TABLE_BYTES.most // 2**20),
@@ -126,9 +129,10 @@ def home_page(root: Path, jobs: Iterable[JobState], drafts: Iterable[Draft]) -> 
                 say("Jobs in this folder"),
                 (PageTable(say("Jobs"), headings, rows, say("No job lies here yet: drop an export."), heard=True),),
             ),
+            (say("A part"), (p.Links((Cell(say("Its plan, the certificate of the machine, and its points"), PART),)),)),
             (
                 say("A certificate that you received"),
-                (p.Links((Cell(say("Check a file: who says what, and whether it holds"), "/file"),)),),
+                (p.Links((Cell(say("Verify it: who says what, what it rests on, and whether it holds"), VERIFY),)),),
             ),
         ),
     )
@@ -164,6 +168,8 @@ def job_page(
         if one.made
         else ()
     )
+    hint = say("CSV with feature, point, x_mm, y_mm, z_mm, in the frame of the part; job.toml then names it.")
+    points = p.Drop(address(POINTS, name=one.name), say("Drop the measured points here"), hint, say("Take them"))
     edit = PageForm(
         JOB,
         (FormEntry("text", say("job.toml"), text, "area"),),
@@ -176,7 +182,13 @@ def job_page(
         DESK,
         lead=p.shown(one.machine),
         above=(Cell(say("Desk"), DESK),),
-        blocks=(*above, *made, *check_blocks(check), *((make,) if check.get("sound") else ())),
+        blocks=(
+            *above,
+            *made,
+            *check_blocks(check),
+            *((make,) if check.get("sound") else ()),
+            *((points,) if one.part else ()),
+        ),
         sections=(
             (say("What it states"), (edit,)),
             (
@@ -214,7 +226,12 @@ def run_page(run: ReportRun) -> WebPage:
 def certificate_page(one: JobState, said: Mapping[str, Any], field: bool, warnings: Iterable[str]) -> WebPage:
     """The certificate, its diagnosis, the residual field, and what to do next."""
     word, standing = DECISIONS.get(said["overall"], (Verbatim(said["overall"]), "open"))
-    lines = tuple(Cell(_decided(*each)) for each in said["decided"])
+    lines = tuple(Cell(_decided(*each[:-1])) for each in said["decided"])
+    lacking = tuple(
+        PageNotice(Verbatim(each[0]), "open", tuple(Cell(Verbatim(str(what))) for what in each[-1]))
+        for each in said["decided"]
+        if each[-1]
+    )
     head = PageNotice(word if said["decided"] else say("It states no conformity"), standing or "good", lines)
     changed = () if one.current else (PageNotice(say("The job was changed since: make the certificate again"), "open"),)
     names = (
@@ -249,6 +266,7 @@ def certificate_page(one: JobState, said: Mapping[str, Any], field: bool, warnin
         blocks=(*changed, head, p.Links((*look, *kept))),
         sections=(
             (say("What to do next"), next_steps(one, said, warnings)),
+            *(((say("What a complete test lacks"), lacking),) if lacking else ()),
             *(((say("Diagnosis"), (*diagnosis, *turning)),) if diagnosis or turning else ()),
             *(
                 ((say("The certificate"), (p.SandboxFrame(say("Certificate"), address(FILE, at=page)),)),)
@@ -259,7 +277,7 @@ def certificate_page(one: JobState, said: Mapping[str, Any], field: bool, warnin
     )
 
 
-def _decided(by: str, outcome: str, value: Any, expanded: Any, limit: Any, unit: str, missing: list[str]) -> Text:
+def _decided(by: str, outcome: str, value: Any, expanded: Any, limit: Any, unit: str) -> Text:
     word = DECISIONS.get(outcome, (Verbatim(outcome), None))[0]
     if not isinstance(value, int | float) or not isinstance(limit, int | float):
         told = say("{by}: {word:small}", by=Verbatim(by), word=word)
@@ -276,7 +294,7 @@ def _decided(by: str, outcome: str, value: Any, expanded: Any, limit: Any, unit:
             told = say(
                 "{told}, U = {expanded} {unit}", told=told, expanded=number(expanded, ".2g"), unit=Verbatim(unit)
             )
-    return say("{told}; missing: {what}", told=told, what=commas(map(Verbatim, map(str, missing)))) if missing else told
+    return told
 
 
 def _said(block: list[Any]) -> Block:
@@ -299,7 +317,7 @@ def next_steps(one: JobState, said: Mapping[str, Any], warnings: Iterable[str]) 
             say("The machine does not conform: what the diagnosis names is to be looked at first, then measured again.")
         )
     if said["overall"] in ("incomplete", "undecided"):
-        steps.append(say("The test is not complete or not decided: what is missing stands above."))
+        steps.append(say("The test is not complete or not decided: what is missing stands below."))
     steps += [Verbatim(text) for text in lacking]
     steps.append(
         say(

@@ -40,6 +40,22 @@ _LABELS = {
     "rated_conditions.temperature_c": "Rated temperatures, °C",
 }
 _EXAMPLES = {"job.date": "2026-05-31", "job.customer": "", "machine.serial": "9.12.6", "artefact.serial": "SG-4711"}
+_OF_CERTIFICATE = {
+    "laboratory.name": "Laboratory",
+    "laboratory.address": "Its address",
+    "laboratory.signatory": "Who authorises certificates",
+    "job.issued": "Issued on",
+    "job.address": "Address of the customer",
+    "job.place": "Where it was measured",
+    "job.procedure": "Procedure",
+    "job.conditions": "Conditions that influence the results",
+    "artefact.certificate.number": "Number of the artefact's certificate",
+    "artefact.certificate.laboratory": "Who issued that",
+    "artefact.certificate.issuer": "What that is: national institute, accredited, in-house",
+    "artefact.certificate.date": "Date of that certificate",
+    "artefact.certificate.due": "Last day on which it holds",
+}
+"""What ISO/IEC 17025:2017, 7.8 asks for besides; a certificate without it is a draft."""
 _PAIRS = ("machine.travel_mm.x", "machine.travel_mm.y", "machine.travel_mm.z", "rated_conditions.temperature_c")
 LAID_OUT = (BUDGET, PART, PLAN)
 
@@ -83,18 +99,21 @@ def _schema_of(schema: Mapping[str, Any], dotted: str) -> Mapping[str, Any]:
 
 
 def fields(kind: str) -> list[dict[str, str]]:
-    """Fields of the form of a kind: key, label, example, sort."""
+    """Fields of the form of a kind: key, label, example, sort, and whether only a whole certificate needs it."""
     schema, found = json.loads(shipped("job")), []
     for dotted, value in _wanted(kind):
         known = _schema_of(schema, dotted)
         said = str(known.get("description", "")).partition(". Unit:")[0].partition(":")[0].rstrip(".")
-        unit = f", {known['x-unit']}" if "x-unit" in known else ""
+        unit = f", {known['x-unit']}" if "x-unit" in known and not said.endswith(str(known["x-unit"])) else ""
         label = _LABELS.get(dotted) or f"{said}{unit}" or dotted
         if dotted.startswith("machine.travel_mm."):
             label = f"Travel of {dotted[-1].upper()}, lowest to highest reading, mm"
         example = " to ".join(f"{one:g}" for one in value) if isinstance(value, list) else str(value)
         sort = "date" if dotted == "job.date" else "text"
-        found.append({"key": dotted, "label": label, "example": example, "sort": sort})
+        found.append({"key": dotted, "label": label, "example": example, "sort": sort, "further": ""})
+    for dotted, label in _OF_CERTIFICATE.items():
+        sort = "date" if dotted.endswith((".issued", ".date", ".due")) else "text"
+        found.append({"key": dotted, "label": label, "example": "", "sort": sort, "further": "yes"})
     return found
 
 
@@ -106,6 +125,7 @@ def tables_of(values: Mapping[str, str]) -> dict[str, dict[str, Any]]:
         if not (text := text.strip()):
             continue
         known = _schema_of(schema, dotted)
+        known = known.get("properties", {}).get(dotted.rpartition(".")[2], known)
         plain = known.get("type") == "string" and known.get("format") != "date"
         value = text if plain else value_of(_point(text))
         if dotted in _PAIRS:

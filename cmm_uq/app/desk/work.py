@@ -22,16 +22,23 @@ from typing import Any, TextIO
 import numpy as np
 
 from cmm_uq.analysis.diagnosis.location import residual_field
+from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.app.commands.files import Written
+from cmm_uq.app.commands.parts.part import PartOptions, write_part
 from cmm_uq.app.commands.report import write_report
-from cmm_uq.app.desk import exports, questions
+from cmm_uq.app.desk import exports, parts, questions
 from cmm_uq.app.serve import page as p
 from cmm_uq.app.serve.certificate_page import diagnosis_section
 from cmm_uq.app.serve.exchange import WebRequest
 from cmm_uq.app.serve.site import Site
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.content import content_of
+from cmm_uq.base.files.limits import JOB_BYTES
 from cmm_uq.base.output.interruption import done, watch
 from cmm_uq.certificate.result import Outcome, Result
+from cmm_uq.certificate.verify.given import CHECKS
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.part.job import is_part
 from cmm_uq.laboratory.records.place import is_url, of_folder, place_of
 
 MOST_VECTORS = 1500
@@ -39,10 +46,18 @@ Tell = Callable[[Mapping[str, Any]], None]
 
 
 def report(job: str, tell: Tell) -> dict[str, Any]:
-    """``cmm-uq report`` of a job in the root folder, with its residuals as vectors where it has some."""
-    written = write_report(Path(job), stage=lambda what, part: tell({"what": what, "part": part}), records=None)
+    """``cmm-uq report`` of a job in the root folder, with its residuals as vectors where it has some, or ``part``."""
+    folder = Path(job)
+
+    def stage(what: str, part: float) -> None:
+        tell({"what": what, "part": part})
+
+    if is_part(content_of(folder / "job.toml", JOB_BYTES, "")):
+        of_part = write_part(folder, options=PartOptions(), stage=stage)
+        return {"id": of_part.name, "sha256": "", "field": None}
+    written = write_report(folder, stage=stage, records=None)
     digest = sha256(written.results).hexdigest()
-    return {"id": written.name, "recorded": written.recorded, "sha256": digest, "field": vectors(written)}
+    return {"id": written.name, "sha256": digest, "field": vectors(written)}
 
 
 def vectors(written: Written[Outcome]) -> dict[str, Any] | None:
@@ -98,6 +113,45 @@ def results(path: str) -> dict[str, Any]:
     return {"overall": verdicts.get("overall", "none"), "decided": decided, "diagnosis": said}
 
 
+def verification(path: str) -> dict[str, Any]:
+    """What a certificate says, on what it rests, and whether it holds, as ``cmm-uq verify --no-rerun`` finds it."""
+    found = verify((Path(path),), rerun=False)
+    inquiry, given = found.inquiry, found.given
+    checks = [
+        [any(one.check == name for one in inquiry.findings), what, inquiry.done.get(name, 0)]
+        for name, what in CHECKS.items()
+        if name in inquiry.done or any(one.check == name for one in inquiry.findings)
+    ]
+    signed = next((note for note in inquiry.notes if "sign" in note.lower()), "Nobody has signed it electronically.")
+    decided = ((given.results[1].get("verdicts") or {}) if given.results is not None else {}).get("overall", "none")
+    return {
+        "word": inquiry.word,
+        "said": _said(found.subject, found.job, str(decided)),
+        "signed": signed,
+        "checks": checks,
+        "findings": [str(one) for one in inquiry.findings],
+        "unchecked": [str(one) for one in inquiry.unchecked],
+    }
+
+
+def _said(subject: str, job: Job | None, decided: str) -> str:
+    """In one line who says what, and what it rests on."""
+    decision = p.DECISIONS.get(decided, p.DECISIONS["none"])[0]
+    if job is None:
+        return f"{subject}: {decision}"
+    facts, artefact = job.facts, job.facts.artefact
+    who = facts.laboratory.name or "A laboratory that is not named"
+    machine = f"{facts.machine.name}{f' ({facts.machine.serial})' if facts.machine.serial else ''}"
+    chain = artefact.certificate
+    by = (
+        f", certificate {chain.number} by {chain.laboratory}"
+        if chain is not None and chain.number
+        else ", whose certificate is not named"
+    )
+    rests = f"{artefact.name or artefact.kind}{f' {artefact.serial}' if artefact.serial else ''}{by}"
+    return f"{who} says of {machine}, measured on {facts.job.date}: {str(decision).lower()}. It rests on {rests}."
+
+
 @cache
 def _site() -> Site:
     where = place_of(None, of_folder(None))
@@ -135,9 +189,11 @@ DOES: Mapping[str, Callable[..., Any]] = {
     "check_answers": questions.check_answers,
     "check": questions.check_text,
     "create": questions.create,
+    "create_part": parts.create_part,
     "report": report,
     "results": results,
     "page": page,
+    "verification": verification,
     "ready": lambda: True,
 }
 

@@ -210,7 +210,7 @@ class PageForm(NamedTuple):
     """A form that is sent.
 
     ``buttons``: the value that ``then`` has with each, and its text; ``hidden``: what goes with it; ``check``: address
-    that says while somebody types what is wrong; ``legend``: what its fields have in common.
+    that says while somebody types what is wrong; ``further``: fields that are folded away below a ``legend``.
     """
 
     path: str
@@ -220,6 +220,7 @@ class PageForm(NamedTuple):
     grid: CellGrid | None = None
     check: str = ""
     legend: Text = NOTHING
+    further: tuple[FormEntry, ...] = ()
 
 
 class Choices(NamedTuple):

@@ -34,6 +34,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.schema import commented
 from cmm_uq.jobs.tables.identification import EXAMPLE, MEASURED, SIMULATED, Origin, first_line
 from cmm_uq.machine.model.kind import Kind
+from cmm_uq.machine.physics.catalogue import effects
 
 RECORDING, SCHEMA, README = "recording.csv", ".cmm-uq/job.schema.json", "README.md"
 REST = "docs/reference/job.md, cmm-uq schema job, or what an editor that knows TOML schemas completes"
@@ -197,6 +198,10 @@ def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: s
                          fix="Give the date of measurement: --set job.date=2026-05-31")  # fmt: skip
     bare = replace(begin, artefact={}, conformity=None, test={})
     whole = _tables(found, bare, given, id, origin=MEASURED) | {"machine": dict(given.get("machine", {}))}
+    if "effects" not in given.get("model", {}):  # what the export has no column for it cannot tell
+        recorded = read_new(found, whole, files).points.columns
+        known = (one for one in effects(begin.effects) if set(one.columns) <= set(recorded))
+        whole["model"] = {**whole["model"], "effects": [one.name for one in known]}
     return job_files(found.name, whole, files, begin=begin)
 
 
