@@ -154,12 +154,15 @@ def _figures(effect: Effect, machine: Machine, blank: ErrorMap) -> Floats | None
         return found if np.ndim(lean) == 0 else None
     random, start = np.random.default_rng(0), 0
     places = np.column_stack([random.choice(each.positions, 40) for each in blank.axes])
-    true = effect.basis(_points(machine, places))
+    # with a tip: without one a turn of what carries nothing moves nothing, and any carriage seems to hold it
+    whole, tip = replace(machine, tip_on_every_carriage=True), np.array([60.0, 80.0, -130.0])
+    true = effect.basis(_points(whole, places, tip))
     for i, each in enumerate(blank.axes):
         found[start : start + 6 * len(each.positions)] = _of_carriage(effect, machine, i, each.positions).reshape(
             -1, count
         )
-        carried = MapCovariance(found, np.zeros(3)).root(blank, places, chain=machine.chain)
+        tips = np.broadcast_to(tip, places.shape)
+        carried = MapCovariance(found, np.zeros(3)).root(blank, places, tip=tips, chain=machine.chain)
         if np.abs(carried - true).max(initial=0.0) <= _EXACT * np.abs(true).max(initial=0.0):
             return found
         found[:] = 0.0

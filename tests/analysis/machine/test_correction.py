@@ -16,7 +16,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine
 from cmm_uq.machine.model.field import curves
 from cmm_uq.machine.physics.catalogue import effects, every
-from cmm_uq.machine.physics.compensation import Compensation
+from cmm_uq.machine.physics.compensation import NOMINAL, Compensation, PointConditions
 from cmm_uq.machine.physics.error_map import ErrorMap
 from cmm_uq.machine.physics.map_covariance import MapCovariance
 from cmm_uq.machine.physics.map_interpolation import ErrorMaps
@@ -44,13 +44,17 @@ def positions(blank: ErrorMap, count: int) -> np.ndarray:
 PLACED = [name for name, one in every().items() if room._of_place(one)]
 
 
+@pytest.mark.parametrize("tip", [None, np.array([120.0, -40.0, -200.0])], ids=["bare", "tip"])
 @pytest.mark.parametrize("leaning", [0.0, 1.0])
 @pytest.mark.parametrize("chain", ["XYZ", "YXZ", "ZXY", "XFYZ", "YFXZ"])
-def test_a_map_moves_points_by_what_the_errors_themselves_do(chain: str, leaning: float) -> None:
+def test_a_map_moves_points_by_what_the_errors_themselves_do(
+    chain: str, leaning: float, tip: np.ndarray | None
+) -> None:
     """All errors of the catalogue that follow from the place, and the curves of the field, at once: the compensation by the
     map beside the superposition of effects, where a map has its positions. Axes that lean by some 50″ (2.4·10⁻⁴) turn what
-    goes along them, to which order both are the same."""
+    goes along them, to which order both are the same. With a tip turns of what carries nothing show, of the ram too."""
     machine = Machine(chain=chain, travel_mm=TRAVEL, origin_mm=np.array([100.0, -20.0, 30.0]))
+    machine = replace(machine, tip_on_every_carriage=tip is not None)
     blank = room._blank([tuple(each) for each in TRAVEL.tolist()], 20.0)
     acting = [*effects(PLACED), *curves()]
     tables = [room._figures(one, machine, blank) for one in acting]
@@ -62,9 +66,10 @@ def test_a_map_moves_points_by_what_the_errors_themselves_do(chain: str, leaning
     ]
     coefficients = np.concatenate([size * random.standard_normal(len(size)) for size in sizes])
     made = room._filled(blank, np.hstack([table for _, table in held]) @ coefficients)
-    points = room._points(machine, positions(blank, 50))
+    points = room._points(machine, positions(blank, 50), tip)
     expected = Superposition(tuple(one for one, _ in held)).errors(points, coefficients)
-    e, _ = Compensation(ErrorMaps([made]), chain, machine.origin_mm).error(points.xyz)
+    when = NOMINAL if tip is None else PointConditions(tip=np.tile(tip, (50, 1)))
+    e, _ = Compensation(ErrorMaps([made]), chain, machine.origin_mm).error(points.xyz, when)
     np.testing.assert_allclose(e, expected, atol=(1e-9 + 3e-4 * leaning) * np.abs(expected).max())
 
 
