@@ -9,29 +9,18 @@ import json
 import tempfile
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
 from cmm_uq import __version__
-from cmm_uq.app.desk import export_pages, job_pages
+from cmm_uq.app.desk import export_pages, job_pages as jobs
 from cmm_uq.app.desk.drafts import Draft, DraftFolder, received
 from cmm_uq.app.desk.export_pages import ARTEFACT, FIELDS, READ
 from cmm_uq.app.desk.guard import POLICY, Guard
-from cmm_uq.app.desk.job_pages import (
-    CANCEL,
-    CERTIFICATE,
-    DELETE,
-    FILE,
-    JOB,
-    PART,
-    POINTS,
-    REPORTS,
-    RUN,
-    JobState,
-    state_of,
-)
+from cmm_uq.app.desk.job_pages import REPORTS, JobState, state_of
 from cmm_uq.app.desk.part_pages import PLAN, part_page, with_points
 from cmm_uq.app.desk.place import ChangedError, below, jobs_in, safe_name, sha256, write_over
 from cmm_uq.app.desk.shown import OWN_FILES, own_file, records_page, shown_file
@@ -43,7 +32,7 @@ from cmm_uq.app.serve.rendering import DESK, fault, refusal, render_page
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
-from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 
 VERIFY_S = 180.0  # s that reading and comparing a certificate may take
 AT_ONCE = 2  # reports under way
@@ -56,6 +45,7 @@ class Desk:
         self.root, self.tell = root.resolve(), tell
         self.drafts, self.reader = DraftFolder(self.root), Worker(self.root)
         self.runs: dict[str, ReportRun] = {}
+        self.checked: dict[str, tuple[str, Text]] = {}
         self._lock = threading.Lock()
         self.guard: Guard | None = None
         self.url = ""
@@ -78,8 +68,9 @@ class Desk:
         try:
             if isinstance(request, RefusedRequest):
                 raise request
-            admitted = self.guard.admit(request, self.url) if self.guard is not None else None
-            return admitted or self._answer(request)
+            if self.guard is None:
+                raise RefusedRequest(HTTPStatus.FORBIDDEN, say("the desk is not open yet"))
+            return self.guard.admit(request, self.url) or self._answer(request)
         except RefusedRequest as error:
             refused = error
         except CmmUqError as error:
@@ -100,8 +91,7 @@ class Desk:
             return records_page(self.reader, request)
         pages = self._forms() if request.method == "POST" else self._pages()
         if request.path not in pages:
-            known = request.path in self._pages()
-            if request.method == "POST" and known:
+            if request.path in self._pages():
                 raise RefusedRequest(HTTPStatus.METHOD_NOT_ALLOWED, say("this page can only be looked at"))
             raise RefusedRequest(HTTPStatus.NOT_FOUND, say("there is no page of that address"))
         found = pages[request.path](request)
@@ -113,14 +103,14 @@ class Desk:
             READ: self.reading,
             ARTEFACT: self.artefact,
             FIELDS: self.fields,
-            JOB: self.job,
-            RUN: self.running,
-            CERTIFICATE: self.certificate,
-            FILE: partial(shown_file, self.root),
-            PART: self.part,
+            jobs.JOB: self.job,
+            jobs.RUN: self.running,
+            jobs.CERTIFICATE: self.certificate,
+            jobs.FILE: partial(shown_file, self.root),
+            jobs.PART: self.part,
             VERIFY: lambda request: verify_page(),
-            f"{DESK}/events": self.events,
-            f"{DESK}/field.json": self.field,
+            jobs.EVENTS: self.events,
+            jobs.FIELD: self.field,
         }
 
     def _forms(self) -> Mapping[str, Callable[[WebRequest], WebPage | WebResponse]]:
@@ -128,21 +118,27 @@ class Desk:
             f"{DESK}/drop": self.drop,
             READ: self.correct,
             FIELDS: self.fill_in,
-            JOB: self.save,
-            RUN: self.run,
-            CANCEL: self.cancel,
+            jobs.JOB: self.save,
+            jobs.RUN: self.run,
+            jobs.CANCEL: self.cancel,
             f"{DESK}/check": self.check,
-            DELETE: self.delete,
+            jobs.DELETE: self.delete,
             PLAN: self.plan,
-            PART: self.create_part,
-            POINTS: self.points,
+            jobs.PART: self.create_part,
+            jobs.POINTS: self.points,
             VERIFY: self.verify,
         }
 
     def home(self, request: WebRequest) -> WebPage:
         request.only(())
-        states = (state_of(self.root, folder) for folder in jobs_in(self.root))
-        return job_pages.home_page(self.root, states, self.drafts.every())
+        states = (self._checked(state_of(self.root, folder)) for folder in jobs_in(self.root))
+        return jobs.home_page(self.root, states, self.drafts.every())
+
+    def _checked(self, one: JobState) -> JobState:
+        """With what check said of it, unless it was changed since."""
+        seen, told = self.checked.get(one.name, ("", NOTHING))
+        same = seen and seen == sha256((self.root / one.name / "job.toml").read_bytes())
+        return replace(one, checked=told) if same else one
 
     def drop(self, request: WebRequest) -> WebResponse:
         request.only(())
@@ -170,7 +166,9 @@ class Desk:
         chosen, said = export_pages.said_in(form)
         one.keys = self.reader.ask("corrected", path=one.export, keys=one.keys, chosen=chosen, said=said)
         self.drafts.write(one)
-        return to(ARTEFACT if form.get("then") == "on" else READ, draft=one.id)
+        if form.get("then") == "remember":
+            self.reader.ask("remembered", path=one.export, keys=one.keys)
+        return to(READ if form.get("then") == "read" else ARTEFACT, draft=one.id)
 
     def artefact(self, request: WebRequest) -> WebPage:
         request.only(("draft",))
@@ -209,7 +207,7 @@ class Desk:
             return self._fields(one, kind, error)
         self.drafts.remember(one.values)
         self.drafts.delete(one)
-        return to(JOB, name=folder)
+        return to(jobs.JOB, name=folder)
 
     def part(self, request: WebRequest) -> WebPage:
         request.only(("draft",))
@@ -220,7 +218,7 @@ class Desk:
         one = self.drafts.take(request)
         one.values = {"part": "plan"}
         self.drafts.write(one)
-        return to(PART, draft=one.id)
+        return to(jobs.PART, draft=one.id)
 
     def create_part(self, request: WebRequest) -> WebResponse:
         form = read_form(request)
@@ -236,7 +234,7 @@ class Desk:
             not_measured=form.get("not_measured") == "yes",
         )
         self.drafts.delete(one)
-        return to(JOB, name=folder)
+        return to(jobs.JOB, name=folder)
 
     def points(self, request: WebRequest) -> WebResponse:
         """Measured points of a part, into its folder and its job.toml."""
@@ -246,7 +244,7 @@ class Desk:
         content = content_of(path, JOB_BYTES, "")
         points = received(request, path.parent)
         write_over(path, with_points(content.decode(), points).encode(), sha256(content))
-        return to(JOB, name=name)
+        return to(jobs.JOB, name=name)
 
     def verify(self, request: WebRequest) -> WebPage:
         request.only(())
@@ -287,7 +285,11 @@ class Desk:
 
     def _job(self, name: str, text: str, seen: str, above: tuple[Any, ...] = (), draft: str | None = None) -> WebPage:
         check = self.reader.ask("check", job=name, text=draft)
-        return job_pages.job_page(self.root, state_of(self.root, self.root / name), check, text, seen, above)
+        if draft is None:
+            count = len(check["problems"])
+            told = say("checked: {count} problems", count=count) if count else say("checked: nothing would stop it")
+            self.checked[name] = seen, told
+        return jobs.job_page(self.root, state_of(self.root, self.root / name), check, text, seen, above)
 
     def save(self, request: WebRequest) -> WebPage | WebResponse:
         form = read_form(request)
@@ -301,7 +303,7 @@ class Desk:
                 name, text, sha256(changed.now), export_pages.difference(changed.now, text.encode()), draft=text
             )
             return page._replace(status=HTTPStatus.CONFLICT)
-        return to(JOB, name=name)
+        return to(jobs.JOB, name=name)
 
     def run(self, request: WebRequest) -> WebResponse:
         name = self._folder(read_form(request).get("name", ""))
@@ -315,7 +317,7 @@ class Desk:
                         say("Wait for one of them, or cancel it"),
                     )
                 self.runs[name] = ReportRun(self.root, name, self._keep_field)
-        return to(RUN, name=name)
+        return to(jobs.RUN, name=name)
 
     def _run_of(self, request: WebRequest) -> ReportRun | None:
         request.only(("name",))
@@ -324,16 +326,16 @@ class Desk:
     def running(self, request: WebRequest) -> WebPage | WebResponse:
         run = self._run_of(request)
         if run is None:  # of an earlier start
-            return to(JOB, name=self._folder(request.text("name")))
+            return to(jobs.JOB, name=self._folder(request.text("name")))
         if run.found is not None:
-            return to(CERTIFICATE, name=run.job)
-        return job_pages.run_page(run)
+            return to(jobs.CERTIFICATE, name=run.job)
+        return jobs.run_page(run)
 
     def cancel(self, request: WebRequest) -> WebResponse:
         name = read_form(request).get("name", "")
         if name in self.runs:
             self.runs[name].cancel()
-        return to(RUN, name=name)
+        return to(jobs.RUN, name=name)
 
     def events(self, request: WebRequest) -> WebResponse:
         run = self._run_of(request)
@@ -346,7 +348,7 @@ class Desk:
         one = self._state(request.text("name"))
         said = self.reader.ask("results", path=one.file("results.json"))
         warnings = self.reader.ask("check", job=one.name, text=None)["warnings"]
-        return job_pages.certificate_page(one, said, self._field_of(one).is_file(), warnings)
+        return jobs.certificate_page(one, said, self._field_of(one).is_file(), warnings)
 
     def _state(self, name: str) -> JobState:
         one = state_of(self.root, self.root / self._folder(name))

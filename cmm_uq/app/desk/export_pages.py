@@ -20,10 +20,12 @@ from cmm_uq.app.serve.page import (
     PageParagraph,
     WebPage,
     address,
+    section,
 )
 from cmm_uq.app.serve.rendering import DESK
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 
+DESK_CELL = Cell(say("Desk"), DESK)
 READ, ARTEFACT, FIELDS = f"{DESK}/read", f"{DESK}/artefact", f"{DESK}/fields"
 MEANINGS: Mapping[str, Text] = {
     "": say("not used"),
@@ -44,23 +46,17 @@ MEANINGS: Mapping[str, Text] = {
     "temp_air_c": say("temperature of the air"),
     "time_s": say("time"),
 }
-COLOURED = {
-    "x_mm": "x",
-    "y_mm": "y",
-    "z_mm": "z",
-    "length_mm": "length",
-    "nominal_mm": "nominal",
-    "reference_mm": "nominal",
-    "deviation_um": "length",
-    "deviation_mm": "length",
-    "repeat": "repeat",
-    "line": "repeat",
-    "measurement": "repeat",
-    "point": "repeat",
-    "name": "repeat",
+_CLASSES = {
+    "x": "x_mm",
+    "y": "y_mm",
+    "z": "z_mm",
+    "length": "length_mm deviation_um deviation_mm",
+    "nominal": "nominal_mm reference_mm",
+    "repeat": "repeat line measurement point name",
     "ignored": "ignored",
     "unknown": "unknown",
 }
+COLOURED = {meaning: name for name, meanings in _CLASSES.items() for meaning in meanings.split()}
 """Classes of the style sheet."""
 _UNITS = ("mm", "um", "inch", "m", "cm", "mil")
 _HERE = {
@@ -91,46 +87,37 @@ def here(fix: str) -> Text:
 def read_page(draft: Draft, found: Mapping[str, Any]) -> WebPage:
     """The reading of an export, whole, and the form that corrects it."""
     problem, lines = found["problem"], found["lines"]
-    where = [Cell(Verbatim(problem[0]))] if problem and problem[0] != draft.name and problem[0] else []
+    first = (Cell(say("First: {example}", example=Verbatim(found["example"]))),)
     if problem is None:
-        head = PageNotice(
-            say("Read whole"), "good", (Cell(say("First: {example}", example=Verbatim(found["example"]))),)
-        )
+        head = PageNotice(say("Read whole"), "good", first)
     elif lines:
         asked = say(
-            "Only where the lines lie is open: errors of a machine depend on it, and no table of lengths says it"
+            "Only where the lines lie is open: what a machine does depends on it, and no table of lengths says it"
         )
-        head = PageNotice(asked, "open", (Cell(say("First: {example}", example=Verbatim(found["example"]))),))
+        head = PageNotice(asked, "open", first)
     else:
-        head = PageNotice(Verbatim(problem[1]), "bad", (*where, *((Cell(here(problem[2])),) if problem[2] else ())))
-    form = PageForm(
-        READ,
-        (*_settings(draft, found), *_lines(draft, lines)),
-        _buttons(problem),
-        (("draft", draft.id), ("seen", draft.seen)),
-        _grid(found),
-    )
+        where, what, fix = problem
+        told = (*p.lines_of({where} - {"", draft.name}), *((Cell(here(fix)),) if fix else ()))
+        head = PageNotice(Verbatim(what), "bad", told)
+    fields, buttons = (*_lines(draft, lines), *_settings(draft, found)), _buttons(problem, {*draft.keys} - {"lines"})
+    form = PageForm(READ, fields, buttons, (("draft", draft.id), ("seen", draft.seen)), _grid(found))
     facts = tuple((Verbatim(label), Cell(Verbatim(text))) for label, text in found["facts"])
-    return WebPage(
-        say("How it was read"),
-        DESK,
-        lead=Verbatim(draft.name),
-        above=(Cell(say("Desk"), DESK),),
-        blocks=(steps(1, draft.id), head, form),
-        sections=(
-            *(((say("What was recognised"), (p.PageFacts(facts),)),) if facts else ()),
-            (
-                say("Not wanted"),
-                (PageForm(f"{DESK}/delete", (), (("delete", say("Delete this export")),), (("draft", draft.id),)),),
-            ),
-            (say("The same by a command"), (p.SourceText(say("Command"), found["command"]),)),
-        ),
+    delete = PageForm(f"{DESK}/delete", (), (("delete", say("Delete this export")),), (("draft", draft.id),))
+    sections = (
+        *section(say("What was recognised"), *((p.PageFacts(facts),) if facts else ())),
+        *section(say("The same by a command"), p.SourceText(say("Command"), found["command"])),
+        *section(say("Not wanted"), delete),
     )
+    blocks = (steps(1, draft.id), head, form)
+    return WebPage(say("How it was read"), DESK, Verbatim(draft.name), blocks, sections, (DESK_CELL,))
 
 
-def _buttons(problem: Any) -> tuple[tuple[str, Text], ...]:
+def _buttons(problem: Any, said: set[str]) -> tuple[tuple[str, Text], ...]:
     again = ("read", say("Read it so"))
-    return (again,) if problem else (("on", say("It is right: choose the artefact")), again)
+    if problem:
+        return (again,)
+    remember = (("remember", say("Right, and the same for every export with this head")),) if said else ()
+    return (("on", say("It is right: choose the artefact")), *remember, again)
 
 
 def _grid(found: Mapping[str, Any]) -> p.CellGrid:
@@ -197,13 +184,13 @@ def artefact_page(draft: Draft, kinds: list[list[str]]) -> WebPage:
     choices = tuple(
         (address(FIELDS, draft=draft.id, kind=name), Verbatim(title), drawing(name)) for name, title in kinds
     )
-    return WebPage(
-        say("What was measured"),
-        DESK,
-        lead=say("Choose the artefact, or the kind of measurement."),
-        above=(Cell(say("Desk"), DESK), Cell(Verbatim(draft.name), address(READ, draft=draft.id))),
-        blocks=(steps(2, draft.id), p.Choices(say("Kinds of measurement"), choices)),
-    )
+    blocks = (steps(2, draft.id), p.Choices(say("Kinds of measurement"), choices))
+    lead = say("Choose the artefact, or the kind of measurement.")
+    return WebPage(say("What was measured"), DESK, lead, blocks, above=_above(draft))
+
+
+def _above(draft: Draft) -> tuple[Cell, ...]:
+    return DESK_CELL, Cell(Verbatim(draft.name), address(READ, draft=draft.id))
 
 
 def fields_page(
@@ -212,15 +199,8 @@ def fields_page(
     """The dozen things that a job states, with what was filled in last; ``found``: what a check of them says."""
     filled = draft.values if draft.values else last
     folder = draft.values.get("folder", "")
-    entries = [
-        FormEntry(
-            "folder",
-            say("Name of the job, and of its folder"),
-            folder,
-            example="K-2026-115",
-            hint=say("Its certificate has this name too"),
-        )
-    ]
+    named, hint = say("Name of the job, and of its folder"), say("Its certificate has this name too")
+    entries = [FormEntry("folder", named, folder, hint=hint, example="K-2026-115")]
     further = list[FormEntry]()
     for one in fields:
         sort: Literal["date", "text"] = "date" if one["sort"] == "date" else "text"
@@ -231,20 +211,13 @@ def fields_page(
     hidden = (("draft", draft.id), ("kind", kind), ("seen", draft.seen))
     legend = say("What ISO/IEC 17025 asks for besides: without it the certificate is a draft")
     form = PageForm(FIELDS, tuple(entries), buttons, hidden, None, f"{DESK}/check", legend, tuple(further))
-    remembered = (
-        (PageParagraph(say("Filled in as last time: look at each."), "note"),) if last and not draft.values else ()
-    )
-    return WebPage(
-        say("What the job states"),
-        DESK,
-        lead=say("What is left empty is not stated. In grey stands an example."),
-        above=(
-            Cell(say("Desk"), DESK),
-            Cell(Verbatim(draft.name), address(READ, draft=draft.id)),
-            Cell(say("Artefact"), address(ARTEFACT, draft=draft.id)),
-        ),
-        blocks=(steps(3, draft.id), *remembered, *(check_blocks(found) if found else ()), form),
-    )
+    blocks: list[Block] = [steps(3, draft.id)]
+    if last and not draft.values:
+        blocks.append(PageParagraph(say("Filled in as last time: look at each."), "note"))
+    blocks += [*(check_blocks(found) if found else ()), form]
+    above = (*_above(draft), Cell(say("Artefact"), address(ARTEFACT, draft=draft.id)))
+    lead = say("What is left empty is not stated. In grey stands an example.")
+    return WebPage(say("What the job states"), DESK, lead, tuple(blocks), above=above)
 
 
 def check_blocks(found: Mapping[str, Any]) -> tuple[Block, ...]:

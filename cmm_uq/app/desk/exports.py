@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from cmm_uq.app.commands.jobs.exchange import lines_asked, remembered_keys
+from cmm_uq.app.commands.jobs.exchange import lines_asked, remember, remembered_keys
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.points import Machine
+from cmm_uq.jobs.importing.answers import matching, path_of
 from cmm_uq.jobs.importing.arrangement import text_of
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, Recognition, Sheet, letters, sources_of
 from cmm_uq.jobs.importing.header import NAME, Header, understood
@@ -28,6 +30,21 @@ _FIGURES = ("length_mm", "deviation_um", "deviation_mm")
 def first_keys(path: str) -> dict[str, Any]:
     """Keys with which an export is first read: those that are remembered of its format."""
     return remembered_keys(Path(path), ImportKeys())[0].model_dump(exclude_defaults=True)
+
+
+def remembered(path: str, keys: Mapping[str, Any]) -> str:
+    """Keep the answers to an export for all with the same head, as ``cmm-uq import --save-as`` does; under which name."""
+    said, content = keys_of(keys), content_of(Path(path), TABLE_BYTES, "Drop it again")
+    head = imported(content, Path(path).name, said).recognised.head
+    name = f"desk-{sha256(repr(head).encode()).hexdigest()[:8]}"
+    own = path_of(name)
+    if (known := matching(content, Path(path).name)) is not None and known[0] != own:
+        raise CmmUqError(
+            f"is remembered as {known[0].stem} already", where=Path(path).name, fix=f"Remove {known[0]} first"
+        )
+    own.unlink(missing_ok=True)
+    remember(name, said, head)
+    return name
 
 
 def keys_of(data: Mapping[str, Any]) -> ImportKeys:

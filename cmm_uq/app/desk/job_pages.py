@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.app.desk.drafts import Draft
-from cmm_uq.app.desk.export_pages import READ, check_blocks, steps
+from cmm_uq.app.desk.export_pages import DESK_CELL, READ, check_blocks, steps
 from cmm_uq.app.desk.place import sha256
 from cmm_uq.app.desk.verify_page import VERIFY
 from cmm_uq.app.desk.workers import ReportRun
@@ -27,17 +28,21 @@ from cmm_uq.app.serve.page import (
     PageTable,
     WebPage,
     address,
+    section,
 )
 from cmm_uq.app.serve.rendering import DESK
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
+from cmm_uq.base.output.manifest import plain_name
 
 JOB, RUN, CANCEL, CERTIFICATE, FILE = (f"{DESK}/{name}" for name in ("job", "run", "cancel", "certificate", "file"))
-PART, POINTS, DELETE = f"{DESK}/part", f"{DESK}/points", f"{DESK}/delete"
+PART, POINTS, DELETE, EVENTS = (f"{DESK}/{name}" for name in ("part", "points", "delete", "events"))
+FIELD = f"{DESK}/field.json"
 RESULTS, REPORTS = "results.json", "reports"
 MOST_FILES = 100
+_ID = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 
 
 @dataclass(frozen=True)
@@ -51,12 +56,13 @@ class JobState:
     decision: str | None = None
     made: dt.datetime | None = None
     current: bool = False
+    checked: Text = NOTHING  # what check said of it as it is
     files: tuple[str, ...] = ()  # of the certificate, by path below the root
 
     @property
     def standing(self) -> Cell:
         if self.made is None:
-            return Cell(say("No certificate yet"))
+            return Cell(say("No certificate yet"), note=self.checked)
         when = say("of {day}", day=Verbatim(self.made.strftime("%Y-%m-%d %H:%M")))
         if not self.current:
             return Cell(say("Certificate, and changed since"), standing="open", note=when)
@@ -84,216 +90,142 @@ def state_of(root: Path, folder: Path) -> JobState:
     part = isinstance(data.get("part"), dict)
     of = of or (str(data["part"].get("name", "")) if part else "")
     report = root / REPORTS / own
-    if not own or "/" in own or own[0] == "." or not (report / RESULTS).is_file() or report.is_symlink():
+    if not _ID.fullmatch(own) or not (report / RESULTS).is_file() or report.is_symlink():
         return JobState(name, own, of, part)
     try:
         results = json.loads(content_of(report / RESULTS, TABLE_BYTES, ""))
-        inputs = results["job"]["inputs_sha256"]
-        current = all(sha256(content_of(folder / one, TABLE_BYTES, "")) == digest for one, digest in inputs.items())
+        inputs = {name: one for name, one in results["job"]["inputs_sha256"].items() if plain_name(name)}
+        current = all(sha256(content_of(folder / one, TABLE_BYTES, "")) == same for one, same in inputs.items())
         decision = str((results.get("verdicts") or {}).get("overall", "none"))
-    except (CmmUqError, ValueError, KeyError, TypeError, AttributeError):
+    except (CmmUqError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         current, decision = False, "none"
     made = dt.datetime.fromtimestamp((report / RESULTS).stat().st_mtime)
     files = tuple(
         f"{REPORTS}/{own}/{path.name}" for path in sorted(report.iterdir()) if path.is_file() and path.name[0] != "."
     )
-    return JobState(name, own, of, part, decision, made, current, files)
+    return JobState(name, own, of, part, decision, made, current, NOTHING, files)
 
 
 def home_page(root: Path, jobs: Iterable[JobState], drafts: Iterable[Draft]) -> WebPage:
-    rows = tuple(
-        (
-            Cell(Verbatim(one.name), address(JOB, name=one.name)),
-            Cell(p.shown(one.machine)),
-            one.standing,
-            Cell(say("Certificate"), address(CERTIFICATE, name=one.name)) if one.made else Cell(NOTHING),
+    rows = []
+    for one in jobs:
+        result = Cell(say("Certificate"), address(CERTIFICATE, name=one.name)) if one.made else Cell(NOTHING)
+        rows.append(
+            (Cell(Verbatim(one.name), address(JOB, name=one.name)), Cell(p.shown(one.machine)), one.standing, result)
         )
-        for one in jobs
-    )
     headings = p.columns(say("Job"), say("Machine"), say("State"), say("Result"))
+    table = PageTable(say("Jobs"), headings, tuple(rows), say("No job lies here yet: drop an export."), heard=True)
     begun = tuple(Cell(Verbatim(one.name), address(PART if one.part else READ, draft=one.id)) for one in drafts)
-    hint = say(
-        "CSV, text, .xlsx, .ods, PC-DMIS, Calypso, DMIS, QIF, I++: as the measuring program wrote it; at most {most} MB.",
-        most=number(TABLE_BYTES.most // 2**20),
+    formats = say("CSV, text, .xlsx, .ods, PC-DMIS, Calypso, DMIS, QIF, I++: as the measuring program wrote it")
+    hint = say("{formats}; at most {most} MB.", formats=formats, most=number(TABLE_BYTES.most // 2**20))
+    drop = p.Drop(f"{DESK}/drop", say("Drop an export here, or choose one"), hint, say("Read it"))
+    notices = (PageNotice(say("Begun, and no job yet"), "open", begun),) if begun else ()
+    part = Cell(say("Its plan, the certificate of the machine, and its points"), PART)
+    received = Cell(say("Verify it: who says what, what it rests on, and whether it holds"), VERIFY)
+    sections = (
+        *section(say("Jobs in this folder"), table),
+        *section(say("A part"), p.Links((part,))),
+        *section(say("A certificate that you received"), p.Links((received,))),
     )
-    return WebPage(
-        say("Desk"),
-        DESK,
-        lead=Verbatim(str(root)),
-        blocks=(
-            p.Drop(f"{DESK}/drop", say("Drop an export here, or choose one"), hint, say("Read it")),
-            *((PageNotice(say("Begun, and no job yet"), "open", begun),) if begun else ()),
-        ),
-        sections=(
-            (
-                say("Jobs in this folder"),
-                (PageTable(say("Jobs"), headings, rows, say("No job lies here yet: drop an export."), heard=True),),
-            ),
-            (say("A part"), (p.Links((Cell(say("Its plan, the certificate of the machine, and its points"), PART),)),)),
-            (
-                say("A certificate that you received"),
-                (p.Links((Cell(say("Verify it: who says what, what it rests on, and whether it holds"), VERIFY),)),),
-            ),
-        ),
-    )
+    return WebPage(say("Desk"), DESK, Verbatim(str(root)), (drop, *notices), sections)
 
 
 def job_page(
     root: Path, one: JobState, check: Mapping[str, Any], text: str, seen: str, above: tuple[Block, ...] = ()
 ) -> WebPage:
     """One job: what check says, its job.toml to be changed, its files."""
-    folder = root / one.name
-    names = [
-        path.relative_to(root).as_posix()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and not any(part[0] == "." for part in path.relative_to(root).parts)
-    ][:MOST_FILES]
-    rows = tuple(
-        (
-            Cell(Verbatim(name), address(FILE, at=name)),
-            Cell(say("{bytes} bytes", bytes=number((root / name).stat().st_size, ",d"))),
+    rows: list[tuple[Cell, ...]] = []
+    for path in sorted((root / one.name).rglob("*")):
+        name = path.relative_to(root).as_posix()
+        if path.is_file() and "/." not in f"/{name}" and len(rows) < MOST_FILES:
+            size = say("{bytes} bytes", bytes=number(path.stat().st_size, ",d"))
+            rows.append((Cell(Verbatim(name), address(FILE, at=name)), Cell(size)))
+    files = PageTable(say("Files of the job"), p.columns(say("File"), say("Size")), tuple(rows), heard=True)
+    name_field = (("name", one.name),)
+    blocks = [*above]
+    if one.made:
+        look = Cell(say("Look at it"), address(CERTIFICATE, name=one.name))
+        blocks.append(
+            PageNotice(say("There is a certificate"), "good" if one.current else "open", (one.standing, look))
         )
-        for name in names
-    )
-    command = "part" if one.part else "report"
-    make = PageForm(RUN, (), (("run", say("Make the certificate")),), (("name", one.name),))
-    made = (
-        (
-            PageNotice(
-                say("There is a certificate"),
-                "good" if one.current else "open",
-                (one.standing, Cell(say("Look at it"), address(CERTIFICATE, name=one.name))),
-            ),
+    blocks += check_blocks(check)
+    if check.get("sound"):
+        blocks.append(PageForm(RUN, (), (("run", say("Make the certificate")),), name_field))
+    if one.part:
+        hint = say("CSV with feature, point, x_mm, y_mm, z_mm, in the frame of the part; job.toml then names it.")
+        blocks.append(
+            p.Drop(address(POINTS, name=one.name), say("Drop the measured points here"), hint, say("Take them"))
         )
-        if one.made
-        else ()
+    buttons = (("save", say("Save")), ("check", say("Check")))
+    entry = FormEntry("text", say("job.toml"), text, "area")
+    edit = PageForm(JOB, (entry,), buttons, (*name_field, ("seen", seen)), check=f"{DESK}/check")
+    commands = f"cmm-uq check {one.name}\ncmm-uq {'part' if one.part else 'report'} {one.name}"
+    sections = (
+        *section(say("What it states"), edit),
+        *section(say("Its files"), files),
+        *section(say("The same by commands"), p.SourceText(say("Commands"), commands)),
     )
-    hint = say("CSV with feature, point, x_mm, y_mm, z_mm, in the frame of the part; job.toml then names it.")
-    points = p.Drop(address(POINTS, name=one.name), say("Drop the measured points here"), hint, say("Take them"))
-    edit = PageForm(
-        JOB,
-        (FormEntry("text", say("job.toml"), text, "area"),),
-        (("save", say("Save")), ("check", say("Check"))),
-        (("name", one.name), ("seen", seen)),
-        check=f"{DESK}/check",
-    )
-    return WebPage(
-        Verbatim(one.id or one.name),
-        DESK,
-        lead=p.shown(one.machine),
-        above=(Cell(say("Desk"), DESK),),
-        blocks=(
-            *above,
-            *made,
-            *check_blocks(check),
-            *((make,) if check.get("sound") else ()),
-            *((points,) if one.part else ()),
-        ),
-        sections=(
-            (say("What it states"), (edit,)),
-            (
-                say("Its files"),
-                (PageTable(say("Files of the job"), p.columns(say("File"), say("Size")), rows, heard=True),),
-            ),
-            (
-                say("The same by commands"),
-                (p.SourceText(say("Commands"), f"cmm-uq check {one.name}\ncmm-uq {command} {one.name}"),),
-            ),
-        ),
-    )
+    title, lead = Verbatim(one.id or one.name), p.shown(one.machine)
+    return WebPage(title, DESK, lead, tuple(blocks), sections, (DESK_CELL,))
 
 
 def run_page(run: ReportRun) -> WebPage:
-    above, name = (Cell(say("Desk"), DESK), Cell(Verbatim(run.job), address(JOB, name=run.job))), (("name", run.job),)
+    name = (("name", run.job),)
     again = PageForm(RUN, (), (("run", say("Begin again")),), name)
     blocks: tuple[Block, ...]
     if run.cancelled:
         blocks = (PageNotice(say("Cancelled: nothing was written"), "open"), again)
     elif run.problem is not None:
         where, problem, fix = run.problem
-        lines = tuple(Cell(Verbatim(one)) for one in (where, fix) if one)
-        blocks = (PageNotice(Verbatim(problem), "bad", lines), again)
+        blocks = (PageNotice(Verbatim(problem), "bad", p.lines_of(filter(None, (where, fix)))), again)
     else:
-        stop = PageForm(CANCEL, (), (("cancel", say("Cancel")),), name)
-        blocks = (
-            steps(4),
-            p.Running(address(f"{DESK}/events", name=run.job), Verbatim(run.what), round(100 * run.part)),
-            stop,
-        )
-    return WebPage(say("Certificate under way"), DESK, lead=Verbatim(run.job), above=above, blocks=blocks)
+        under_way = p.Running(address(EVENTS, name=run.job), Verbatim(run.what), round(100 * run.part))
+        blocks = (steps(4), under_way, PageForm(CANCEL, (), (("cancel", say("Cancel")),), name))
+    above = (DESK_CELL, Cell(Verbatim(run.job), address(JOB, name=run.job)))
+    return WebPage(say("Certificate under way"), DESK, Verbatim(run.job), blocks, above=above)
 
 
 def certificate_page(one: JobState, said: Mapping[str, Any], field: bool, warnings: Iterable[str]) -> WebPage:
     """The certificate, its diagnosis, the residual field, and what to do next."""
     word, standing = DECISIONS.get(said["overall"], (Verbatim(said["overall"]), "open"))
     lines = tuple(Cell(_decided(*each[:-1])) for each in said["decided"])
-    lacking = tuple(
-        PageNotice(Verbatim(each[0]), "open", tuple(Cell(Verbatim(str(what))) for what in each[-1]))
-        for each in said["decided"]
-        if each[-1]
+    lacking = [PageNotice(Verbatim(each[0]), "open", p.lines_of(each[-1])) for each in said["decided"] if each[-1]]
+    blocks = [PageNotice(word if lines else say("It states no conformity"), standing or "good", lines)]
+    if not one.current:
+        blocks.insert(0, PageNotice(say("The job was changed since: make the certificate again"), "open"))
+    pdf, page = one.file(".pdf"), one.file(".html")
+    links = [Cell(say("Open the PDF"), address(FILE, at=pdf))] if pdf else []
+    for label, path in (("PDF", pdf), ("HTML", page), (RESULTS, one.file(RESULTS)), ("DCC", one.file(".xml"))):
+        if path:
+            keep = say("{name} to keep", name=Verbatim(label))
+            links.append(Cell(keep, address(FILE, at=path, keep="yes"), download=True))
+    diagnosis = [_said(each) for each in said["diagnosis"]]
+    if field:
+        told = say("Residuals as vectors in the volume; the certificate has them as pictures.")
+        diagnosis.append(p.Turnable(address(FIELD, name=one.name), told))
+    frame = (p.SandboxFrame(say("Certificate"), address(FILE, at=page)),) if page else ()
+    sections = (
+        *section(say("What to do next"), *next_steps(one, said, warnings)),
+        *section(say("What a complete test lacks"), *lacking),
+        *section(say("Diagnosis"), *diagnosis),
+        *section(say("The certificate"), *frame),
     )
-    head = PageNotice(word if said["decided"] else say("It states no conformity"), standing or "good", lines)
-    changed = () if one.current else (PageNotice(say("The job was changed since: make the certificate again"), "open"),)
-    names = (
-        ("PDF", one.file(".pdf")),
-        ("HTML", one.file(".html")),
-        (RESULTS, one.file(RESULTS)),
-        ("DCC", one.file(".xml")),
-    )
-    kept = tuple(
-        Cell(say("{name} to keep", name=Verbatim(label)), address(FILE, at=path, keep="yes"), download=True)
-        for label, path in names
-        if path
-    )
-    look = (Cell(say("Open the PDF"), address(FILE, at=one.file(".pdf"))),) if one.file(".pdf") else ()
-    diagnosis = tuple(_said(each) for each in said["diagnosis"])
-    turning = (
-        (
-            p.Turnable(
-                address(f"{DESK}/field.json", name=one.name),
-                say("Residuals as vectors in the volume; the certificate has them as pictures."),
-            ),
-        )
-        if field
-        else ()
-    )
-    page = one.file(".html")
-    return WebPage(
+    title, above = (
         say("Certificate {number}", number=Verbatim(one.id)),
-        DESK,
-        lead=p.shown(one.machine),
-        above=(Cell(say("Desk"), DESK), Cell(Verbatim(one.name), address(JOB, name=one.name))),
-        blocks=(*changed, head, p.Links((*look, *kept))),
-        sections=(
-            (say("What to do next"), next_steps(one, said, warnings)),
-            *(((say("What a complete test lacks"), lacking),) if lacking else ()),
-            *(((say("Diagnosis"), (*diagnosis, *turning)),) if diagnosis or turning else ()),
-            *(
-                ((say("The certificate"), (p.SandboxFrame(say("Certificate"), address(FILE, at=page)),)),)
-                if page
-                else ()
-            ),
-        ),
+        Cell(Verbatim(one.name), address(JOB, name=one.name)),
     )
+    return WebPage(title, DESK, p.shown(one.machine), (*blocks, p.Links(tuple(links))), sections, (DESK_CELL, above))
 
 
 def _decided(by: str, outcome: str, value: Any, expanded: Any, limit: Any, unit: str) -> Text:
-    word = DECISIONS.get(outcome, (Verbatim(outcome), None))[0]
-    if not isinstance(value, int | float) or not isinstance(limit, int | float):
-        told = say("{by}: {word:small}", by=Verbatim(by), word=word)
-    else:
+    told = say("{by}: {word:small}", by=Verbatim(by), word=DECISIONS.get(outcome, (Verbatim(outcome), None))[0])
+    for text, figure, digits in (("", value, ".3g"), (" against", limit, ".3g"), (", U =", expanded, ".2g")):
+        if not isinstance(figure, int | float):
+            return told
+        lead = Verbatim(text or ";")
         told = say(
-            "{by}: {word:small}; {value} {unit} against {limit} {unit}",
-            by=Verbatim(by),
-            word=word,
-            value=number(value, ".3g"),
-            limit=number(limit, ".3g"),
-            unit=Verbatim(unit),
+            "{told}{lead} {figure} {unit}", told=told, lead=lead, figure=number(figure, digits), unit=Verbatim(unit)
         )
-        if isinstance(expanded, int | float):
-            told = say(
-                "{told}, U = {expanded} {unit}", told=told, expanded=number(expanded, ".2g"), unit=Verbatim(unit)
-            )
     return told
 
 

@@ -120,7 +120,8 @@ def jobs_in(root: Path, most: int = 300) -> Iterator[Path]:
     count = 0
     for folder in sorted(path for pattern in ("*/job.toml", "*/*/job.toml") for path in root.glob(pattern)):
         parts = folder.relative_to(root).parts[:-1]
-        if any(part[0] == "." for part in parts) or parts[0] == "reports" or folder.parent.is_symlink():
+        linked = any(one.is_symlink() for one in (folder, *folder.parents[: len(parts)]))
+        if any(part[0] == "." for part in parts) or parts[0] == "reports" or linked:
             continue
         count += 1
         if count <= most:

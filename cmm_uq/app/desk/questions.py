@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import chdir
@@ -173,37 +174,45 @@ def check_answers(kind: str, export: str, keys: Mapping[str, Any], values: Mappi
     return {"problems": list(in_lines([Problem.of(one) for one in wrong.problems])), "warnings": [], "sound": False}
 
 
-def _checked(name: str, files: Mapping[str, bytes]) -> dict[str, Any]:
-    """What check says of a job of these files, in a folder of that name, which is laid out for it."""
-    with tempfile.TemporaryDirectory(prefix="cmm-uq-") as place, chdir(place):
-        for file, content in files.items():
-            target = Path(name) / file
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(content)
-        found = check_job(Path(name))
-    problems, warnings = found.lines
-    return {"problems": list(problems), "warnings": list(warnings), "sound": found.sound, "command": found.command}
+def _checked(name: str, files: Mapping[str, bytes], beside: Path | None = None) -> dict[str, Any]:
+    """What check says of a job of these files, and of those ``beside``, laid out in a folder of that name."""
+    with tempfile.TemporaryDirectory(prefix="cmm-uq-") as place:
+        if beside is not None:
+            shutil.copytree(beside, Path(place, name), ignore=_hidden, symlinks=True, copy_function=_linked)
+        with chdir(place):
+            for file, content in files.items():
+                target = Path(name, file)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.unlink(missing_ok=True)  # what is linked is another's
+                target.write_bytes(content)
+            return check_text(name, None)
+
+
+def _hidden(folder: str, names: list[str]) -> list[str]:
+    return [name for name in names if name[0] == "."]
+
+
+def _linked(source: str, target: str) -> None:
+    """The same file under another name, or a copy where that cannot be."""
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copyfile(source, target)
 
 
 def check_text(job: str, text: str | None) -> dict[str, Any]:
     """What check says of a job's folder, or of what it would be with another job.toml."""
-    folder = Path(job)
-    if text is None:
-        found = check_job(folder)
-        problems, warnings = found.lines
-        return {"problems": list(problems), "warnings": list(warnings), "sound": found.sound, "command": found.command}
-    files = {
-        path.relative_to(folder).as_posix(): content_of(path, TABLE_BYTES, "")
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and not path.is_symlink() and path.name != "job.toml"
-    }
-    if len(text.encode()) > JOB_BYTES.most:
-        raise CmmUqError("is longer than any job", where="job.toml", fix="Shorten it")
-    return _checked(job, {**files, "job.toml": text.encode()})
+    if text is not None:
+        if len(text.encode()) > JOB_BYTES.most:
+            raise CmmUqError("is longer than any job", where="job.toml", fix="Shorten it")
+        return _checked(job, {"job.toml": text.encode()}, Path(job))
+    found = check_job(Path(job))
+    problems, warnings = found.lines
+    return {"problems": list(problems), "warnings": list(warnings), "sound": found.sound, "command": found.command}
 
 
 def create(kind: str, export: str, keys: Mapping[str, Any], values: Mapping[str, str], folder: str) -> dict[str, Any]:
     """Write the new job around its export; see :func:`~cmm_uq.app.commands.jobs.exchange.write_job_of_export`."""
     given = tables_of(values)
     files = write_job_of_export(kind, Path(export), Path(folder), given, keys_of(keys))
-    return {"files": sorted(files), "id": job_id(Path(folder), given), "cwd": os.getcwd()}  # noqa: PTH109
+    return {"files": sorted(files), "id": job_id(Path(folder), given)}

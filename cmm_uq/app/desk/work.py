@@ -184,6 +184,7 @@ DOES: Mapping[str, Callable[..., Any]] = {
     "first_keys": exports.first_keys,
     "read": exports.read,
     "corrected": exports.corrected,
+    "remembered": exports.remembered,
     "kinds": questions.kinds,
     "fields": questions.fields,
     "check_answers": questions.check_answers,

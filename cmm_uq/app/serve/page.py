@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import datetime as dt
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from http import HTTPStatus
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 from urllib.parse import urlencode
@@ -262,6 +262,16 @@ class Turnable(NamedTuple):
 ReadBlock = PageTable | PageFacts | Tally | PageNotice | PageParagraph | Chooser | Pager | Charts | Links | SourceText
 Block = ReadBlock | Drop | Press | PageForm | Choices | SandboxFrame | Running | Turnable
 Section = tuple[Text, tuple[Block, ...]]  # a titled part of a page
+
+
+def section(title: Text, *blocks: Block) -> tuple[Section, ...]:
+    """A titled part of a page; none where it has nothing in it."""
+    return ((title, blocks),) if blocks else ()
+
+
+def lines_of(texts: Iterable[object]) -> tuple[Cell, ...]:
+    """Texts of elsewhere, each a line."""
+    return tuple(Cell(Verbatim(str(text))) for text in texts)
 
 
 def kind(block: Block) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.app.cli.jobs import import_keys
-from cmm_uq.app.desk.exports import corrected, keys_of, read
+from cmm_uq.app.desk.exports import corrected, first_keys, keys_of, read, remembered
 from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import imported
 from tests.jobs.importing.laboratory import EXPORTS
@@ -117,3 +117,19 @@ def test_a_column_taken_for_another_is_corrected_by_its_heading(tmp_path: Path) 
         100.7,
         200.7,
     ]
+
+
+def test_answers_are_remembered_for_the_next_export_with_the_same_head(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CMM_UQ_FORMATS", str(tmp_path / "formats"))
+    head = "measurement;point;X [mm];Y [mm];Z [mm];X corr [mm]\n"
+    first, second, other = (tmp_path / name for name in ("a.csv", "b.csv", "c.csv"))
+    first.write_text(head + "1;1;1.5;0.5;1.5;1.7\n1;2;9.5;0.5;1.5;9.7\n", encoding="utf-8")
+    second.write_text(head + "1;1;2.5;0.5;1.5;2.7\n1;2;8.5;0.5;1.5;8.7\n", encoding="utf-8")
+    other.write_text(head.replace("corr", "raw") + "1;1;2.5;0.5;1.5;2.7\n1;2;8.5;0.5;1.5;8.7\n", encoding="utf-8")
+    keys = {"columns": {"x_mm": "X corr [mm]"}}
+    remembered(str(first), keys)
+    remembered(str(first), keys | {"unit": "mm"})  # another answer takes the place of the first
+    assert first_keys(str(second)) == keys | {"unit": "mm"}
+    assert first_keys(str(other)) == {}
