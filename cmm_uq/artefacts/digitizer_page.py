@@ -9,7 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from cmm_uq.artefacts.digitizer import ANGLES, OFFSET, THREE, DigitizerArtefact, words, worst_direction
+from cmm_uq.artefacts.digitizer import ANGLES, OFFSET, THREE, DigitizerArtefact, alignments, words, worst_direction
 from cmm_uq.base.messages import DASH, Text, Verbatim, number, say, semicolons, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
@@ -19,7 +19,7 @@ from cmm_uq.certificate.plots.residuals import length_plot
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import expanded
 from cmm_uq.machine.model.measurement import ARTEFACT
-from cmm_uq.machine.physics.digitizer import three_alignment_offset
+from cmm_uq.machine.physics.digitizer import Alignment, MountOffset, mount_offset, three_alignment_offset
 from cmm_uq.maths.uncertainty.quantity import Quantity, alike, rounded
 
 MEANING = say("The mount lies at [U1 V1 W1] in the digitizer's frame u, v, w, whose origin is that of the scan plane.")
@@ -101,6 +101,34 @@ class DigitizerFigures(OffsetFigures):
         return tuple(digitizer.centre(model.placed(values), values[len(values) - len(digitizer.sizes) :]).tolist())
 
     @cached_property
+    def _true(self) -> Floats | None:
+        """(n, 3) of the mount by the errors of the machine that are estimated, mm; ``None`` where the job names none."""
+        model, values = self.result.model, self.result.values.mean(axis=0)
+        xyz = self.digitizer.points.xyz
+        return xyz + model.errors(xyz, values[: len(values) - len(self.digitizer.sizes)]) if model.effects else None
+
+    @cached_property
+    def alignments(self) -> tuple[Alignment, ...]:
+        """Of each attitude by itself, on the axes that are estimated."""
+        digitizer = self.digitizer
+        return digitizer.alignments if self._true is None else alignments(digitizer.points.at(self._true), None)
+
+    @cached_property
+    def start(self) -> MountOffset:
+        """The offset from these alone."""
+        return self.digitizer.start if self._true is None else mount_offset(self.alignments)
+
+    def _readings(self) -> list[Floats]:
+        """[D0 E0 F0] of each attitude as the scales read: errors are linear over so little travel."""
+        found = [one.reading for one in self.alignments]
+        if self._true is None:
+            return found
+        middle, xyz = self._true.mean(axis=0), self.digitizer.points.xyz
+        design = np.column_stack([self._true - middle, np.ones(len(xyz))])
+        fitted = np.linalg.lstsq(design, self._true - xyz, rcond=None)[0]
+        return [true - np.append(true - middle, 1.0) @ fitted for true in found]
+
+    @cached_property
     def times(self) -> tuple[Floats, float]:
         """The direction that the attitudes tell least of, and its uncertainty in those of one centre."""
         return worst_direction(self.digitizer.alignments)
@@ -110,16 +138,15 @@ class DigitizerFigures(OffsetFigures):
         digitizer, found = self.digitizer, []
         offset = np.array([one.value for one in self.offset])
         used = self.result.model.used
-        for i, (measurement, one) in enumerate(
-            zip(digitizer.poses.numbers.tolist(), digitizer.alignments, strict=True)
-        ):
+        each = zip(digitizer.poses.numbers.tolist(), self.alignments, self._readings(), strict=True)
+        for i, (measurement, one, reading) in enumerate(each):
             of_it = (digitizer.measurement == measurement) & used
             residuals = self.result.residuals[of_it] / MICROMETRE
             rows = digitizer.poses.index == i
             angles = np.array([float(digitizer.points.columns[name][rows][0]) for name in ANGLES])
             off = (one.reading - one.attitude @ offset - self.sphere) / MICROMETRE
             rms = float(np.sqrt(np.mean(residuals**2))) if len(residuals) else None
-            found.append(AttitudePose(measurement, angles, int(rows.sum()), one.reading, off, rms))
+            found.append(AttitudePose(measurement, angles, int(rows.sum()), reading, off, rms))
         return tuple(found)
 
     @cached_property
@@ -131,13 +158,13 @@ class DigitizerFigures(OffsetFigures):
             if min(turned) > _SAME_ATTITUDE:
                 return None
             order.append(int(np.argmin(turned)))
-        return three_alignment_offset(np.array([self.poses[i].reading_mm for i in order]), np.zeros(3))[0]
+        return three_alignment_offset(np.array([self.alignments[i].reading for i in order]), np.zeros(3))[0]
 
 
 def results(result: Result) -> Mapping[str, Any]:
     """For results.json; ``cmm-uq compensate`` reads offset, covariance and poses back."""
     found = DigitizerFigures(result)
-    closed, start = found.closed_form, found.digitizer.start
+    closed, start = found.closed_form, found.start
     direction, times = found.times
     return {
         "digitizer": {
@@ -195,7 +222,7 @@ def _assumed(digitizer: DigitizerArtefact) -> list[Block]:
 
 
 def _two_ways(found: DigitizerFigures) -> Table:
-    start, closed = found.digitizer.start.offset, found.closed_form
+    start, closed = found.start.offset, found.closed_form
     rows = []
     for i, (name, quantity) in enumerate(zip(OFFSET, found.offset, strict=True)):
         value, _ = rounded(quantity.value, quantity.expanded)

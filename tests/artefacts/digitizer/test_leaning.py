@@ -11,8 +11,10 @@ import pytest
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.model import model_of
 from cmm_uq.app.commands.reading import read_job
+from cmm_uq.app.commands.report import analyse
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.digitizer import DigitizerArtefact
+from cmm_uq.artefacts.digitizer_page import DigitizerFigures
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
@@ -95,3 +97,33 @@ def test_half_a_degree_that_nobody_names_is_left_to_the_diagnosis(tmp_path: Path
     (tmp_path / "job.toml").write_text((example / "job.toml").read_text())
     found, _ = screened_model(read_job(tmp_path))
     assert np.degrees(found.artefact.leans) == pytest.approx(0.5 * DEGREES, abs=0.05)
+
+
+def job_on_leaning_axes(folder: Path, degrees: float) -> Path:
+    """The example's own scans as such a machine reads them, its angles named."""
+    example = ROOT / "examples" / "digitizer-simulated"
+    points = read(scans(SIX), degrees)
+    names = ("measurement", "point", "repeat", "x_mm", "y_mm", "z_mm", *points.columns)
+    columns = [points.measurement, points.point, points.repeat, *points.xyz.T, *points.columns.values()]
+    rows = [",".join(f"{value:.9g}" for value in row) for row in zip(*columns, strict=True)]
+    (folder / "recording.csv").write_text("\n".join([",".join(names), *rows]) + "\n")
+    toml = (example / "job.toml").read_text()
+    assert "effects = []" in toml
+    (folder / "job.toml").write_text(toml.replace("effects = []", f"effects = {[*LEANS]}".replace("'", '"')))
+    return folder
+
+
+@pytest.mark.long
+def test_every_attitude_is_held_against_the_axes_that_are_estimated(tmp_path: Path) -> None:
+    """Centres by themselves lie within their noise of the common one, where on square axes they are off by millimetres."""
+    found = DigitizerFigures(analyse(job_on_leaning_axes(tmp_path, 3.0)))
+    off = np.array([pose.off_um for pose in found.poses])
+    assert np.abs(off).max() < 30.0
+    square = found.digitizer
+    assert np.linalg.norm(square.start.residuals, axis=1).max() > 0.5
+    assert found.start.offset == pytest.approx(OFFSET, abs=0.03)
+    assert np.abs(square.start.offset - OFFSET).max() > 0.3
+    # with the digitizer's origin at the centre the scales read what these axes make of the centre
+    axes = leaning(3 * 3600 * DEGREES)
+    centres_by_hand = np.array([found.sphere + one.attitude @ OFFSET for one in found.alignments]) @ np.linalg.inv(axes)
+    np.testing.assert_allclose([pose.reading_mm for pose in found.poses], centres_by_hand, atol=0.08)
