@@ -41,7 +41,8 @@ ENDS = (((0.0, 1.0),) * 3, *product(((0.0, 0.5), (0.5, 1.0)), repeat=3))
 
 def factors(machine: truth.Truth, ends: tuple[tuple[float, float], ...]) -> np.ndarray:
     """Scales in ppm and squarenesses in seconds (6,), in a region by shares of the travels."""
-    along = [low + (high - low) * np.linspace(*end, EACH) for (low, high), end in zip(truth.TRAVEL, ends, strict=True)]
+    parts = (np.arange(EACH) + 0.5) / EACH
+    along = [low + (high - low) * (a + (b - a) * parts) for (low, high), (a, b) in zip(truth.TRAVEL, ends, strict=True)]
     read, nothing = np.array(list(product(*along))), np.zeros(3)
 
     def errors(of: truth.Truth) -> np.ndarray:

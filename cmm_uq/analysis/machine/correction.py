@@ -12,14 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.diagnosis.held_out import FOLDS, held_out_groups, predicted
 from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecordings
-from cmm_uq.analysis.machine.regions import DrawnErrors, Key, columns_of, disagreeing
+from cmm_uq.analysis.machine.regions import DrawnErrors, Key, columns_of, disagreeing, filling
 from cmm_uq.analysis.machine.state import StatementEvidence, of_machine
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
@@ -37,7 +36,6 @@ from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior
 
 STEPS = 64  # of the map along each axis: of the shortest wave a straight line between them leaves two hundredths
-_EACH = 4  # points along each axis of the measuring range
 _DRAWS, _FOLD_DRAWS = 2000, 400
 _EXACT = 1e-9  # part of its size within which an error is what a map says
 
@@ -90,7 +88,7 @@ def field_map(
     own = drawn.doubted(model, named, drawn.own[:, named])
     draws = np.hstack([own, drawn.further[:, smooth]])
 
-    grid = np.array(list(product(*(np.linspace(*each, _EACH) for each in ends))))
+    grid = filling(machine)
     carried = MapCovariance(np.eye(len(blank_figures(blank))), np.zeros(3)).root(blank, grid, chain=machine.chain)
     carried = carried.reshape(3 * len(grid), -1)
     rigid = _rigid(blank, machine.chain)

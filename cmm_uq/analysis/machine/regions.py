@@ -45,7 +45,7 @@ DRAWS = 2000
 _ABSENT = 1e-4  # size of a family of errors that are not there
 _ERRORS, _LEAST = 4_000_000, 200  # errors of lengths that are drawn, and how often each at least
 _MOST = 100  # quantities of a recording, with their repeats: time grows with the cube of what they show
-_EACH = 4  # points along each axis of a region
+_EACH = 5  # points along each axis of a region
 _ANYWHERE = ("ppm", "″", "″/m")  # units of what means the same on a part of a travel; a bow is one of the whole travel
 _HALVES = ((0.0, 0.5), (0.5, 1.0))
 EIGHTHS = tuple(product(_HALVES, repeat=3))  # parts of the measuring range, by shares of the travels
@@ -255,6 +255,20 @@ def _chosen(effects: Sequence[Effect], columns: Ints) -> list[Effect]:
     return list(dict.fromkeys(of[i] for i in columns))
 
 
+def filling(machine: Machine, ends: Sequence[tuple[float, float]] = ((0.0, 1.0),) * 3) -> Floats:
+    """(125, 3) readings that stand for a region, whose ends are shares of the travels: each for a part of the same size.
+
+    Least squares of waves of the field at these are within 3 % (rms) of those over the whole region; at as many points
+    with the ends among them 20 % off, for corners and faces count too much.
+    """
+    parts = (np.arange(_EACH) + 0.5) / _EACH
+    shares = [a + (b - a) * parts for a, b in ends]
+    travels = [machine.travel(axis) for axis in AXES]
+    return np.array(
+        list(product(*(low + (high - low) * one for (low, high), one in zip(travels, shares, strict=True))))
+    )
+
+
 def _moved(
     machine: Machine, named: Sequence[Effect], others: Sequence[Effect], ends: Sequence[tuple[float, float]]
 ) -> Floats:
@@ -262,9 +276,7 @@ def _moved(
 
     Not a number for a named error that cannot be told there. ``ends``: of the region, in shares of the travels.
     """
-    travels = [machine.travel(axis) for axis in AXES]
-    along = [low + (high - low) * np.linspace(*end, _EACH) for (low, high), end in zip(travels, ends, strict=True)]
-    readings = np.array(list(product(*along)))
+    readings = filling(machine, ends)
     one = np.ones(len(readings), dtype=np.int64)
     about = About(Points(machine.coordinates(readings), one, np.arange(len(readings)), one, machine))
 

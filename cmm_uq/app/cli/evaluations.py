@@ -101,7 +101,10 @@ def effects(
     job: Path | None = option(None, "Job whose own effects are listed too.", "JOB", "none"),
     end: Ending = opt.ONLY_JSON,
 ) -> None:
-    """List the effects that a job can name and a diagnosis looks for: of the program, of packages, of the job itself."""
+    """List the effects that a job can name and a diagnosis looks for: of the program, of packages, of the job itself.
+
+    With WORD also formula, prior, needed columns and what each points to.
+    """
     from cmm_uq.app.commands.forms import listed_effects
 
     found = listed_effects(word, job)
@@ -112,7 +115,8 @@ def effects(
     rows: list[tuple[str, str]] = []
     for each in found:
         rows.append((each.pop("name"), each.pop("title")))
-        rows += [("", f"{said.get(key, key)}: {text}") for key, text in each.items() if text]
+        if word:
+            rows += [("", f"{said.get(key, key)}: {text}") for key, text in each.items() if text]
     show(screen_layout(verbose=True).table(rows))
 
 

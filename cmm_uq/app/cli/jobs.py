@@ -35,6 +35,8 @@ KEY = option(None, _KEY, "KEY=VALUE", "as recognised", "--key")
 LINE = option(
     None, 'Where a line of lengths lies: "1=along X from 100,200,300", in mm.', "NAME=PLACE", "asked for", "--line"
 )
+_PLAN = "Plan, or a recording, whose measurements lie where the lines of lengths with their numbers do."
+PLAN = option(None, _PLAN, "FILE", "asked for", "--plan")
 
 
 def new(
@@ -51,6 +53,7 @@ def new(
     column: list[str] | None = COLUMN,
     key: list[str] | None = KEY,
     line: list[str] | None = LINE,
+    plan: Path | None = PLAN,
     end: Ending = opt.BRIEF,
 ) -> None:  # fmt: skip
     """Begin a job: job.toml with the lines that matter, and a simulated recording to be replaced by your own.
@@ -72,10 +75,11 @@ def new(
         raise CmmUqError(what, where="--column", fix="Leave it out")
     tables = _tables(machine, serial, settings or [])
     if export is not None and kind != PART:
-        from cmm_uq.app.commands.jobs.exchange import read_export, remembered_keys, write_job_of_export
+        from cmm_uq.app.commands.jobs.exchange import placed_by_plan, read_export, remembered_keys, write_job_of_export
 
         keys, _ = remembered_keys(export, import_keys(column, key, line))
         with in_options():
+            keys = keys if plan is None else placed_by_plan(export, keys, plan)
             recognised = read_export(export, keys).recognised
         if not silent:
             show_recognised(recognised)
@@ -111,6 +115,7 @@ def import_export(
     column: list[str] | None = COLUMN,
     key: list[str] | None = KEY,
     line: list[str] | None = LINE,
+    plan: Path | None = PLAN,
     save_as: str = option(
         "", "Remember the answers for exports with the same head.", "NAME", "not remembered", "--save-as"
     ),
@@ -122,6 +127,7 @@ def import_export(
     from cmm_uq.app.commands.jobs.exchange import (
         example,
         lines_asked,
+        placed_by_plan,
         read_export,
         remember,
         remembered_keys,
@@ -134,6 +140,7 @@ def import_export(
         say(f"As remembered in {known}")
     try:
         with in_options():
+            keys = keys if plan is None else placed_by_plan(file, keys, plan)
             export = read_export(file, keys)
     except CmmUqError as error:
         asked = lines_asked(error)
@@ -233,7 +240,7 @@ def show_proposed(recognised: Recognition, example: str, names: Iterable[str]) -
     named = ((name, name if name in {"X", "Y", "Z"} else "X") for name in names)
     lines = (f'--line "{name}=along {axis} from 100,200,300"' for name, axis in named)
     say(f"Read as: {example}")
-    say(f"Where they lie: {' '.join(lines)}")
+    say(f"Where they lie: {' '.join(lines)}, or --plan plan.csv where they were planned")
 
 
 def show_imported(job: Job, *, silent: bool) -> None:

@@ -6,16 +6,27 @@ row of those that it is of. What is left out is told with its place and why: a s
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Verbatim, commas, say
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing.encodings import is_number
-from cmm_uq.jobs.importing.format import Cell, Sheet, unit_named
-from cmm_uq.jobs.importing.header import LINES_BEFORE, Header, Heading, plain_words, without_unit, words_of
+from cmm_uq.jobs.importing.format import Cell, Fact, Sheet, unit_named
+from cmm_uq.jobs.importing.header import (
+    LINES_BEFORE,
+    Header,
+    Heading,
+    plain_words,
+    understood,
+    without_unit,
+    words_of,
+)
 
+_ENDS_IN_AXIS = re.compile(r"(.*?)[\s_.:/-]*([XYZ])", re.IGNORECASE)
 _DEEPEST = 4  # rows of a head
 _SHOWN = 40  # characters of a row that is left out
 SUMMARY, REMARK, AGAIN = "a summary", "a remark", "the head again"
@@ -23,6 +34,9 @@ BASES, FIGURES = (
     ("reference_mm", "nominal_mm"),
     ("length_mm", "deviation_um", "deviation_mm", "run"),
 )  # of a table of lengths
+
+
+_MEASURED, _OF_LENGTHS = ("length_mm", "run"), ("line", "repeat")
 
 
 def text_of(cell: Cell) -> str:
@@ -56,6 +70,63 @@ def with_one_head(
     if problem is not None:
         raise problem
     return None
+
+
+def with_points(sheet: Sheet, meaning_of: Callable[[str], Heading]) -> Sheet:
+    """A sheet with a row for each point, where each coordinate has one: X, Y and Z in turn, or names that end in them.
+
+    Every three rows have a label of their own; lengths on lines that are called X, Y and Z have none. As it is where the
+    column that was measured is not clear.
+    """
+    for first in range(1, min(LINES_BEFORE, len(sheet.rows) - 2)) if not sheet.listed else ():
+        for axis, three in enumerate(zip(*sheet.rows[first : first + 3], strict=False)):
+            if _axes(three) == "XYZ":
+                return _of_coordinates(sheet, first, axis, meaning_of) or sheet
+    return sheet
+
+
+def _axes(cells: Sequence[Cell]) -> str:
+    ends = (_ENDS_IN_AXIS.fullmatch(text_of(cell)) for cell in cells)
+    return "".join(end[2].upper() if end else "?" for end in ends)
+
+
+def _of_coordinates(sheet: Sheet, first: int, axis: int, meaning_of: Callable[[str], Heading]) -> Sheet | None:
+    """The table of a sheet whose column ``axis`` names axes from row ``first`` on; ``None`` where it holds no points."""
+    places = [i for i in range(first, len(sheet.rows)) if any(cell != "" for cell in sheet.rows[i])]
+    width = max(len(sheet.rows[i]) for i in places)
+    columns = [*zip(*([*sheet.rows[i], *[""] * (width - len(sheet.rows[i]))] for i in places), strict=True)]
+    if _axes(columns[axis]) != "XYZ" * (len(places) // 3):
+        return None
+    head = [*map(text_of, sheet.rows[first - 1]), *[""] * width]
+    stems = [text_of(cell)[:-1].rstrip("_.:/- ") for cell in columns[axis]]
+    texts = {axis: stems} if all(stems) else {j: [*map(text_of, columns[j])] for j in range(width) if j != axis}
+    labels = {j: own[::3] for j, own in texts.items() if _of_threes(own, head[j])}
+    names = [*zip(*labels.values(), strict=True)]
+    figures = [j for j, own in enumerate(columns) if j not in (axis, *labels) and all(map(is_number, own))]
+    measured = [j for j in figures if meaning_of(head[j]).column in _MEASURED] or figures
+    if len({*names}) < len(places) // 3 or (
+        len(measured) != 1 and meaning_of(head[measured[0]]).column not in _MEASURED
+    ):
+        return None
+    unit, runs = without_unit(head[measured[0]])[1], ["Repeat"] if len(measured) > 1 else []
+    xyz = [f"{letter} [{unit.name}]" if unit else letter for letter in "XYZ"]
+    rows: list[list[Cell]] = [[*(head[j] for j in labels), *runs, *xyz]]
+    for k, name in enumerate(names):
+        for repeat, j in enumerate(measured, 1):
+            rows.append([*name, *([str(repeat)] if runs else []), *columns[j][3 * k : 3 * k + 3]])
+    lines = [sheet.lines[first - 1], *(sheet.lines[i] for i in places[::3] for _ in measured)]
+    values = commas([Verbatim(head[j]) for j in measured])
+    of = say("{axis}: X, Y, Z; values: {values}", axis=Verbatim(head[axis]), values=values)
+    fact = Fact("in_rows", say("A row for each coordinate"), of)
+    return replace(sheet, rows=rows, lines=lines, spreadsheet=False, facts=(*sheet.facts, fact))
+
+
+def _of_threes(labels: Sequence[str], heading: str) -> bool:
+    """Whether labels are of three rows each, in all of them or in the first, and say more than a number nobody names."""
+    if understood(heading).column not in ("point", "measurement") and all(map(is_number, filter(None, labels))):
+        return False
+    threes = zip(labels[::3], labels[1::3], labels[2::3], strict=True)
+    return all(one and two == three and two in (one, "") for one, two, three in threes)
 
 
 def figures_follow(sheet: Sheet, header: Header) -> bool:

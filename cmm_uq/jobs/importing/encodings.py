@@ -9,6 +9,7 @@ from __future__ import annotations
 import codecs
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from xml.etree.ElementTree import Element, ParseError
 
 import numpy as np
@@ -25,7 +26,19 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16", "UTF-16"),
     (codecs.BOM_UTF16_BE, "utf-16", "UTF-16"),
 )
-_TITLES = {"utf-8": "UTF-8", "utf-16": "UTF-16", "cp1252": "Windows-1252", "latin-1": "ISO 8859-1"}
+_TITLES = {
+    "utf-8": "UTF-8",
+    "utf-16": "UTF-16",
+    "cp1252": "Windows-1252",
+    "latin-1": "ISO 8859-1",
+    "cp932": "Shift JIS",
+}
+_TITLES |= {"cp1250": "Windows-1250", "cp1251": "Windows-1251", "gb18030": "GB 18030"}
+# two characters of Shift JIS after each other, as words of Japanese are; letters with accents in Windows-1252 are single
+_JAPANESE, _ACCENTED = (
+    re.compile(rb"(?:[\x81-\x9f][\x40-\x7e\x80-\xfc]){2}"),
+    re.compile(rb"[\xc0-\xff](?![\x80-\xff])"),
+)
 _FIX = "Export it again, or name encoding"
 _REPORT_LINE = 2000  # characters of a line of a report, which has 80 to 200
 
@@ -33,8 +46,8 @@ _REPORT_LINE = 2000  # characters of a line of a report, which has 80 to 200
 def decoded(content: bytes, where: str, asked: str | None = None) -> tuple[str, str]:
     """Text of a file, and what its encoding is called.
 
-    A byte-order mark decides; without one, UTF-16 shows by a zero in every other byte, UTF-8 by being valid; what remains is
-    Windows-1252, which has every character of ISO 8859-1 in the same place.
+    A byte-order mark decides; without one, UTF-16 shows by a zero in every other byte, UTF-8 by being valid, Shift JIS by
+    being valid with words of Japanese; what remains is Windows-1252, which has every character of ISO 8859-1 in its place.
     """
     mark = next((found for found in _MARKS if content.startswith(found[0])), None)
     if mark is not None and (asked is None or mark[1].startswith(asked)):
@@ -57,11 +70,12 @@ def _without_mark(content: bytes) -> str:
     head = content[:4096]
     if len(head) >= 4 and head.count(0) > len(head) // 4:
         return "utf-16-le" if head[1::2].count(0) > head[::2].count(0) else "utf-16-be"
-    try:
-        content.decode("utf-8")
-    except UnicodeDecodeError:
-        return "cp1252" if not any(byte in content for byte in b"\x81\x8d\x8f\x90\x9d") else "latin-1"
-    return "utf-8"
+    japanese = len(_JAPANESE.findall(content)) > len(_ACCENTED.findall(_JAPANESE.sub(b"", content)))
+    for codec in ("utf-8", "cp932") if japanese else ("utf-8",):
+        with suppress(UnicodeDecodeError):
+            content.decode(codec)
+            return codec
+    return "cp1252" if not any(byte in content for byte in b"\x81\x8d\x8f\x90\x9d") else "latin-1"
 
 
 def report_lines(text: str, where: str) -> list[str]:

@@ -124,7 +124,7 @@ class FileKeys(JobTable):
     decimal: Literal[".", ","] | None = key(None, "The file's decimal sign, where its numbers can be read either way.")
     delimiter: Literal[",", ";", "tab", "blank", "|"] | None = None
     """What separates the cells of a text file, where that is not found."""
-    encoding: Literal["utf-8", "utf-16", "cp1252", "latin-1"] | None = None
+    encoding: Literal["utf-8", "utf-16", "cp1252", "latin-1", "cp932", "cp1250", "cp1251", "gb18030"] | None = None
     """Encoding of a text file, where it is mistaken for another."""
 
     @field_validator("unit")

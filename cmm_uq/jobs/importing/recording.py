@@ -23,12 +23,12 @@ from cmm_uq.base.messages import Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest
 from cmm_uq.jobs.importing.answers import head_of
-from cmm_uq.jobs.importing.arrangement import figures_follow, with_one_head
+from cmm_uq.jobs.importing.arrangement import figures_follow, with_one_head, with_points
 from cmm_uq.jobs.importing.columns import columns_of, left_out_fact
 from cmm_uq.jobs.importing.encodings import is_number
 from cmm_uq.jobs.importing.format import Fact, FileKeys, ImportKeys, Recognition, Sheet, format_of, length_named
 from cmm_uq.jobs.importing.header import LINES_BEFORE, POINTS, REFERENCES, Header, header_of, no_header, understood
-from cmm_uq.jobs.importing.length_tables import tables_of
+from cmm_uq.jobs.importing.length_tables import of_lengths, tables_of
 from cmm_uq.jobs.importing.lengths import MeasuredLengths, lengths_of, placed
 
 # lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled
@@ -202,7 +202,7 @@ def _imported(
         raise CmmUqError(f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file", where=where,
                          fix="Split it")  # fmt: skip
     form = format_of(content, where)
-    sheets = [_with_unit(sheet) for sheet in form.read(content, where, keys)]
+    sheets = [with_points(_with_unit(sheet), of_lengths) for sheet in form.read(content, where, keys)]
     found = _chosen(sheets, keys, where, wanted)
     file = PurePath(where).name
     sheet, header = found[0] if isinstance(found, list) else found

@@ -36,7 +36,7 @@ from cmm_uq.machine.physics.effects.rigid_body import Rotation, Straightness, tu
 
 PERIODIC, PLAY, POSITION, STRAIGHTNESS, ROTATION = "periodic", "play", "position", "straightness", "rotation"
 _LONG, _SHORT, STATED = " long", " short", " as stated"
-WAVES, LONG = 8, 2  # of a function; those that count as long
+WAVES, LONG, _BEYOND = 10, 2, 0.125  # of a function; those that count as long; part of the travel beyond its ends
 FAMILIES: Mapping[str, Text] = {
     PERIODIC: say("Periodic errors of the scales"), PLAY: say("Play of the drives"),
     POSITION + _LONG: say("Position errors along the axes, long waves"),
@@ -82,23 +82,28 @@ class AxisFunction(Effect):
         self.name, self.title, self.formula = of.name, of.title, of.formula
         self.mechanism, self.points_to, self.along_motion = of.mechanism, of.points_to, of.along_motion
         every = np.arange(1, WAVES + 1)
-        self.orders = every[:LONG] if long else every[LONG:]
+        turns = 2 * np.pi * every / (1 + 2 * _BEYOND)
+        squares = (1 - 2 * np.sin(turns * _BEYOND) / turns) / every**2  # of each wave, over the travel
+        forms = 1 + (kind == ROTATION)  # bow, and slope
+        part, chosen = ALLOWED[self.kind] / np.sqrt(forms + squares.sum()), slice(LONG) if long else slice(LONG, None)
+        self.orders, self.forms = every[chosen], forms if long else 0
         self.family = self.kind + (_LONG if long else _SHORT)
-        share = 1 / self.orders / np.sqrt(np.sum(1 / every**2.0))
-        allowed, of_unit = ALLOWED[self.kind], unit("″" if kind == ROTATION else "µm")
-        self.coefficients = tuple(
-            Parameter(f"wave {k}", of_unit, float(allowed * part)) for k, part in zip(self.orders, share, strict=True)
-        )
+        self.rms = float(part * np.sqrt(self.forms + squares[chosen].sum()))
+        named = [("bow", part), ("slope", part)][: self.forms] + [(f"wave {k}", part / k) for k in self.orders]
+        of_unit = unit("″" if kind == ROTATION else "µm")
+        self.coefficients = tuple(Parameter(name, of_unit, float(sd)) for name, sd in named)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         axis = self.of.axis
         low, high = points.machine.travel(axis)
-        angle = np.pi * (points.readings[axis] - low) / (high - low)
-        waves = np.sqrt(2.0) * np.cos(angle[:, None] * self.orders)
+        place = (points.readings[axis] - low) / (high - low)
+        angle, t = np.pi * (place + _BEYOND) / (1 + 2 * _BEYOND), 2 * place[:, None] - 1
+        simple = np.hstack([np.sqrt(1.25) * (3 * t**2 - 1), np.sqrt(3.0) * t])[:, : self.forms]
+        each = np.hstack([simple, np.sqrt(2.0) * np.cos(angle[:, None] * self.orders)])
         if isinstance(self.of, Rotation):
             lever = turned(points, axis, self.of.about, np.ones(len(points)))
-            return np.asarray(lever * (ARCSECOND * waves)[:, None, :])
-        return along(self.of.direction if isinstance(self.of, Straightness) else axis, MICROMETRE * waves)
+            return np.asarray(lever * (ARCSECOND * each)[:, None, :])
+        return along(self.of.direction if isinstance(self.of, Straightness) else axis, MICROMETRE * each)
 
 
 def bounded(effect: Effect, largest_um: float) -> Effect:
@@ -135,7 +140,8 @@ def allowed(family: str) -> tuple[float, str]:
     if family.endswith(STATED):
         return 1.0, "1"
     one = next(effect for effect in (*EVERY.values(), *curves()) if family_of(effect) == family)
-    return float(np.sqrt(sum(c.prior_sd**2 for c in one.coefficients))), str(one.coefficients[0].unit)
+    most = one.rms if isinstance(one, AxisFunction) else float(np.sqrt(sum(c.prior_sd**2 for c in one.coefficients)))
+    return most, str(one.coefficients[0].unit)
 
 
 class EveryPeriod(Effect):

@@ -68,6 +68,8 @@ def test_effects_are_listed_with_all_that_is_said_of_them_or_asked_for_in_anothe
 """
     )
     assert len(json.loads(run("effects", "--json").stdout)["effects"]) == len(EVERY)
+    listed = [line.split()[0] for line in run("effects").stdout.splitlines()]
+    assert listed == list(EVERY)  # a line each
     wrong = run("effects", "sqareness")
     assert (wrong.returncode, wrong.stdout) == (2, "")
     assert wrong.stderr == "cmm-uq: cmm-uq effects: no effect has 'sqareness' in it. Did you mean 'squareness'?\n"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from decimal import Decimal
@@ -190,10 +191,9 @@ def isclose_interval(data: Any, path: tuple[str, ...]) -> bool:
     for key in path[:-2]:
         data = data[int(key) if isinstance(data, list) else key]
     low, high = data["interval95"]
-    return (
-        f"{high - data['value']:.2g}" == f"{data['value'] - low:.2g}"
-        or abs((high - data["value"]) - (data["value"] - low)) < 0.06 * data["U"]
-    )
+    digits = 1 - math.floor(math.log10(data["U"] or 1.0))
+    above, below = (round(side, digits) for side in (high - data["value"], data["value"] - low))
+    return above == below or abs((high - data["value"]) - (data["value"] - low)) < 0.06 * data["U"]
 
 
 @pytest.mark.parametrize("name", REPORTED)

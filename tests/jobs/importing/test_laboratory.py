@@ -12,7 +12,7 @@ from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, exampl
 from tests.jobs.importing import laboratory, unseen
 from tests.jobs.importing.laboratory import Export, text
 
-ASKED = {"lines_side_by_side": "could all be length_mm", "polyworks_rows": "nothing says which lengths lie on one line"}
+ASKED = {"lines_side_by_side": "could all be length_mm"}
 """Of those that were written after the reading was built, what is refused with a question."""
 EVERY = {**laboratory.EXPORTS, **{name: made for name, made in unseen.EXPORTS.items() if name not in ASKED}}
 

@@ -6,6 +6,7 @@ import re
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
@@ -109,3 +110,57 @@ def test_an_answer_for_another_file_stands_in_no_one_s_way(tmp_path: Path, monke
     ended = run("import", "plain.csv", cwd=tmp_path)
     assert "UTF-16" not in ended.stderr
     assert "As remembered" not in ended.stdout
+
+
+PLANNED = "\n".join(
+    [
+        "measurement,point,repeat,x_mm,y_mm,z_mm",
+        "1,1,1,10,20,30",
+        "1,2,1,310,420,30",
+        "2,1,1,0,0,-5",
+        "2,2,1,0,90,-5",
+        "2,3,1,0,30,-5",
+    ]
+)
+
+
+def test_lengths_lie_where_the_plan_has_the_measurements_of_their_numbers(tmp_path: Path) -> None:
+    """By hand: 500.002 mm along (3, 4, 0)/5 from the plan's first point; to its point farthest from it, not to its last."""
+    (tmp_path / "plan.csv").write_text(PLANNED, encoding="utf-8")
+    (tmp_path / "bar.csv").write_text("Position;Length 1 (mm)\n2;500.0000\n1;500.0020\n", encoding="utf-8")
+    asked = run("import", "bar.csv", cwd=tmp_path)
+    assert (asked.returncode, "--plan plan.csv" in asked.stdout) == (2, True)
+    ended = run("import", "bar.csv", "--plan", "plan.csv", "--out", "recording.csv", cwd=tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    rows = [[float(cell) for cell in row.split(",")] for row in (tmp_path / "recording.csv").read_text().split()[1:]]
+    expected = [[1, 1, 1, 0, 0, -5], [1, 2, 1, 0, 500, -5], [2, 1, 1, 10, 20, 30], [2, 2, 1, 310.0012, 420.0016, 30]]
+    np.testing.assert_allclose(rows, expected, atol=1e-9)
+    begun = run("new", "ballbar", "job", "--from", "bar.csv", "--plan", "plan.csv", "--machine", "M",
+                "--set", "job.date=2026-05-31", cwd=tmp_path)  # fmt: skip
+    assert begun.returncode == 0, begun.stderr
+    assert "from 10.0,20.0,30.0 to 310.0,420.0,30.0" in (tmp_path / "job" / "job.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        ("1 3", "plan.csv: no measurement has the number of line '3'. Say where it lies: --line"),
+        ("1 A", "plan.csv: no measurement has the number of line 'A'"),
+        ("1 1.2", "no measurement has the number of line '1.2'"),
+        ("A1 B1", "bar.csv: lines 'A1' and 'B1' have the same number"),
+    ],
+)
+def test_a_line_that_the_plan_does_not_number_is_asked_for(names: str, told: str, tmp_path: Path) -> None:
+    (tmp_path / "plan.csv").write_text(PLANNED, encoding="utf-8")
+    rows = "".join(f"{name};500.0000\n" for name in names.split())
+    (tmp_path / "bar.csv").write_text(f"Position;Length 1 (mm)\n{rows}", encoding="utf-8")
+    ended = run("import", "bar.csv", "--plan", "plan.csv", "--out", "recording.csv", cwd=tmp_path)
+    assert (ended.returncode, told in ended.stderr, (tmp_path / "recording.csv").exists()) == (2, True, False), (
+        ended.stderr
+    )
+
+
+def test_a_plan_beside_an_export_of_points_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "plan.csv").write_text(PLANNED, encoding="utf-8")
+    ended = run("import", "plan.csv", "--plan", "plan.csv", cwd=tmp_path)
+    assert (ended.returncode, "holds no lengths whose place is asked for" in ended.stderr) == (2, True)

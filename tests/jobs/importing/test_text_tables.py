@@ -9,6 +9,7 @@ import pytest
 from hypothesis import assume, given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.jobs.importing.encodings import decoded
 from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import ImportedTable, imported
 from tests.jobs.importing.exports import HEADINGS
@@ -297,3 +298,73 @@ def test_any_text_is_read_or_refused_in_one_line(text: str, before: str) -> None
 )
 def test_any_bytes_are_read_or_refused_in_one_line(content: bytes, before: bytes) -> None:
     assert "\n" not in said_of(before + content)
+
+
+JAPANESE = "測定線;校正長さ [mm];測定値 1 [mm];測定値 2 [mm]\n1;100;100.0012;100.0008\n1;250;250.0021;250.0019\n"
+
+
+def test_a_japanese_table_is_read_in_shift_jis_as_in_utf_8() -> None:
+    place = {"lines": {"1": "along X from 0,0,0"}}
+    utf_8, shift_jis = (read(JAPANESE.encode(code), **place) for code in ("utf-8", "cp932"))
+    assert ("encoding", "Shift JIS") in [(fact.key, str(fact.value)) for fact in shift_jis.recognised.facts]
+    assert shift_jis.columns.keys() == utf_8.columns.keys()
+    assert all(np.array_equal(values, utf_8.columns[name]) for name, values in shift_jis.columns.items())
+    assert shift_jis.recognised.columns == utf_8.recognised.columns
+
+
+WESTERN = [
+    "Größe", "Länge", "Nennmaß", "Prüfkörper", "mesuré", "répétition", "Línea", "Répétabilité", "à", "Åsa", "Größen–Liste",
+    "100–200", "µm", "±0,5", "„Zitat“", "«écart»", "a–b", "‘x’", "…", "naïve", "Ø12", "20", "°C",
+]  # fmt: skip
+
+
+@given(st.lists(st.sampled_from(WESTERN), min_size=1), st.sampled_from([" ", ";", "\n"]))
+def test_western_words_in_windows_1252_are_not_taken_for_japanese(words: list[str], between: str) -> None:
+    text = between.join(words)
+    assert decoded(text.encode("cp1252"), "export.csv")[0] == text
+
+
+IN_ROWS = {
+    "axes in a column": [
+        "Element;Merkmal;Istwert [mm];Sollwert [mm]", "Kugel 1;X;1,5;1", "Kugel 1;Y;2,5;2", "Kugel 1;Z;-3,5;-3",
+        "Kugel 2;X;4,5;4", "Kugel 2;Y;5,5;5", "Kugel 2;Z;6,5;6",
+    ],
+    "labels in the first row": [
+        "Feature;Axis;Nominal;Measured [mm];Dev", "S 1;X;1;1.5;0.5", ";Y;2;2.5;0.5", ";Z;-3;-3.5;-0.5",
+        "S 2;X;4;4.5;0.5", ";Y;5;5.5;0.5", ";Z;6;6.5;0.5",
+    ],
+    "numbered points": [
+        "Messung;Punkt;Achse;Soll;Ist (mm)", "1;1;X;1;1,5", "1;1;Y;2;2,5", "1;1;Z;-3;-3,5", "1;2;X;4;4,5", "1;2;Y;5;5,5",
+        "1;2;Z;6;6,5",
+    ],
+    "names that end in an axis": [
+        "Name;Actual [mm]", "M1_P1_X;1.5", "M1_P1_Y;2.5", "M1_P1_Z;-3.5", "M1_P2_X;4.5", "M1_P2_Y;5.5", "M1_P2_Z;6.5",
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", IN_ROWS)
+def test_a_row_for_each_coordinate_is_a_point_in_three_rows(name: str) -> None:
+    keys = {} if name in ("numbered points", "names that end in an axis") else {"points_per_measurement": 2}
+    found = read("\n".join(IN_ROWS[name]), **keys)
+    assert xyz(found) == [[1.5, 2.5, -3.5], [4.5, 5.5, 6.5]]
+    assert found.columns["point"].tolist() == [1, 2]
+    assert found.lines.tolist() == [2, 5]
+
+
+def test_runs_beside_each_other_are_repeats_of_a_point_in_three_rows() -> None:
+    text = "Point;Axis;Run 1 (mm);Run 2 (mm)\n1;X;1.5;1.25\n;Y;2.5;2.25\n;Z;3.5;3.25\n2;X;4.5;4.25\n;Y;5.5;5.25\n;Z;6.5;6.25\n"
+    found = read(text, points_per_measurement=4)
+    assert xyz(found) == [[1.5, 2.5, 3.5], [1.25, 2.25, 3.25], [4.5, 5.5, 6.5], [4.25, 5.25, 6.25]]
+    assert found.columns["repeat"].tolist() == [1, 2, 1, 2]
+
+
+@pytest.mark.parametrize("head", ["Run;Axis", "Nr.;Axis"])
+def test_lengths_along_x_y_and_z_in_turn_are_no_points(head: str) -> None:
+    rows = "".join(
+        f"{run};{axis};{size};{size}.00{run}\n"
+        for run in (1, 2)
+        for axis, size in zip("XYZ", (800, 600, 400), strict=True)
+    )
+    with pytest.raises(CmmUqError, match="nothing says where lines 'X', 'Y', 'Z' lie"):
+        read(f"{head};Nominal (mm);Measured (mm)\n{rows}")

@@ -33,30 +33,70 @@ def test_a_machine_has_eighteen_functions_of_long_and_of_short_waves() -> None:
 
 @pytest.mark.parametrize("name", ["scale_curvature_y", "straightness_y_z", "rotation_y_x"])
 def test_long_and_short_waves_together_have_the_size_that_physics_allows(name: str) -> None:
-    """Over the travel: waves are orthogonal there, each with the mean square ½·2."""
-    parts = curve(name), curve(name, long=False)
-    assert sum(len(one.coefficients) for one in parts) == WAVES
-    squares = sum(c.prior_sd**2 for one in parts for c in one.coefficients)
-    assert np.sqrt(squares) == pytest.approx(ALLOWED[parts[0].kind])
-    assert np.hypot(*(allowed(one.family)[0] for one in parts)) == pytest.approx(ALLOWED[parts[0].kind])
-    sd = [c.prior_sd for one in parts for c in one.coefficients]
+    """Over the travel, the root mean square of what the coefficients make beforehand; of each family its part."""
+    parts, low, high = (curve(name), curve(name, long=False)), *MACHINE.travel("y")
+    at = low + (high - low) * (np.arange(20_000) + 0.5) / 20_000
+    ones = np.ones(len(at), dtype=np.int64)
+    line = Points(np.column_stack([0 * at, at, 0 * at - 300.0]), ones, np.arange(len(at)), ones, MACHINE)
+    unit_of = (
+        EVERY[name].basis(line)[:, :, 0] / ((at - low) / 1000)[:, None]
+        if "rotation" in name
+        else 1e-3 * np.ones((1, 3))
+    )
+    across = np.abs(unit_of).sum(axis=0).argmax() if "rotation" in name else {"y_z": 2}.get(name[-3:], 1)
+    squares = []
+    for one in parts:
+        moved = one.basis(line)[:, across] / unit_of[:, [across]]
+        squares.append(np.mean(moved**2, axis=0) @ [c.prior_sd**2 for c in one.coefficients])
+        assert allowed(one.family)[0] == pytest.approx(np.sqrt(squares[-1]), rel=1e-6)
+    assert np.sqrt(sum(squares)) == pytest.approx(ALLOWED[parts[0].kind], rel=1e-6)
+    sd = [c.prior_sd for one in parts for c in one.coefficients][parts[0].forms :]
+    assert len(sd) == WAVES
     np.testing.assert_allclose(np.array(sd) * np.arange(1, WAVES + 1), sd[0])
 
 
 def test_a_wave_moves_points_across_by_its_cosine() -> None:
-    """By hand: half way through the travel of x the first wave is zero, the second −√2 µm."""
+    """By hand: half way through the travel of x the bow is −½·√5, the first wave zero, the second −√2 µm."""
     middle = POINTS.at(np.where(np.arange(3) == 0, 450.0, XYZ))
     moved = curve("straightness_x_z").basis(middle)
-    np.testing.assert_allclose(moved[:, 2], np.tile([0.0, -np.sqrt(2) * 1e-3], (40, 1)), atol=1e-15)
+    by_hand = [-0.5e-3 * np.sqrt(5), 0.0, -np.sqrt(2) * 1e-3]
+    np.testing.assert_allclose(moved[:, 2], np.tile(by_hand, (40, 1)), atol=1e-15)
     assert not moved[:, :2].any()
+
+
+def test_a_wave_has_slopes_at_the_ends_of_the_travel() -> None:
+    """By hand: √2·cos(πk/10) at its beginning and, with the sign of (−1)^k, at its end; its slope."""
+    ends, k = POINTS.at(np.column_stack([np.repeat([0.0, 9e-4, 900.0], 1), np.zeros((3, 2))])), np.array([1, 2])
+    moved = curve("straightness_x_z").basis(ends)[:, 2, 1:] * 1e3
+    np.testing.assert_allclose(moved[0], np.sqrt(2) * np.cos(np.pi * k / 10))
+    np.testing.assert_allclose(moved[2], (-1.0) ** k * moved[0])
+    np.testing.assert_allclose(
+        (moved[1] - moved[0]) / 1e-6, -np.sqrt(2) * 0.8 * np.pi * k * np.sin(np.pi * k / 10), rtol=1e-4
+    )
 
 
 def test_a_rotation_turns_what_its_carriage_carries() -> None:
     """As the rotation of the catalogue, whose angle grows with the travel, where that has the same angle."""
     low, high = MACHINE.travel("y")
+    place = (XYZ[:, [1]] - low) / (high - low)
     plain = EVERY["rotation_y_x"].basis(POINTS)[:, :, 0] / ((XYZ[:, [1]] - low) / 1000)
-    waves = np.sqrt(2) * np.cos(np.pi * (XYZ[:, [1]] - low) / (high - low) * np.array([[1, 2]]))
-    np.testing.assert_allclose(curve("rotation_y_x").basis(POINTS), plain[:, :, None] * waves[:, None, :], atol=1e-12)
+    waves = np.sqrt(2) * np.cos(np.pi * (place + 0.125) / 1.25 * np.array([[1, 2]]))
+    forms = [np.sqrt(5) * (6 * place**2 - 6 * place + 1), np.sqrt(3) * (2 * place - 1)]
+    turned = np.hstack([*forms, waves])
+    np.testing.assert_allclose(curve("rotation_y_x").basis(POINTS), plain[:, :, None] * turned[:, None, :], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["scale_curvature_y", "straightness_y_z", "rotation_y_x"])
+def test_the_simplest_form_of_an_error_is_one_of_its_functions(name: str) -> None:
+    """But for a constant: a displacement as a whole, or a turn. Waves alone are 5 % of it off, and more at the ends."""
+    simplest, columns = EVERY[name].basis(POINTS)[:, :, 0], curve(name).basis(POINTS)
+    low, _ = MACHINE.travel("y")
+    whole = simplest / (XYZ[:, [1]] - low) if "rotation" in name else np.ones_like(simplest) * np.any(simplest, axis=0)
+    forms = np.concatenate([columns[:, :, : 1 + ("rotation" in name)], whole[:, :, None]], axis=2).reshape(
+        simplest.size, -1
+    )
+    left = simplest.ravel() - forms @ np.linalg.lstsq(forms, simplest.ravel(), rcond=None)[0]
+    assert np.abs(left).max() < 1e-12 * np.abs(simplest).max()
 
 
 def test_effects_know_their_family() -> None:

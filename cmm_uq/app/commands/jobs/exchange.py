@@ -21,7 +21,14 @@ from cmm_uq.jobs.columns import WHOLE
 from cmm_uq.jobs.dcc import Certificate, read
 from cmm_uq.jobs.importing.answers import as_file, folder, matching, path_of
 from cmm_uq.jobs.importing.format import ImportKeys, Recognition
-from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, example as example, imported, points_of
+from cmm_uq.jobs.importing.recording import (
+    ImportedTable,
+    UnplacedError,
+    example as example,
+    imported,
+    points_of,
+    read_recording,
+)
 from cmm_uq.jobs.reports import ReportResults, read_results
 from cmm_uq.jobs.source import RESULTS
 
@@ -63,6 +70,35 @@ def lines_asked(error: CmmUqError) -> tuple[Recognition, str, list[str]] | None:
         return None
     every = [name for one in error.lengths for name in one.names]
     return error.recognised, example(error.lengths), list(dict.fromkeys(every))
+
+
+def placed_by_plan(export: Path, keys: ImportKeys, plan: Path) -> ImportKeys:
+    """Keys of an export of lengths: each line that they do not place lies as a plan's measurement of its number does.
+
+    plan : ``plan.csv`` or any recording; a line begins at the measurement's first point and goes to the one farthest from it.
+    """
+    try:
+        read_export(export, keys)
+    except UnplacedError as error:
+        lines = dict.fromkeys(name for one in error.lengths for name in one.names if name not in keys.lines)
+    else:
+        raise CmmUqError(f"{export} holds no lengths whose place is asked for", where="--plan", fix="Leave it out")
+    content = content_of(plan, TABLE_BYTES, "Name the plan.csv of cmm-uq plan, or a recording")
+    points, placed = read_recording(content, str(plan), Machine()), dict[int, str]()
+    for name in lines:
+        numbers = [int(one) for one in re.findall(r"\d+", name)]
+        rows = np.flatnonzero(points.measurement == numbers[0]) if len(numbers) == 1 else ()
+        fix = f'Say where it lies: --line "{name}=along X from 100,200,300"'
+        if len(rows) < 2:
+            raise CmmUqError(f"no measurement has the number of line {name!r}", where=str(plan), fix=fix)
+        if numbers[0] in placed:
+            what = f"lines {placed[numbers[0]]!r} and {name!r} have the same number"
+            raise CmmUqError(what, where=str(export), fix=fix)
+        xyz = points.xyz[rows[np.argsort(points.point[rows], kind="stable")]]
+        far = xyz[np.linalg.norm(xyz - xyz[0], axis=1).argmax()]
+        start, end = (",".join(map(repr, one.tolist())) for one in (xyz[0], far))
+        placed[numbers[0]], lines[name] = name, f"from {start} to {end}"
+    return keys.model_copy(update={"lines": {**keys.lines, **lines}})
 
 
 def own_format(found: ImportedTable) -> bytes:
