@@ -25,7 +25,7 @@ from cmm_uq.jobs.part.feature import ASKS, FEWEST, LIMITS, PATTERNS, Asks
 from cmm_uq.jobs.part.qif import PROGRAM as QIF
 from cmm_uq.jobs.schema import keys_of, without_place, written
 from cmm_uq.laboratory.live.instruments.library import profile_named, ready
-from cmm_uq.laboratory.live.instruments.profile import ProfileFile
+from cmm_uq.laboratory.live.instruments.profile import ProfileFacts, ProfileFile
 from cmm_uq.machine.physics.catalogue import EVERY
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES
 from cmm_uq.maths.uncertainty.models.input_keys import KINDS as DISTRIBUTIONS
@@ -237,21 +237,21 @@ def ready_profiles() -> str:
     found = [profile_named(name) for name in ready()]
     rows = [(f"[`{one.name}`](#{one.name})", one.title, _spoken(one)) for one in found]
     parts = [
-        "What is not found is assumed, and said. None was tried on real hardware. `cmm-uq instruments list` lists them; a "
-        "profile of your own may begin as a copy of one, from `cmm_uq/laboratory/live/instruments/profiles`.",
+        "Each by its manuals; what these do not say is assumed. None was tried on real hardware. `cmm-uq instruments list` "
+        "lists them; a profile of your own may begin as a copy, from `cmm_uq/laboratory/live/instruments/profiles`.",
         table(("profile", "instrument", "line"), rows),
     ]  # fmt: skip
     for one in found:
-        quantities = ", ".join(f"`{name}`" for name in sorted(one.named(), key=_numbered))
         asked = ", ".join(f"`{poll.send}`" for poll in one.send.poll)
-        how = f"asked {asked} every {one.send.every_s:g} s" if asked else "listened to"
-        told = [f"- {text}" for text in one.facts.sources] + [f"- Not found: {text}." for text in one.facts.not_found]
-        said = f"It is {how}." if one.protocol == "messages" else "See [I++ DME](ipp.md)."
-        parts += [
-            f"## {one.name}",
-            f"{one.title}. Quantities: {quantities}. {said} {one.facts.tried[0].upper()}{one.facts.tried[1:]}.",
-            "\n".join(told),
+        how = f"polled by {asked} every {one.send.every_s:g} s" if asked else "listened to"
+        said = [
+            ("quantities", ", ".join(f"`{name}`" for name in sorted(one.named(), key=_numbered))),
+            ("line", how if one.protocol == "messages" else "[I++ DME](ipp.md)"),
+            *(("source", text) for text in one.facts.sources),
+            *(("not found", text) for text in one.facts.not_found),
+            *([("tried on", one.facts.tried)] if one.facts.tried != ProfileFacts().tried else []),
         ]
+        parts += [f"## {one.name}", f"{one.title}.", table(("", ""), said)]
     return page("Ready profiles", *parts)
 
 

@@ -18,9 +18,9 @@ WANTED, CELL, CRIES = (93.0, 97.0), (92.0, 98.0), 2.0
 
 EXPLAINED = """\
 Written by `python -m benchmarks.coverage.study FOLDER --page`. Recordings come from equations that share no code with the
-package; true errors, sizes and noise are drawn anew for each, and the job names all physics that acts. The reading noise is
-0.7 to 2 µm and not stated, unless a row says so. Every second recording has the time in it; those of slow noise all have it.
-Of a gauge either the whole line is measured three times over, or each face three times before the next.
+package; true errors, sizes and noise are drawn anew for each, and the job names all physics that acts. The reading noise
+is 0.7 to 2 µm and not stated, unless a row says so. Every second recording, and all of slow noise, have the time. Of a
+gauge either the whole line is measured three times over, or each face three times before the next.
 
 | noise | what |
 | --- | --- |
@@ -33,11 +33,11 @@ Of a gauge either the whole line is measured three times over, or each face thre
 | t3 | Student's t with three degrees of freedom |
 | resolution | white, displayed in steps of 5 µm |
 
-*Hold*: 95 % intervals that contain the truth: of factors (all parameters of all effects), of sizes, of figures of performance.
-The true figure of a ballbar is the mean over 400 repetitions of the recording with all its noise drawn anew, set-up offsets
-and the display's steps included; that of a gauge line is its slope without noise, indicated over true distance. In brackets,
-the exact binomial interval of 99.9 %; it takes intervals of one recording for independent, and so is too narrow.
-*Noisy axis*: the scale of the axis that reads worse. *Cries*: diagnoses other than consistent, all of them false."""
+*Hold*: 95 % intervals that contain the truth: of factors (all parameters of all effects), of sizes, of figures of
+performance. The true figure of a ballbar is the mean over 400 repetitions of the recording with all its noise drawn anew;
+that of a gauge line is its slope without noise, indicated over true distance. In brackets, the exact binomial interval of
+99.9 %, too narrow in that it takes intervals of one recording for independent. *Noisy axis*: the scale of the axis that
+reads worse. *Cries*: diagnoses other than consistent, all of them false."""
 
 
 def page(found: Mapping[str, Tally], beside: Mapping[str, Tally], power: Path | None) -> str:

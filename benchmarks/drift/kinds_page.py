@@ -11,42 +11,39 @@ PAGE = Path(__file__).parents[2] / "docs" / "records" / "drift-kinds-study.md"
 
 HOW = """
     {machines} machines of each of five kinds were made by a generator that shares no code with the package
-    (`benchmarks/drift/kinds.py`, SHA-256 `{seal}…`), with two to ten calibrations, a year or half a year apart, three in ten
-    of them always in the same month; certificates, artefacts and adjustments as in [the study of a fleet](drift-study.md).
-    All have a rate (Student's t, four degrees of freedom), a random walk, and a step in thirty years. *Plain* machines have
-    no more. *Settling* ones settle by 0.2 to 0.8 of the limit after the first certificate, with decay times from 0.15 to 2
-    years; an adjustment does not begin that anew. *Season*: amplitudes from 0.1 to 0.4 of the limit, 15 % more or less each
-    year, with a second harmonic. *Wear*: a power from 1.3 to 2.5 of the time since an installation up to four years before
-    the first certificate, across the limit in 4 to 15 years. *Step*: one of 0.2 to 0.8 of the limit between the first
-    certificate and the last. Season, wear and rates do not have the form that the model gives them. Generator and judging
-    were committed with their hashes (`benchmarks/drift/kinds_seal.json`) before the run; the seed is the first digits of the
-    generator's hash. How a day is placed in its distribution, and what ± means, is as in the other study.
+    (`benchmarks/drift/kinds.py`, SHA-256 `{seal}…`), with two to ten calibrations, a year or half a year apart, three
+    in ten of them always in the same month; otherwise as in [the study of a fleet](drift-study.md). All have a rate
+    (Student's t, four degrees of freedom), a random walk, and a step in thirty years. *Plain* machines have no more.
+    *Settling* ones settle by 0.2 to 0.8 of the limit after the first certificate, with decay times from 0.15 to 2
+    years; an adjustment does not begin that anew. *Season*: amplitudes from 0.1 to 0.4 of the limit, 15 % more or
+    less each year, with a second harmonic. *Wear*: a power from 1.3 to 2.5 of the time since an installation up to
+    four years before the first certificate, across the limit in 4 to 15 years. *Step*: one of 0.2 to 0.8 of the limit
+    between the first certificate and the last. Season, wear and rates have other forms than in the model. Generator
+    and judging were committed with their hashes (`benchmarks/drift/kinds_seal.json`) before the run; the seed is the
+    first digits of the generator's hash.
 """
 READ = """
-    *With* is the model as `due` and `history` have it without a fleet; *without* is the same with neither settling nor
-    season nor wear that speeds up. *Earlier* and *later* are the parts whose day came before or after the interval, 5 % each
-    for a right model. *Never*: not in forty years. *Width* is the median width of the 90 % interval, which ends at forty
-    years.
+    *With* is the model as `due` and `history` have it without a fleet; *without*, the same without settling, season
+    and wear that speeds up. *Earlier* and *later*: the day came before or after the interval, 5 % each for a right
+    model. *Never*: not in forty years. *Width*: median width of the 90 % interval, which ends at forty years.
 """
 STEPS = """
-    Of the first {dated} machines of each kind, the steps that were named (probability of 50 % and more): how many there
-    were, of how many on average by the probabilities that they were given, in how many the true size is within ± (k = 2),
-    and how many of the true steps of at least 0.4 of the limit, before the last certificate, were named. A step before the
-    last certificate only is one that no second one confirms; one across an adjustment is not seen.
+    Of the first {dated} machines of each kind, the steps named (probability of 50 % and more): their number, the
+    number expected by their probabilities, in how many the true size is within ± (k = 2), and how many of the true
+    steps of at least 0.4 of the limit, before the last certificate, were named. No second certificate confirms a step
+    before the last one; one across an adjustment is not seen.
 """
 FLEET = """
-    The first {of_fleet} machines of all five kinds, as one fleet, each with what all others taught as prior, and no settling,
-    season or wear ([a fleet](fleet.md)). Machines at rest after they settled or stepped are foreseen to move too early: what
-    the fleet's machines do has gone into its walk, steps and rates. Without a fleet a machine's own certificates tell.
+    The first {of_fleet} machines of all five kinds as one fleet, each with the prior of all others, without settling,
+    season or wear ([a fleet](fleet.md)). Machines at rest after they settled or stepped are predicted to move too
+    early, since the fleet's walk, steps and rates include that; without a fleet a machine's own certificates tell.
 """
 WHY = """
-    A machine that is of one kind is not one drawn from the prior. 90 % is what a right prior gives over machines of all
-    kinds; a kind whose days are all much alike (wear crosses in 4 to 15 years, and the prior reckons with never) is held more
-    often, one that the prior takes for rare less often. What is missed is late rather than early nearly everywhere: of
-    settled machines many never cross, and the model, that does not know a rate to better than a fiftieth of the limit a
-    year, seldom dares to say never. The development seed, of other machines of the same generator, was looked at while the
-    priors were chosen ([what else was looked at](drift.md#what-is-assumed-where-there-is-no-fleet)); the machines of this
-    page were not.
+    90 % is what a right prior gives over machines of all kinds, not of one: a kind whose days are much alike (wear
+    crosses in 4 to 15 years) is held more often, one that the prior takes for rare less often. Misses are late nearly
+    everywhere: many settled machines never cross, and the model, which does not know a rate to better than a fiftieth
+    of the limit a year, seldom says never. Priors were chosen on other machines of the same generator ([what else was
+    looked at](drift.md#what-is-assumed-where-there-is-no-fleet)).
 """
 GROUPS = ("2 or 3 certificates", "4 to 6", "7 and more", "both ends are dates")
 

@@ -28,42 +28,56 @@ SAID = """\
 
 ## What was done
 
-`python -m benchmarks.second.study FOLDER --cases {cases} --nulls {nulls} --seed {seed} --workers N --page docs` makes
-the cases (job folders, as users write them), seals their truth by a hash, diagnoses them and searches them by two oracles;
-every result is a line in FOLDER, so that a run can be stopped and taken up again, and more cases added with larger numbers.
-In the end it writes this page; with `--count` of what is there. It takes {hours} of one core, by what these took. Generator
-and oracles (`benchmarks/second/`) share no code with the package; a test holds their equations to those of the package.
+`python -m benchmarks.second.study FOLDER --cases {cases} --nulls {nulls} --seed {seed} --workers N --page docs` makes the
+cases as job folders, seals their truth by a hash, diagnoses them, searches them by two oracles and writes this page
+({hours} of one core); every result is a line in FOLDER, so that a run can be stopped and resumed. Generator and oracles
+(`benchmarks/second/`) share no code with the package; a test holds their equations to those of the package.
 
-- **Recordings**: 20 × 2 ballbars, a step gauge in seven lines there and back, a plate of sixteen balls in one to three ways,
-  a sphere in three places, and the twenty bars of the DEA Iota 1102 where they really stood. Columns (time, sides of approach,
-  temperatures, load) are there or not; the noise is stated (half of the time, of these a third by a wrong factor of two) or
-  not; rows stand in any order in every second one. In every seventh, and in all of *simulation*, the model is the prediction
-  of another program: six factors, or the machine's real error maps at 20, 25 or 30 °C.
-- **Noise**: *white*; *axis*, one reads 1.5 to 3.5 times worse; *set-up*, an offset of each point of each set-up of 0.5 to 2
-  of the reading noise; *growing*, one to three times it at the longest distance; *slow*, an Ornstein–Uhlenbeck process of one
-  to four times it that forgets over a fiftieth to a half of the recording; *walk*, a random walk that ends at one to four
-  times it; *tails*, t of 3 or 4 degrees of freedom; *display*, steps of 0.8 to 2.5 of it; *real*: what the six factors
-  leave of the real bars (two recordings, 11 µm), dealt to other positions with other signs.
-- **Hidden** with √λ, the length of the signal over its noise once all else is projected out: *one* or *two* effects, *real
-  one* in the real bars, *simulation* beyond a prediction, *shuffled* (the same rows in two orders), each 4.5 to 10;
-  *unresolved period*, a gauge of twelve equal steps, whose periods have aliases; faults of the artefact (6 to 15): a pattern
-  of its nodes, its own geometry (out of square, stretched, bowed, bent, twisted), its temperature, the same or another in
-  every set-up; *outside* the catalogue (9 to 15; every known effect leaves at least √λ = 4 of it). *Maps* are the real ones at
-  three temperatures, their own expansion taken off and their differences dealt anew among the temperatures.
-- **The oracles** search by likelihood ratios among all effects of the catalogue, one after the other. One estimates the noise
-  within the same kinds (white and one kind besides, of a few sizes, and t); the other is told the noise exactly (of real noise
-  its size). Each draws 199 recordings of noise alone as it takes it to be; an alarm is what at most one of them exceeds.
-  Outside the catalogue a third one is told the form of what is hidden, not its size, and estimates the noise as the first
-  does: what it does not see is not there to be seen. A diagnosis has no such form; it searches functions of every form.
-- **Found** is what is named, alone or among effects said to be indistinguishable, of all that is hidden, or else a rival that
-  leaves less than √λ = 2 of it. **Innocent** is what is named and is neither. **Blamed** for an artefact's fault is an effect
-  of the machine with no word of the artefact in its group. A probability is *right* where the effect is there, *with its
-  group*, where one of its group is. Of an artefact's fault the effect is there that the fault is by the equation from which
-  it was drawn, or one that leaves less than √λ = 2 of it. A pattern, and temperatures that differ from set-up to set-up, are
-  two effects where the scale that all have in common can be seen by itself. Errors of a plate of which the recording could
-  not tell the one from the other, were it without noise (out of square, or turned row by row), are one statement, and what is
-  said of it is the probability of all explanations that remain with any of them. The rule before (up to 0.13.0) took each as
-  right, with its own share."""
+- **Recordings**: 20 × 2 ballbars, a step gauge in seven lines there and back, a plate of sixteen balls in one to three
+  ways, a sphere in three places, and the twenty bars of the DEA Iota 1102 where they really stood. Columns (time, sides
+  of approach, temperatures, load) are there or not; the noise is stated in half (of these a third wrong by a factor of
+  two); rows stand in any order in every second one. In every seventh, and in all of *simulation*, the model is the
+  prediction of another program: six factors, or the machine's real error maps at 20, 25 or 30 °C.
+- **Noise**, in units of the reading noise:
+
+| noise | what |
+| --- | --- |
+| white | independent and alike in every coordinate |
+| axis | one reads 1.5 to 3.5 times worse |
+| set-up | an offset of each point of each set-up of 0.5 to 2 |
+| growing | one to three times at the longest distance |
+| slow | an Ornstein–Uhlenbeck process of one to four that forgets over a fiftieth to a half of the recording |
+| walk | a random walk that ends at one to four |
+| tails | t of 3 or 4 degrees of freedom |
+| display | steps of 0.8 to 2.5 |
+| real | residuals of the real bars (two recordings, 11 µm), dealt to other positions with other signs |
+
+- **Hidden**; √λ is the length of the signal over its noise once all else is projected out:
+
+| hidden | √λ | what |
+| --- | --- | --- |
+| one, two | 4.5 to 10 | effects |
+| real one | 4.5 to 10 | one in the real bars |
+| simulation | 4.5 to 10 | an effect beyond a prediction |
+| shuffled | 4.5 to 10 | the same rows in two orders |
+| unresolved period | | a gauge of twelve equal steps |
+| artefact | 6 to 15 | a pattern of its nodes, its own geometry (out of square, stretched, bowed, bent, twisted), its \
+temperature, the same or another in every set-up |
+| outside | 9 to 15 | functions outside the catalogue; every known effect leaves at least √λ = 4 |
+| maps | | the real ones at three temperatures, their own expansion taken off and their differences dealt anew |
+
+- **The oracles** search by likelihood ratios among all effects of the catalogue. One estimates the noise within the same
+  kinds (white and one kind besides, of a few sizes, and t); the other knows it exactly (of real noise its size). Each
+  draws 199 recordings of noise alone; an alarm is what at most one of them exceeds. Outside the catalogue a third knows
+  the form of what is hidden, not its size: what it does not see cannot be seen.
+- **Found**: all that is hidden is named, alone or among effects said to be indistinguishable, or a rival that leaves less
+  than √λ = 2 of it. **Innocent** is what is named and is neither. **Blamed** for an artefact's fault is an effect of the
+  machine with no word of the artefact in its group.
+- **Right**: the effect is there; *with its group*, one of its group is. Of an artefact's fault that is the effect of its
+  own equation, or one that leaves less than √λ = 2 of it. A pattern, and temperatures that differ between set-ups, are
+  two effects where the scale common to all can be seen by itself. Errors of a plate that are the same without noise (out
+  of square, or turned row by row) are one statement, with the probability of all explanations that remain with any of
+  them. The rule before (up to 0.13.0) took each as right, with its own share."""
 
 
 def write(truths: list[dict], found: Records, oracles: Records, mark: str, asked: tuple[int, int, int],

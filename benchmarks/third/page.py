@@ -23,34 +23,45 @@ VERDICTS = ("consistent", "undetermined", "unexplained", "empirical", "partial",
 SAID = """\
 ## What was done
 
-`python -m benchmarks.third.study FOLDER --count {count} --seed {seed} --page docs` makes the cases (job folders, as users
-write them), seals their truth by a hash, diagnoses them one after the other and asks an oracle; every result is a line in
-FOLDER, so that a run can be stopped and taken up again with `--resume`. Generator and oracle (`benchmarks/third/`, and what
-they take of `benchmarks/second/`) share no code with the package.
+`python -m benchmarks.third.study FOLDER --count {count} --seed {seed} --page docs` makes the cases as job folders, seals
+their truth by a hash, diagnoses them and asks an oracle; every result is a line in FOLDER, so that a run can be resumed
+with `--resume`. Generator and oracle (`benchmarks/third/`, and what they take of `benchmarks/second/`) share no code with
+the package.
 
-- **Recordings**: 20 to 40 ballbars twice, a step gauge on 7 to 12 lines there and back twice, a plate of sixteen balls in one
-  to three ways twice, and the twenty bars of the DEA Iota 1102 where they stood, whose residuals, dealt anew, are the noise
-  (*real*). Columns are there or not; the noise is stated in half, of these one in five wrongly by a factor of two; rows stand
-  in any order in three of ten; of one in seven the model is the prediction of another program.
+- **Recordings**: 20 to 40 ballbars twice, a step gauge on 7 to 12 lines there and back twice, a plate of sixteen balls in
+  one to three ways twice, and the twenty bars of the DEA Iota 1102, whose residuals, dealt anew, are the noise (*real*).
+  Columns are there or not; the noise is stated in half, of these one in five wrong by a factor of two; rows stand in any
+  order in three of ten; of one in seven the model is the prediction of another program.
 - **Noise** as in [the second study](diagnosis-second-study.md#what-was-done).
-- **Outside the catalogue**, two of five: *dictionary*, a step, dent, ramp, cubic, saturating curve (tanh), sawtooth,
-  exponential in time, sine with a harmonic, product of two positions, bowl, sign of motion or dead zone; *other*, a chirp,
-  |sine|, cusp, ripple, a random field of two positions, stick–slip and a random walk of position or time. √λ, the length of
-  what shows over the noise, is 3.5 to 25, evenly in its logarithm; every effect of the catalogue of the second study leaves
-  half of it.
-- **Inside**: *catalogue*, one or two effects of √λ 4.5 to 12; *squareness*, the three squarenesses and a job that names
-  nothing; *ratio*, two scales or squarenesses as 1 : 2, likewise.
-- **The oracle** of what is outside is told covariate, axis and noise. *Sees*: nothing is rejected at 1 %, by the most
-  surprising member of the dictionary or sum of cosines among 199 draws of noise. *Removes*: held-out rms, of set-ups or of
-  the points of few, with the true form of which it fits the size. *Decides*: the true form has odds of 20 : 1 against every
-  other form of the dictionary, a smooth function and nothing, all with the same prior for what they make visible. That of
-  the catalogue is the second study's, which estimates the noise.
-- **Located**: something is asserted, and the covariate is named in `where` or in the empirical model, or effects are named
-  that leave less than √λ = 2 of it. **Named**: the true form, or effects that leave less than that. **Wrong**: a name that is
-  neither the truth, nor said to be one with it, nor is it for all that is seen (√λ below 2), nor a form against which the
-  oracle has less than 20 : 1. Of *squareness* and *ratio* an effect is right only where the truth is said with it; against a
-  prediction, a scale or a squareness is right that is worth 20 : 1 of what is hidden.
-- Chains are a tenth as long as those of a diagnosis, and what to measure next is left out: nothing here counts either."""
+- Chains are a tenth as long as those of a diagnosis, and the next measurement is left out.
+
+√λ is the length of what shows over the noise.
+
+| hidden | √λ | what |
+| --- | --- | --- |
+| dictionary, other: two of five | 3.5 to 25, evenly in its logarithm | a step, dent, ramp, cubic, saturating curve \
+(tanh), sawtooth, exponential in time, sine with a harmonic, product of two positions, bowl, sign of motion or dead \
+zone; a chirp, absolute sine, cusp, ripple, random field of two positions, stick–slip or random walk of position or \
+time; every effect of the second study's catalogue leaves half of it |
+| catalogue | 4.5 to 12 | one or two effects |
+| squareness, ratio | | the three squarenesses; two scales or squarenesses as 1 : 2; both with a job that names nothing |
+
+| of the oracle, which outside the catalogue knows covariate, axis and noise | meaning |
+| --- | --- |
+| sees | "nothing" is rejected at 1 %, by the most surprising member of the dictionary or sum of cosines among 199 \
+draws of noise |
+| removes | held-out rms, of set-ups or of the points of few, with the true form and a fitted size |
+| decides | the true form has odds of 20 : 1 against every other form of the dictionary, a smooth function and \
+nothing, under equal priors |
+| catalogue | the second study's, which estimates the noise |
+
+| of the diagnosis | meaning |
+| --- | --- |
+| located | the covariate is named in `where` or in the empirical model, or effects that leave less than √λ = 2 |
+| named | the true form, or effects that leave less than that |
+| wrong | a name that is neither true, nor said to be one with the truth, nor equal to it as far as is seen (√λ below \
+2), nor a form against which the oracle has less than 20 : 1. Of *squareness* and *ratio* an effect is right only \
+where the truth is named with it; against a prediction also a scale or squareness worth 20 : 1 of what is hidden |"""
 
 
 @dataclass(frozen=True)
@@ -180,8 +191,8 @@ def _missed(every: Sequence[Judged]) -> list[str]:
             _of(one) for one in every if one.kind == "catalogue" and one.found == (False, True)
         ],
     }
-    return ["## What falls short", "", *(
-        f"- {title}: {'; '.join(cases) if cases else 'none'}." for title, cases in listed.items()
+    return ["## What falls short", "", "| what | cases |", "| --- | --- |", *(
+        f"| {title} | {'; '.join(cases) if cases else 'none'} |" for title, cases in listed.items()
     )]  # fmt: skip
 
 
