@@ -1,6 +1,6 @@
 """How often intervals hold of runs along axes: figures of ISO 230-2, named errors, and the map of curves of no known form.
 
-    python -m benchmarks.artefacts.axis_runs_coverage figures|errors|single|map|references|circles COUNT
+    python -m benchmarks.artefacts.axis_runs_coverage figures|errors|single|map|references|circles|certified COUNT [NOISE]
 
 The machine is simulated here, by its kinematics written out for the chain XYZ, and shares no code with the package.
 """
@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from scipy import stats
 
+from benchmarks.artefacts.weighed import intervals
 from cmm_uq.analysis.conformity.positioning import uncertainty_of_figures
 from cmm_uq.app.commands.jobs.compensate import write_new_map
 from cmm_uq.app.commands.reading import read_job
@@ -24,10 +26,8 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
-from cmm_uq.machine.model.noise import noise_of as components_of
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.geometry.circular import CircularTest
-from cmm_uq.maths.inference.posterior import sample_with_noise
 
 TRAVEL = np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]])
 MIDDLE, SECOND = TRAVEL.mean(axis=1), np.pi / 180 / 3600
@@ -94,6 +94,7 @@ class Machine:
 def recorded(
     machine: Machine, random: np.random.Generator, folder: Path, runs: list[tuple[int, int]], *, u: float = 0.4,
     sigma: float = 0.25, targets: int = 7, repeats: int = 3, names: list[str] | None = None, turning: float | None = None,
+    kind: str | None = None,
 ) -> Path:  # fmt: skip
     """A job of runs, each an axis and what is read: 0 … 2 a displacement along it, 3 … 5 a rotation about it."""
     rows, wrong = ["measurement,point,repeat,x_mm,y_mm,z_mm,reading_um,reading_arcsec," + ",".join(
@@ -108,12 +109,17 @@ def recorded(
         moved, turned = machine.error(xyz, OPTICS)
         moved[:, axis] += 0.5 * machine.gap[axis] * way
         zero, slope = random.normal(0, 20), random.normal(0, 5) if sense < 3 and sense != axis else 0.0
+        off = noise_of(kind, random, (repeats, len(at)), sigma) if kind else None
         for repeat in range(1, repeats + 1):
             read = (moved[:, sense] if sense < 3 else turned[:, sense - 3]) + zero + slope * at / 1000
             read = (
                 read
                 + (wrong * at / 1000 if sense == axis else 0.0)
-                + (sigma if turning is None or sense < 3 else turning) * random.normal(size=len(at))
+                + (
+                    (sigma if turning is None or sense < 3 else turning) * random.normal(size=len(at))
+                    if off is None
+                    else off[repeat - 1]
+                )
             )
             for k, value in enumerate(read):
                 cells = [number, k + 1, repeat, *xyz[k], value if sense < 3 else 0.0, value if sense >= 3 else 0.0]
@@ -131,29 +137,57 @@ def artefact(folder: Path) -> tuple[Job, Artefact]:
     return job, artefact_of(job.facts.artefact, job.points)
 
 
-def figures(count: int) -> None:
-    """U = 2 u of what a perfect instrument would have found on the same runs."""
-    held: dict[str, int] = {}
-    for seed in range(count):
-        random = np.random.default_rng([1, seed])
-        machine = Machine(random, smooth=True)
-        with tempfile.TemporaryDirectory() as name:
-            folder = recorded(machine, random, Path(name), [(0, 0)], sigma=0.3, repeats=5, u=0.0)
-            job, runs = artefact(folder)
-            true = runs.positionings()[1]
-            (folder / "job.toml").write_text(
-                (folder / "job.toml").read_text().replace("u_scale_um_per_m = 0.0", "u_scale_um_per_m = 0.4")
-            )
-            job, runs = artefact(folder)
+def figures(count: int, noises: tuple[str, ...] = ("white",)) -> None:
+    """U = 2 u of what a perfect instrument would have found on the same runs, by how the instrument's readings change."""
+    for kind in noises:
+        held, half = Counter[str](), Counter[str]()
+        for seed in range(count):
+            random = np.random.default_rng([1, seed])
+            machine = Machine(random, smooth=True)
+            with tempfile.TemporaryDirectory() as name:
+                folder = recorded(machine, random, Path(name), [(0, 0)], sigma=0.3, repeats=5, u=0.0)
+                job, runs = artefact(folder)
+                true = runs.positionings()[1]
+                (folder / "job.toml").write_text(
+                    (folder / "job.toml").read_text().replace("u_scale_um_per_m = 0.0", "u_scale_um_per_m = 0.4")
+                )
+                job, runs = artefact(folder)
             part = (true.targets - true.targets[0]) / np.ptp(true.targets)
             whole = random.normal(0, 0.4 * np.ptp(true.targets) / 1000) + random.normal(0, 0.3)
-            x = true.x + whole * part[None, :, None] + 0.2 * random.normal(size=true.x.shape)
+            _, targets, repeats = true.x.shape
+            off = noise_of(kind, random, (repeats, 2 * targets), 0.2)  # forth, and back through the same targets
+            there_and_back = np.stack([off[:, :targets].T, off[:, : targets - 1 : -1].T])
+            x = true.x + whole * part[None, :, None] + there_and_back
             read = replace(runs.positionings()[1], x=x)
             spread, found, at = uncertainty_of_figures(read, job.circumstances), read.figures(), true.figures()
             for figure, u in spread.items():
-                held[figure] = held.get(figure, 0) + (abs(found[figure] - at[figure]) <= 2 * u)
-    for figure, times in held.items():
-        print(f"| {figure} | {times} of {count} |")
+                held[figure] += abs(found[figure] - at[figure]) <= 2 * u
+                half[figure] += abs(found[figure] - at[figure]) <= u
+        told = (f"{name} {100 * n / count:.1f} % (half {100 * half[name] / count:.1f})" for name, n in held.items())
+        print(f"{kind}, {count}: " + "; ".join(told), flush=True)
+
+
+def certified(count: int, noises: tuple[str, ...]) -> None:
+    """95 % intervals of the certificate of eighteen runs, all errors named, by noise."""
+    runs = [(axis, sense) for axis in range(3) for sense in range(6)]
+    for kind in noises:
+        held, narrow = np.zeros(len(NAMES)), np.zeros(len(NAMES))
+        for seed in range(count):
+            random = np.random.default_rng([6, seed])
+            machine = Machine(random, smooth=False)
+            with tempfile.TemporaryDirectory() as name:
+                _, seen = artefact(recorded(machine, random, Path(name), runs, repeats=2, targets=6, kind=kind))
+            low, high = intervals(RecordingModel(seen, effects(NAMES)), seed, len(NAMES))
+            true = np.array([*machine.scale, *machine.gap, *machine.bow[~np.eye(3, dtype=bool)], *machine.turn.ravel()])
+            off = np.abs(true - 0.5 * (low + high)) / (0.5 * (high - low))
+            held, narrow = held + (off <= 1), narrow + (off <= 0.5)
+            if seed + 1 == count or (seed + 1) % 100 == 0:
+                told = []
+                for what in ("scale", "hysteresis", "straightness", "rotation"):
+                    own = [i for i, each in enumerate(NAMES) if each.startswith(what)]
+                    rates = (100 * each[own].mean() / (seed + 1) for each in (held, narrow))
+                    told.append("{} {:.1f} % (half {:.1f})".format(what, *rates))
+                print(f"{kind}, {seed + 1}: " + ", ".join(told), flush=True)
 
 
 def errors(count: int) -> None:
@@ -250,9 +284,7 @@ def against(key: str, rows: dict[str, np.ndarray], names: list[str], **facts: fl
     )
     seen = artefact_of(artefact_facts(kind="axis_runs", **{key: facts.pop(key), **facts}), points)
     model = RecordingModel(seen, effects(names))
-    about = model.estimate()
-    posterior = sample_with_noise(about.linear, components_of(model, in_turn=True), about.least_squares, 1)
-    low, high = np.percentile(posterior.draws[:, : len(names)], [2.5, 97.5], axis=0)
+    low, high = intervals(model, 1, len(names))
     return 0.5 * (low + high), 0.5 * (high - low)
 
 
@@ -272,8 +304,11 @@ def runs_of(
 
 
 def noise_of(kind: str, random: np.random.Generator, shape: tuple[int, int], sigma: float) -> np.ndarray:
-    """White; or slow: half of it white, and a random walk that is as large over a repeat; or with tails (t of 4)."""
+    """White; or slow: half of it white, and a random walk that is as large over a repeat; with tails (t of 4); by set-up:
+    half of it an offset of each repeat, of a circle of each sense."""
     white = random.standard_normal(shape)
+    if kind == "set-up":
+        return sigma * np.sqrt(0.5) * (white + random.standard_normal((shape[0], 1)))
     if kind == "tails":
         return sigma * random.standard_t(4, shape) / np.sqrt(2)
     if kind == "slow":
@@ -282,7 +317,7 @@ def noise_of(kind: str, random: np.random.Generator, shape: tuple[int, int], sig
     return sigma * white
 
 
-NOISES = ("white", "slow", "tails")
+NOISES = ("white", "slow", "tails", "set-up")
 
 
 def joined(parts: list[dict[str, np.ndarray]], **columns: list[float]) -> dict[str, np.ndarray]:
@@ -291,10 +326,10 @@ def joined(parts: list[dict[str, np.ndarray]], **columns: list[float]) -> dict[s
     return whole | {name: np.repeat(np.array(values), count) for name, values in columns.items()}
 
 
-def references(count: int) -> None:
+def references(count: int, noises: tuple[str, ...]) -> None:
     """Squareness by a square (its angle drawn of its u) and straightness by a straightedge turned over, by noise."""
     at = np.linspace(100.0, 800.0, 8)
-    for kind in NOISES:
+    for kind in noises:
         held = np.zeros(2)
         for seed in range(count):
             random = np.random.default_rng([4, seed])
@@ -320,14 +355,14 @@ def references(count: int) -> None:
         )
 
 
-def circles(count: int) -> None:
+def circles(count: int, noises: tuple[str, ...]) -> None:
     """Squareness, scales and plays of two axes by a circle, and U of G, H, F and D against a perfect bar on the same path."""
     angle = np.radians(np.arange(0, 360, 5))
     outward = np.column_stack([np.cos(angle), np.sin(angle)])
     tangent = np.column_stack([-np.sin(angle), np.cos(angle)])
     names = ["squareness_xy", "scale_x", "scale_y", "hysteresis_x", "hysteresis_y"]
-    for kind in NOISES:
-        held, figures_held = np.zeros(5), {}
+    for kind in noises:
+        held, narrow, figures_held, half_held = np.zeros(5), np.zeros(5), Counter[str](), Counter[str]()
         for seed in range(count):
             random = np.random.default_rng([5, seed])
             true = random.normal(0, [10, 15, 15, 2, 2])
@@ -350,26 +385,28 @@ def circles(count: int) -> None:
                 rows[f"read_{a}"] = np.tile(outward[:, i], 2) if i < 2 else np.zeros(144)
                 rows[f"turn_{a}"] = np.zeros(144)
             value, half = against("u_bar_um", rows, names, u_bar_um=0.4)
-            held += np.abs(value - true) <= half
+            held, narrow = held + (np.abs(value - true) <= half), narrow + (np.abs(value - true) <= 0.5 * half)
             targets, ones = np.degrees(angle), np.ones(72)
             made = [CircularTest(targets, x[:, :, None], "↺↻", u_reference=0.4, growth=ones, length_mm=150.0, calibrated=True)
                     for x in (actual, read)]  # fmt: skip
             spread = uncertainty_of_figures(made[1], Circumstances(uncertainty=TestUncertainty(u_repeat_um=0.3)))
             exact, found = (one.figures() for one in made)
             for figure, u in spread.items():
-                figures_held[figure] = figures_held.get(figure, 0) + (abs(found[figure] - exact[figure]) <= 2 * u)
-        told = [f"{name} {100 * one / count:.1f}" for name, one in zip(names, held, strict=True)]
-        told += [f"{figure} {100 * times / count:.1f}" for figure, times in figures_held.items()]
-        print(f"| {kind} | {count} | " + ", ".join(told) + " |", flush=True)
+                figures_held[figure] += abs(found[figure] - exact[figure]) <= 2 * u
+                half_held[figure] += abs(found[figure] - exact[figure]) <= u
+            if seed + 1 < count and (seed + 1) % 250:
+                continue
+            told = [f"{name} {100 * one / (seed + 1):.1f} (half {100 * other / (seed + 1):.1f})"
+                    for name, one, other in zip(names, held, narrow, strict=True)]  # fmt: skip
+            told += [f"{figure} {100 * times / (seed + 1):.1f} (half {100 * half_held[figure] / (seed + 1):.1f})"
+                     for figure, times in figures_held.items()]  # fmt: skip
+            print(f"| {kind} | {seed + 1} | " + ", ".join(told) + " |", flush=True)
 
 
 if __name__ == "__main__":
-    studies = {
-        "figures": figures,
-        "errors": errors,
-        "single": single,
-        "map": of_map,
-        "references": references,
-        "circles": circles,
-    }
-    studies[sys.argv[1]](int(sys.argv[2]))
+    by_noise = {"figures": figures, "references": references, "circles": circles, "certified": certified}
+    others = {"errors": errors, "single": single, "map": of_map}
+    if sys.argv[1] in by_noise:
+        by_noise[sys.argv[1]](int(sys.argv[2]), tuple(sys.argv[3:]) or NOISES)
+    else:
+        others[sys.argv[1]](int(sys.argv[2]))

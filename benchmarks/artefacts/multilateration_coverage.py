@@ -1,6 +1,6 @@
 """How often intervals hold of multilateration: the machine's errors, where stations stand, and targets by distances alone.
 
-    python -m benchmarks.artefacts.multilateration_coverage white|drift|slow COUNT
+    python -m benchmarks.artefacts.multilateration_coverage white|drift|slow|tails COUNT
 
 The machine is simulated by its kinematics written out for the chain XYZ, and shares no code with the package.
 """
@@ -80,9 +80,9 @@ def recorded(machine: Square, dead: np.ndarray, off: np.ndarray) -> Points:
 
 def drawn(kind: str, seed: int) -> tuple[Square, np.ndarray, Points]:
     """A machine, its dead paths and a recording; the interferometer's scale is wrong too."""
-    random = np.random.default_rng([["white", "drift", "slow"].index(kind), seed])
+    random = np.random.default_rng([["white", "drift", "slow", "tails"].index(kind), seed])
     machine, dead, q, t = Square(random), random.uniform(-300, 300, len(SET_UPS)), len(SET_UPS), len(targets())
-    off = SIGMA * random.normal(size=(q, t))
+    off = SIGMA * (random.standard_t(4, (q, t)) / np.sqrt(2) if kind == "tails" else random.normal(size=(q, t)))
     if kind == "drift":
         off += random.normal(0, DRIFT, (q, 1)) * SECONDS / 3600 * (np.arange(t) - (t - 1) / 2)
     if kind == "slow":

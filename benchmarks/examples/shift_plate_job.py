@@ -1,6 +1,6 @@
 """Writes the simulated example of a plate shifted and turned: 25 balls of an uncalibrated plate in seven placings in xy.
 
-Run:  python benchmarks/examples/shift_plate_job.py [FOLDER]
+Run:  python -m benchmarks.examples.shift_plate_job [FOLDER]
 
 Linearity, straightness, squareness and yaw are simple functions below; the noise comes from the seed, so two runs write the
 same bytes.
@@ -9,8 +9,8 @@ same bytes.
 from __future__ import annotations
 
 import numpy as np
-from written_job import write
 
+from benchmarks.examples.written_job import write
 from cmm_uq.base.points import Floats
 
 SEED = 20260103

@@ -229,9 +229,43 @@ def test_a_repeat_with_the_other_sign_is_refused_and_noise_alone_is_not() -> Non
         CmmUqError, match=r"line 22.*repeat 2 of measurement 1 reads as the others do with the other sign"
     ):
         AxisRuns(EXACT, joined(rows))
-    for seed in range(50):
-        rows["reading_um"] = np.random.default_rng(seed).normal(0, 1, 60)
+    for seed in range(200):
+        white = np.random.default_rng(seed).normal(0, 1, (3, 20))
+        for noise in (
+            white,
+            np.cumsum(white, axis=1),
+        ):  # what drifts within each repeat looks as turned over more often
+            rows["reading_um"] = noise.ravel()
+            AxisRuns(EXACT, joined(rows))
+
+
+def test_one_direction_of_a_repeat_with_the_other_sign_is_refused() -> None:
+    rows = read(run(1, X, repeats=3), 5.0)
+    back = (rows["repeat"] == 2) & (rows["approach_x"] < 0)
+    rows["reading_um"] = np.where(back, -rows["reading_um"], rows["reading_um"])
+    with pytest.raises(
+        CmmUqError, match=r"line 32.*repeat 2, in one direction, of measurement 1 reads as the others do"
+    ):
         AxisRuns(EXACT, joined(rows))
+
+
+def test_a_point_that_another_repeat_approaches_the_other_way_is_refused_and_runs_of_one_direction_in_turn_are_not() -> (
+    None
+):
+    rows = read(run(1, X, repeats=3))
+    rows["approach_x"] = np.where(rows["repeat"] == 3, -rows["approach_x"], rows["approach_x"])
+    with pytest.raises(CmmUqError, match=r"line 42.*point 1 of measurement 1 is approached the other way in repeat 3"):
+        AxisRuns(EXACT, joined(rows))
+    rows["approach_x"] = np.where(rows["repeat"] == 2, -1.0, 1.0)
+    assert len(AxisRuns(EXACT, joined(rows)).readings) == 60
+
+
+def test_positions_in_another_unit_are_refused() -> None:
+    rows = read(run(1, X))
+    rows["xyz"][:, 0] *= 25.4
+    with pytest.raises(CmmUqError, match=r"line 2.*measurement 1 goes 25.4 times the travel of X") as error:
+        AxisRuns(EXACT, joined(rows))
+    assert "positions in mm" in str(error.value)
 
 
 @pytest.mark.parametrize(("axis", "factor", "words"), [

@@ -21,6 +21,7 @@ from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.jobs.recording.beside import ShortGauge
 from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Forms, Indications
 from cmm_uq.machine.model.kind import Observed
+from cmm_uq.maths.geometry.positioning import PositioningRuns
 from cmm_uq.maths.uncertainty.quantity import nominal, significant
 
 _NAMED = 5  # Findings, or gaps of a numbering, that are named one by one
@@ -57,7 +58,10 @@ class OutsideReadings:
 
     def whole(self, kept: Artefact) -> Artefact:
         """An artefact, corrected or not, with what was left out of it."""
-        return kept if self.artefact is None else AsRecorded(kept, self.artefact, self)
+        if self.artefact is None:
+            return kept
+        same = len(kept.points) == np.sum(self.kept)  # else it has points of its own, and its readings are in columns
+        return AsRecorded(kept, self.artefact, self) if same else self.artefact
 
     def any_of(self, rows: Ints) -> NDArray[np.bool_]:
         """Which of some values (m,), each of several points (m, j), rest on a reading that was left out as outside."""
@@ -95,6 +99,9 @@ class Around(Artefact):
 
     def forms(self) -> Forms | None:
         return self.inner.forms()
+
+    def positionings(self) -> Mapping[int, PositioningRuns]:
+        return self.inner.positionings()
 
     def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
         if self.inner.indications() is not None:

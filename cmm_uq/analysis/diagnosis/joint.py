@@ -132,6 +132,20 @@ def joint_posterior(
     return JointPosterior(both, components, shapes)
 
 
+def finer(likely: Floats, step: float, low: float, high: float) -> Floats:
+    """Shapes about the likely ones, two at least, between the ends of what they may be."""
+    offsets = np.arange(-_FINER, _FINER + 1) / _FINER
+    fine = np.unique(np.round((likely[:, None] + step * offsets).ravel() / step * _FINER)) * step / _FINER
+    found = np.unique(np.clip(fine, low, high))
+    if len(found) == 1:  # all beyond one end
+        found = (
+            np.linspace(low, high, 2)
+            if high - low < step
+            else found + step / _FINER * np.array([0, 1 - 2 * (found[0] == high)])
+        )
+    return np.sort(found)
+
+
 def _shaped(result: SearchResult, model: RecordingModel, effect: Effect, values: Floats) -> Shaped:
     """An effect's columns on a fine grid of its shape, wherever the search found some probability."""
     explanations = result.first.explanations
@@ -141,11 +155,9 @@ def _shaped(result: SearchResult, model: RecordingModel, effect: Effect, values:
     even = even_scale(effect, np.array([explanations[index].members[m].shape[0] for m in member]))
     step = float(np.median(np.diff(np.sort(even)))) if len(even) > 1 else 0.1 * abs(float(even[0]))
     likely = even[evidence > evidence.max() - _IMPROBABLE]
-    offsets = np.arange(-_FINER, _FINER + 1) / _FINER
-    fine = np.unique(np.round((likely[:, None] + step * offsets).ravel() / step * _FINER)) * step / _FINER
     (shape,) = effect.shape
     low, high = np.sort(even_scale(effect, np.array([shape.low, shape.high])))
-    nodes = np.sort(from_even_scale(effect, np.unique(np.clip(fine, low, high))))
+    nodes = np.sort(from_even_scale(effect, finer(likely, step, low, high)))
     table = np.stack([model.seen(model.columns(effect, (float(node),), values), values) for node in nodes])
     keys = [unknown.key for unknown in model.unknowns]
     return Shaped([keys.index((effect.name, c.name)) for c in effect.coefficients], nodes, table)

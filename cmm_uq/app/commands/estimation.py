@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy import special
 
 from cmm_uq.analysis.conformity.accuracy import repeated_draws, with_uncertainty
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.plans import ALIGNED
+from cmm_uq.analysis.conformity.standards import statement
+from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.analysis.screening.columns import Finding, finding
 from cmm_uq.analysis.screening.screening import (
     counted_with,
@@ -19,10 +24,12 @@ from cmm_uq.analysis.screening.screening import (
     recurring_points,
     stretch_words,
 )
+from cmm_uq.artefacts import kind_of
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, PPM, unit
 from cmm_uq.certificate.result import LACK_OF_FIT, Contradiction, NoiseComponent, RecordingNoise
+from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model import Estimate, RecordingModel
 from cmm_uq.machine.model.artefact_doubt import growth
 from cmm_uq.machine.model.measurement import ARTEFACT
@@ -276,3 +283,18 @@ def accuracy(
     found = figures(apart=False)
     other = figures(apart=True) if causes else found
     return {name: max(one, other[name], key=lambda quantity: quantity.expanded) for name, one in found.items()}
+
+
+def decision(
+    job: Job, model: RecordingModel, findings: Sequence[Finding], i: int, figures: Mapping[str, Quantity] | None = None
+) -> Statement:
+    """The ``i``-th statement, from 1, that a job wishes, of all its readings as they were recorded.
+
+    Without ``figures`` of performance, which take a posterior, what cannot be decided is refused, and the values mean nothing.
+    """
+    kind = kind_of(job)
+    observe = partial(kind.observing("reported"), job.facts.artefact, where=job.recording_path)
+    known = defaultdict(lambda: Quantity(1.0, 1.0, (0.0, 2.0), unit("µm"))) if figures is None else figures
+    outside = OutsideReadings.of(job.points, findings, observe)
+    key, wish = f"[[conformity]] {i}", job.facts.conformity[i - 1]
+    return statement(wish, model.artefact, known, key, kind.tested, None, job.circumstances, outside)

@@ -7,8 +7,6 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
-from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.machine.regions import FactorRegions, factor_regions
 from cmm_uq.app.commands.certificates.further import JointRecordings, together_of
 from cmm_uq.app.commands.certificates.release import reissued, with_replaced
@@ -16,6 +14,7 @@ from cmm_uq.app.commands.diagnose import diagnose_model, screened_model
 from cmm_uq.app.commands.estimation import (
     accuracy,
     contradictions,
+    decision,
     named_draws,
     noise,
     parameters,
@@ -64,6 +63,8 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
 
     # screen, and model: damaged rows refused, exchanged and copied points named, gross errors set aside
     screened, findings = screened_model(job)
+    for i, _ in enumerate(job.facts.conformity, 1):
+        decision(job, screened, findings, i)  # what cannot be decided is refused before anything is sampled
 
     # estimate: least squares, a stated noise held against the residuals (χ²), then the posterior with the noise unknown
     model, estimate, p_value = with_noise(screened)
@@ -75,11 +76,7 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
     # figures of performance of the lengths as recorded, and decisions
     figures = accuracy(model, estimate, posterior, causes, seed)
     returning = accuracy(model, estimate, posterior, causes, seed, returning=True)
-    outside = OutsideReadings.of(job.points, findings, observe)
-    statements = tuple(
-        statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested, None, job.circumstances, outside)
-        for i, wish in enumerate(job.facts.conformity, 1)
-    )
+    statements = tuple(decision(job, model, findings, i, figures) for i, _ in enumerate(job.facts.conformity, 1))
 
     # diagnose: where several explanations remain, estimates are averages over them
     known = posterior if model.sigma == screened.sigma else None

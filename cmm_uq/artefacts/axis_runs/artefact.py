@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.artefacts.axis_runs.denied import refuse_denied
 from cmm_uq.artefacts.axis_runs.kind import READ, TURN, AxisRunsFacts
 from cmm_uq.artefacts.axis_runs.run import (
     ACROSS,
@@ -30,7 +31,6 @@ from cmm_uq.artefacts.axis_runs.run import (
     circle_axes,
     kinds_of,
     profiles,
-    read_otherwise,
     reference_shape,
     refuse,
     reversed_profile,
@@ -39,7 +39,6 @@ from cmm_uq.artefacts.axis_runs.run import (
     scatter,
     senses_of,
     squares,
-    turned_over,
 )
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
@@ -124,15 +123,8 @@ class AxisRuns(Artefact):
                 xyz = points.xyz[run.rows]
                 target[run.rows] = run.radius + run.sense @ (xyz - run.radius * run.sense).mean(axis=0)
         readings = self._in_mm(points, kind, target, where)
-        for run in runs if len(points.lines) else ():
-            if (one := turned_over(run, readings[run.rows], points.repeat[run.rows])) is not None:
-                wrong = (points.measurement == run.measurement) & (points.repeat == one)
-                problem = f"repeat {one} of measurement {run.measurement} reads as the others do with the other sign"
-                refuse(points, wrong, where, problem, "Turn its readings over, or leave it out")
-        if len(points.lines) and (found := read_otherwise(points, runs, readings)):
-            number, other, what = found
-            problem = f"measurement {number} reads the line of measurement {other} {what}"
-            refuse(points, points.measurement == number, where, problem, "Mend the one that is wrong, or leave it out")
+        if len(points.lines):
+            refuse_denied(points, runs, readings, where)
         zero = self._zeros_of(points).means(readings)
         if self._facts.u_bar_um is not None:
             zero[kind == CIRCLE] = 0.0

@@ -15,7 +15,7 @@ from cmm_uq.artefacts.axis_runs.kind import APPROACHES, READ, TURN
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
-from cmm_uq.base.units import ARCSECOND, METRE
+from cmm_uq.base.units import METRE
 from cmm_uq.machine.model.recorded import place
 
 ALONG, ACROSS, TURNING, CIRCLE = "along", "across", "turning", "circle"
@@ -26,10 +26,9 @@ END, TARGET, START, ZERO = "_arm_end", "_target_mm", "_start_mm", "_zero_mm"
 STRAIGHTEDGE, SQUARE = "straightedge", "square"  # columns: +1, and −1 reversed; number of the setting
 _UNIT, _SAME_MM = 0.01, 1e-6
 _ALONG, _ACROSS = 0.999, 0.05  # cosines between what is read and the travel
-_OPPOSITE = 16.0  # how much nearer a repeat is to the others with its sign changed, in squares, to be one turned over
-_COMMON, _SLOPE = 8, 1e-6 / ARCSECOND  # targets by which two runs of one line are compared; 1 µm/m in ″
 _CUBIC = 5  # targets of which one lies between two on either side
 _ROUND = 0.02  # of its radius, by which targets may be off a circle
+_BEYOND = 2.0  # times the travel of an axis, from which on positions along it are in another unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,62 +99,6 @@ def roughness(run: Run, readings: Floats, repeat: Ints) -> tuple[float, int]:
         )
         count += len(where)
     return squares, count
-
-
-def turned_over(run: Run, readings: Floats, repeat: Ints) -> int | None:
-    """The repeat whose readings (k,) are those of the others with the other sign; ``None`` where there is none such.
-
-    Noise does not look so: the mean of others is smaller than it.
-    """
-    where = np.column_stack([np.round(run.positions / _SAME_MM), run.directions])
-    index = np.unique(where, axis=0, return_inverse=True)[1].ravel()
-    for one in np.unique(repeat) if len(np.unique(repeat)) > 2 else ():
-        means = []
-        for rows in (repeat == one, repeat != one):
-            count = np.maximum(np.bincount(index[rows], minlength=index.max() + 1), 1)
-            means.append(np.bincount(index[rows], readings[rows], index.max() + 1) / count)
-        own, others = means
-        own, others = own - own.mean(), others - others.mean()
-        if np.sum((own - others) ** 2) > _OPPOSITE * np.sum((own + others) ** 2):
-            return int(one)
-    return None
-
-
-def read_otherwise(points: Points, runs: tuple[Run, ...], readings: Floats) -> tuple[int, int, str] | None:
-    """Two measurements of one line of which the later reads as the first does with the other sign, or in another unit.
-
-    Of eight targets in common at least; readings against a straightedge or a square may differ so.
-    """
-    names = tuple(f"tip_{a}_mm" for a in AXES)
-    against = np.any([points.columns.get(name, np.zeros(len(points))) != 0 for name in (STRAIGHTEDGE, SQUARE)], axis=0)
-    first: dict[tuple[float, ...], tuple[Run, dict[tuple[float, float], float]]] = {}
-    for run in runs:
-        if run.kind == CIRCLE or against[run.rows].any():
-            continue
-        beside = points.xyz[run.rows[0]] - (points.xyz[run.rows[0]] @ run.travel) * run.travel
-        line = np.concatenate([run.travel, run.sense, beside, _vectors(points, names)[run.rows[0]]])
-        key = (run.kind == TURNING, *(np.round(line, 2) + 0.0).tolist())
-        at: dict[tuple[float, float], list[float]] = {}
-        for target, way, value in zip(run.positions + run.start, run.directions, readings[run.rows], strict=True):
-            at.setdefault((round(float(target), 2), float(way)), []).append(float(value))
-        means = {where: float(np.mean(each)) for where, each in at.items()}
-        other, those = first.setdefault(key, (run, means))
-        common = sorted(set(means) & set(those))
-        if other is run or len(common) < _COMMON:
-            continue
-        own, before = (np.array([each[where] for where in common]) for each in (means, those))
-        free = np.vander([target for target, _ in common], 2 if run.kind == ACROSS else 1)
-        own, before = (each - free @ np.linalg.lstsq(free, each, rcond=None)[0] for each in (own, before))
-        words = {-1.0: "with the other sign"}
-        if run.kind == TURNING:
-            words |= {
-                1 / _SLOPE: "4.85 times as large, as µm/m are",
-                _SLOPE: "0.206 times as large, as ″ against µm/m are",
-            }
-        for factor, what in words.items():
-            if np.sum((own - before) ** 2) > _OPPOSITE * np.sum((own - factor * before) ** 2):
-                return run.measurement, other.measurement, what
-    return None
 
 
 def reference_shape(run: Run, at: Floats) -> Floats:
@@ -277,7 +220,7 @@ def refuse(points: Points, rows: NDArray[np.bool_], where: str | None, problem: 
         raise CmmUqError(problem, where=place(points, rows, where), fix=fix)
 
 
-def _vectors(points: Points, names: tuple[str, ...]) -> Floats:
+def vectors(points: Points, names: tuple[str, ...]) -> Floats:
     """(n, 3) of columns, those that are not there being zero."""
     return np.column_stack([points.columns.get(name, np.zeros(len(points))) for name in names])
 
@@ -304,14 +247,14 @@ def _circle(points: Points, number: int, rows: Ints, senses: Floats) -> Run | No
     if START in points.columns:
         run = replace(run, radius=float(points.columns[START][rows[0]]))
     along, across = (senses @ circle_axes(run)).T
-    forward = np.sum(_vectors(points, APPROACHES)[rows] * np.cross(axis, senses), axis=1)
+    forward = np.sum(vectors(points, APPROACHES)[rows] * np.cross(axis, senses), axis=1)
     angles = np.round(np.degrees(np.arctan2(across, along)), 3) % 360
     return replace(run, positions=angles, directions=np.sign(np.round(forward, 9)))
 
 
 def runs_of(points: Points, where: str | None) -> tuple[Run, ...]:
     """The runs of a recording; what is none is refused."""
-    read, turn = _vectors(points, READ), _vectors(points, TURN)
+    read, turn = vectors(points, READ), vectors(points, TURN)
     found = []
     for number, rows in zip(np.unique(points.measurement).tolist(), rows_by(points.measurement), strict=True):
         own = points.measurement == number
@@ -326,6 +269,14 @@ def runs_of(points: Points, where: str | None) -> tuple[Run, ...]:
                 f"measurement {number} stands still: all its positions are one",
                 "Give the position of every reading as x_mm, y_mm, z_mm",
             )
+        far = np.ptp(points.xyz[rows], axis=0) / np.ptp(points.machine.travel_mm, axis=1)
+        refuse(
+            points,
+            own & bool(far.max() > _BEYOND),
+            where,
+            f"measurement {number} goes {far.max():.3g} times the travel of {AXES[int(far.argmax())].upper()}",
+            "Give positions in mm, or mend travel_mm in [machine]",
+        )
         travel = travel / length
         travel = travel * np.sign(travel[int(np.argmax(np.abs(travel)))])
         turns = bool(np.any(turn[rows]))
@@ -377,6 +328,6 @@ def runs_of(points: Points, where: str | None) -> tuple[Run, ...]:
                 f"measurement {number} has {len(targets)} positions: a straightness needs three",
                 "Record more positions, or leave it out",
             )
-        directions = np.sign(np.round(_vectors(points, APPROACHES)[rows] @ travel, 9))
+        directions = np.sign(np.round(vectors(points, APPROACHES)[rows] @ travel, 9))
         found.append(Run(number, kind, rows, travel, sense, start, positions, directions))
     return tuple(found)

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.csv_table import number_problem
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, Sheet, sheets_of
@@ -21,7 +22,7 @@ from cmm_uq.jobs.importing.reports import TextReport
 
 _SECTION, _KEY = re.compile(r"([A-Z][A-Z -]{0,40})::"), re.compile(r"([A-Za-z][\w -]{0,40}?)\s{0,9}:\s{0,9}(.{0,200})")
 _LINEAR, _TRIPLE = {"linear", ""}, 3
-_AGAIN = "Export the runs anew"
+_AGAIN, _SHOWN = "Export the runs anew", 40
 HEADINGS = [
     "measurement", "point", "repeat", *(f"{a}_mm" for a in AXES), "reading_um", *(f"read_{a}" for a in AXES),
     *(f"approach_{a}" for a in AXES),
@@ -72,10 +73,10 @@ class _Runs:
 
     @staticmethod
     def _figures(text: str, place: str) -> list[float]:
-        try:
-            return [float(figure) for figure in text.split()]
-        except ValueError:
-            raise CmmUqError(f"{text!r} holds no figures", where=place, fix=_AGAIN) from None
+        figures = text.split()
+        if any(number_problem(figure) for figure in figures):
+            raise CmmUqError(f"{text[:_SHOWN]!r} holds no figures", where=place, fix=_AGAIN)
+        return list(map(float, figures))
 
     def ways(self) -> Iterator[tuple[int, float]]:
         """Number and sense of each run: by the order of its targets; none where all are listed in the same one."""
@@ -88,6 +89,13 @@ class _Runs:
 class Rtl(TextReport):
     name, title = "rtl", say("Laser interferometer (RTL)")
     shows = (re.compile(r"^\s{0,9}TARGET DATA::", re.M), re.compile(r"^\s{0,9}Target-count\s{0,9}:", re.M))
+
+    def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
+        sheets = super().read(content, where, keys)
+        last = content.count(b"\n") + 1
+        if not content.endswith((b"\n", b"\r", b"\0")) and any(last in sheet.lines for sheet in sheets):
+            raise CmmUqError("ends within a figure: the file was cut off", where=f"{where} line {last}", fix=_AGAIN)
+        return sheets
 
     def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
         found = _Runs(lines, where)

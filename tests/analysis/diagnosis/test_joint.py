@@ -12,7 +12,7 @@ from cmm_uq.analysis.diagnosis.comparison.combinations import Combination, Combi
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
-from cmm_uq.analysis.diagnosis.joint import UNRESOLVED, Mode, _peaks, _too_little, period_settled
+from cmm_uq.analysis.diagnosis.joint import UNRESOLVED, Mode, _peaks, _too_little, finer, period_settled
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.plate import Plate
 from cmm_uq.base.messages import say
@@ -114,3 +114,11 @@ def test_places_at_unequal_distances_do() -> None:
     low, high = item.parameters["period_mm"].interval95
     assert low < PERIOD < high
     assert high - low < 0.1
+
+
+@pytest.mark.parametrize(("likely", "step"), [(0.5, 0.1), (1.5, 0.1), (-0.5, 0.1), (3.0, 5.0), (0.0, 1e-9)])
+def test_shapes_to_draw_from_are_two_at_least_wherever_the_likely_ones_lie(likely: float, step: float) -> None:
+    found = finer(np.array([likely]), step, 0.0, 1.0)
+    assert len(found) >= 2
+    assert np.all(np.diff(found) > 0)
+    assert (found[0] >= 0.0, found[-1] <= 1.0) == (True, True)

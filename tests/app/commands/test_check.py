@@ -15,9 +15,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cmm_uq.app.commands.estimation import decision
 from cmm_uq.app.commands.jobs.check import Problem, check_job, in_lines
 from cmm_uq.app.commands.jobs.exchange import own_format, read_export, write_job_of_export, write_recording
 from cmm_uq.app.commands.jobs.simulate import simulated_job
+from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError, OutputError
@@ -101,6 +103,34 @@ def test_what_stops_report_stops_check_and_nothing_else_does(
     with pytest.raises(CmmUqError):
         write_report(gauge, tmp_path / "report")
     assert any(told in one.problem for one in found.problems)
+
+
+def test_a_decision_that_a_reading_too_few_forbids_stops_check_and_stops_report_before_it_samples(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = Path(shutil.copytree(ROOT / "examples" / "axis-runs-simulated", tmp_path / "job"))
+    change(job / "recording.csv", r"^1,2,1,.*\n", "")
+    (problem, _) = check_job(job).problems
+    assert re.search("target .* needs one", problem.problem)
+    assert (problem.key, problem.line) == (
+        "[[conformity]] 1 standard",
+        change(job / "job.toml", r"^standard = ", "standard = "),
+    )
+    monkeypatch.setattr("cmm_uq.app.commands.report.sample_with_noise", lambda *_: pytest.fail("sampled"))
+    with pytest.raises(CmmUqError, match=re.escape(problem.problem)):
+        write_report(job, tmp_path / "report")
+
+
+def test_runs_are_decided_where_the_place_of_another_reading_is_damaged(tmp_path: Path) -> None:
+    """Runs of rotations have points of their own, more than readings: these could not be put back for decisions."""
+    job = Path(shutil.copytree(ROOT / "examples" / "axis-runs-simulated", tmp_path / "job"))
+    expected = decision(read_job(job), *recorded_model(read_job(job)), 1)
+    change(job / "recording.csv", r"^(2,3,1,[^,]*,[^,]*),[^,]*", "2,3,1,315.00000,600.00000,-0.001")
+    read = read_job(job)
+    model, findings = recorded_model(read)
+    assert [finding.set_aside for finding in findings] == [True]
+    assert decision(read, model, findings, 1).value_um == pytest.approx(expected.value_um, rel=1e-9)
+    assert check_job(job).sound
 
 
 def test_what_the_certificate_warns_of_is_told_with_the_key_that_mends_it(iota: Path) -> None:

@@ -66,6 +66,11 @@ def test_runs_all_listed_in_one_order_have_no_direction() -> None:
         (written().replace(" 1 3 2.200", " 1 9 2.200"), "line 26: is no run, target and deviation"),
         (written().replace(" 1 3 2.200", " 1 3 two"), "line 26: ' *1 3 two' holds no figures"),
         (written().split("DEVIATIONS::")[0], r"has 0 of 2 \(run-count\)"),
+        (written().replace(" 1 3 2.200", " 1 3 2_200"), "line 26: ' *1 3 2_200' holds no figures"),
+        (written().replace(" 1 3 2.200", " 1 3 １２"), "line 26: ' *1 3 １２' holds no figures"),
+        (written().replace(" 1 3 2.200", " 1 3 nan"), "line 26: ' *1 3 nan' holds no figures"),
+        (written().replace("500.000 \r", "5_00.000 \r"), "line 11: '5_00.000' holds no figures"),
+        (written(back=False).partition("4.100\r")[0] + "4.1", "line 35: ends within a figure: the file was cut off"),
     ],
 )
 def test_a_damaged_file_is_refused_with_its_place(text: str, said: str) -> None:

@@ -16,6 +16,7 @@ from typing import Any
 
 from cmm_uq.analysis.conformity.standards import decidable
 from cmm_uq.app.commands.certificates.further import further_certificates, verify_further
+from cmm_uq.app.commands.estimation import decision
 from cmm_uq.app.commands.model import recorded_model, refuse_unmeasured
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import kind_of
@@ -233,6 +234,9 @@ def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
     model, findings = recorded_model(job)
     with wrong.going_on():
         model.estimate()
+    for i, _ in enumerate(facts.conformity, 1):
+        with wrong.going_on():
+            decision(job, model, findings, i)
     with wrong.going_on():
         further_certificates(job, job, verify_further(job))
     lines = ((one, one.lines[0] if one.lines else None) for one in findings)
