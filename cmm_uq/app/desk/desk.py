@@ -131,8 +131,9 @@ class Desk:
 
     def home(self, request: WebRequest) -> WebPage:
         request.only(())
-        states = (self._checked(state_of(self.root, folder)) for folder in jobs_in(self.root))
-        return jobs.home_page(self.root, states, self.drafts.every())
+        folders = jobs_in(self.root)
+        states = (self._checked(state_of(self.root, folder)) for folder in folders[: jobs.LISTED])
+        return jobs.home_page(self.root, states, self.drafts.every(), len(folders))
 
     def _checked(self, one: JobState) -> JobState:
         """With what check said of it, unless it was changed since."""
@@ -249,7 +250,7 @@ class Desk:
     def verify(self, request: WebRequest) -> WebPage:
         request.only(())
         with tempfile.TemporaryDirectory(prefix="cmm-uq-") as folder:
-            name = received(request, Path(folder))
+            name = received(request, Path(folder), written=True)
             return verify_page(name, self.reader.ask("verification", seconds=VERIFY_S, path=str(Path(folder) / name)))
 
     def _check_folder(self, name: str) -> None:

@@ -118,13 +118,13 @@ class DraftFolder:
             write_over(path, as_json(kept), sha256(path.read_bytes()) if path.exists() else "")
 
 
-def received(request: WebRequest, folder: Path) -> str:
+def received(request: WebRequest, folder: Path, *, written: bool = False) -> str:
     """Name of a file that was dropped, once it lies in a folder, whole, and over nothing."""
     unfinished = folder / f".unfinished-{secrets.token_hex(8)}"
     try:
         with unfinished.open("wb") as file:
             dropped = read_dropped(request, file, TABLE_BYTES.most)
-        name = safe_name(dropped.name)
+        name = safe_name(dropped.name, written=written)
         if (folder / name).exists():
             raise CmmUqError("is there already", where=name, fix="Give the file another name")
         unfinished.rename(folder / name)

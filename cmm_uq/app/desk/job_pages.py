@@ -41,7 +41,7 @@ JOB, RUN, CANCEL, CERTIFICATE, FILE = (f"{DESK}/{name}" for name in ("job", "run
 PART, POINTS, DELETE, EVENTS = (f"{DESK}/{name}" for name in ("part", "points", "delete", "events"))
 FIELD = f"{DESK}/field.json"
 RESULTS, REPORTS = "results.json", "reports"
-MOST_FILES = 100
+MOST_FILES, LISTED = 100, 200
 _ID = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 
 
@@ -106,7 +106,7 @@ def state_of(root: Path, folder: Path) -> JobState:
     return JobState(name, own, of, part, decision, made, current, NOTHING, files)
 
 
-def home_page(root: Path, jobs: Iterable[JobState], drafts: Iterable[Draft]) -> WebPage:
+def home_page(root: Path, jobs: Iterable[JobState], drafts: Iterable[Draft], count: int) -> WebPage:
     rows = []
     for one in jobs:
         result = Cell(say("Certificate"), address(CERTIFICATE, name=one.name)) if one.made else Cell(NOTHING)
@@ -114,7 +114,9 @@ def home_page(root: Path, jobs: Iterable[JobState], drafts: Iterable[Draft]) -> 
             (Cell(Verbatim(one.name), address(JOB, name=one.name)), Cell(p.shown(one.machine)), one.standing, result)
         )
     headings = p.columns(say("Job"), say("Machine"), say("State"), say("Result"))
-    table = PageTable(say("Jobs"), headings, tuple(rows), say("No job lies here yet: drop an export."), heard=True)
+    more = (say("The newest {shown} of {count}.", shown=LISTED, count=count),) if count > LISTED else ()
+    none = say("No job lies here yet: drop an export.")
+    table = PageTable(say("Jobs"), headings, tuple(rows), none, more, heard=True)
     begun = tuple(Cell(Verbatim(one.name), address(PART if one.part else READ, draft=one.id)) for one in drafts)
     formats = say("CSV, text, .xlsx, .ods, PC-DMIS, Calypso, DMIS, QIF, I++: as the measuring program wrote it")
     hint = say("{formats}; at most {most} MB.", formats=formats, most=number(TABLE_BYTES.most // 2**20))

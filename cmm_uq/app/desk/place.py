@@ -12,13 +12,12 @@ import re
 import tempfile
 import threading
 import unicodedata
-from collections.abc import Iterator
 from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import JOB_BYTES
-from cmm_uq.jobs.source import check_name
+from cmm_uq.jobs.source import check_name, device_name
 
 LONGEST = 100  # characters of a name that is made of a dropped one
 DEEPEST = 6  # folders below the root that a path may lead through
@@ -27,8 +26,8 @@ OWN = ".cmm-uq"  # folder of the desk's own files in the root
 _writing = threading.Lock()
 
 
-def safe_name(name: str) -> str:
-    r"""A file name that every system takes, and no command writes, as near as can be to one from elsewhere.
+def safe_name(name: str, *, written: bool = False) -> str:
+    r"""A file name that every system takes, as near as can be to one from elsewhere; none that a command has ``written``.
 
     Examples
     --------
@@ -47,7 +46,8 @@ def safe_name(name: str) -> str:
     try:
         check_name(plain, "")
     except CmmUqError:
-        plain = f"{FOREIGN}-{plain}" if plain else FOREIGN
+        if not (plain and written) or device_name(plain):
+            plain = f"{FOREIGN}-{plain}" if plain else FOREIGN
     return plain
 
 
@@ -115,14 +115,13 @@ def write_over(path: Path, content: bytes, seen: str) -> None:
             ) from None
 
 
-def jobs_in(root: Path, most: int = 300) -> Iterator[Path]:
-    """Folders of jobs in the root and one level below, by name."""
-    count = 0
-    for folder in sorted(path for pattern in ("*/job.toml", "*/*/job.toml") for path in root.glob(pattern)):
-        parts = folder.relative_to(root).parts[:-1]
-        linked = any(one.is_symlink() for one in (folder, *folder.parents[: len(parts)]))
-        if any(part[0] == "." for part in parts) or parts[0] == "reports" or linked:
-            continue
-        count += 1
-        if count <= most:
-            yield folder.parent
+def jobs_in(root: Path) -> list[Path]:
+    """Folders of jobs in the root and one level below, the newest first."""
+    found: dict[Path, float] = {}
+    for file in (path for pattern in ("*/job.toml", "*/*/job.toml") for path in root.glob(pattern)):
+        parts = file.relative_to(root).parts
+        linked = any(one.is_symlink() for one in (file, *file.parents[: len(parts) - 1]))
+        if not (linked or parts[0] == "reports" or any(part[0] == "." for part in parts)):
+            with contextlib.suppress(OSError):
+                found[file.parent] = file.stat().st_mtime
+    return sorted(found, key=lambda folder: (-found[folder], folder))

@@ -40,9 +40,8 @@ def verify_page(name: str = "", found: Mapping[str, Any] | None = None) -> WebPa
         )
         for wrong, what, count in found["checks"]
     )
-    table = p.PageTable(
-        say("What was compared"), p.columns(say("Is"), say("What"), (say("Things"), "number")), rows, heard=True
-    )
+    headings = p.columns(say("Is"), say("What"), (say("Things"), "number"))
+    table = p.PageTable(say("Comparisons"), headings, rows, heard=True)
     wrong: tuple[Block, ...] = tuple(PageParagraph(Verbatim(one)) for one in found["findings"])
     left: tuple[Block, ...] = tuple(PageParagraph(Verbatim(one), "note") for one in found["unchecked"])
     again = p.SourceText(say("Command"), f"cmm-uq verify {name}")

@@ -120,7 +120,7 @@ def verification(path: str) -> dict[str, Any]:
     checks = [
         [any(one.check == name for one in inquiry.findings), what, inquiry.done.get(name, 0)]
         for name, what in CHECKS.items()
-        if name in inquiry.done or any(one.check == name for one in inquiry.findings)
+        if inquiry.done.get(name) or any(one.check == name for one in inquiry.findings)
     ]
     signed = next((note for note in inquiry.notes if "sign" in note.lower()), "Nobody has signed it electronically.")
     decided = ((given.results[1].get("verdicts") or {}) if given.results is not None else {}).get("overall", "none")

@@ -198,6 +198,8 @@ def test_files_of_the_folder_are_shown_in_a_sandbox(worked: Visitor, name: str, 
     assert "frame-ancestors 'self'" in policy
     assert answer.headers["x-content-type-options"] == "nosniff"
     assert answer.headers["content-disposition"].startswith("attachment" if name == "run.js" else "inline")
+    kept = worked.get(f"/desk/file?at=K-1/{name}&keep=yes")
+    assert kept.headers["content-disposition"].startswith("attachment")
     (worked.desk.root / "K-1" / name).unlink()
 
 

@@ -8,7 +8,7 @@ from pathlib import Path, PureWindowsPath
 import pytest
 from hypothesis import given, strategies as st
 
-from cmm_uq.app.desk.place import LONGEST, ChangedError, below, parts_of, safe_name, sha256, write_over
+from cmm_uq.app.desk.place import LONGEST, ChangedError, below, jobs_in, parts_of, safe_name, sha256, write_over
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.source import check_name
 
@@ -42,6 +42,13 @@ def test_names_keep_what_can_be_kept(name: str, safe: str) -> None:
     assert safe_name(name) == safe
 
 
+@pytest.mark.parametrize(
+    ("name", "safe"), [("certificate.pdf", "certificate.pdf"), ("../con.pdf", "export-con.pdf"), ("", "export")]
+)
+def test_a_certificate_that_is_only_looked_at_keeps_its_name(name: str, safe: str) -> None:
+    assert safe_name(name, written=True) == safe
+
+
 @given(st.lists(st.one_of(NAMES, st.just("..")), max_size=8).map("/".join))
 def test_a_path_that_is_taken_leads_nowhere_else(path: str) -> None:
     try:
@@ -73,6 +80,17 @@ def test_links_are_not_followed(tmp_path: Path) -> None:
     for path in ("folder/secret.txt", "folder", "file.txt"):
         with pytest.raises(CmmUqError, match="is a link"):
             below(root, path)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a right there")
+def test_jobs_are_listed_newest_first_and_none_from_elsewhere(tmp_path: Path) -> None:
+    root = tmp_path / "root"
+    for i, name in enumerate(("a", "2026/b", "reports/c", ".hidden/d", "../elsewhere/e")):
+        (root / name).mkdir(parents=True)
+        (root / name / "job.toml").touch()
+        os.utime(root / name / "job.toml", (i, i))
+    (root / "linked").symlink_to(tmp_path / "elsewhere")
+    assert [folder.relative_to(root).as_posix() for folder in jobs_in(root)] == ["2026/b", "a"]
 
 
 def test_what_was_changed_meanwhile_is_not_written_over(tmp_path: Path) -> None:
