@@ -151,6 +151,7 @@ class Information:
     unknowns: tuple[Unknown, ...]
     each: Floats  # (c, k, k) of every set-up; there may be more rows than unknowns, of freedoms that all set-ups share
     prior: Floats  # (k, k) of the certificates, without that of the effects
+    sought: tuple[int, ...] = ()  # rows of sizes of the artefact that are to be determined with the effects
 
     def where(self, effects: Sequence[Effect]) -> list[int]:
         names = {effect.name for effect in effects}
@@ -158,8 +159,8 @@ class Information:
 
     @property
     def nuisance(self) -> list[int]:
-        """Rows of the artefact's sizes and of what all set-ups share."""
-        effects = [i for i, unknown in enumerate(self.unknowns) if unknown.key[0] != ARTEFACT]
+        """Rows of the artefact's sizes that are not sought, and of what all set-ups share."""
+        effects = [i for i, unknown in enumerate(self.unknowns) if unknown.key[0] != ARTEFACT or i in self.sought]
         return [i for i in range(len(self.prior)) if i not in effects]
 
 
@@ -171,7 +172,10 @@ def set_up_information(setting: Setting, placings: Sequence[SetUp], also: tuple[
     numbers = np.unique(points.measurement)
     models = [setting.model(points.select(points.measurement == number), also) for number in numbers]
     matrices = [gram(model, np.array([u.prior_mean for u in model.unknowns]), setting.noise) for model in models]
-    return Information(models[0].unknowns, np.stack(matrices), certified(models[0].unknowns))
+    unknowns, sizes = models[0].unknowns, models[0].artefact.sizes
+    names = {(ARTEFACT, size.name) for size in sizes if size.role == "sought"}
+    sought = tuple(i for i, unknown in enumerate(unknowns) if unknown.key in names)
+    return Information(unknowns, np.stack(matrices), certified(unknowns), sought)
 
 
 def recording_information(setting: Setting, points: Points, also: tuple[Effect, ...] = ()) -> Floats:

@@ -275,7 +275,7 @@ def _searched(
     known = choice.set_up_information(setting, possible, rivals)
     existing = known.prior + choice.recording_information(setting, start.points, rivals)
     size = np.diag(known.each.sum(axis=0) + existing)  # only effects of which something could show anywhere
-    wanted = known.where(rivals) if plan.criterion == "separation" else known.where(setting.named)
+    wanted = known.where(rivals) if plan.criterion == "separation" else [*known.where(setting.named), *known.sought]
     wanted = [i for i in wanted if size[i] > 1e-12 * size.max()]
     if not wanted:
         raise CmmUqError("no candidate placing shows any of these effects", where="job.toml [model] effects",

@@ -177,7 +177,8 @@ class ScannedBallbar(Ballbar):
         told = np.linalg.svd(self._along(self._attitude), compute_uv=False)
         if np.abs(np.diff(self._attitude.reshape(-1, 2, 3, 3), axis=1)).max() < 1e-9:
             return False
-        if len(told) == 3 and told[-1] > _TOLD * np.sqrt(len(self.rows)):
+        planned = not (len(self.points.lines) or np.ptp(self.measurement))  # bar by bar, of which none tells it alone
+        if planned or (len(told) == 3 and told[-1] > _TOLD * np.sqrt(len(self.rows))):
             return True
         problem = "the attitudes in which the two ends of the bars are seen leave part of [U1 V1 W1] open"
         both = "one end of a bar in one of them and the other in another, on bars along all axes"
@@ -208,20 +209,26 @@ SCREENING = Screening(shape_of, balls=True)
 
 
 _PLANNED_RADIUS = 38.1  # mm, of balls that are not scanned yet
+_WAYS = 6  # in which two ends are seen in two of three attitudes
 
 
 def positions(setting: Setting) -> tuple[SetUp, ...]:
     """Those of a bar; where a digitizer scans it, each end in an attitude of its own, all readings within the volume."""
-    facts, volume = cast("BallbarFacts", setting.artefact), setting.volume
-    if facts.offset_mm is None:
+    if cast("BallbarFacts", setting.artefact).offset_mm is None:
         return ballbar.ballbar_positions(setting)
-    scans = [scan(euler_313(*np.radians(each)), np.array(facts.offset_mm), _PLANNED_RADIUS) for each in THREE]
+    scans, within = _scans(setting)
+    return tuple(_scanned(placing, scans, i) for i, placing in enumerate(ballbar.ballbar_positions(within)))
+
+
+def _scans(setting: Setting) -> tuple[list[tuple[Floats, Floats]], Setting]:
+    """A ball as each attitude scans it, and the room that its centre has so that all readings are within the volume."""
+    offset, volume = np.array(cast("BallbarFacts", setting.artefact).offset_mm), setting.volume
+    scans = [scan(euler_313(*np.radians(each)), offset, _PLANNED_RADIUS) for each in THREE]
     reach = np.vstack([moved for _, moved in scans])
     box = volume.box - np.column_stack([reach.min(axis=0), reach.max(axis=0)])
     if np.any(box[:, 0] >= box[:, 1]):
         raise volume.too_small(reach, say("over the three attitudes"))
-    placings = ballbar.ballbar_positions(replace(setting, volume=replace(volume, box=box)))
-    return tuple(_scanned(placing, scans, i) for i, placing in enumerate(placings))
+    return scans, replace(setting, volume=replace(volume, box=box))
 
 
 def _scanned(placing: SetUp, scans: Sequence[tuple[Floats, Floats]], number: int) -> SetUp:
@@ -239,11 +246,13 @@ def _scanned(placing: SetUp, scans: Sequence[tuple[Floats, Floats]], number: int
 
 
 def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
-    if cast("BallbarFacts", setting.artefact).offset_mm is not None:
-        problem = "the places of a bar that a digitizer scans are not searched for"
-        fix = "Leave it out: the usual plan sees each end in an attitude of its own"
-        raise CmmUqError(problem, where="job.toml [plan] criterion", fix=fix)
-    return ballbar.PLANNING.candidates(setting, start)
+    """Those of a bar; of one that is scanned each with its ends in two of the three attitudes, in every way."""
+    if cast("BallbarFacts", setting.artefact).offset_mm is None:
+        return ballbar.PLANNING.candidates(setting, start)
+    scans, within = _scans(setting)
+    fewer = within.plan.model_copy(update={"candidates": max(1, within.plan.candidates // _WAYS)})
+    placings = ballbar.PLANNING.candidates(replace(within, plan=fewer), None)
+    return tuple(_scanned(placing, scans, i) for placing in placings for i in range(_WAYS))
 
 
 def elsewhere(artefact: Artefact, volume: Volume, most: int) -> tuple[SetUp, ...]:

@@ -30,6 +30,8 @@ from benchmarks.examples.optical_ballbar_job import (
     true_over_read,
 )  # fmt: skip
 from cmm_uq.app.commands.jobs.compensate import write_compensated_cloud, write_new_map
+from cmm_uq.app.commands.planning import make_plan
+from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.optical.ballbar import ScannedBallbar, observe
@@ -271,3 +273,32 @@ def test_a_cloud_with_a_coordinate_that_is_no_number_is_refused_with_its_line(tm
     assert done.returncode == 2
     assert "line 21" in done.stderr
     assert "u_mm" in done.stderr
+
+
+SIZES = np.array([300.0] * 3 + [500.0] * 3 + [0.1] * 3)
+"""Of scales, squarenesses and offsets, by which a criterion compares them: ppm, ″, mm."""
+
+
+@pytest.mark.parametrize("criterion", ["D", "A"])
+def test_a_plan_by_criterion_tells_offset_and_factors_from_fewer_bars(tmp_path: Path, criterion: str) -> None:
+    """Twelve bars that are chosen beside the first twelve of the usual plan, each end in one of three attitudes."""
+    job = tmp_path / "job"
+    job.mkdir()
+    toml = (ROOT / "examples" / "optical-ballbar-simulated" / "job.toml").read_text(encoding="utf-8")
+    (job / "job.toml").write_text(
+        f'{toml}\n[plan]\ncriterion = "{criterion}"\nnumber = 12\nrepeats = 1\nrivals = []\n', encoding="utf-8"
+    )
+    found = make_plan(read_job(job, recorded=False), power=False)
+    assert found.better is not None
+    chosen, first = found.better.points, found.start.points
+    bars = ScannedBallbar(facts(), chosen)
+    assert (len(bars.rows), len(bars.sizes)) == (12, 4)  # all of [U1 V1 W1] is told
+    both = [tuple(ball.angles_deg for ball in bars.balls[i : i + 2]) for i in range(0, 24, 2)]
+    assert all(one != other for one, other in both)
+    variance = {}
+    for name, points in (("chosen", chosen), ("first", first.select(first.measurement <= 12))):
+        model = RecordingModel(ScannedBallbar(facts(), points), effects(SIX), 1e-3)
+        own = model.estimate().least_squares.covariance[:, [0, 1, 2, 3, 4, 5, 7, 8, 9]][[0, 1, 2, 3, 4, 5, 7, 8, 9]]
+        scaled = own / np.outer(SIZES, SIZES)
+        variance[name] = {"D": np.linalg.det(scaled) ** (1 / 9), "A": np.trace(scaled) / 9}[criterion]
+    assert variance["chosen"] < 0.9 * variance["first"]
