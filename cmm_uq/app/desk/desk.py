@@ -6,7 +6,6 @@ A form that changes something is answered with a redirect, so that reload and ba
 from __future__ import annotations
 
 import json
-import tempfile
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -17,33 +16,33 @@ from typing import Any
 
 from cmm_uq import __version__
 from cmm_uq.app.desk import export_pages, job_pages as jobs
-from cmm_uq.app.desk.drafts import Draft, DraftFolder, received
+from cmm_uq.app.desk.drafts import Draft
 from cmm_uq.app.desk.export_pages import ARTEFACT, FIELDS, READ
+from cmm_uq.app.desk.folder import DeskFolder, to
 from cmm_uq.app.desk.guard import POLICY, Guard
-from cmm_uq.app.desk.job_pages import REPORTS, JobState, state_of
-from cmm_uq.app.desk.part_pages import PLAN, part_page, with_points
-from cmm_uq.app.desk.place import ChangedError, below, jobs_in, safe_name, sha256, write_over
+from cmm_uq.app.desk.job_pages import JobState, state_of
+from cmm_uq.app.desk.part_pages import PLAN
+from cmm_uq.app.desk.place import ChangedError, below, jobs_in, sha256, write_over
 from cmm_uq.app.desk.shown import OWN_FILES, own_file, records_page, shown_file
 from cmm_uq.app.desk.verify_page import VERIFY, verify_page
-from cmm_uq.app.desk.workers import ReportRun, Worker
+from cmm_uq.app.desk.workers import ReportRun
 from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse, read_form
-from cmm_uq.app.serve.page import WebPage, address
+from cmm_uq.app.serve.page import WebPage
 from cmm_uq.app.serve.rendering import DESK, fault, refusal, render_page
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 
-VERIFY_S = 180.0  # s that reading and comparing a certificate may take
 AT_ONCE = 2  # reports under way
 
 
-class Desk:
+class Desk(DeskFolder):
     """Answers the requests of one start; ``root``: the folder that it works in."""
 
     def __init__(self, root: Path, tell: Callable[[str], None] = lambda line: None) -> None:
-        self.root, self.tell = root.resolve(), tell
-        self.drafts, self.reader = DraftFolder(self.root), Worker(self.root)
+        super().__init__(root)
+        self.tell = tell
         self.runs: dict[str, ReportRun] = {}
         self.checked: dict[str, tuple[str, Text]] = {}
         self._lock = threading.Lock()
@@ -108,6 +107,7 @@ class Desk:
             jobs.CERTIFICATE: self.certificate,
             jobs.FILE: partial(shown_file, self.root),
             jobs.PART: self.part,
+            jobs.FACTS: self.facts,
             VERIFY: lambda request: verify_page(),
             jobs.EVENTS: self.events,
             jobs.FIELD: self.field,
@@ -126,6 +126,7 @@ class Desk:
             PLAN: self.plan,
             jobs.PART: self.create_part,
             jobs.POINTS: self.points,
+            jobs.FACTS: self.state_facts,
             VERIFY: self.verify,
         }
 
@@ -202,7 +203,7 @@ class Desk:
         folder = one.values.get("folder", "").strip()
         values = {name: value for name, value in one.values.items() if name != "folder"}
         try:
-            self._check_folder(folder)
+            self.check_new(folder)
             self.reader.ask("create", kind=kind, export=one.export, keys=one.keys, values=values, folder=folder)
         except CmmUqError as error:
             return self._fields(one, kind, error)
@@ -210,59 +211,13 @@ class Desk:
         self.drafts.delete(one)
         return to(jobs.JOB, name=folder)
 
-    def part(self, request: WebRequest) -> WebPage:
-        request.only(("draft",))
-        draft = self.drafts.read(request.text("draft")) if request.text("draft") else None
-        return part_page(draft, (state_of(self.root, folder) for folder in jobs_in(self.root)))
-
-    def plan(self, request: WebRequest) -> WebResponse:
-        one = self.drafts.take(request)
-        one.values = {"part": "plan"}
-        self.drafts.write(one)
-        return to(jobs.PART, draft=one.id)
-
-    def create_part(self, request: WebRequest) -> WebResponse:
-        form = read_form(request)
-        one, folder = self.drafts.read(form.get("draft", "")), form.get("folder", "").strip()
-        self._check_folder(folder)
-        certificate = below(self.root, form.get("certificate", "")).relative_to(self.root).as_posix()
-        self.reader.ask(
-            "create_part",
-            plan=one.export,
-            certificate=certificate,
-            folder=folder,
-            date=form.get("date", ""),
-            not_measured=form.get("not_measured") == "yes",
-        )
-        self.drafts.delete(one)
-        return to(jobs.JOB, name=folder)
-
-    def points(self, request: WebRequest) -> WebResponse:
-        """Measured points of a part, into its folder and its job.toml."""
-        request.only(("name",))
-        name = self._folder(request.text("name"))
-        path = self.root / name / "job.toml"
-        content = content_of(path, JOB_BYTES, "")
-        points = received(request, path.parent)
-        write_over(path, with_points(content.decode(), points).encode(), sha256(content))
-        return to(jobs.JOB, name=name)
-
-    def verify(self, request: WebRequest) -> WebPage:
-        request.only(())
-        with tempfile.TemporaryDirectory(prefix="cmm-uq-") as folder:
-            name = received(request, Path(folder), written=True)
-            return verify_page(name, self.reader.ask("verification", seconds=VERIFY_S, path=str(Path(folder) / name)))
-
-    def _check_folder(self, name: str) -> None:
-        if not name or safe_name(name) != name or name == REPORTS:
-            fix = "Use letters, digits, - and _, such as K-2026-115"
-            raise CmmUqError(f"{name!r} is no name of a folder on every system", fix=fix)
-
     def check(self, request: WebRequest) -> WebResponse:
         """What is wrong with what is being typed; nothing is written."""
         form = read_form(request)
-        if "text" in form:
-            found = self.reader.ask("check", job=self._folder(form.get("name", "")), text=form["text"])
+        if "name" in form:
+            name = self.job_of(form["name"])
+            text = form["text"] if "text" in form else self.with_facts(name, form)[0]
+            found = self.reader.ask("check", job=name, text=text)
         else:
             one = self.drafts.read(form.get("draft", ""))
             values = {
@@ -273,14 +228,9 @@ class Desk:
             )
         return WebResponse(json.dumps(found).encode(), "application/json", policy=POLICY)
 
-    def _folder(self, name: str) -> str:
-        folder = below(self.root, name)
-        below(self.root, f"{name}/job.toml")
-        return folder.relative_to(self.root).as_posix()
-
     def job(self, request: WebRequest) -> WebPage:
         request.only(("name",))
-        name = self._folder(request.text("name"))
+        name = self.job_of(request.text("name"))
         content = content_of(self.root / name / "job.toml", JOB_BYTES, "")
         return self._job(name, content.decode("utf-8", "replace"), sha256(content))
 
@@ -294,7 +244,7 @@ class Desk:
 
     def save(self, request: WebRequest) -> WebPage | WebResponse:
         form = read_form(request)
-        name, text = self._folder(form.get("name", "")), form.get("text", "")
+        name, text = self.job_of(form.get("name", "")), form.get("text", "")
         if form.get("then") != "save":
             return self._job(name, text, form.get("seen", ""), draft=text)
         try:
@@ -307,7 +257,7 @@ class Desk:
         return to(jobs.JOB, name=name)
 
     def run(self, request: WebRequest) -> WebResponse:
-        name = self._folder(read_form(request).get("name", ""))
+        name = self.job_of(read_form(request).get("name", ""))
         with self._lock:
             under_way = [one for one in self.runs.values() if not one.over]
             if not any(one.job == name for one in under_way):
@@ -327,7 +277,7 @@ class Desk:
     def running(self, request: WebRequest) -> WebPage | WebResponse:
         run = self._run_of(request)
         if run is None:  # of an earlier start
-            return to(jobs.JOB, name=self._folder(request.text("name")))
+            return to(jobs.JOB, name=self.job_of(request.text("name")))
         if run.found is not None:
             return to(jobs.CERTIFICATE, name=run.job)
         return jobs.run_page(run)
@@ -352,7 +302,7 @@ class Desk:
         return jobs.certificate_page(one, said, self._field_of(one).is_file(), warnings)
 
     def _state(self, name: str) -> JobState:
-        one = state_of(self.root, self.root / self._folder(name))
+        one = state_of(self.root, self.root / self.job_of(name))
         if one.made is None:
             raise RefusedRequest(
                 HTTPStatus.NOT_FOUND, say("this job has no certificate yet"), say("Make it on the page of the job")
@@ -388,8 +338,3 @@ class Desk:
         )
         body = render_page(page._replace(place=page.place or DESK), foot, desk=True)
         return WebResponse(body, status=page.status, policy=POLICY, referrer="same-origin")
-
-
-def to(path: str, **query: str) -> WebResponse:
-    """After a form: a page to be got, so that reload sends nothing again."""
-    return WebResponse(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": address(path, **query)})

@@ -193,6 +193,24 @@ def _above(draft: Draft) -> tuple[Cell, ...]:
     return DESK_CELL, Cell(Verbatim(draft.name), address(READ, draft=draft.id))
 
 
+def facts_form(
+    path: str,
+    fields: list[dict[str, str]],
+    filled: Mapping[str, str],
+    buttons: tuple[tuple[str, Text], ...],
+    hidden: tuple[tuple[str, str], ...],
+    first: tuple[FormEntry, ...] = (),
+) -> PageForm:
+    """The dozen fields, and folded away those that only a whole certificate needs."""
+    entries, further = list(first), list[FormEntry]()
+    for one in fields:
+        sort: Literal["date", "text"] = "date" if one["sort"] == "date" else "text"
+        entry = FormEntry(one["key"], Verbatim(one["label"]), filled.get(one["key"], ""), sort, example=one["example"])
+        (further if one["further"] else entries).append(entry)
+    legend = say("What ISO/IEC 17025 asks for besides: without it the certificate is a draft")
+    return PageForm(path, tuple(entries), buttons, hidden, None, f"{DESK}/check", legend, tuple(further))
+
+
 def fields_page(
     draft: Draft, kind: str, fields: list[dict[str, str]], last: Mapping[str, str], found: Mapping[str, Any] | None
 ) -> WebPage:
@@ -200,17 +218,11 @@ def fields_page(
     filled = draft.values if draft.values else last
     folder = draft.values.get("folder", "")
     named, hint = say("Name of the job, and of its folder"), say("Its certificate has this name too")
-    entries = [FormEntry("folder", named, folder, hint=hint, example="K-2026-115")]
-    further = list[FormEntry]()
-    for one in fields:
-        sort: Literal["date", "text"] = "date" if one["sort"] == "date" else "text"
-        value = filled.get(one["key"], "")
-        entry = FormEntry(one["key"], Verbatim(one["label"]), value, sort, example=one["example"])
-        (further if one["further"] else entries).append(entry)
+    name = FormEntry("folder", named, folder, hint=hint, example="K-2026-115")
     buttons = (("create", say("Make the job")), ("check", say("Check")))
-    hidden = (("draft", draft.id), ("kind", kind), ("seen", draft.seen))
-    legend = say("What ISO/IEC 17025 asks for besides: without it the certificate is a draft")
-    form = PageForm(FIELDS, tuple(entries), buttons, hidden, None, f"{DESK}/check", legend, tuple(further))
+    form = facts_form(
+        FIELDS, fields, filled, buttons, (("draft", draft.id), ("kind", kind), ("seen", draft.seen)), (name,)
+    )
     blocks: list[Block] = [steps(3, draft.id)]
     if last and not draft.values:
         blocks.append(PageParagraph(say("Filled in as last time: look at each."), "note"))

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.app.desk.drafts import Draft
-from cmm_uq.app.desk.export_pages import DESK_CELL, READ, check_blocks, steps
+from cmm_uq.app.desk.export_pages import DESK_CELL, READ, check_blocks, facts_form, steps
 from cmm_uq.app.desk.place import sha256
 from cmm_uq.app.desk.verify_page import VERIFY
 from cmm_uq.app.desk.workers import ReportRun
@@ -39,7 +39,7 @@ from cmm_uq.base.output.manifest import plain_name
 
 JOB, RUN, CANCEL, CERTIFICATE, FILE = (f"{DESK}/{name}" for name in ("job", "run", "cancel", "certificate", "file"))
 PART, POINTS, DELETE, EVENTS = (f"{DESK}/{name}" for name in ("part", "points", "delete", "events"))
-FIELD = f"{DESK}/field.json"
+FIELD, FACTS = f"{DESK}/field.json", f"{DESK}/facts"
 RESULTS, REPORTS = "results.json", "reports"
 MOST_FILES, LISTED = 100, 200
 _ID = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
@@ -162,13 +162,37 @@ def job_page(
     entry = FormEntry("text", say("job.toml"), text, "area")
     edit = PageForm(JOB, (entry,), buttons, (*name_field, ("seen", seen)), check=f"{DESK}/check")
     commands = f"cmm-uq check {one.name}\ncmm-uq {'part' if one.part else 'report'} {one.name}"
+    change = () if one.part else (p.Links((Cell(say("Change it by fields"), address(FACTS, name=one.name)),)),)
     sections = (
-        *section(say("What it states"), edit),
+        *section(say("What it states"), *change, edit),
         *section(say("Its files"), files),
         *section(say("The same by commands"), p.SourceText(say("Commands"), commands)),
     )
     title, lead = Verbatim(one.id or one.name), p.shown(one.machine)
     return WebPage(title, DESK, lead, tuple(blocks), sections, (DESK_CELL,))
+
+
+def facts_page(
+    name: str, found: Mapping[str, Any], values: Mapping[str, str], seen: str, above: tuple[Block, ...]
+) -> WebPage:
+    """What a job states, by fields; what else stands in its job.toml stays as it is."""
+    buttons = (("save", say("Save")), ("check", say("Check")))
+    form = facts_form(FACTS, found["fields"], values, buttons, (("name", name), ("seen", seen)))
+    lead = say("What is left empty is not stated. All else in job.toml stays as it is.")
+    places = (DESK_CELL, Cell(Verbatim(name), address(JOB, name=name)))
+    return WebPage(say("What the job states"), DESK, lead, (*above, form), above=places)
+
+
+def differing(found: Mapping[str, Any], values: Mapping[str, str]) -> PageNotice:
+    """Fields that are another in the file by now than they were typed."""
+    labels = {one["key"]: one["label"] for one in found["fields"]}
+    lines = [
+        f"{labels[key]}: {now or '(empty)'} in the file, {values.get(key, '') or '(empty)'} here"
+        for key, now in found["values"].items()
+        if now != values.get(key, "").strip()
+    ]
+    head = say("Not written: it was changed meanwhile, by another tab, an editor or a command")
+    return PageNotice(head, "bad", p.lines_of(lines))
 
 
 def run_page(run: ReportRun) -> WebPage:

@@ -26,7 +26,7 @@ from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.app.commands.files import Written
 from cmm_uq.app.commands.parts.part import PartOptions, write_part
 from cmm_uq.app.commands.report import write_report
-from cmm_uq.app.desk import exports, parts, questions
+from cmm_uq.app.desk import exports, facts, parts, questions
 from cmm_uq.app.serve import page as p
 from cmm_uq.app.serve.certificate_page import diagnosis_section
 from cmm_uq.app.serve.exchange import WebRequest
@@ -191,6 +191,8 @@ DOES: Mapping[str, Callable[..., Any]] = {
     "check": questions.check_text,
     "create": questions.create,
     "create_part": parts.create_part,
+    "facts": facts.facts,
+    "with_facts": facts.with_facts,
     "report": report,
     "results": results,
     "page": page,

@@ -40,12 +40,12 @@ class Worker:
 
     def begin(self) -> IO[str]:
         """Start it, unless it is there; what it reads."""
-        if self._process is not None and self._process.poll() is None:
-            return cast("IO[str]", self._process.stdin)
+        if (process := self._process) is not None and process.poll() is None:
+            return cast("IO[str]", process.stdin)
         self.end()
         environment = {**dict.fromkeys(_THREADS, "1"), **os.environ}
         command = [sys.executable, "-P", "-m", "cmm_uq.app.desk.work", str(self._memory)]
-        self._process = subprocess.Popen(  # noqa: S603 - this interpreter and this package
+        process = subprocess.Popen(  # noqa: S603 - this interpreter and this package
             command,
             cwd=self._root,
             env=environment,
@@ -55,9 +55,9 @@ class Worker:
             text=True,
             encoding="utf-8",
         )
-        self._lines = queue.Queue()
-        threading.Thread(target=_pumped, args=(self._process.stdout, self._lines), daemon=True).start()
-        return cast("IO[str]", self._process.stdin)
+        self._process, self._lines = process, queue.Queue()
+        threading.Thread(target=_pumped, args=(process.stdout, self._lines), daemon=True).start()
+        return cast("IO[str]", process.stdin)
 
     def ask(self, do: str, seconds: float = PATIENCE_S, **given: Any) -> Any:
         with self._lock:
@@ -95,19 +95,19 @@ class Worker:
                 return
 
     def end(self) -> None:
-        """End it, whatever it does; what it had staged is removed."""
-        if self._process is None:
+        """End it, whatever it does and whoever else ends it; what it had staged is removed."""
+        process, self._process = self._process, None
+        if process is None:
             return
-        if self._process.poll() is None:
-            self._process.terminate()
+        if process.poll() is None:
+            process.terminate()
             try:
-                self._process.wait(3.0)
+                process.wait(3.0)
             except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait()
+                process.kill()
+                process.wait()
         with suppress(OSError):
-            cast("IO[str]", self._process.stdin).close()
-        self._process = None
+            cast("IO[str]", process.stdin).close()
 
 
 def _pumped(out: IO[str], lines: queue.Queue[str | None]) -> None:
@@ -138,6 +138,7 @@ class ReportRun:
         self.problem: tuple[str, str, str] | None = None
         self.cancelled = self.over = False
         self._worker, self._changed, self._done = Worker(root, 0), threading.Condition(), done
+        self._worker.begin()  # or it could be cancelled before it is there
         threading.Thread(target=self._run, daemon=True).start()
 
     def _run(self) -> None:
