@@ -100,7 +100,8 @@ def read_page(draft: Draft, found: Mapping[str, Any]) -> WebPage:
         told = (*p.lines_of({where} - {"", draft.name}), *((Cell(here(fix)),) if fix else ()))
         head = PageNotice(Verbatim(what), "bad", told)
     fields, buttons = (*_lines(draft, lines), *_settings(draft, found)), _buttons(problem, {*draft.keys} - {"lines"})
-    form = PageForm(READ, fields, buttons, (("draft", draft.id), ("seen", draft.seen)), _grid(found))
+    grid = _grid(found) if found["columns"] else None
+    form = PageForm(READ, fields, buttons, (("draft", draft.id), ("seen", draft.seen)), grid)
     facts = tuple((Verbatim(label), Cell(Verbatim(text))) for label, text in found["facts"])
     delete = PageForm(f"{DESK}/delete", (), (("delete", say("Delete this export")),), (("draft", draft.id),))
     sections = (

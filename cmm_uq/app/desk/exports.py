@@ -78,7 +78,10 @@ def read(path: str, keys: Mapping[str, Any]) -> dict[str, Any]:
         if (asked := lines_asked(error)) is not None:
             recognised, found["example"], found["lines"] = asked
         found["problem"] = [error.where or "", error.problem, error.fix or ""]
-    sheets, tables = tables_in(content, name, said)
+    try:
+        sheets, tables = tables_in(content, name, said)
+    except CmmUqError:  # it is told already why nothing is read
+        return found | {"sheets": [], "columns": [], "rows": [], "more": 0, "understood": False}
     if recognised is not None:
         found["facts"] = [
             [str.__str__(label), str.__str__(text)]

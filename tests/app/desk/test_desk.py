@@ -107,8 +107,24 @@ def test_a_workbook_that_unpacks_to_more_than_it_may_is_refused_in_words(
         for i in range(5):
             archive.writestr(f"xl/worksheets/sheet{i}.xml", b"\0" * 100_000_000)
     page = visitor.get(f"/desk/read?draft={draft}")
-    assert page.status == 409
     assert "once it is unpacked" in page.text
+    assert "Delete this export" in page.text
+
+
+@pytest.mark.parametrize(
+    ("content", "told"), [(b"%PDF-1.7 x", "is a PDF"), (b"", "is empty"), (b"\x00\x01\x02", "is no text")]
+)
+def test_what_is_no_export_is_told_with_what_to_do_and_can_be_deleted(
+    seated: Visitor, content: bytes, told: str
+) -> None:
+    draft = draft_of(seated, content, "a.bin")
+    page = seated.get(f"/desk/read?draft={draft}")
+    assert page.status == 200
+    assert told in page.text
+    assert "Export" in page.text
+    assert "It is right" not in page.text
+    assert seated.post("/desk/delete", draft=draft).status == 303
+    assert seated.get(f"/desk/read?draft={draft}").status == 409
 
 
 @pytest.mark.long
