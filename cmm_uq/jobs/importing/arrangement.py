@@ -7,6 +7,7 @@ row of those that it is of. What is left out is told with its place and why: a s
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -26,7 +27,10 @@ from cmm_uq.jobs.importing.header import (
     words_of,
 )
 
+_IS_UNIT = re.compile(r"(?:\A|\bunits?\s*[=:]\s*)([\w.µμ\"]+)\Z", re.IGNORECASE)
+NUMBERED = ("measurement", "point", "repeat")
 _ENDS_IN_AXIS = re.compile(r"(.*?)[\s_.:/-]*([XYZ])", re.IGNORECASE)
+_DECIMAL = re.compile(r"[.,]\d")  # of a figure, which is in no head
 _DEEPEST = 4  # rows of a head
 _SHOWN = 40  # characters of a row that is left out
 SUMMARY, REMARK, AGAIN = "a summary", "a remark", "the head again"
@@ -56,7 +60,7 @@ def with_one_head(
             continue
         for top in range(last, max(last - _DEEPEST, -1), -1):
             head = _combined(sheet.rows[top : last + 1], meaning_of)
-            if not any(head):
+            if not any(head) or any(is_number(cell) and _DECIMAL.search(text_of(cell)) for cell in sheet.rows[top]):
                 break
             probe = replace(sheet, rows=[head, below], lines=sheet.lines[last : last + 2])
             try:
@@ -70,6 +74,31 @@ def with_one_head(
     if problem is not None:
         raise problem
     return None
+
+
+def with_blocks(sheet: Sheet) -> Sheet:
+    """Tables of points below each other with the same head, as one: each a measurement where no column numbers them."""
+    rows = [] if sheet.listed else [tuple(map(text_of, row)) for row in sheet.rows]
+    heads = [row for row, count in Counter(rows).items() if count > 1 and _names_places(row)]
+    if len(heads) != 1:
+        return sheet
+    starts = [i for i, row in enumerate(rows) if row == heads[0]]
+    numbered = any(understood(cell).column == "measurement" for cell in heads[0])
+    table: list[list[Cell]] = [[*heads[0], *([] if numbered else ["Measurement"])]]
+    lines, left_out = [sheet.lines[starts[0]]], [*sheet.left_out]
+    for block, (start, end) in enumerate(pairwise([*starts, len(rows)]), 1):
+        for i in range(start + 1, end):
+            row = [*sheet.rows[i], *[""] * (len(heads[0]) - len(sheet.rows[i]))]
+            if any(cell != "" and is_number(cell) for cell in row[1:]):
+                table.append([*row, *([] if numbered else [str(block)])])
+                lines.append(sheet.lines[i])
+            elif any(rows[i]):
+                left_out.append(shown(sheet, i, REMARK))
+    return replace(sheet, rows=table, lines=lines, left_out=tuple(left_out))
+
+
+def _names_places(row: Sequence[str]) -> bool:
+    return {*COORDINATES} <= {understood(cell).column for cell in row}
 
 
 def with_points(sheet: Sheet, meaning_of: Callable[[str], Heading]) -> Sheet:
@@ -92,7 +121,8 @@ def _axes(cells: Sequence[Cell]) -> str:
 
 def _of_coordinates(sheet: Sheet, first: int, axis: int, meaning_of: Callable[[str], Heading]) -> Sheet | None:
     """The table of a sheet whose column ``axis`` names axes from row ``first`` on; ``None`` where it holds no points."""
-    places = [i for i in range(first, len(sheet.rows)) if any(cell != "" for cell in sheet.rows[i])]
+    filled = [i for i in range(first, len(sheet.rows)) if any(cell != "" for cell in sheet.rows[i])]
+    places = [i for i in filled if axis < len(sheet.rows[i]) and _axes(sheet.rows[i][axis : axis + 1]) in {*"XYZ"}]
     width = max(len(sheet.rows[i]) for i in places)
     columns = [*zip(*([*sheet.rows[i], *[""] * (width - len(sheet.rows[i]))] for i in places), strict=True)]
     if _axes(columns[axis]) != "XYZ" * (len(places) // 3):
@@ -104,11 +134,14 @@ def _of_coordinates(sheet: Sheet, first: int, axis: int, meaning_of: Callable[[s
     names = [*zip(*labels.values(), strict=True)]
     figures = [j for j, own in enumerate(columns) if j not in (axis, *labels) and all(map(is_number, own))]
     measured = [j for j in figures if meaning_of(head[j]).column in _MEASURED] or figures
-    if len({*names}) < len(places) // 3 or (
-        len(measured) != 1 and meaning_of(head[measured[0]]).column not in _MEASURED
-    ):
+    of_points = any(meaning_of(head[j]).column not in _OF_LENGTHS for j in labels)
+    clear = len(measured) == 1 or (bool(measured) and meaning_of(head[measured[0]]).column in _MEASURED)
+    if not (of_points and clear) or len({*names}) < len(places) // 3:
         return None
-    unit, runs = without_unit(head[measured[0]])[1], ["Repeat"] if len(measured) > 1 else []
+    runs = ["Repeat"] if len(measured) > 1 else []
+    alike = (_IS_UNIT.search(text_of(own[0])) for own in columns if len({*own}) == 1)
+    units = [without_unit(head[measured[0]])[1], *(unit_named(found[1]) for found in alike if found)]
+    unit = next(filter(None, units), None)
     xyz = [f"{letter} [{unit.name}]" if unit else letter for letter in "XYZ"]
     rows: list[list[Cell]] = [[*(head[j] for j in labels), *runs, *xyz]]
     for k, name in enumerate(names):
@@ -118,12 +151,14 @@ def _of_coordinates(sheet: Sheet, first: int, axis: int, meaning_of: Callable[[s
     values = commas([Verbatim(head[j]) for j in measured])
     of = say("{axis}: X, Y, Z; values: {values}", axis=Verbatim(head[axis]), values=values)
     fact = Fact("in_rows", say("A row for each coordinate"), of)
-    return replace(sheet, rows=rows, lines=lines, spreadsheet=False, facts=(*sheet.facts, fact))
+    left_out = (*sheet.left_out, *(shown(sheet, i, "no coordinate") for i in filled if i not in {*places}))
+    return replace(sheet, rows=rows, lines=lines, spreadsheet=False, facts=(*sheet.facts, fact), left_out=left_out)
 
 
 def _of_threes(labels: Sequence[str], heading: str) -> bool:
     """Whether labels are of three rows each, in all of them or in the first, and say more than a number nobody names."""
-    if understood(heading).column not in ("point", "measurement") and all(map(is_number, filter(None, labels))):
+    of = understood(heading)
+    if (of.column not in NUMBERED or of.unit is not None) and all(map(is_number, filter(None, labels))):
         return False
     threes = zip(labels[::3], labels[1::3], labels[2::3], strict=True)
     return all(one and two == three and two in (one, "") for one, two, three in threes)
@@ -136,6 +171,8 @@ def figures_follow(sheet: Sheet, header: Header) -> bool:
         for name, names in (("all", (*COORDINATES, *BASES)), ("any", FIGURES))
     }
     for row in sheet.rows[header.first : header.first + _DEEPEST]:
+        if any(cell != "" for cell in row[len(header.headings) :]):
+            return False
         cells = {name: [row[i] if i < len(row) else "" for i in columns] for name, columns in of.items()}
         if any(cell != "" for own in cells.values() for cell in own):
             number = {name: [cell != "" and is_number(cell) for cell in own] for name, own in cells.items()}
@@ -166,15 +203,21 @@ def _combined(rows: Sequence[Sequence[Cell]], meaning_of: Callable[[str], Headin
         parts = list(dict.fromkeys(parts))
         full, last = " ".join(parts), parts[-1] if parts else ""
         if meaning_of(full).column is None and meaning_of(last).column not in (None, *COORDINATES):
-            full = last
+            above = plain_words(" ".join(parts[:-1]))
+            numbers = [word for word in above if word.isdigit()]
+            full = f"{last} {numbers[0]}" if len(numbers) == 1 else last
+            if not words_of("rows")["summary"].isdisjoint(above):  # the mean of what stands beside it
+                full = " ".join(parts)
         headings.append(f"{full} [{unit}]" if unit and full else full)
     return headings
 
 
 def is_summary(row: Sequence[Cell]) -> bool:
-    """Whether one of the first two cells with anything in them is a word for a figure of other rows."""
+    """Whether one of the first two cells is a word for a figure of other rows, or the first has a unit: ``Form (µm)``."""
     labels = [cell for cell in row if cell != ""][:2]
-    return any(isinstance(cell, str) and " ".join(plain_words(cell)) in words_of("rows")["summary"] for cell in labels)
+    if any(isinstance(cell, str) and " ".join(plain_words(cell)) in words_of("rows")["summary"] for cell in labels):
+        return True
+    return bool(labels) and text_of(labels[0]).endswith((")", "]")) and without_unit(text_of(labels[0]))[1] is not None
 
 
 def shown(sheet: Sheet, i: int, why: str) -> str:

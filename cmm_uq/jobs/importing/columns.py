@@ -286,9 +286,11 @@ MEASUREMENT, POINT, REPEAT = "measurement", "point", "repeat"
 NUMBERS = (MEASUREMENT, POINT, REPEAT)
 _DIGITS = re.compile(r"\d+")
 _WORD = re.compile(r"([^\W\d_]*)[^\w]*_*\d+")
+_LETTER = re.compile(r"(?<![^\W\d_])[A-Ha-h](?![^\W_])")
 # short words in the names of features
 _BY_LETTER = {"m": MEASUREMENT, "p": POINT, "b": POINT, "k": POINT, "r": REPEAT, "bar": MEASUREMENT, "stab": MEASUREMENT,
-              "barre": MEASUREMENT, "barra": MEASUREMENT, "pos": MEASUREMENT, "line": MEASUREMENT}  # fmt: skip
+              "barre": MEASUREMENT, "barra": MEASUREMENT, "pos": MEASUREMENT, "line": MEASUREMENT,
+              "pass": REPEAT, "trial": REPEAT, "durchgang": REPEAT, "passage": REPEAT}  # fmt: skip
 _NAMED = 6
 _FIX = (
     'Say how many rows in turn are one, points_per_measurement = N (or "all"), or which columns number them: '
@@ -368,12 +370,19 @@ def split_names(labels: Sequence[str]) -> tuple[list[str | None], Floats] | None
 def _of_names(labels: Sequence[str]) -> dict[str, Floats] | None:
     """Measurement, point (and repeat) from names that are alike but for two (or three) numbers.
 
-    The word before a number says what it numbers; where none is known, they stand in this order.
+    The word before a number says what it numbers; where none is known, they stand in this order. A letter from A to H that
+    stands alone, or after a number, tells balls apart: then ``P`` numbers positions, ``M`` measurements at one.
     """
+    letters = [_LETTER.findall(label) for label in labels]
+    if all(len(one) == 1 for one in letters) and len({one[0] for one in letters}) > 1:
+        labels = [_LETTER.sub(lambda of: f"_ball{ord(of[0].upper()) - ord('A') + 1}", label) for label in labels]
     split = split_names(labels)
     if split is None:
         return None
     known, numbers = split
+    for i, word in enumerate(_WORD.findall(labels[0])):
+        if known.count(known[i]) > 1:
+            known[i] = {"p": MEASUREMENT, "m": REPEAT}.get(word.casefold(), known[i])
     columns = NUMBERS[: len(known)]
     claimed = [column for column in known if column in columns]
     if len(set(claimed)) < len(claimed):

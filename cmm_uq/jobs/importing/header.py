@@ -26,7 +26,7 @@ NAME = "name"  # of the point or feature, by which it may be numbered; no column
 
 
 def plain_words(text: str) -> list[str]:
-    plain = unicodedata.normalize("NFKD", text.casefold())
+    plain = unicodedata.normalize("NFKD", text.casefold().translate(_ORDINAL))
     return _WORDS.findall("".join(c for c in plain if not unicodedata.combining(c)))
 
 
@@ -60,7 +60,8 @@ def words_of(table: str) -> Mapping[str, frozenset[str]]:
     }
 
 
-_WORDS = re.compile(r"[^\W\d_]+|\d+")
+_WORDS = re.compile(r"[^\W\d_\u3040-\u9fff]+|[\u3040-\u9fff]+|\d+")  # Japanese beside a letter is a word of its own
+_ORDINAL = str.maketrans("", "", "ªº°")  # after a number
 _COLUMNS = {phrase: column for column, phrases in words_of("columns").items() for phrase in phrases}
 _AXIS = words_of("axis")  # words beside the letter of an axis, those that leave it a coordinate among them
 _NOMINAL, _SMALL, _POINT = _AXIS["nominal"], _AXIS["small"], words_of("columns")["point"]

@@ -89,7 +89,7 @@ def _settled(found: head_words.Assigned, named: Mapping[str, object]) -> head_wo
         found[NOMINAL], base = bare, [NOMINAL]
     elif bare and not figures and (base or LINE in found):
         found[MEASURED], figures = bare, [MEASURED]
-    if not figures or not (base or (figures == [MEASURED] and LINE in found)):
+    if not figures or not (base or (MEASURED in figures and LINE in found)):
         return None
     if REFERENCE in found and NOMINAL not in named:
         found.pop(NOMINAL, None)
@@ -144,6 +144,13 @@ def _is_title(row: Sequence[Cell]) -> bool:
     )
 
 
+def _refuse_wider(sheet: Sheet, i: int, width: int, figures: Sequence[int], where: str) -> None:
+    """A row of figures with more cells than the head, of which nobody knows which stands below which heading."""
+    if figures and any(cell != "" for cell in sheet.rows[i][width:]):
+        what, fix = f"has {len(sheet.rows[i])} cells where the header has {width}", "Give every column a heading"
+        raise CmmUqError(what, where=sheet.at(where, i), fix=f"{fix}, or mend the row")
+
+
 def _cleaned(
     sheet: Sheet, header: Header, heads: Sequence[Sequence[Cell]], title: str, where: str
 ) -> tuple[Sheet, Header]:
@@ -160,6 +167,7 @@ def _cleaned(
     for i in range(header.first, len(sheet.rows)):
         row = [*sheet.rows[i], *[""] * (width - len(sheet.rows[i]))]
         numeric = [k for k in figures if row[k] != "" and is_number(row[k])]
+        _refuse_wider(sheet, i, width, numeric, where)
         if [text_of(cell) for cell in sheet.rows[i]] in texts and not _is_title(row):
             left_out[-1 if before and left_out else len(left_out) :] = [arrangement.shown(sheet, i, arrangement.AGAIN)]
             if before and not title:  # the first block is named as the others are

@@ -28,6 +28,7 @@ _BELOW = {
 }
 _FIGURES = re.compile(r"^\s*(?P<axis>[A-Z][A-Z0-9]?)\s+(?:(?:RFS|MMC|LMC)\s+)?[-+\d.]", re.IGNORECASE)
 _CONDITION = re.compile(r"^\s*[A-Z]+\s+(RFS|MMC|LMC)\s", re.IGNORECASE)
+_UNIT_LINE = re.compile(rf"^\s*(?:{_WORDS['units']})\s*[:=]\s*(\w+)", re.IGNORECASE)
 _NUMBER = re.compile(r"(?<!\S)(?:[-+]?\d*[.,]?\d+|[-+]?\d+[^\s\d.,]{1,3}\d+'\d+(?:[.,]\d+)?\")(?!\S)")
 
 
@@ -72,9 +73,50 @@ class PcDmis(TextReport):
                 where=f"{where} line {second.line}",
                 fix="Report all dimensions in one unit",
             )
+        if len({place.feature for place in places}) < len(places):  # one feature, measured again
+            places = [replace(place, feature=place.dimension) for place in places]
         unused = others + len(every) - len(places)
         facts = facts_of(encoding, "dimensions_not_used", say("Dimensions that are no place"), unused)
         return sheets_of([place.row for place in places], WITH_DIRECTION[:4], unit=places[0].unit, facts=facts)
+
+
+_TITLE = re.compile(rf"^[ \t]*(?P<sort>{_WORDS['features']})[ \t]*[:=][ \t]*(?P<of>\S+)", re.IGNORECASE | re.MULTILINE)
+_COORDINATE = re.compile(r"^[ \t]*(?P<axis>[XYZ])(?:[- ]?[^\W\d]+)?[ \t]+[-+\d]", re.IGNORECASE | re.MULTILINE)
+_SECTION = re.compile(r"^\s*(?:\*+|=+|#+)\s*(.*\w)\s*(?:\*+|=+|#+)\s*$")
+
+
+class FeatureReport(TextReport):
+    """A report with a title for each feature, as ``SPHERE : S1``, below it a heading and lines X, Y and Z with figures."""
+
+    name = "features"
+    title = say("text report of features")
+    shows = (_TITLE, _COORDINATE)
+
+    def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
+        places: list[ReportedPlace] = []
+        section, ends, unit = "", dict[str, int](), None
+        for line, content in enumerate(lines, 1):
+            words = _ends(content)
+            if title := _TITLE.match(content):
+                places.append(ReportedPlace(title["of"], line, "", section, title["sort"]))
+            elif found := _SECTION.match(content):
+                section = found[1]
+            elif {"MEAS", "NOMINAL"} <= words.keys() and not any(map(str.isdigit, content)):
+                ends = words
+            elif places and (row := _COORDINATE.match(content)):
+                place = f"{where} line {line}"
+                places[-1].xyz.setdefault(row["axis"].upper(), _below(content, ends, place)["MEAS"])
+            elif of_unit := _UNIT_LINE.match(content):
+                unit = of_unit[1]
+        whole = [place for place in places if len(place.xyz) == len(AXES)]
+        if odd := [place for place in places if 0 < len(place.xyz) < len(AXES)]:
+            what = f"{odd[0].feature!r} has not X, Y and Z"
+            fix = "Report all three of every feature; if it is the last one, the file was cut off"
+            raise CmmUqError(what, where=f"{where} line {odd[0].line}", fix=fix)
+        if len({place.feature for place in whole}) < len(whole):  # named again in each section
+            whole = [replace(place, feature=f"{place.dimension} {place.feature}") for place in whole]
+        facts = facts_of(encoding, "features_not_used", say("Features that are no place"), len(places) - len(whole))
+        return sheets_of([place.row for place in whole], WITH_DIRECTION[:4], unit=unit, facts=facts)
 
 
 @dataclass(frozen=True)
@@ -117,7 +159,7 @@ def dimensions(lines: Sequence[str], where: str) -> list[Dimension]:
     ends: dict[str, int] = {}
     for line, content in enumerate(lines, 1):
         if _HEADING.match(content):
-            ends = {_BELOW.get(word[0].upper(), word[0].upper()): word.end() for word in re.finditer(r"\S+", content)}
+            ends = _ends(content)
         elif _DIMENSION.match(content):
             name, _, text = content.partition("=")
             found.append(Dimension(re.sub(r"^DIM\s+", "", name.strip()), text, line, {}))
@@ -146,6 +188,11 @@ def _lengths(lines: Sequence[str], where: str) -> list[Row]:
     return [
         ("", [one.name, own.get("NOMINAL", ""), own["MEAS"]], one.line) for one, own in zip(every, below, strict=True)
     ]
+
+
+def _ends(heading: str) -> dict[str, int]:
+    """Where each word of a heading line ends."""
+    return {_BELOW.get(word[0].upper(), word[0].upper()): word.end() for word in re.finditer(r"\S+", heading)}
 
 
 def _below(content: str, ends: dict[str, int], place: str) -> dict[str, str]:

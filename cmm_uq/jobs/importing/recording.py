@@ -23,11 +23,20 @@ from cmm_uq.base.messages import Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest
 from cmm_uq.jobs.importing.answers import head_of
-from cmm_uq.jobs.importing.arrangement import figures_follow, with_one_head, with_points
+from cmm_uq.jobs.importing.arrangement import figures_follow, with_blocks, with_one_head, with_points
 from cmm_uq.jobs.importing.columns import columns_of, left_out_fact
 from cmm_uq.jobs.importing.encodings import is_number
-from cmm_uq.jobs.importing.format import Fact, FileKeys, ImportKeys, Recognition, Sheet, format_of, length_named
-from cmm_uq.jobs.importing.header import LINES_BEFORE, POINTS, REFERENCES, Header, header_of, no_header, understood
+from cmm_uq.jobs.importing.format import Cell, Fact, FileKeys, ImportKeys, Recognition, Sheet, format_of, length_named
+from cmm_uq.jobs.importing.header import (
+    LINES_BEFORE,
+    POINTS,
+    REFERENCES,
+    Header,
+    header_of,
+    no_header,
+    numbered_words,
+    understood,
+)
 from cmm_uq.jobs.importing.length_tables import of_lengths, tables_of
 from cmm_uq.jobs.importing.lengths import MeasuredLengths, lengths_of, placed
 
@@ -38,7 +47,7 @@ _OTHER_UNITS = re.compile(
     r"_(m|cm|um|µm|mm|nm|in|inch|mil|k|f|c|min|ms|h|s|pa|kpa|hpa|mbar|mmhg|rad|deg|arcsec|pct|percent)$"
 )
 _UNIT_LINE = re.compile(
-    r"(?:\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;]+|単位\s*[:：=]?"
+    r"(?:\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;]+|単位\s*[:：=;]*"
     r"|\b(?:dimensions|lengths|values|angaben|ma(?:ß|ss)e|werte|cotes|valeurs|misure|valori|medidas)\s+(?:in|en)\b)\s*([^\s;,]+)",
     re.IGNORECASE,
 )
@@ -202,7 +211,7 @@ def _imported(
         raise CmmUqError(f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file", where=where,
                          fix="Split it")  # fmt: skip
     form = format_of(content, where)
-    sheets = [with_points(_with_unit(sheet), of_lengths) for sheet in form.read(content, where, keys)]
+    sheets = [with_points(with_blocks(_with_unit(sheet)), of_lengths) for sheet in form.read(content, where, keys)]
     found = _chosen(sheets, keys, where, wanted)
     file = PurePath(where).name
     sheet, header = found[0] if isinstance(found, list) else found
@@ -272,11 +281,33 @@ def _chosen(
         return lengths
     if not tables:
         raise no_header(sheets, keys, where, wanted)
+    if len(tables) > 1 and (runs := _runs_of(tables)) is not None:
+        tables = [runs]
     if len(tables) > 1:
         listed = ", ".join(repr(sheet.name) for sheet, _ in tables)
         raise CmmUqError(f"holds {len(tables)} tables of points: {listed}", where=where,
                          fix=f'Say which: sheet = "{tables[0][0].name}"')  # fmt: skip
     return tables[0]
+
+
+def _runs_of(tables: Sequence[tuple[Sheet, Header]]) -> tuple[Sheet, Header] | None:
+    """Sheets with one head that are called runs, "Run 1", "Run 2", as one table with a column of repeats."""
+    names = [numbered_words(sheet.name) for sheet, _ in tables]
+    first, header = tables[0]
+    alike = all(len(one[1]) == 1 and one[0] == names[0][0] for one in names)
+    same = all(head.headings == header.headings and head.columns == header.columns for _, head in tables)
+    if not (alike and same) or understood(" ".join(names[0][0])).column != "repeat" or "repeat" in header.columns:
+        return None
+    width, lines, head_row = len(header.headings), [first.lines[header.row]], [*header.headings, "Repeat"]
+    rows: list[list[Cell]] = [[*head_row]]
+    for (sheet, head), (_, (number,)) in zip(tables, names, strict=True):
+        for row, line in zip(sheet.rows[head.first :], sheet.lines[head.first :], strict=True):
+            cells = [*row, *[""] * (width - len(row))]
+            rows.append([*cells[:width], str(number) if any(cell != "" for cell in cells) else "", *cells[width:]])
+            lines.append(line)
+    columns = {**header.columns, "repeat": (width,)}
+    header = replace(header, row=0, first=1, headings=head_row, columns=columns)
+    return replace(first, name=", ".join(sheet.name for sheet, _ in tables), rows=rows, lines=lines), header
 
 
 def _table(sheet: Sheet, keys: ImportKeys, where: str, wanted: Sequence[Sequence[str]]) -> tuple[Sheet, Header] | None:

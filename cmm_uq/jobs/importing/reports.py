@@ -7,6 +7,7 @@ from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
+from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LINE, ROWS
@@ -52,7 +53,7 @@ class ReportedPlace:
     feature: str
     line: int
     unit: str = ""
-    dimension: str = ""
+    dimension: Any = ""  # by what it is told from others
     sort: str = ""
     xyz: dict[str, str] = field(default_factory=dict)
 
@@ -96,8 +97,20 @@ class Calypso(TextReport):
             raise CmmUqError(f"coordinates are in {first} and in {second}: the file mixes units",
                              where=f"{where} line {units[second]}", fix="Export it in one unit")  # fmt: skip
         facts = facts_of(encoding, "characteristics_not_used", say("Characteristics that are no coordinate"), others)
-        rows_of = [place.row for place in places]
-        return sheets_of(rows_of, WITH_DIRECTION[:4], unit=next(iter(units), None), facts=facts)
+        head, rows_of = WITH_DIRECTION[:4], [place.row for place in places]
+        if (
+            len(runs := list(dict.fromkeys(place.dimension for place in places))) > 1
+        ):  # each by its plan and its part's number
+            plans = list(dict.fromkeys(plan for plan, _ in runs))
+            numbers = {
+                run: (plans.index(run[0]) + 1, [one for one in runs if one[0] == run[0]].index(run) + 1) for run in runs
+            }
+            head = ["measurement", "repeat", *head]
+            rows_of = [
+                (sort, [*map(str, numbers[place.dimension]), *cells], line)
+                for place, (sort, cells, line) in zip(places, rows_of, strict=True)
+            ]
+        return sheets_of(rows_of, head, unit=next(iter(units), None), facts=facts)
 
 
 def _characteristics(rows: Sequence[Sequence[str]], where: str) -> tuple[list[ReportedPlace], dict[str, int], int]:
@@ -105,7 +118,7 @@ def _characteristics(rows: Sequence[Sequence[str]], where: str) -> tuple[list[Re
     index = {name: i for i, name in enumerate(rows[0])}
     symbol, actual, feature = (index[name] for name in _CALYPSO)
     unit, others = index.get("unit", len(rows[0])), 0
-    places: dict[str, ReportedPlace] = {}
+    places: dict[tuple[str, ...], ReportedPlace] = {}
     units: dict[str, int] = {}
     for line, cells in enumerate(rows[1:], 2):
         if not any(cells) or cells[0].casefold() == "end":
@@ -118,7 +131,8 @@ def _characteristics(rows: Sequence[Sequence[str]], where: str) -> tuple[list[Re
         if axis is None:
             others += 1
             continue
-        place = places.setdefault(cells[feature], ReportedPlace(cells[feature], line))
+        run = (cells[0], cells[1])
+        place = places.setdefault((*run, cells[feature]), ReportedPlace(cells[feature], line, "", run))
         if axis in place.xyz:
             raise CmmUqError(f"{axis} of {place.feature!r} is there twice", where=at,
                              fix="Export each run as a file of its own, or name the features of each run")  # fmt: skip
