@@ -8,11 +8,13 @@ what is tested. What a complete test consists of is the laboratory's too, and wi
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.analysis.conformity import positioning
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.analysis.conformity.standard import NOT_STATED, Characteristic, Standard, Test
 from cmm_uq.analysis.conformity.statement import Statement, least_favourable
@@ -33,7 +35,7 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import CompleteTest
 from cmm_uq.machine.model.artefact import ArtefactFigure, Indications
 
-NAME = "laboratory's own rule"
+NAME = positioning.OWN_RULE
 # lines of a figure whose u is that of its evaluation, with all that is stated of the readings
 EVALUATED: tuple[str, ...] = ()
 # each figure: what is compared, what is counted of it, and the lines of its uncertainty
@@ -230,18 +232,21 @@ def _unstated(lines: tuple[str, ...], artefact: ArtefactFacts) -> str | None:
 
 STANDARD = Standard(
     NAME,
-    tuple(
-        Characteristic(
-            name,
-            name,
-            partial(decided, name=name),
-            unstated=partial(_unstated, lines),
-            asks=enough,
-            needs="u_repeat_um" if lines == REPEAT_LINES else None,
-            lines=lines,
-            angle=name in ANGLES,
-        )
-        for name, (_, _, lines) in FIGURES.items()
+    (
+        *(
+            Characteristic(
+                name,
+                name,
+                partial(decided, name=name),
+                unstated=partial(_unstated, lines),
+                asks=enough,
+                needs="u_repeat_um" if lines == REPEAT_LINES else None,
+                lines=lines,
+                angle=name in ANGLES,
+            )
+            for name, (_, _, lines) in FIGURES.items()
+        ),
+        *(replace(one, asks=enough) for one in positioning.OF_AXES),
     ),
     (
         say(

@@ -103,7 +103,7 @@ class AxisRuns(Artefact):
         self.readings = self._base - self._seen(points.xyz[:, :, None])[:, 0]
         zero = own.columns[ZERO] - self._zeros.means(self.readings)
         self.readings += np.where(free[:, 0] > 0, zero, 0.0)
-        self._profile = reversed_profile(own, self.runs, self.readings)
+        self._profile = reversed_profile(own, self.runs, self.readings, where)
         spans = [np.ptp(self._base[run.rows]) for run in self.runs if run.kind == ALONG]
         self._length = self._instrument(float(max(spans))) if spans else ()
         further = list(self._references(square, np.any(edges != 0, axis=1), where))
@@ -125,6 +125,13 @@ class AxisRuns(Artefact):
         readings = self._in_mm(points, kind, target, where)
         if len(points.lines):
             refuse_denied(points, runs, readings, where)
+        for run in runs if len(points.lines) else ():
+            at = run.positions + run.start
+            outside = [t for t in self._targets(run) if not at.min() - _SAME_MM <= t <= at.max() + _SAME_MM]
+            if outside:
+                problem = f"target {outside[0]:g} mm lies outside the readings of measurement {run.measurement}"
+                fix = f"Name targets from {at.min():g} to {at.max():g} mm"
+                raise CmmUqError(problem, where=f"job.toml [artefact.on_the_fly] {run.axis}", fix=fix)
         zero = self._zeros_of(points).means(readings)
         if self._facts.u_bar_um is not None:
             zero[kind == CIRCLE] = 0.0
@@ -306,7 +313,13 @@ class AxisRuns(Artefact):
         if run.kind == ALONG:
             readings = readings * np.sign(run.sense @ run.travel)
         at, repeat = run.positions + run.start, self.repeat[run.rows]
-        found = PositioningRuns.of(at, run.directions, repeat, readings, straight=run.kind == ACROSS)
+        read = at, run.directions, repeat, readings
+        targets, straight = self._targets(run), run.kind == ACROSS
+        if len(targets):
+            known = self._facts.on_the_fly.u_delay_um if self._facts.on_the_fly and run.kind == ALONG else 0.0
+            found = PositioningRuns.interpolated(targets, *read, straight=straight, u_delay=known)
+        else:
+            found = PositioningRuns.of(*read, straight=straight)
         growth = reference_shape(run, found.targets)
         if run.kind == ALONG:
             size, span = self.sizes[0], float(np.ptp(found.targets))
@@ -319,6 +332,11 @@ class AxisRuns(Artefact):
             return replace(of_bar, u_reference=known or 0.0, growth=growth, length_mm=run.radius)
         own = [size for size in self.sizes if size.name.startswith(f"reference_{run.measurement}_")]
         return replace(found, u_reference=own[0].sd if own else 0.0, growth=growth)
+
+    def _targets(self, run: Run) -> Floats:
+        """At which readings of a run that were taken in motion are evaluated; none of one at rest."""
+        fly = self._facts.on_the_fly
+        return np.array(getattr(fly, run.axis) if fly and run.axis else [], dtype=np.float64)
 
     def positionings(self) -> Mapping[int, PositioningRuns]:
         return {run.measurement: self.positioning(run) for run in self.runs if run.kind in (ALONG, CIRCLE)}

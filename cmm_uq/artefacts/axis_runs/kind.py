@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from cmm_uq.base.files.table import Length, Triple, Uncertainty, key
+from cmm_uq.base.files.limits import LISTED
+from cmm_uq.base.files.table import JobTable, Length, Position, Triple, Uncertainty, key
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.beginning import AT_20_C, SIX, Beginning, circumstances
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertifiedValue
@@ -35,6 +38,29 @@ class InterferometerFacts(ArtefactFacts):
         return self.u_scale_um_per_m is not None
 
 
+Targets = Annotated[list[Position], Field(min_length=2, max_length=LISTED.most)]
+
+
+class OnTheFly(JobTable):
+    """``[artefact.on_the_fly]``: readings taken in motion, and where along each axis figures are evaluated of them."""
+
+    x: Targets = Field(default_factory=list)
+    """Targets along X, mm by its scale: each is interpolated linearly between the two nearest readings of every run."""
+    y: Targets = Field(default_factory=list, description="The same along Y.")
+    z: Targets = Field(default_factory=list, description="The same along Z.")
+    u_delay_um: Uncertainty | None = None
+    """Standard uncertainty of what a delay between the scales and the instrument makes of a displacement at the speed of the
+    runs; 0 where one trigger reads both. Without it nothing is decided."""
+
+    def problems(self) -> Iterator[str]:
+        for axis in AXES:
+            targets = getattr(self, axis)
+            if any(after <= before for before, after in pairwise(targets)):
+                yield f"{axis}: targets must grow"
+        if not (self.x or self.y or self.z):
+            yield "x, y or z must have targets"
+
+
 class AxisRunsFacts(InterferometerFacts):
     """What reads along the runs: a laser interferometer, straightness or angular optics, a level, a straightedge."""
 
@@ -51,6 +77,7 @@ class AxisRunsFacts(InterferometerFacts):
     arm_mm: Length = key(100.0, "Arm over which a rotation is read: distance of two retroreflectors, base of a level.")
     zero_each_repeat: bool = key(False, "Whether the instrument was set to zero before each repeat, and not once.")
     dead_path_mm: Uncertainty = key(0.0, "Path in air between interferometer and zero, where air is not corrected for.")
+    on_the_fly: OnTheFly | None = key(None, "Readings taken in motion, evaluated at targets of these.")
 
 
 CIRCLES = Beginning(

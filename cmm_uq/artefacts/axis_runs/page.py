@@ -41,6 +41,22 @@ def _evaluated(result: Result) -> list[tuple[Run, PositioningRuns | MissingReadi
 def missing_words(run: Run, error: MissingReadingError) -> Text:
     """Why a run has no figures."""
     way = {1.0: say("in the positive direction"), -1.0: say("in the negative direction")}.get(error.direction, NOTHING)
+    if error.gap:
+        why = say("lies outside the readings of repeat {repeat}", repeat=error.repeat)
+        if np.isfinite(error.gap):
+            why = say(
+                "lies between readings of repeat {repeat} that are {gap:.3g} mm apart, more than {most:.3g} mm",
+                repeat=error.repeat,
+                gap=error.gap,
+                most=error.most,
+            )
+        return say(
+            "measurement {number} is not evaluated: target {target:g} mm {way} {why}",
+            number=run.measurement,
+            target=error.target,
+            way=way,
+            why=why,
+        )
     return say(
         "measurement {number} is not evaluated: target {target:g} mm {way} has {count} readings in repeat {repeat}, not one",
         number=run.measurement,
@@ -72,6 +88,14 @@ def results(result: Result) -> dict[str, Any]:
             "reversal": found.reversal.tolist(),
         }
         told |= {"figures": dict(found.figures()), "U": {name: COVERAGE * u for name, u in spread.items()}}
+        if (motion := found.motion) is not None:
+            told["in_motion"] = {
+                "widest_gap_mm": motion.widest_gap,
+                "linear_less_cubic_rms": float(np.sqrt(np.mean(motion.curvature**2))),
+                "linear_less_cubic_max": float(np.abs(motion.curvature).max()),
+                "part_of_noise": float(np.sqrt(np.mean(motion.share**2))),
+                "u_delay": motion.u_delay,
+            }
         runs.append({**told, "drift_of_repeats": found.drift.tolist()})
     return {"runs": runs, "not_read": _not_read(result)}
 
@@ -93,7 +117,7 @@ def sections(result: Result) -> list[Section]:
     whole = [(run, found, spread) for run, found, spread in every if isinstance(found, PositioningRuns)]
     straight = [each for each in whole if each[0].kind != CIRCLE]
     round_ = [each for each in whole if each[0].kind == CIRCLE]
-    blocks: list[Block | None] = [_both(straight), _each_way(straight), *_circles(round_)]
+    blocks: list[Block | None] = [_both(straight), _each_way(straight), _in_motion(straight), *_circles(round_)]
     blocks += [
         Paragraph(say("{why:capital}.", why=missing_words(run, found)))
         for run, found, _ in every
@@ -170,6 +194,45 @@ def _both(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
 def _each_way(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
     names = [f"{figure}{arrow}" for figure in "AER" for arrow in "↑↓"]
     return _table(say("Each direction by itself"), names, whole, ())
+
+
+def _in_motion(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
+    rows = tuple(
+        (
+            number(run.measurement),
+            run.quantity,
+            number(motion.widest_gap, ".3g"),
+            number(float(np.sqrt(np.mean(motion.share**2))), ".2f"),
+            number(float(np.abs(motion.curvature).max()), ".2g"),
+            say("–") if motion.u_delay is None else number(motion.u_delay, ".2g"),
+            _unit(run),
+        )
+        for run, found, _ in whole
+        if (motion := found.motion) is not None
+    )
+    heads = [
+        *text_columns(say("Measurement"), say("Quantity")),
+        Column(say("Widest gap"), unit("mm")),
+        Column(say("Part of noise")),
+        Column(say("Linear less cubic")),
+        Column(say("u of delay")),
+        *text_columns(say("Unit")),
+    ]
+    return table(
+        say("Readings in motion, interpolated at targets"),
+        heads,
+        rows,
+        say(
+            "Deviations at targets are interpolated linearly between the two readings next to each, of the same repeat and "
+            "direction. ISO 230-2 asks that the axis rests at each target: these figures follow its formulas, and are no test "
+            "by it."
+        ),
+        say(
+            "U contains the noise of two readings (its part of that of one, by which scatter between repeats may be smaller, "
+            "too), how far a cubic through two readings on either side is off the line, and what a delay between scales and "
+            "instrument makes in either direction, as far as stated; a dash: not stated, and not contained."
+        ),
+    )
 
 
 def _circles(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Iterator[Table | None]:

@@ -135,7 +135,7 @@ def profiles(points: Points, runs: tuple[Run, ...]) -> Floats:
     return np.hstack(blocks)
 
 
-def reversed_profile(points: Points, runs: tuple[Run, ...], readings: Floats) -> Floats:
+def reversed_profile(points: Points, runs: tuple[Run, ...], readings: Floats, where: str | None) -> Floats:
     """(n,) what of readings (n,) is the straightedge's: half the difference of its two positions, target by target."""
     found, sign = np.zeros(len(points)), points.columns.get(STRAIGHTEDGE, np.zeros(len(points)))
     whole = _beside(points, runs, STRAIGHTEDGE)
@@ -152,8 +152,11 @@ def reversed_profile(points: Points, runs: tuple[Run, ...], readings: Floats) ->
             ]
             targets, index = np.unique(at, return_inverse=True)
             means.append((targets, np.bincount(index.ravel(), np.concatenate(flat)) / np.bincount(index.ravel())))
-        common, *where = np.intersect1d(means[0][0], means[1][0], return_indices=True)
-        own = 0.5 * (means[0][1][where[0]] - means[1][1][where[1]])
+        common, *shared = np.intersect1d(means[0][0], means[1][0], return_indices=True)
+        if not len(common):
+            problem = f"measurement {there[0].measurement} and the straightedge turned over share no position"
+            raise CmmUqError(problem, where=where or "recording", fix="Record both at the same targets")
+        own = 0.5 * (means[0][1][shared[0]] - means[1][1][shared[1]])
         for run in (*there, *back):
             found[run.rows] = sign[run.rows] * np.interp(run.positions + run.start, common, own)
     return found

@@ -6,12 +6,15 @@ of its standard uncertainty (n − 1), B_i = x̄_i↑ − x̄_i↓, and
     R_i↑ = 4·s_i↑,  R_i = max(2s_i↑ + 2s_i↓ + |B_i|, R_i↑, R_i↓),  R = max R_i,  B = max |B_i|,
     E = max x̄_i − min x̄_i over both directions,  M the same of (x̄_i↑ + x̄_i↓)/2,
     A = max(x̄_i + 2s_i) − min(x̄_i − 2s_i) over both directions.
+
+Of readings taken in motion x_ij is interpolated linearly between the two nearest to the target, of the same direction and
+repeat. How far the cubic through two on either side is off that says what the interpolation leaves out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +22,22 @@ from cmm_uq.base.points import Floats, Ints
 
 UP, DOWN = 0, 1
 _SAME_MM = 1e-2  # targets nearer than this are one
+_ON_IT = 1e-6  # mm from a target, within which a reading is at it
+# of the least distance of targets, that readings in motion may be apart: of the shortest wave that targets resolve, twice
+# that distance, a straight line then leaves out (π/20)²/2 of its amplitude at most, 1.2 %
+LARGEST_GAP = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class InMotion:
+    """What is uncertain of deviations for being interpolated between readings taken in motion."""
+
+    curvature: Floats  # (d, t, n) deviation interpolated linearly, less that by the cubic
+    share: Floats  # (d, t, n) of the noise of one reading in each
+    widest_gap: float  # mm between two readings about a target
+    u_delay: (
+        float | None
+    )  # of what a delay between scales and instrument makes, in each direction the other way; if known
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +52,32 @@ class PositioningRuns:
     growth: Floats | None = None
     length_mm: float = 0.0
     travel: tuple[float, ...] = ()  # unit vector
+    motion: InMotion | None = None  # where readings were taken in motion
+
+    @classmethod
+    def interpolated(
+        cls, targets: Floats, positions: Floats, directions: Floats, repeats: Ints, readings: Floats, *,
+        straight: bool = False, u_delay: float | None = None,
+    ) -> PositioningRuns:  # fmt: skip
+        """At targets (t,), ascending, of readings (k,) taken in motion anywhere.
+
+        Raises ``MissingReadingError`` where a target lies outside the readings of a run, or between two too far apart.
+        """
+        most, rows = LARGEST_GAP * float(np.diff(targets).min()), []
+        for way, number in np.unique(np.column_stack([directions, repeats]), axis=0):
+            group = (directions == way) & (repeats == number)
+            at, index = np.unique(np.round(positions[group] / _ON_IT) * _ON_IT, return_inverse=True)
+            read = np.bincount(index.ravel(), readings[group]) / np.bincount(index.ravel())
+            for target in targets:
+                found = _between(at, read, float(target))
+                if not found[-1] <= most:
+                    raise MissingReadingError(way, target, int(number), 0, found[-1], most)
+                rows.append((target, way, number, *found))
+        at, way, number, value, *beside, gap = np.array(rows).T
+        own = at, way, number.astype(np.int64)
+        curvature, share = (cls.of(*own, each).x for each in beside)
+        motion = InMotion(curvature, share, float(gap.max()), u_delay)
+        return replace(cls.of(*own, value, straight=straight), motion=motion)
 
     @classmethod
     def of(
@@ -120,11 +165,40 @@ class PositioningRuns:
 
 
 class MissingReadingError(ValueError):
-    """Of a direction, target and repeat that no reading, or more than one, belongs to."""
+    """Of a direction, target and repeat that no reading, or more than one, belongs to.
 
-    def __init__(self, direction: float, target: float, repeat: int, count: int) -> None:
-        super().__init__(f"target {target:g} mm has {count} readings in direction {direction:+g} of repeat {repeat}")
+    Of readings in motion: that lies between two that are ``gap`` mm apart and not ``most``, or outside of all (infinite).
+    """
+
+    def __init__(
+        self, direction: float, target: float, repeat: int, count: int, gap: float = 0.0, most: float = 0.0
+    ) -> None:
+        what = f"has {count} readings"
+        if gap:
+            apart = f"between readings {gap:.3g} mm apart, more than {most:.3g} mm,"
+            what = f"lies {apart if np.isfinite(gap) else 'outside the readings'}"
+        super().__init__(f"target {target:g} mm {what} in direction {direction:+g} of repeat {repeat}")
         self.direction, self.target, self.repeat, self.count = direction, target, repeat, count
+        self.gap, self.most = gap, most
+
+
+def _between(at: Floats, read: Floats, target: float) -> tuple[float, float, float, float]:
+    """Of readings at ascending positions: that at a target, less it by the cubic, noise in it, and how far two are apart."""
+    after = int(np.searchsorted(at, target - _ON_IT))
+    if after < len(at) and at[after] - target <= _ON_IT:
+        return float(read[after]), 0.0, 1.0, 0.0
+    if after in (0, len(at)):
+        return 0.0, 0.0, 1.0, np.inf
+    gap = at[after] - at[after - 1]
+    part = float((target - at[after - 1]) / gap)
+    linear = float((1 - part) * read[after - 1] + part * read[after])
+    # the next ones on either side that are not nearer than these two are: no weight is then large
+    further = np.searchsorted(at, at[after - 1] - gap, side="right") - 1, np.searchsorted(at, at[after] + gap)
+    chosen = np.array([after - 1, after, *(i for i in further if 0 <= i < len(at))])
+    others = ~np.eye(len(chosen), dtype=bool)
+    off = np.where(others, at[chosen][:, None] - at[chosen], 1.0)
+    weight = np.prod(np.where(others, target - at[chosen], 1.0) / off, axis=1)
+    return linear, linear - float(weight @ read[chosen]), float(np.hypot(1 - part, part)), float(gap)
 
 
 def _figures(x: Floats) -> Floats:

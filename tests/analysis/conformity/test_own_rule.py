@@ -325,7 +325,7 @@ def test_an_angle_that_is_a_second_of_arc_too_wide_is_that_arc_of_the_shorter_si
 
 
 @pytest.mark.parametrize(("added", "message"), [
-    (statement_of("bryan", "spam"), r"characteristic = 'spam' of laboratory's own rule is not decided here: only .*span"),
+    (statement_of("bryan", "spam"), r"characteristic = 'spam' of laboratory's own rule is not decided here: only .*pivot"),
     (statement_of("bryan", "span", "limit_um = -1.0"), r"limit_um.*greater than 0|limit_um.*above 0|limit_um.*> 0"),
     (statement_of("bryan", "span", "limit_arcsec = -1.0"), r"limit_arcsec.*(greater than|above|>) 0"),
     (statement_of("bryan", "span", "limit_arcsec = 1.0\nlimit_um = 1.0"), r"either limit_um.*limit_arcsec"),

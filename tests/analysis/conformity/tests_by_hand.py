@@ -201,13 +201,48 @@ def positioned(figure: str) -> Callable[..., Hand]:
     return made
 
 
+ABOUT = np.array([-7.0, -2.0, 2.0, 7.0])
+"""mm of the readings in motion about each target, the outer two of which lie 0.5 µm higher."""
+
+
+def in_motion(figure: str) -> Callable[..., Hand]:
+    """The run of ``positioned`` without a stop: at targets it is the mean of two readings, and the cubic is lower."""
+
+    def made(how: str) -> Hand:
+        targets = np.linspace(0.0, 800.0, 4 if how == "incomplete" else 9) + 50.0
+        turned = 0 if how == "copied" else 1
+        x = np.array([[np.roll([-1.0, -1.0, 0.0, 1.0, 1.0], turned * i) for i in range(len(targets))]] * 2)
+        x[0, -1] += 6.0
+        read = (x[:, :, None] + np.array([0.5, 0.0, 0.0, 0.5])[None, None, :, None]).reshape(2, -1, 5)
+        at = (targets[:, None] + ABOUT).ravel()
+        rows = run(1, X, at=at, repeats=5, place=(100.0, -100.0))
+        rows["reading_um"] = np.concatenate([[*read[0, :, k], *read[1, ::-1, k]] for k in range(5)])
+        known = how != "no u"
+        facts = artefact_facts(
+            kind="axis_runs", u_scale_um_per_m=0.1 if known else 0.0,
+            on_the_fly={"x": targets.tolist(), "u_delay_um": 0.02 if known else 0.0},
+        )  # fmt: skip
+        u = spread_by_loops(tuple(x.ravel()), len(targets), figure, motion=True) if known else 0.1
+        asked = CompleteTest(measurements=1, repeats=5, points=72)
+        stated = changing(0.05 if known else 0.0)
+        return Hand(AxisRuns(facts, joined(rows)), stated, {}, POSITIONED[figure], u, False, asked)
+
+    return made
+
+
 @cache
-def spread_by_loops(x: tuple[float, ...], targets: int, figure: str) -> float:
+def spread_by_loops(x: tuple[float, ...], targets: int, figure: str, *, motion: bool = False) -> float:
     """Standard uncertainty of a figure, µm, under the draws of the program, figure by figure in loops."""
     random = np.random.default_rng(np.random.SeedSequence(230, spawn_key=(2,)))
     whole = np.array(x).reshape(2, targets, 5)
     along = 0.08 * random.standard_normal((2000, 1, 1, 1)) * np.linspace(0, 1, targets)[None, None, :, None]
     each = 0.05 * random.standard_normal((2000, *whole.shape))
+    if motion:
+        each = each * 0.5**0.5
+        left_out = 0.0 - np.polyval(np.polyfit(ABOUT, [0.5, 0.0, 0.0, 0.5], 3), 0.0)
+        along = along + left_out * random.standard_normal((2000, 1, targets, 1))
+        delay = 0.02 * random.standard_normal(2000)
+        along = along + np.stack([delay, -delay], axis=1)[:, :, None, None]
     once, more = (
         [by_loops(whole + change)[figure] - by_loops(whole)[figure] for change in along + times * each]
         for times in (1.0, 3**0.5)
@@ -345,6 +380,7 @@ TESTS: Mapping[tuple[str, str], Callable[[str], Hand]] = {
     ("ISO 10360-8:2013", "P_Size.Sph.1x25:Tr:ODS"): probed(size=True, sensing="optical"),
     **{("ISO 230-2:2014", figure): positioned(figure) for figure in POSITIONED},
     **{(own_rule.NAME, figure): own(figure) for figure in OWN},
+    **{(own_rule.NAME, figure): in_motion(figure) for figure in POSITIONED},
     ("ISO 230-6:2002", "Ed"): diagonals("E"),
     ("ISO 230-6:2002", "Bd"): diagonals("B"),
     ("ISO 230-4:1996", "G"): circular("G", 12.0, LOBES, 0.5 * LOBES),
