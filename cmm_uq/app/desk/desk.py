@@ -22,7 +22,7 @@ from cmm_uq.app.desk.folder import DeskFolder, to
 from cmm_uq.app.desk.guard import POLICY, Guard
 from cmm_uq.app.desk.job_pages import JobState, state_of
 from cmm_uq.app.desk.part_pages import PLAN
-from cmm_uq.app.desk.place import ChangedError, below, jobs_in, sha256, write_over
+from cmm_uq.app.desk.place import ChangedError, below, jobs_in, plans_in, sha256, write_over
 from cmm_uq.app.desk.shown import OWN_FILES, own_file, records_page, shown_file
 from cmm_uq.app.desk.verify_page import VERIFY, verify_page
 from cmm_uq.app.desk.workers import ReportRun
@@ -159,13 +159,16 @@ class Desk(DeskFolder):
     def reading(self, request: WebRequest) -> WebPage:
         request.only(("draft",))
         one = self.drafts.read(request.text("draft"))
-        return export_pages.read_page(one, self.reader.ask("read", path=one.export, keys=one.keys))
+        found = self.reader.ask("read", path=one.export, keys=one.keys)
+        return export_pages.read_page(one, found, plans_in(self.root) if found["lines"] else ())
 
     def correct(self, request: WebRequest) -> WebPage | WebResponse:
         form = read_form(request)
         one = self.drafts.read(form.get("draft", ""))
         one.seen = form.get("seen", "")
         chosen, said = export_pages.said_in(form)
+        if said.get("plan"):
+            said["plan"] = below(self.root, said["plan"]).relative_to(self.root).as_posix()
         one.keys = self.reader.ask("corrected", path=one.export, keys=one.keys, chosen=chosen, said=said)
         self.drafts.write(one)
         if form.get("then") == "remember":

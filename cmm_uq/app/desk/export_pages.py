@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from difflib import unified_diff
 from typing import Any, Literal
 
@@ -84,8 +84,8 @@ def here(fix: str) -> Text:
     return next((text for pattern, text in _HERE.items() if re.search(pattern, fix)), Verbatim(fix))
 
 
-def read_page(draft: Draft, found: Mapping[str, Any]) -> WebPage:
-    """The reading of an export, whole, and the form that corrects it."""
+def read_page(draft: Draft, found: Mapping[str, Any], plans: Sequence[str] = ()) -> WebPage:
+    """The reading of an export, whole, and the form that corrects it; ``plans``: files that may say where lines lie."""
     problem, lines = found["problem"], found["lines"]
     first = (Cell(say("First: {example}", example=Verbatim(found["example"]))),)
     if problem is None:
@@ -99,7 +99,11 @@ def read_page(draft: Draft, found: Mapping[str, Any]) -> WebPage:
         where, what, fix = problem
         told = (*p.lines_of({where} - {"", draft.name}), *((Cell(here(fix)),) if fix else ()))
         head = PageNotice(Verbatim(what), "bad", told)
-    fields, buttons = (*_lines(draft, lines), *_settings(draft, found)), _buttons(problem, {*draft.keys} - {"lines"})
+    planned = (("", say("none")), *((one, Verbatim(one)) for one in plans))
+    hint = say("A plan.csv in this folder: line 7 lies as its measurement 7")
+    by_plan = FormEntry("plan", say("Where they were planned"), "", "select", planned, hint=hint)
+    lying = (*((by_plan,) if plans and lines and problem else ()), *_lines(draft, lines))
+    fields, buttons = (*lying, *_settings(draft, found)), _buttons(problem, {*draft.keys} - {"lines"})
     grid = _grid(found) if found["columns"] else None
     form = PageForm(READ, fields, buttons, (("draft", draft.id), ("seen", draft.seen)), grid)
     facts = tuple((Verbatim(label), Cell(Verbatim(text))) for label, text in found["facts"])
@@ -174,7 +178,7 @@ def _lines(draft: Draft, names: Any) -> tuple[FormEntry, ...]:
 def said_in(form: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
     """Meanings of columns by index, and the other keys of an import, as a form has them."""
     chosen = {name[1:]: value for name, value in form.items() if re.fullmatch(r"c\d+", name)}
-    names = ("unit", "decimal", "sheet", "points_per_measurement")
+    names = ("unit", "decimal", "sheet", "points_per_measurement", "plan")
     others: dict[str, Any] = {name: form[name].strip() for name in names if form.get(name, "").strip()}
     lines = {name[5:]: value.strip() for name, value in form.items() if name.startswith("line:") and value.strip()}
     return chosen, others | {"lines": lines}

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cmm_uq.app.commands.jobs.exchange import lines_asked, remember, remembered_keys
+from cmm_uq.app.commands.jobs.exchange import lines_asked, placed_by_plan, remember, remembered_keys
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
@@ -166,10 +166,13 @@ def corrected(path: str, keys: Mapping[str, Any], chosen: Mapping[str, str], sai
             sources = [_source(i, header) for i in own]
             columns[name] = sources if len(sources) > 1 else sources[0]
     lines = {name: place for name, place in said.get("lines", {}).items() if place}
-    others = {name: value for name, value in said.items() if name != "lines" and value}
+    others = {name: value for name, value in said.items() if name not in ("lines", "plan") and value}
     if (points := others.get("points_per_measurement")) and points.isdecimal():
         others["points_per_measurement"] = int(points)
-    return keys_of({"columns": columns, "lines": lines, **others}).model_dump(exclude_defaults=True)
+    after = keys_of({"columns": columns, "lines": lines, **others})
+    if said.get("plan"):
+        after = placed_by_plan(Path(path), after, Path(said["plan"]))
+    return after.model_dump(exclude_defaults=True)
 
 
 def _source(i: int, header: Header | None) -> str | int:

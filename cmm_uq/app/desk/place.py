@@ -115,6 +115,12 @@ def write_over(path: Path, content: bytes, seen: str) -> None:
             ) from None
 
 
+def plans_in(root: Path) -> list[str]:
+    """Files ``plan.csv`` in the root and two levels below, by their paths there."""
+    found = (path.relative_to(root) for pattern in ("", "*/", "*/*/") for path in root.glob(f"{pattern}plan.csv"))
+    return sorted(path.as_posix() for path in found if not any(part[0] == "." for part in path.parts))
+
+
 def jobs_in(root: Path) -> list[Path]:
     """Folders of jobs in the root and one level below, the newest first."""
     found: dict[Path, float] = {}

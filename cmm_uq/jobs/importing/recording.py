@@ -26,7 +26,17 @@ from cmm_uq.jobs.importing.answers import head_of
 from cmm_uq.jobs.importing.arrangement import figures_follow, with_blocks, with_one_head, with_points
 from cmm_uq.jobs.importing.columns import columns_of, left_out_fact
 from cmm_uq.jobs.importing.encodings import is_number
-from cmm_uq.jobs.importing.format import Cell, Fact, FileKeys, ImportKeys, Recognition, Sheet, format_of, length_named
+from cmm_uq.jobs.importing.format import (
+    Cell,
+    Fact,
+    FileKeys,
+    Format,
+    ImportKeys,
+    Recognition,
+    Sheet,
+    format_of,
+    length_named,
+)
 from cmm_uq.jobs.importing.header import (
     LINES_BEFORE,
     POINTS,
@@ -211,7 +221,7 @@ def _imported(
         raise CmmUqError(f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file", where=where,
                          fix="Split it")  # fmt: skip
     form = format_of(content, where)
-    sheets = [with_points(with_blocks(_with_unit(sheet)), of_lengths) for sheet in form.read(content, where, keys)]
+    sheets = _sheets_of(form, content, where, keys)
     found = _chosen(sheets, keys, where, wanted)
     file = PurePath(where).name
     sheet, header = found[0] if isinstance(found, list) else found
@@ -246,13 +256,18 @@ def _lengths(
 
 
 def tables_in(content: bytes, where: str, keys: ImportKeys) -> tuple[list[Sheet], list[tuple[Sheet, Header]]]:
-    """Sheets of a file as they stand, and its tables with their headers; none where they are not understood."""
-    sheets = [_with_unit(sheet) for sheet in format_of(content, where).read(content, where, keys)]
+    """Sheets of a file, and its tables with their headers; none where they are not understood."""
+    sheets = _sheets_of(format_of(content, where), content, where, keys)
     try:
         found = _chosen(sheets, keys, where, POINTS)
     except CmmUqError:
         return sheets, []
     return sheets, found if isinstance(found, list) else [found]
+
+
+def _sheets_of(form: Format, content: bytes, where: str, keys: ImportKeys) -> list[Sheet]:
+    """Sheets of a file, each with a row for each point or length."""
+    return [with_points(with_blocks(_with_unit(sheet)), of_lengths) for sheet in form.read(content, where, keys)]
 
 
 def _with_unit(sheet: Sheet) -> Sheet:

@@ -11,6 +11,7 @@ import pytest
 
 from cmm_uq.app.cli.jobs import import_keys
 from cmm_uq.app.desk.exports import corrected, first_keys, keys_of, read, remembered
+from cmm_uq.app.desk.place import plans_in
 from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import imported
 from tests.jobs.importing.laboratory import EXPORTS
@@ -134,3 +135,24 @@ def test_answers_are_remembered_for_the_next_export_with_the_same_head(
     remembered(str(first), keys | {"unit": "mm"})  # another answer takes the place of the first
     assert first_keys(str(second)) == keys | {"unit": "mm"}
     assert first_keys(str(other)) == {}
+
+
+def test_lines_lie_as_a_plan_of_the_folder_has_them(tmp_path: Path) -> None:
+    (tmp_path / "reports" / "a").mkdir(parents=True)
+    plan = tmp_path / "reports" / "a" / "plan.csv"
+    plan.write_text("measurement,point,repeat,x_mm,y_mm,z_mm\n1,1,1,10,20,30\n1,2,1,310,420,30\n", encoding="utf-8")
+    export = tmp_path / "bar.csv"
+    export.write_text("Position;Length 1 (mm)\n1;500.0020\n", encoding="utf-8")
+    assert plans_in(tmp_path) == ["reports/a/plan.csv"]
+    keys = corrected(str(export), {}, {}, {"plan": str(plan)})
+    assert keys == {"lines": {"1": "from 10.0,20.0,30.0 to 310.0,420.0,30.0"}}
+    assert read(str(export), keys)["problem"] is None
+
+
+def test_a_row_for_each_coordinate_is_shown_as_points(tmp_path: Path) -> None:
+    export = tmp_path / "rows.csv"
+    rows = "1;1;X;1,5\n1;1;Y;2,5\n1;1;Z;-3,5\n1;2;X;4,5\n1;2;Y;5,5\n1;2;Z;6,5\n"
+    export.write_text(f"Messung;Punkt;Achse;Ist (mm)\n{rows}", encoding="utf-8")
+    found = read(str(export), {})
+    assert [meaning for _, meaning in found["columns"]] == ["measurement", "point", "x_mm", "y_mm", "z_mm"]
+    assert found["rows"][1][1] == ["1", "1", "1,5", "2,5", "-3,5"]
