@@ -88,6 +88,7 @@ LINES = (
     Line(f"sign @{MADE}/certificate.pdf @{MADE}/certificate.xml --key @key.p12 --out out --records none",
          (f"{MADE}/certificate.pdf", f"{MADE}/certificate.xml", "key.p12")),
     Line("affected --version 0.3.0 --list =", (RECORDS,)), Line("serve = --port 0", (RECORDS, MADE)),
+    Line("desk @live --no-open", ("live/job.toml",)),
     Line("standards ISO_10360-2:2009 --form form.toml"), Line("schema job"), Line("selftest --quiet"),
     Line("instruments test @profile.toml file:job/log.txt --seconds 0.1", ("profile.toml", "log.txt")),
     Line("instruments test table --job @live --seconds 0.1", ("live/job.toml", "live/own.toml", "live/log.txt")),

@@ -108,6 +108,7 @@ LINES = (
          ("reports/mount", "keys", "out")),
     Line(f"affected --version 0.3.0 --list {_OF}", ("reports",)),
     Line(f"serve {_OF} --port 0", ("reports",), 143),
+    Line("desk job --no-open", ("job",), 143),
     Line("standards ISO_10360-2:2009 --form out/form.toml", ("out",)),
     Line("schema job", ()),
     Line("selftest --json", ()),
@@ -121,7 +122,7 @@ LINES = (
     Line("records import reports/mount --records out/new.db", ("reports/mount", "out")),
     Line(f"records restore {_RECORDS} --records out/new.db", ("reports", "out")),
 )  # fmt: skip
-CODES = {"verify": (1, 3), "records": (1,), "serve": (143,), "report": (1,)}
+CODES = {"verify": (1, 3), "records": (1,), "serve": (143,), "desk": (143,), "report": (1,)}
 """Exit codes beside those of every command, as each documents them."""
 TOLD_ON_OUTPUT = ("check", "batch", "records", "verify", "report")
 """Commands that say on standard output what is wrong."""
@@ -205,7 +206,7 @@ def attempt(line: Line, place: str, state: str, folder: Path, run_as: Runner = a
     if place:
         _give(folder / place, STATES[state])
     before, rights = snapshot(folder), _rights(folder)
-    kill = (signal.SIGTERM, SECONDS_OF_SERVER) if line.command == "serve" else None
+    kill = (signal.SIGTERM, SECONDS_OF_SERVER) if line.command in ("serve", "desk") else None
     words = [word.replace("_", " ") if word.startswith(("ISO", "T=")) else word for word in line.words.split()]
     more = {"CMM_UQ_SIGN_PASSPHRASE": "open", "HOME": str(folder.parent / "home")}
     outcome = run_as(words, folder, kill, more)

@@ -31,7 +31,7 @@ def altered(seed: int, root: Path, numbers: Sequence[int]) -> Iterator[dict[str,
 
 def _process(this: Case, warm: Warm, root: Path, arguments: tuple[str, ...]) -> Outcome:
     run: Callable[..., Outcome] = processes.run if this.number % STARTED == 0 else warm.run
-    return run(arguments, root, kill=(signal.SIGTERM, SERVES_S) if this.target == "serve" else None)
+    return run(arguments, root, kill=(signal.SIGTERM, SERVES_S) if this.target in ("serve", "desk") else None)
 
 
 def acquisitions(seed: int, root: Path, numbers: Sequence[int]) -> Iterator[dict[str, Any]]:

@@ -143,7 +143,7 @@ READ = {
     "cmm_uq/laboratory/live": {"now"}, "cmm_uq/laboratory/live/instruments": {"now", "time_ns", "monotonic"},
     "cmm_uq/laboratory/records": {"now"}, "cmm_uq/app/cli": {"now"}, "cmm_uq/app/commands/laboratory": {"now"},
     "cmm_uq/laboratory/schedule": {"now", "time", "monotonic"}, "cmm_uq/certificate/sign": {"now"},
-    "cmm_uq/app/serve": {"now", "monotonic"}, "cmm_uq/certificate/verify": {"now"},
+    "cmm_uq/app/serve": {"now", "monotonic"}, "cmm_uq/certificate/verify": {"now"}, "cmm_uq/app/desk": {"monotonic"},
 }  # fmt: skip
 """How long a command waits for another one's lock, or for what it is writing when it is interrupted; the date that a new job
 begins with, for its reader to change; when a reading came, and when a simulated instrument sends one; when something was

@@ -111,7 +111,7 @@ def test_a_decision_that_a_reading_too_few_forbids_stops_check_and_stops_report_
     job = Path(shutil.copytree(ROOT / "examples" / "axis-runs-simulated", tmp_path / "job"))
     change(job / "recording.csv", r"^1,2,1,.*\n", "")
     (problem, _) = check_job(job).problems
-    assert re.search("target .* needs one", problem.problem)
+    assert problem.problem.startswith("target 180 mm has 0 readings in direction +1 of repeat 1")
     assert (problem.key, problem.line) == (
         "[[conformity]] 1 standard",
         change(job / "job.toml", r"^standard = ", "standard = "),
