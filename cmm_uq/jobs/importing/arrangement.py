@@ -7,7 +7,6 @@ row of those that it is of. What is left out is told with its place and why: a s
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -77,28 +76,33 @@ def with_one_head(
 
 
 def with_blocks(sheet: Sheet) -> Sheet:
-    """Tables of points below each other with the same head, as one: each a measurement where no column numbers them."""
-    rows = [] if sheet.listed else [tuple(map(text_of, row)) for row in sheet.rows]
-    heads = [row for row, count in Counter(rows).items() if count > 1 and _names_places(row)]
-    if len(heads) != 1:
+    """Tables of points below each other with the same head, as one.
+
+    Each is a measurement where it has a title and no column numbers them; a head without one is that of another page.
+    """
+    heads = [row for row in sheet.rows[:LINES_BEFORE] if _names_places(row)] if not sheet.listed else []
+    starts = [i for i, row in enumerate(sheet.rows) if row == heads[0]] if heads else []
+    if len(starts) < 2:
         return sheet
-    starts = [i for i, row in enumerate(rows) if row == heads[0]]
-    numbered = any(understood(cell).column == "measurement" for cell in heads[0])
-    table: list[list[Cell]] = [[*heads[0], *([] if numbered else ["Measurement"])]]
+    head = [*map(text_of, heads[0])]
+    ahead = [next((row for row in reversed(sheet.rows[:i]) if any(cell != "" for cell in row)), ()) for i in starts[1:]]
+    titled = all(row and not any(cell != "" and is_number(cell) for cell in row) for row in ahead)
+    numbered = not titled or any(understood(cell).column == "measurement" for cell in head)
+    table: list[list[Cell]] = [[*head, *([] if numbered else ["Measurement"])]]
     lines, left_out = [sheet.lines[starts[0]]], [*sheet.left_out]
-    for block, (start, end) in enumerate(pairwise([*starts, len(rows)]), 1):
+    for block, (start, end) in enumerate(pairwise([*starts, len(sheet.rows)]), 1):
         for i in range(start + 1, end):
-            row = [*sheet.rows[i], *[""] * (len(heads[0]) - len(sheet.rows[i]))]
+            row = [*sheet.rows[i], *[""] * (len(head) - len(sheet.rows[i]))]
             if any(cell != "" and is_number(cell) for cell in row[1:]):
                 table.append([*row, *([] if numbered else [str(block)])])
                 lines.append(sheet.lines[i])
-            elif any(rows[i]):
+            elif any(cell != "" for cell in row):
                 left_out.append(shown(sheet, i, REMARK))
     return replace(sheet, rows=table, lines=lines, left_out=tuple(left_out))
 
 
-def _names_places(row: Sequence[str]) -> bool:
-    return {*COORDINATES} <= {understood(cell).column for cell in row}
+def _names_places(row: Sequence[Cell]) -> bool:
+    return {*COORDINATES} <= {understood(text_of(cell)).column for cell in row}
 
 
 def with_points(sheet: Sheet, meaning_of: Callable[[str], Heading]) -> Sheet:

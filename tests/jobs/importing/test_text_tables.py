@@ -368,3 +368,19 @@ def test_lengths_along_x_y_and_z_in_turn_are_no_points(head: str) -> None:
     )
     with pytest.raises(CmmUqError, match="nothing says where lines 'X', 'Y', 'Z' lie"):
         read(f"{head};Nominal (mm);Measured (mm)\n{rows}")
+
+
+BLOCK = "Punkt;X [mm];Y [mm];Z [mm]\n1;1.5;2.5;3.5\n2;4.5;5.5;6.5\n"
+
+
+def test_tables_below_each_other_are_measurements_where_each_has_a_title() -> None:
+    found = read(f"Lage 1\n{BLOCK}\nLage 2\n{BLOCK}")
+    assert found.columns["measurement"].tolist() == [1, 1, 2, 2]
+    assert found.columns["point"].tolist() == [1, 2, 1, 2]
+    assert found.lines.tolist() == [3, 4, 8, 9]
+
+
+def test_the_head_of_another_page_begins_no_measurement() -> None:
+    text = "Name;X [mm];Y [mm];Z [mm]\nM1_P1;1.5;2.5;3.5\nName;X [mm];Y [mm];Z [mm]\nM1_P2;4.5;5.5;6.5\n"
+    found = read(text)
+    assert (found.columns["measurement"].tolist(), found.columns["point"].tolist()) == ([1, 1], [1, 2])
