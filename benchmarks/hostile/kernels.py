@@ -24,6 +24,8 @@ SAMPLED = (
     ".regions.recorded",
 )  # fmt: skip
 """What follows from a posterior whose noise is sampled."""
+WITHOUT_NOISE = "without_noise"
+"""In the name of a figure of the machine by draws of the field, beside the one that is decided."""
 SPREADS = (
     ".u_um", ".guard_band_um", ".prior_share", ".probability_conforming", ".covariance.", ".lengths.", ".length_budget.",
     ".posterior.", ".k", ".regions.",
@@ -78,7 +80,7 @@ def reported(example: str, kernel: str, folder: Path) -> bytes:
 def differences(one: object, other: object, where: str = "") -> Iterator[str]:
     """Where two results disagree by more than their kind allows."""
     if isinstance(one, Mapping) and isinstance(other, Mapping) and one.keys() == other.keys():
-        u = one.get("u") if where.startswith(SAMPLED) else None
+        u = one.get("u") if where.startswith(SAMPLED) or WITHOUT_NOISE in where else None
         for key in one:
             if isinstance(u, float) and key != "k":
                 yield from _sampled(one[key], other[key], u, f"{where}.{key}")

@@ -213,7 +213,7 @@ def sizes_table(scales: Mapping[str, Floats]) -> Table | None:
     figures = (say("Physics allows"), say("As recorded"), say("95 % interval from"), say("to"))
     heads: tuple[Text | Column, ...] = (say("Errors"), *map(Column, figures), say("Unit"))
     rows = (
-        (family_words(one["family"]), *(number(one[key], ".2g") for key in keys), unit(one["unit"]))
+        (family_words(one["family"]), *(number(float(f"{one[key]:.2g}"), "g") for key in keys), unit(one["unit"]))
         for one in families_data(scales)
     )
     return table(say("Sizes of errors, root mean square"), heads, rows, say(
