@@ -394,6 +394,8 @@ def _fall(model: FieldModel, density: LogDensity, sizes: Callable[[Floats], Size
         value, of_noise = by_steps(density, at, d)
         scale = size_of(at[None, d:])  # its square grows by s·φ(z)/φ(s)·dz
         grows = (scale * np.exp(0.5 * (scale**2 - at[d:] ** 2)))[0]
-        return value, np.append(of_noise, at[d:] - model.slopes(sizes(at[None]), scale) * grows)
+        with np.errstate(over="ignore", invalid="ignore"):  # of sizes that no machine has
+            slopes = model.slopes(sizes(at[None]), scale) * grows
+        return value, np.append(of_noise, at[d:] - np.where(np.isfinite(slopes), slopes, 0.0))
 
     return fall

@@ -89,6 +89,16 @@ def test_slopes_are_those_of_the_density() -> None:
     assert found.slopes(white(SIGMA), scale) == pytest.approx(by_steps, rel=1e-5)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_step_to_noise_that_no_machine_has_has_no_slopes_but_the_priors() -> None:
+    found = families(observed((0.2, 1.0), 1))
+    density, sizes, d, begin = room._density(found, None)
+    z = np.full(len(found.families), 0.3)
+    value, slopes = room._fall(found, density, sizes, d)(np.append(np.full_like(begin, 800.0), z))
+    assert np.isfinite(value)
+    np.testing.assert_array_equal(slopes[d:], z)
+
+
 def test_sizes_by_slopes_are_those_by_steps() -> None:
     found = families(observed((0.2, 1.0), 3))
     by_slopes, by_steps = (
