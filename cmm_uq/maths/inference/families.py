@@ -5,8 +5,7 @@
 Beforehand each s_f is half-normal: one stands for as large as physics allows, and none is excluded below. Given the sizes of
 the families and of the noise everything is normal, so that these alone are sampled (emcee), by their exact density in the
 space of observations; all else is drawn from its exact distribution given them (Matheron's rule: Chilès, Delfiner 2012,
-Geostatistics, 7.3). A family shrinks by what observations show of it and by nothing else: where they show nothing of it, the
-density is that of the prior.
+Geostatistics, 7.3). A family shrinks by what observations show of it alone: where that is nothing, its density is the prior's.
 """
 
 from __future__ import annotations
