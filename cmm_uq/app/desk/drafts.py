@@ -58,8 +58,12 @@ class DraftFolder:
         return self.root / OWN / "desk"
 
     def every(self) -> list[Draft]:
-        found = [path.parent.name for path in sorted(self.folder.glob(f"*/{ANSWERS}"), key=_age, reverse=True)]
-        return [self.read(name) for name in found if _ID.fullmatch(name)][:MOST_DRAFTS]
+        """The newest first; one whose answers were damaged is told of where it is opened, and stands in nobody's way."""
+        found: list[Draft] = []
+        for path in sorted(self.folder.glob(f"*/{ANSWERS}"), key=_age, reverse=True):
+            with contextlib.suppress(CmmUqError):
+                found.append(self.read(path.parent.name))
+        return found[:MOST_DRAFTS]
 
     def take(self, request: WebRequest) -> Draft:
         """A file that was dropped, in a draft of its own; nothing is left of one that did not come whole."""

@@ -8,6 +8,7 @@ from pathlib import Path, PureWindowsPath
 import pytest
 from hypothesis import given, strategies as st
 
+from cmm_uq.app.desk.drafts import DraftFolder
 from cmm_uq.app.desk.place import LONGEST, ChangedError, below, jobs_in, parts_of, safe_name, sha256, write_over
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.source import check_name
@@ -107,3 +108,17 @@ def test_what_was_changed_meanwhile_is_not_written_over(tmp_path: Path) -> None:
     with pytest.raises(ChangedError):
         write_over(path, b"three", sha256(b"two"))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_draft_whose_answers_are_damaged_hides_no_other(tmp_path: Path) -> None:
+    drafts = DraftFolder(tmp_path)
+    for name, text in (
+        ("0" * 16, '{"export": "a.csv", "keys": {}, "values": {}}'),
+        ("1" * 16, '{"export": "b'),
+        ("no-draft", "{}"),
+    ):
+        (drafts.folder / name).mkdir(parents=True)
+        (drafts.folder / name / "answers.json").write_text(text, encoding="utf-8")
+    assert [one.name for one in drafts.every()] == ["a.csv"]
+    with pytest.raises(CmmUqError, match="cannot be read"):
+        drafts.read("1" * 16)
