@@ -1,7 +1,8 @@
 """Twenty-four exports as laboratories have them, written by somebody who knew vendors' documents and nothing of the reader.
 
 They were hashed (``SHA256SUMS``) before they were tried. At the first try 6 were read, or ended with a question that their
-author allows, 17 were refused and one was a fault of the program; what is read since is below. None may be read wrongly.
+author allows, 16 were refused, one was asked about on a wrong reading, and one was a fault of the program; what is read since
+is below. None may be read wrongly.
 """
 
 from __future__ import annotations
