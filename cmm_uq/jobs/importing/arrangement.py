@@ -26,7 +26,7 @@ from cmm_uq.jobs.importing.header import (
     words_of,
 )
 
-_IS_UNIT = re.compile(r"(?:\A|\bunits?\s*[=:]\s*)([\w.µμ\"]+)\Z", re.IGNORECASE)
+_SAYS_UNIT = re.compile(r"\bunits?\s*[=:]\s*([\w.µμ\"]+)\Z", re.IGNORECASE)
 NUMBERED = ("measurement", "point", "repeat")
 _ENDS_IN_AXIS = re.compile(r"(.*?)[\s_.:/-]*([XYZ])", re.IGNORECASE)
 _DECIMAL = re.compile(r"[.,]\d")  # of a figure, which is in no head
@@ -40,6 +40,8 @@ BASES, FIGURES = (
 
 
 _MEASURED, _OF_LENGTHS = ("length_mm", "run"), ("line", "repeat")
+_NOT_MEASURED = ("nominal_mm", "reference_mm", "deviation_um", "deviation_mm", "summary")
+_OF_UNITS = re.compile(r"units?|einheit(?:en)?|unit[ée]s?|unit[àa]|unidad(?:es)?|単位", re.IGNORECASE)
 
 
 def text_of(cell: Cell) -> str:
@@ -86,7 +88,7 @@ def with_blocks(sheet: Sheet) -> Sheet:
         return sheet
     head = [*map(text_of, heads[0])]
     ahead = [next((row for row in reversed(sheet.rows[:i]) if any(cell != "" for cell in row)), ()) for i in starts[1:]]
-    titled = all(row and not any(cell != "" and is_number(cell) for cell in row) for row in ahead)
+    titled = all(map(_names_a_measurement, ahead))
     numbered = not titled or any(understood(cell).column == "measurement" for cell in head)
     table: list[list[Cell]] = [[*head, *([] if numbered else ["Measurement"])]]
     lines, left_out = [sheet.lines[starts[0]]], [*sheet.left_out]
@@ -99,6 +101,14 @@ def with_blocks(sheet: Sheet) -> Sheet:
             elif any(cell != "" for cell in row):
                 left_out.append(shown(sheet, i, REMARK))
     return replace(sheet, rows=table, lines=lines, left_out=tuple(left_out))
+
+
+def _names_a_measurement(row: Sequence[Cell]) -> bool:
+    """Whether a row is a title such as ``Lage 2``, and neither figures nor the number of a page."""
+    if any(cell != "" and is_number(cell) for cell in row):
+        return False
+    words = plain_words(" ".join(map(text_of, row)))
+    return any(understood(word).column == "measurement" or word in words_of("lengths")["line"] for word in words)
 
 
 def _names_places(row: Sequence[Cell]) -> bool:
@@ -137,15 +147,16 @@ def _of_coordinates(sheet: Sheet, first: int, axis: int, meaning_of: Callable[[s
     labels = {j: own[::3] for j, own in texts.items() if _of_threes(own, head[j])}
     names = [*zip(*labels.values(), strict=True)]
     figures = [j for j, own in enumerate(columns) if j not in (axis, *labels) and all(map(is_number, own))]
+    figures = [j for j in figures if meaning_of(head[j]).column not in _NOT_MEASURED]
     measured = [j for j in figures if meaning_of(head[j]).column in _MEASURED] or figures
     of_points = any(meaning_of(head[j]).column not in _OF_LENGTHS for j in labels)
     clear = len(measured) == 1 or (bool(measured) and meaning_of(head[measured[0]]).column in _MEASURED)
     if not (of_points and clear) or len({*names}) < len(places) // 3:
         return None
     runs = ["Repeat"] if len(measured) > 1 else []
-    alike = (_IS_UNIT.search(text_of(own[0])) for own in columns if len({*own}) == 1)
-    units = [without_unit(head[measured[0]])[1], *(unit_named(found[1]) for found in alike if found)]
-    unit = next(filter(None, units), None)
+    alike = [(head[j].strip(), text_of(own[0])) for j, own in enumerate(columns) if len({*own}) == 1]
+    said = [text if _OF_UNITS.fullmatch(name) else "".join(_SAYS_UNIT.findall(text)) for name, text in alike]
+    unit = next(filter(None, [without_unit(head[measured[0]])[1], *map(unit_named, said)]), None)
     xyz = [f"{letter} [{unit.name}]" if unit else letter for letter in "XYZ"]
     rows: list[list[Cell]] = [[*(head[j] for j in labels), *runs, *xyz]]
     for k, name in enumerate(names):
@@ -221,7 +232,8 @@ def is_summary(row: Sequence[Cell]) -> bool:
     labels = [cell for cell in row if cell != ""][:2]
     if any(isinstance(cell, str) and " ".join(plain_words(cell)) in words_of("rows")["summary"] for cell in labels):
         return True
-    return bool(labels) and text_of(labels[0]).endswith((")", "]")) and without_unit(text_of(labels[0]))[1] is not None
+    label = text_of(labels[0]) if labels else ""
+    return label.endswith((")", "]")) and not re.search(r"\d", label) and without_unit(label)[1] is not None
 
 
 def shown(sheet: Sheet, i: int, why: str) -> str:

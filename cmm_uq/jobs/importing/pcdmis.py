@@ -93,23 +93,9 @@ class FeatureReport(TextReport):
     shows = (_TITLE, _COORDINATE)
 
     def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
-        places: list[ReportedPlace] = []
-        section, ends, unit = "", dict[str, int](), None
-        for line, content in enumerate(lines, 1):
-            words = _ends(content)
-            if title := _TITLE.match(content):
-                places.append(ReportedPlace(title["of"], line, "", section, title["sort"]))
-            elif found := _SECTION.match(content):
-                section = found[1]
-            elif {"MEAS", "NOMINAL"} <= words.keys() and not any(map(str.isdigit, content)):
-                ends = words
-            elif places and (row := _COORDINATE.match(content)):
-                place = f"{where} line {line}"
-                places[-1].xyz.setdefault(row["axis"].upper(), _below(content, ends, place)["MEAS"])
-            elif of_unit := _UNIT_LINE.match(content):
-                unit = of_unit[1]
+        places, unit = _features(lines, where)
         whole = [place for place in places if len(place.xyz) == len(AXES)]
-        if odd := [place for place in places if 0 < len(place.xyz) < len(AXES)]:
+        if odd := [place for place in places if 0 < len(place.xyz) < len(AXES)] or places[: not whole]:
             what = f"{odd[0].feature!r} has not X, Y and Z"
             fix = "Report all three of every feature; if it is the last one, the file was cut off"
             raise CmmUqError(what, where=f"{where} line {odd[0].line}", fix=fix)
@@ -117,6 +103,32 @@ class FeatureReport(TextReport):
             whole = [replace(place, feature=f"{place.dimension} {place.feature}") for place in whole]
         facts = facts_of(encoding, "features_not_used", say("Features that are no place"), len(places) - len(whole))
         return sheets_of([place.row for place in whole], WITH_DIRECTION[:4], unit=unit, facts=facts)
+
+
+def _features(lines: Sequence[str], where: str) -> tuple[list[ReportedPlace], str | None]:
+    """Features with the coordinates that stand below their titles, and the unit that a line says."""
+    places: list[ReportedPlace] = []
+    section, ends, unit = "", dict[str, int](), None
+    for line, content in enumerate(lines, 1):
+        words = _ends(content)
+        if title := _TITLE.match(content):
+            places.append(ReportedPlace(title["of"], line, "", section, title["sort"]))
+        elif found := _SECTION.match(content):
+            section = found[1]
+        elif {"MEAS", "NOMINAL"} <= words.keys() and not any(map(str.isdigit, content)):
+            ends = words
+        elif places and (row := _COORDINATE.match(content)):
+            place, axis = f"{where} line {line}", row["axis"].upper()
+            if axis in places[-1].xyz:
+                what = f"{axis} of {places[-1].feature!r} is there twice"
+                raise CmmUqError(what, where=place, fix="Export each run as a file of its own")
+            places[-1].xyz[axis] = _below(content, ends, place)["MEAS"]
+        elif of_unit := _UNIT_LINE.match(content):
+            if unit not in (None, of_unit[1]):
+                what = f"is in {unit} before this line, and in {of_unit[1]} after it"
+                raise CmmUqError(what, where=f"{where} line {line}", fix="Export it in one unit")
+            unit = of_unit[1]
+    return places, unit
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,15 @@ from cmm_uq.jobs.importing.header import (
     numbered_words,
     understood,
 )
-from cmm_uq.jobs.importing.length_tables import of_lengths, tables_of
+from cmm_uq.jobs.importing.length_tables import (
+    DEVIATION_MM,
+    DEVIATION_UM,
+    LINE,
+    MEASURED,
+    NOMINAL,
+    of_lengths,
+    tables_of,
+)
 from cmm_uq.jobs.importing.lengths import MeasuredLengths, lengths_of, placed
 
 # lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled
@@ -265,9 +273,14 @@ def tables_in(content: bytes, where: str, keys: ImportKeys) -> tuple[list[Sheet]
     return sheets, found if isinstance(found, list) else [found]
 
 
+LENGTHS_ALONE = (LINE, MEASURED, NOMINAL, DEVIATION_UM, DEVIATION_MM)  # columns that no table of points has
+
+
 def _sheets_of(form: Format, content: bytes, where: str, keys: ImportKeys) -> list[Sheet]:
-    """Sheets of a file, each with a row for each point or length."""
-    return [with_points(with_blocks(_with_unit(sheet)), of_lengths) for sheet in form.read(content, where, keys)]
+    """Sheets of a file, each with a row for each point or length; what is said to be lengths is no coordinate."""
+    sheets = [with_blocks(_with_unit(sheet)) for sheet in form.read(content, where, keys)]
+    lengths = keys.lines or not {*keys.columns}.isdisjoint(LENGTHS_ALONE)
+    return sheets if lengths else [with_points(sheet, of_lengths) for sheet in sheets]
 
 
 def _with_unit(sheet: Sheet) -> Sheet:

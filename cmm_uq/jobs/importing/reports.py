@@ -7,7 +7,6 @@ from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LINE, ROWS
@@ -53,9 +52,10 @@ class ReportedPlace:
     feature: str
     line: int
     unit: str = ""
-    dimension: Any = ""  # by what it is told from others
+    dimension: str = ""
     sort: str = ""
     xyz: dict[str, str] = field(default_factory=dict)
+    run: tuple[str, str] = ("", "")  # plan and number of the part, of a Calypso table
 
     @property
     def row(self) -> Row:
@@ -98,16 +98,12 @@ class Calypso(TextReport):
                              where=f"{where} line {units[second]}", fix="Export it in one unit")  # fmt: skip
         facts = facts_of(encoding, "characteristics_not_used", say("Characteristics that are no coordinate"), others)
         head, rows_of = WITH_DIRECTION[:4], [place.row for place in places]
-        if (
-            len(runs := list(dict.fromkeys(place.dimension for place in places))) > 1
-        ):  # each by its plan and its part's number
-            plans = list(dict.fromkeys(plan for plan, _ in runs))
-            numbers = {
-                run: (plans.index(run[0]) + 1, [one for one in runs if one[0] == run[0]].index(run) + 1) for run in runs
-            }
+        if len(runs := list(dict.fromkeys(place.run for place in places))) > 1:
+            plans = {plan: [run for run in runs if run[0] == plan] for plan, _ in runs}
+            numbers = {run: ([*plans].index(run[0]) + 1, plans[run[0]].index(run) + 1) for run in runs}
             head = ["measurement", "repeat", *head]
             rows_of = [
-                (sort, [*map(str, numbers[place.dimension]), *cells], line)
+                (sort, [*map(str, numbers[place.run]), *cells], line)
                 for place, (sort, cells, line) in zip(places, rows_of, strict=True)
             ]
         return sheets_of(rows_of, head, unit=next(iter(units), None), facts=facts)
@@ -132,7 +128,7 @@ def _characteristics(rows: Sequence[Sequence[str]], where: str) -> tuple[list[Re
             others += 1
             continue
         run = (cells[0], cells[1])
-        place = places.setdefault((*run, cells[feature]), ReportedPlace(cells[feature], line, "", run))
+        place = places.setdefault((*run, cells[feature]), ReportedPlace(cells[feature], line, run=run))
         if axis in place.xyz:
             raise CmmUqError(f"{axis} of {place.feature!r} is there twice", where=at,
                              fix="Export each run as a file of its own, or name the features of each run")  # fmt: skip

@@ -384,3 +384,41 @@ def test_the_head_of_another_page_begins_no_measurement() -> None:
     text = "Name;X [mm];Y [mm];Z [mm]\nM1_P1;1.5;2.5;3.5\nName;X [mm];Y [mm];Z [mm]\nM1_P2;4.5;5.5;6.5\n"
     found = read(text)
     assert (found.columns["measurement"].tolist(), found.columns["point"].tolist()) == ([1, 1], [1, 2])
+
+
+def test_nominal_values_alone_are_no_points() -> None:
+    with pytest.raises(CmmUqError):
+        read("Element;Achse;Soll [mm]\nKugel 1;X;1.5\nKugel 1;Y;2.5\nKugel 1;Z;3.5\n", points_per_measurement=1)
+
+
+def test_a_column_that_is_called_otherwise_says_no_unit() -> None:
+    text = "Element;Achse;Ist;Status\nKugel 1;X;1500.5;M\nKugel 1;Y;2.5;M\nKugel 1;Z;3.5;M\n"
+    assert xyz(read(text, points_per_measurement=1, unit="mm")) == [[1500.5, 2.5, 3.5]]
+    with pytest.raises(CmmUqError, match="nothing says the unit"):
+        read(f"{text}Kugel 2;X;900.5;M\nKugel 2;Y;2.5;M\nKugel 2;Z;3.5;M\n", points_per_measurement=2)
+
+
+def test_what_is_said_to_be_lengths_is_read_as_lengths() -> None:
+    text = "Element;Axis;Nominal (mm);Measured (mm)\nA;X;100;100.001\nA;Y;200;200.002\nA;Z;300;300.003\n"
+    places = {axis: f"along {axis} from 0,0,0" for axis in "XYZ"}
+    found = read(text, columns={"line": "Axis"}, lines=places)
+    np.testing.assert_allclose(found.columns["reference_mm"][1::2], [100, 200, 300])
+
+
+def test_a_page_with_a_remark_begins_no_measurement() -> None:
+    head = "Name;X [mm];Y [mm];Z [mm]\n"
+    found = read(f"{head}M1_P1;1.5;2.5;3.5\nSeite 2\n{head}M1_P2;4.5;5.5;6.5\n")
+    assert (found.columns["measurement"].tolist(), found.columns["point"].tolist()) == ([1, 1], [1, 2])
+
+
+FEATURE = "SPHERE : S{0}\n     Nominal    Actual\nX    1.0000    1.0010\nY    2.0000    2.0010\nZ    3.0000    3.0010\n"
+
+
+@pytest.mark.parametrize(("text", "told"), [
+    (FEATURE.format(1) + "X    4.0000    4.0010\n", "line 6: X of 'S1' is there twice"),
+    ("Units: mm\n" + FEATURE.format(1) + "Units: inch\n" + FEATURE.format(2), "line 7: is in mm before this line"),
+    (FEATURE.format(1).replace("Z    3.0000    3.0010\n", ""), "'S1' has not X, Y and Z"),
+])  # fmt: skip
+def test_a_report_of_features_drops_nothing(text: str, told: str) -> None:
+    with pytest.raises(CmmUqError, match=told):
+        read(text, points_per_measurement=1)
