@@ -107,7 +107,7 @@ def part() -> str:
     schema = schema_named("part")
     parts = [
         "The job of a part is a folder with a `job.toml` and the files that state the machine. `cmm-uq new part` writes one "
-        "with each line explained, or with features and tolerances of a QIF plan or a DMIS program (`--from FILE`); "
+        "with each line explained, or with features and tolerances of a QIF plan, a DMIS program or a table (`--from FILE`); "
         "`cmm-uq check JOB` says all that is wrong with it.",
         EDITORS.format(name="part"),
         "Coordinates of features are those of the part in mm at 20 °C. Units stand at the end of a key's name. A standard "
@@ -126,7 +126,8 @@ def part() -> str:
             parts.append(table(("`what`", "of", "about datums", "limits"), rows))
     parts += [
         "## Plans of other programs",
-        "`cmm-uq new part --from FILE` makes these tables of a QIF plan or a DMIS program. What is not understood is refused "
+        "`cmm-uq new part --from FILE` makes these tables of a QIF plan, a DMIS program or a table. What is not understood is "
+        "refused "
         "by name; `--set part.not_measured='[\"NAME\"]'` leaves it out knowingly, `'[\"*\"]'` all of it, and the job says "
         "what was left out. What such a file leaves open stands in the job as an example.",
         *(

@@ -49,7 +49,7 @@ def new(
         None, 'Any key of job.toml: artefact.length_mm=500, job.customer="A Ltd".', "KEY=VALUE", "none", "--set"),
     export: Path | None = option(
         None, "Begin from a laboratory's export (see cmm-uq import), which needs --machine and --set job.date=…; "
-              "a part from a QIF plan or a DMIS program.", "FILE", "simulated readings", "--from"),
+              "a part from a QIF plan, a DMIS program or a table.", "FILE", "simulated readings", "--from"),
     column: list[str] | None = COLUMN,
     key: list[str] | None = KEY,
     line: list[str] | None = LINE,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from cmm_uq.app.cli import options as opt
+from cmm_uq.app.cli.desk import put_account
 from cmm_uq.app.cli.options import Ending, argument, flag, option
 from cmm_uq.app.cli.summary import COLOURS, HEADING, folder_of, screen_layout, show_summary
 from cmm_uq.app.cli.terminal import BAD_INPUT, NOT_CONFORMING, Line, put_data, say_now, show
@@ -209,23 +210,34 @@ def serve(
     port: int = option(8765, "Port to listen on; 0 takes a free one.", "N", min=0, max=65535),
     bind: str = option(
         "127.0.0.1",
-        "Address to listen on; 0.0.0.0 is every network of this machine. Whoever reaches it can read the records.",
+        "Address to listen on; 0.0.0.0 is every network. Without --accounts whoever reaches it reads the records.",
         "ADDRESS",
     ),
-    name: list[str] | None = option(
-        None, "Further name by which browsers reach this machine; repeatable.", "HOST", "this machine's own"
-    ),
+    name: list[str] | None = opt.HOST,
+    tls: Path | None = opt.TLS,
+    tls_key: Path | None = opt.TLS_KEY,
+    accounts: Path | None = opt.ACCOUNTS,
+    add_account: str | None = opt.ADD_ACCOUNT,
     open_: bool = flag(False, "--open", "Open the page in a browser."),
     quiet: bool = opt.QUIET,
 ) -> None:
     """Show the records in a browser: what is due or fails, trends, certificates, artefacts. Nothing can be changed there."""
-    from cmm_uq.app.serve import server as http, site as pages
+    from cmm_uq.app.serve import accounts as own, server as http, site as pages
 
-    site = pages.Site(records)
-    with http.RecordsServer(site.answer, bind, port, name or ()) as server, keeping(lambda: "the page is closed"):
+    if add_account is not None:
+        put_account(accounts, add_account)
+        return
+    context = own.tls_of(tls, tls_key, accounts)
+    site = pages.Site(records, account=accounts is not None)
+    with (
+        http.RecordsServer(site.answer, bind, port, name or (), context) as server,
+        keeping(lambda: "the page is closed"),
+    ):
+        if accounts is not None:
+            server.answer = own.Accounts(accounts, server.server_port, say_now).around(site.answer)
         if not quiet:
             say_now(f"{site.place} at {server.url} until Ctrl-C")
-            if not server.alone:
+            if not server.alone and accounts is None:
                 say_now("Whoever reaches this address can read the records: there are no passwords")
         threading.Thread(target=site.warm, daemon=True).start()
         if open_:

@@ -202,6 +202,17 @@ _KEPT_IN = "Records that it is kept in: a file, a postgresql:// URL, or none."
 RECORDS = of_environment(_KEPT_IN, "WHERE", "--records", "CMM_UQ_RECORDS", "reports/records.db")
 _READ = "The records: a file, or the URL of a PostgreSQL database."
 READ_RECORDS = option(None, _READ, "WHERE", "CMM_UQ_RECORDS, or reports/records.db", "--records")
+HOST = option(None, "Further name by which browsers reach it; repeatable.", "HOST", "this machine's own", "--name")
+TLS = option(None, "Certificate for TLS, PEM.", "FILE", "none", "--tls")
+TLS_KEY = option(None, "Its key, PEM without a password.", "FILE", "in the file of --tls", "--tls-key")
+ACCOUNTS = option(None, "Accounts of those who may sign in; needs --tls.", "FILE", "none", "--accounts")
+ADD_ACCOUNT = option(
+    None,
+    "Ask for a password, write the account into --accounts, and end; ROLE: read or work.",
+    "NAME:ROLE",
+    "none",
+    "--add-account",
+)
 ON = option(None, "The day asked about; later recordings do not count.", "DATE", "today", "--on")
 _PRIOR = "fleet.json of the fleet that the drift model takes as prior."
 FLEET = option(None, _PRIOR, "FILE", "a prior without a fleet", "--fleet")

@@ -26,6 +26,7 @@ from cmm_uq.app.desk.place import ChangedError, below, jobs_in, plans_in, sha256
 from cmm_uq.app.desk.shown import OWN_FILES, own_file, records_page, shown_file
 from cmm_uq.app.desk.verify_page import VERIFY, verify_page
 from cmm_uq.app.desk.workers import ReportRun
+from cmm_uq.app.serve.accounts import Accounts
 from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse, read_form
 from cmm_uq.app.serve.page import WebPage
 from cmm_uq.app.serve.rendering import DESK, fault, refusal, render_page
@@ -46,12 +47,16 @@ class Desk(DeskFolder):
         self.runs: dict[str, ReportRun] = {}
         self.checked: dict[str, tuple[str, Text]] = {}
         self._lock = threading.Lock()
-        self.guard: Guard | None = None
+        self.guard: Guard | Accounts | None = None
         self.url = ""
 
-    def open_at(self, url: str, port: int) -> str:
-        """Begin with a link that is opened once."""
-        self.url, self.guard = url, Guard(self.tell, port)
+    def open_at(self, url: str, port: int, accounts: Path | None = None) -> str:
+        """Begin with a link that is opened once, or with ``accounts`` of those who may sign in."""
+        self.url = url
+        if accounts is not None:
+            self.guard = Accounts(accounts, port, self.tell, (VERIFY,), DESK)
+            return f"{url.rstrip('/')}{DESK}"
+        self.guard = Guard(self.tell, port)
         return self.guard.link(url)
 
     def begin(self) -> None:
@@ -87,7 +92,7 @@ class Desk(DeskFolder):
         if request.path in OWN_FILES and request.method != "POST":
             return own_file(request.path)
         if not (request.path + "/").startswith(DESK + "/"):
-            return records_page(self.reader, request)
+            return records_page(self.reader, request, account=isinstance(self.guard, Accounts))
         pages = self._forms() if request.method == "POST" else self._pages()
         if request.path not in pages:
             if request.path in self._pages():
@@ -339,5 +344,7 @@ class Desk(DeskFolder):
             say("Folder: {root}", root=Verbatim(str(self.root))),
             say("cmm-uq {version}", version=Verbatim(__version__)),
         )
-        body = render_page(page._replace(place=page.place or DESK), foot, desk=True)
+        body = render_page(
+            page._replace(place=page.place or DESK), foot, desk=True, account=isinstance(self.guard, Accounts)
+        )
         return WebResponse(body, status=page.status, policy=POLICY, referrer="same-origin")

@@ -26,7 +26,7 @@ def part_page(draft: Draft | None, machines: Iterable[JobState]) -> WebPage:
     )
     blocks: tuple[Block, ...]
     if draft is None:
-        hint = say("QIF 3.0 with features and tolerances, or a DMIS program.")
+        hint = say("QIF 3.0 with features and tolerances, a DMIS program, or a table of features.")
         blocks = (p.Drop(PLAN, say("Drop the plan of the part here, or choose it"), hint, say("Read it")),)
     elif not certificates:
         blocks = (PageNotice(say("No certificate of a machine lies in this folder yet: make one first"), "open"),)

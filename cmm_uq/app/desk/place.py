@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
 import re
-import tempfile
 import threading
 import unicodedata
 from pathlib import Path
@@ -17,6 +15,7 @@ from pathlib import Path
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import JOB_BYTES
+from cmm_uq.base.output.staging import replace_file
 from cmm_uq.jobs.source import check_name, device_name
 
 LONGEST = 100  # characters of a name that is made of a dropped one
@@ -98,21 +97,7 @@ def write_over(path: Path, content: bytes, seen: str) -> None:
         now = content_of(path, JOB_BYTES, "") if path.exists() else b""
         if path.is_symlink() or (sha256(now) if path.exists() else "") != seen:
             raise ChangedError(path, now)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=".unfinished-")
-        try:
-            with os.fdopen(descriptor, "wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            os.chmod(name, 0o644)  # noqa: PTH101 - as any other file: mkstemp's are its user's alone
-            os.replace(name, path)  # noqa: PTH105
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                os.unlink(name)  # noqa: PTH108
-            raise CmmUqError(
-                f"cannot be written: {error.strerror}", where=path.name, fix="Free the disk, or mend its permissions"
-            ) from None
+        replace_file(path, content, "Free the disk, or mend its permissions")
 
 
 def plans_in(root: Path) -> list[str]:

@@ -42,7 +42,7 @@ def shown_file(root: Path, request: WebRequest) -> WebResponse:
     return replace(answer, policy=policy, headers={**answer.headers, "X-Frame-Options": "SAMEORIGIN"})
 
 
-def records_page(worker: Worker, request: WebRequest) -> WebResponse:
+def records_page(worker: Worker, request: WebRequest, *, account: bool) -> WebResponse:
     """A page of the records, made by the worker."""
     headers = {name: value for name, value in request.headers.items() if name == "content-type"}
     given: dict[str, Any] = {
@@ -50,6 +50,7 @@ def records_page(worker: Worker, request: WebRequest) -> WebResponse:
         "path": request.path,
         "query": dict(request.query),
         "headers": headers,
+        "account": account,
     }
     if request.body is None:
         return _answered(worker.ask("page", body=None, **given))

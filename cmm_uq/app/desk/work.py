@@ -153,21 +153,21 @@ def _said(subject: str, job: Job | None, decided: str) -> str:
 
 
 @cache
-def _site() -> Site:
+def _site(account: bool) -> Site:
     where = place_of(None, of_folder(None))
     if where is None:
         raise CmmUqError("no records are kept here", fix="Start the desk without CMM_UQ_RECORDS=none to keep them")
     if not is_url(where) and not Path(where).exists():
         raise CmmUqError("no certificate is recorded here yet", fix="Make the first one on the desk")
-    return Site(where, desk=True)
+    return Site(where, desk=True, account=account)
 
 
 def page(
-    method: str, path: str, query: Mapping[str, str], headers: Mapping[str, str], body: str | None
+    method: str, path: str, query: Mapping[str, str], headers: Mapping[str, str], body: str | None, account: bool
 ) -> dict[str, Any]:
     """An answer of the records' pages; ``body``: file that holds what was sent."""
     content = Path(body).read_bytes() if body else b""
-    answer = _site().answer(
+    answer = _site(account).answer(
         WebRequest(method, path, query, headers, io.BytesIO(content) if body else None, len(content))
     )
     return {

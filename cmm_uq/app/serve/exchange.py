@@ -36,7 +36,10 @@ class RefusedRequest(Exception):  # noqa: N818 - what it is, in the words of the
 
 @dataclass(frozen=True)
 class WebRequest:
-    """Its path as it was sent, each name of the query once, headers by name in small letters, ``length`` bytes of body."""
+    """Its path as it was sent, each name of the query once, headers by name in small letters, ``length`` bytes of body.
+
+    ``peer``: address that it came from.
+    """
 
     method: str
     path: str
@@ -44,6 +47,7 @@ class WebRequest:
     headers: Mapping[str, str] = field(default_factory=dict)
     body: BinaryIO | None = None
     length: int = 0
+    peer: str = ""
 
     def only(self, known: Iterable[str]) -> None:
         names = tuple(known)

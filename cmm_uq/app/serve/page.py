@@ -184,7 +184,7 @@ class FormEntry(NamedTuple):
     name: str
     label: Text
     value: str = ""
-    sort: Literal["text", "date", "area", "select"] = "text"
+    sort: Literal["text", "date", "area", "select", "password"] = "text"
     options: tuple[tuple[str, Text], ...] = ()
     hint: Text = NOTHING
     example: str = ""

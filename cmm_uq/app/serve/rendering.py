@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 DESK = "/desk"  # where the pages of a desk begin
+ACCOUNT = "/account"
 CONTENTS: tuple[tuple[str, Text], ...] = (
     ("/", say("Machines")), ("/certificates", say("Certificates")), ("/diagnoses", say("Diagnoses")),
     ("/artefacts", say("Artefacts")), ("/file", say("Check a file")), ("/integrity", say("Integrity")),
@@ -28,11 +29,13 @@ WORDS: dict[str, Text] = {  # what stands around every page
 }  # fmt: skip
 
 
-def render_page(page: WebPage, foot: Sequence[Text], *, desk: bool = False) -> bytes:
-    """``desk``: whether the site is a desk's, whose own pages have a script."""
+def render_page(page: WebPage, foot: Sequence[Text], *, desk: bool = False, account: bool = False) -> bytes:
+    """``desk``: whether the site is a desk's, whose own pages have a script; ``account``: whether somebody signed in."""
     contents, words = (
         (((DESK, say("Desk")), *CONTENTS), WORDS | {"site": say("Calibration desk")}) if desk else (CONTENTS, WORDS)
     )
+    if account:
+        contents = *contents, (ACCOUNT, say("Account"))
     template = _environment().get_template("page.html")
     script = "/desk.js" if page.place == DESK else ""
     return template.render(page=page, foot=foot, contents=contents, words=words, script=script).encode()

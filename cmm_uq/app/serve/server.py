@@ -12,9 +12,11 @@ import io
 import ipaddress
 import math
 import socket
+import ssl
 import threading
 import time
 from collections.abc import Callable, Collection
+from dataclasses import replace
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
@@ -38,15 +40,22 @@ class RecordsServer(ThreadingHTTPServer):
     """Answers browsers until it is closed.
 
     ``answer``: gives the page of a request; ``port``: 0 takes a free one; ``names``: further names under which
-    browsers reach this machine.
+    browsers reach this machine; ``tls``: with which it is spoken with in secret.
     """
 
     daemon_threads = True
     request_queue_size = 64
     allow_reuse_address = not hasattr(socket, "SO_EXCLUSIVEADDRUSE")  # on Windows it would let two servers share a port
 
-    def __init__(self, answer: Answering, bind: str = "127.0.0.1", port: int = 8765, names: Collection[str] = ()):
-        self.answer, self._lock = answer, threading.Lock()
+    def __init__(
+        self,
+        answer: Answering,
+        bind: str = "127.0.0.1",
+        port: int = 8765,
+        names: Collection[str] = (),
+        tls: ssl.SSLContext | None = None,
+    ):
+        self.answer, self.tls, self._lock = answer, tls, threading.Lock()
         self._open: dict[Any, tuple[str | int, float]] = {}  # whose, and since when it waits for its browser
         try:
             address = ipaddress.ip_address(bind)
@@ -76,14 +85,25 @@ class RecordsServer(ThreadingHTTPServer):
         host = self.server_name
         if ipaddress.ip_address(host).is_unspecified:
             host = "127.0.0.1"
-        return f"http://{f'[{host}]' if ':' in host else host}:{self.server_port}/"
+        return f"{self.scheme}://{f'[{host}]' if ':' in host else host}:{self.server_port}/"
+
+    @property
+    def scheme(self) -> str:
+        return "http" if self.tls is None else "https"
+
+    def get_request(self) -> tuple[socket.socket, Any]:
+        """A connection; of one in secret nothing was said yet, so that no slow browser holds up the next."""
+        connection, address = super().get_request()
+        if self.tls is not None:
+            connection = self.tls.wrap_socket(connection, server_side=True, do_handshake_on_connect=False)
+        return connection, address
 
     def answers_to(self, host: str) -> bool:
         """Whether a Host header names this server; beyond this machine any number will do, which no rebinding can forge."""
         name, _, port = host.lower().rpartition(":") if not host.endswith("]") else (host.lower(), "", "")
         if not name:
             name, port = port, ""
-        if (port or "80") != str(self.server_port):
+        if (port or ("80" if self.tls is None else "443")) != str(self.server_port):
             return False
         if name in self.names:
             return True
@@ -161,6 +181,9 @@ class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
 
     def setup(self) -> None:
+        if isinstance(self.request, ssl.SSLSocket):
+            self.request.settimeout(HEAD_S)
+            self.request.do_handshake()
         super().setup()
         self._timed = _Timed(self.connection, HEAD_S)
         self.rfile = cast("io.BufferedIOBase", io.BufferedReader(self._timed, 2**16))
@@ -205,12 +228,12 @@ class _Handler(BaseHTTPRequestHandler):
             )  # fmt: skip
         path, query = read_address(self.path)
         headers = {name.lower(): value for name, value in self.headers.items()}
-        return WebRequest(self.command, path, query, headers)
+        return WebRequest(self.command, path, query, headers, peer=self.client_address[0])
 
     def _posted(self) -> WebRequest:
         asked = self._asked()
         origin = asked.headers.get("origin")
-        host = f"http://{asked.headers['host'].strip().lower()}"
+        host = f"{self.server.scheme}://{asked.headers['host'].strip().lower()}"
         site = asked.headers.get("sec-fetch-site", "same-origin")
         if (origin is not None and origin.lower() != host) or site != "same-origin":
             raise RefusedRequest(HTTPStatus.FORBIDDEN, say("the form was sent from another site"))
@@ -221,7 +244,7 @@ class _Handler(BaseHTTPRequestHandler):
             raise bad(say("the request says that it is longer than anything"))
         self._timed.allow(BODY_S)
         body = cast("BinaryIO", self.rfile)
-        return WebRequest(asked.method, asked.path, asked.query, asked.headers, body, int(given[0]))
+        return replace(asked, body=body, length=int(given[0]))
 
     def _send(self, answer: WebResponse) -> None:
         """All of it within its time; then the connection is closed, after what still comes has been let go."""

@@ -39,7 +39,10 @@ WITH_FORM = ("/file", "/integrity")
 
 
 class Site:
-    """Answers requests; ``where`` as :func:`~cmm_uq.laboratory.records.opening.open_records` takes it; ``desk``: of a desk."""
+    """Answers requests; ``where`` as :func:`~cmm_uq.laboratory.records.opening.open_records` takes it.
+
+    ``desk``, ``account``: what surrounds its pages (:func:`~cmm_uq.app.serve.rendering.render_page`).
+    """
 
     def __init__(
         self,
@@ -48,11 +51,12 @@ class Site:
         due: DueDates = by_rule,
         today: Callable[[], dt.date] = dt.date.today,
         desk: bool = False,
+        account: bool = False,
     ) -> None:
         with open_records(where, read_only=True) as records:  # what is wrong with them is told before anybody looks
             self._where = records.place
         self.place = shown(self._where)  # without a password
-        self._due, self._today, self._desk = due, today, desk
+        self._due, self._today, self._around = due, today, {"desk": desk, "account": account}
         self._lock = threading.Lock()
         self._kept: tuple[tuple[int, str, dt.date], Sequence[MachineStanding]] | None = None
         self.checking = ChainComparing(self.opened)
@@ -127,4 +131,4 @@ class Site:
             say("cmm-uq {version}", version=Verbatim(__version__)),
         )
         referrer = "same-origin" if page.place in WITH_FORM else "no-referrer"
-        return WebResponse(render_page(page, foot, desk=self._desk), status=page.status, referrer=referrer)
+        return WebResponse(render_page(page, foot, **self._around), status=page.status, referrer=referrer)

@@ -18,6 +18,7 @@ import shutil
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from hashlib import file_digest, sha256
 from pathlib import Path
 from typing import Protocol
@@ -269,13 +270,15 @@ def synced(folder: Path) -> None:
             os.close(descriptor)
 
 
-def replace_file(path: Path, content: bytes, fix: str = "Make room, or mend the folder's permissions") -> None:
+def replace_file(
+    path: Path, content: bytes, fix: str = "Make room, or mend the folder's permissions", mode: int = 0o666
+) -> None:
     """Write a file anew, and its folder: who reads it finds the old content or the new one, after a power cut too."""
     temporary = path.with_name(f".unfinished-{secrets.token_hex(6)}")
     with writing_to(path, fix):
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            with temporary.open("xb") as file:
+            with open(temporary, "xb", opener=partial(os.open, mode=mode)) as file:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())

@@ -95,6 +95,8 @@ def _datum(label: str, datums: Mapping[str, str]) -> str:
 
 
 PROGRAM = "DMIS program"
+STATEMENT = re.compile(r"^\s*(?:\w+\s*\([^)]*\)\s*=\s*)?[A-Z]{4,6}\s*/", re.MULTILINE)
+"""Of a text that is a program: a statement of the language, such as UNITS/MM or F(BORE)=FEAT/…"""
 _LABELLED = re.compile(r"^(?P<of>\w+)\s*\((?P<name>[^)]*)\)\s*=\s*(?P<major>\w+)\s*/\s*(?P<rest>.*)$")
 _UNLABELLED = re.compile(r"^(?P<major>\w+)\s*(?:/\s*(?P<rest>.*))?$")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import re
+import ssl
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -78,11 +79,11 @@ class Visitor:
                          Origin=f"http://{self.host}")  # fmt: skip
 
 
-def opened(root: Path) -> Iterator[Visitor]:
+def opened(root: Path, accounts: Path | None = None, tls: ssl.SSLContext | None = None) -> Iterator[Visitor]:
     told: list[str] = []
     desk = Desk(root, told.append)
-    with RecordsServer(desk.answer, port=0) as server:
-        link = desk.open_at(server.url, server.server_port)
+    with RecordsServer(desk.answer, port=0, tls=tls) as server:
+        link = desk.open_at(server.url, server.server_port, accounts)
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
         thread.start()
         yield Visitor(desk, server, link, told)

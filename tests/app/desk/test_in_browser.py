@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import ssl
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,8 +13,10 @@ from typing import TYPE_CHECKING
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
+from cmm_uq.app.serve.accounts import add_account, tls_of
 from tests.app.desk.conftest import Visitor, opened
 from tests.app.desk.test_questions import ANSWERS, EXPORT
+from tests.laboratory.schedule.servers import certificate
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -54,8 +57,10 @@ class Sitting:
         raise AssertionError(f"no Tab leads to {value!r}")
 
 
-def sat(browser: Browser, root: Path, **how: object) -> Iterator[Sitting]:
-    for visitor in opened(root):
+def sat(
+    browser: Browser, root: Path, accounts: Path | None = None, tls: ssl.SSLContext | None = None, **how: object
+) -> Iterator[Sitting]:
+    for visitor in opened(root, accounts, tls):
         context = browser.new_context(viewport={"width": 1280, "height": 900}, **how)  # type: ignore[arg-type]
         yield Sitting(context.new_page(), visitor)
         context.close()
@@ -195,3 +200,31 @@ def test_without_a_script_the_way_is_the_same(browser: Browser, tmp_path: Path) 
         sitting.press("Cancel")  # its page came anew by itself
         assert "Cancelled" in page.locator(".notice").inner_text()
         assert sitting.wrong == []
+
+
+def test_from_another_machine_somebody_signs_in_and_out(browser: Browser, tmp_path: Path) -> None:
+    accounts, root = tmp_path / "accounts.toml", tmp_path / "root"
+    root.mkdir()
+    add_account(accounts, "ben:read", lambda: "staple of the reader")
+    for sitting in sat(browser, root, accounts, tls_of(*certificate(tmp_path), accounts), ignore_https_errors=True):
+        page = sitting.page
+        page.goto(sitting.visitor.link)
+        assert page.url == f"{sitting.url}/account"
+        page.fill("[name=name]", "ben")
+        page.fill("[name=password]", "something else")
+        page.keyboard.press("Enter")
+        page.locator(".notice", has_text="Name or password is wrong").wait_for()
+        sitting.look()
+        page.fill("[name=name]", "ben")
+        page.fill("[name=password]", "staple of the reader")
+        page.keyboard.press("Enter")
+        page.wait_for_url("**/desk")
+        assert "No job lies here yet" in page.inner_text("main")
+        page.get_by_role("link", name="Account").click()
+        assert "ben may look at everything" in page.inner_text("main")
+        sitting.look()
+        sitting.press("Sign out")
+        page.wait_for_url("**/account")
+        page.goto(f"{sitting.url}/desk")
+        assert page.url == f"{sitting.url}/account"
+        assert [one for one in sitting.wrong if "Failed to load resource" not in str(one)] == []

@@ -24,12 +24,13 @@ from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.jobs.importing.encodings import begins_with, head_text
 from cmm_uq.jobs.importing.format import HEAD
 from cmm_uq.jobs.part.checks import freedoms, members, unfit
-from cmm_uq.jobs.part.dmis import drawing_of_dmis
+from cmm_uq.jobs.part.dmis import STATEMENT, drawing_of_dmis
 from cmm_uq.jobs.part.drawing import KEY, Drawing, NotUnderstood, probed_of, set_aside_unsound
 from cmm_uq.jobs.part.feature import CharacteristicFacts
 from cmm_uq.jobs.part.job import POSTERIOR, TABLES, part_of
 from cmm_uq.jobs.part.probed import Probed
 from cmm_uq.jobs.part.qif import drawing_of_qif
+from cmm_uq.jobs.part.table import drawing_of_table
 from cmm_uq.jobs.schema import commented, written
 from cmm_uq.jobs.source import RESULTS
 from cmm_uq.jobs.tables.identification import EXAMPLE, SIMULATED
@@ -143,10 +144,10 @@ def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]: 
     head = content[:HEAD]
     if begins_with(head, "QIFDocument"):
         drawing = drawing_of_qif(content, where)
-    elif "/" in head_text(head) and not head_text(head).lstrip().startswith("<"):
+    elif STATEMENT.search(head_text(head)):
         drawing = drawing_of_dmis(content, where)
     else:
-        raise CmmUqError("is neither a QIF plan nor a DMIS program", where=where, fix="Export one of these")
+        drawing = drawing_of_table(content, where)
     without = given.get(PART, {}).get("not_measured", [])
     if not (isinstance(without, list) and all(isinstance(name, str) for name in without)):
         raise CmmUqError("must be a list of names", where=KEY, fix='Write it as \'["NAME", "NAME"]\'')

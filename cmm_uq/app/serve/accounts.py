@@ -1,0 +1,281 @@
+"""Accounts of those who use the pages from other machines: who may sign in, who is signed in, and what each may do.
+
+They lie in a TOML file of the laboratory: a table each with the role, and a hash of the password by scrypt (RFC 7914). Nobody
+signs in but over TLS. Guesses are slowed down by address and by name; which of name and password was wrong is not said.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+import secrets
+import ssl
+import threading
+import time
+import tomllib
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from http import HTTPStatus
+from pathlib import Path
+from typing import Literal, get_args
+
+from cmm_uq import __version__
+from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse, read_form
+from cmm_uq.app.serve.page import FormEntry, PageForm, PageNotice, PageParagraph, Press, WebPage
+from cmm_uq.app.serve.rendering import ACCOUNT, refusal, render_page
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.content import content_of
+from cmm_uq.base.files.limits import JOB_BYTES
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.base.output.staging import replace_file
+
+Role = Literal["read", "work"]
+SIGN_OUT = f"{ACCOUNT}/sign-out"
+LOOKED_UP = ("/file", "/integrity/chain", "/integrity/files")  # forms that change nothing
+SHORTEST, LONGEST = 15, 200  # characters of a password that stands alone (NIST SP 800-63B-4, 3.1.1.2)
+SESSION_S = 12 * 3600.0  # for which somebody is signed in
+FREE, SLOWEST_S = 5, 900.0  # guesses without waiting, and the longest wait between two later ones
+_COST, _BLOCK, _PARALLEL = 2**15, 8, 1  # of scrypt: 32 MiB and about 0.1 s
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,59}")
+_KEPT = re.compile(r"scrypt:([A-Za-z0-9+/]{22}==):([A-Za-z0-9+/]{43}=)")
+
+
+@dataclass(frozen=True)
+class Account:
+    role: Role
+    salt: bytes
+    key: bytes
+
+
+def read_accounts(path: Path) -> dict[str, Account]:
+    """Accounts of a file by name.
+
+    Raises
+    ------
+    CmmUqError
+        The file cannot be read, or a table of it is no account.
+    """
+    fix = f"Add an account with --accounts {path} --add-account NAME:ROLE"
+    try:
+        data = tomllib.loads(content_of(path, JOB_BYTES, fix).decode())
+    except ValueError as error:
+        raise CmmUqError(f"is no TOML: {error}", where=str(path), fix=fix) from None
+    found = {}
+    for name, one in data.items():
+        kept = _KEPT.fullmatch(str(one.get("password", ""))) if isinstance(one, dict) else None
+        if (
+            kept is None
+            or one.get("role") not in get_args(Role)
+            or {*one} != {"role", "password"}
+            or not _NAME.fullmatch(name)
+        ):
+            raise CmmUqError(
+                "is no account: it has a role (read or work) and a password's hash", where=f"{path}, {name!r}", fix=fix
+            )
+        found[name] = Account(one["role"], *map(base64.b64decode, kept.groups()))
+    return found
+
+
+def add_account(path: Path, stated: str, password: Callable[[], str]) -> None:
+    """Write an account into the file, in the place of one of the same name; ``stated``: ``NAME:ROLE``."""
+    name, _, role = stated.partition(":")
+    if not _NAME.fullmatch(name) or role not in get_args(Role):
+        raise CmmUqError(
+            "is no name with a role", where=f"--add-account {stated}", fix="Such as anna:work, or ben:read"
+        )
+    accounts = read_accounts(path) if path.exists() else {}
+    word = password()
+    if not SHORTEST <= len(word) <= LONGEST:
+        raise CmmUqError(
+            f"has {len(word)} characters", where="password", fix=f"Take {SHORTEST} to {LONGEST}: a few words"
+        )
+    salt = secrets.token_bytes(16)
+    accounts[name] = Account("work" if role == "work" else "read", salt, _key(word, salt))
+    tables = (
+        f'[{json.dumps(name)}]\nrole = "{one.role}"\npassword = "scrypt:{_text(one.salt)}:{_text(one.key)}"\n'
+        for name, one in sorted(accounts.items())
+    )
+    replace_file(path, "\n".join(tables).encode(), mode=0o600)
+
+
+def _text(content: bytes) -> str:
+    return base64.b64encode(content).decode()
+
+
+def _key(password: str, salt: bytes) -> bytes:
+    return hashlib.scrypt(password.encode(), salt=salt, n=_COST, r=_BLOCK, p=_PARALLEL, maxmem=2**26, dklen=32)
+
+
+def tls_of(certificate: Path | None, key: Path | None, accounts: Path | None) -> ssl.SSLContext | None:
+    """What a server needs to be spoken with in secret; ``key``: where it does not stand in the certificate's file."""
+    if certificate is None:
+        if key is not None or accounts is not None:
+            problem = "passwords are sent in secret only, and no certificate for TLS is named"
+            raise CmmUqError(
+                problem, where="--accounts" if accounts else "--tls-key", fix="Name one with --tls CERTIFICATE.pem"
+            )
+        return None
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    try:
+        context.load_cert_chain(certificate, key, password=lambda: "")  # never ask: nobody may be there
+    except (OSError, ssl.SSLError) as error:
+        fix = "Name a certificate and its key in PEM, the key without a password"
+        raise CmmUqError(
+            f"cannot be used for TLS: {error.args[-1]}", where=f"{certificate}, {key or certificate}", fix=fix
+        ) from None
+    return context
+
+
+@dataclass(frozen=True)
+class SignedIn:
+    name: str
+    account: Account
+    until: float
+
+
+class Accounts:
+    """Who is signed in to one start.
+
+    ``path``: the file, read again at each request, so that an account that was taken out of it is signed out; ``tell``: says
+    a line on the terminal; ``harmless``: further forms that change nothing; ``home``: first page;
+    ``clock``: seconds that only grow.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        port: int,
+        tell: Callable[[str], None],
+        harmless: Collection[str] = (),
+        home: str = "/",
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._path, self._tell, self._clock, self._home = path, tell, clock, home
+        self._harmless = {*LOOKED_UP, *harmless, SIGN_OUT}
+        self._cookie = f"__Host-cmm_uq_{port}"  # of this host alone, and only by TLS
+        self._sessions: dict[str, SignedIn] = {}
+        # how many by address or name, and when the next may come
+        self._guesses: dict[tuple[str, str], tuple[int, float]] = {}
+        self._lock, self._one = threading.Lock(), threading.Lock()
+        if not read_accounts(path):
+            raise CmmUqError("holds no account", where=str(path), fix="Add one with --add-account NAME:ROLE")
+
+    def admit(self, request: WebRequest, url: str) -> WebResponse | None:
+        """An answer for whoever is not signed in, signs in or out; ``None`` for a request that may go on."""
+        if request.path in ("/style.css", "/icon.svg") and request.method != "POST":
+            return None
+        if request.method == "POST" and not request.headers.keys() & {"origin", "sec-fetch-site"}:
+            raise RefusedRequest(HTTPStatus.FORBIDDEN, say("the request does not say from which page it comes"))
+        session = self._session(request)
+        if request.path == ACCOUNT:
+            return self._signed_in(request) if request.method == "POST" else self._page(session)
+        if session is None:
+            if request.method == "POST":
+                raise RefusedRequest(
+                    HTTPStatus.FORBIDDEN, say("nobody is signed in"), say("Sign in, and send it again")
+                )
+            return WebResponse(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": ACCOUNT})
+        if request.method == "POST" and session.account.role == "read" and request.path not in self._harmless:
+            problem = say("the account {name} may only look", name=Verbatim(session.name))
+            raise RefusedRequest(HTTPStatus.FORBIDDEN, problem, say("Ask for the role work"))
+        if request.headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
+            raise RefusedRequest(HTTPStatus.FORBIDDEN, say("the request came from another site"))
+        if request.path == SIGN_OUT and request.method == "POST":
+            self._sessions.pop(self._token(request), None)
+            return self._to(ACCOUNT, f"{self._cookie}=; Max-Age=0")
+        return None
+
+    def around(
+        self, answer: Callable[[WebRequest | RefusedRequest], WebResponse]
+    ) -> Callable[[WebRequest | RefusedRequest], WebResponse]:
+        """The answers of a site, for whoever is signed in."""
+
+        def guarded(request: WebRequest | RefusedRequest) -> WebResponse:
+            try:
+                admitted = None if isinstance(request, RefusedRequest) else self.admit(request, "")
+            except RefusedRequest as refused:
+                return _rendered(refusal(refused))
+            except CmmUqError as error:
+                return _rendered(refusal(RefusedRequest(HTTPStatus.SERVICE_UNAVAILABLE, Verbatim(error.problem))))
+            return admitted or answer(request)
+
+        return guarded
+
+    def _token(self, request: WebRequest) -> str:
+        cookies = (part.strip().partition("=") for part in request.headers.get("cookie", "").split(";"))
+        return next((value for name, _, value in cookies if name == self._cookie), "")
+
+    def _session(self, request: WebRequest) -> SignedIn | None:
+        session = self._sessions.get(self._token(request))
+        if (
+            session is None
+            or session.until < self._clock()
+            or read_accounts(self._path).get(session.name) != session.account
+        ):
+            self._sessions.pop(self._token(request), None)
+            return None
+        return session
+
+    def _signed_in(self, request: WebRequest) -> WebResponse:
+        form = read_form(request)
+        name, password = form.get("name", "")[:LONGEST], form.get("password", "")
+        wait = max(self._wait(who) for who in (("address", request.peer), ("name", name)))
+        if wait > 0:
+            problem = say("too many guesses: wait {seconds} s", seconds=int(wait) + 1)
+            page = refusal(RefusedRequest(HTTPStatus.TOO_MANY_REQUESTS, problem))
+            return _rendered(page, {"Retry-After": str(int(wait) + 1)})
+        account = read_accounts(self._path).get(name)
+        with self._one:  # memory of one guess at a time
+            key = _key(password, account.salt if account else b"0" * 16)
+        if account is None or not secrets.compare_digest(key, account.key):
+            self._missed(("address", request.peer), ("name", name))
+            self._tell(f"Not signed in from {request.peer}: name or password is wrong")
+            return self._page(None, wrong=True)
+        token = secrets.token_urlsafe(32)
+        with self._lock:
+            now = self._clock()
+            self._sessions = {one: session for one, session in self._sessions.items() if session.until > now}
+            self._sessions[token] = SignedIn(name, account, now + SESSION_S)
+            self._guesses.pop(("address", request.peer), None)
+            self._guesses.pop(("name", name), None)
+        self._tell(f"{name} ({account.role}) signed in from {request.peer}")
+        return self._to(self._home, f"{self._cookie}={token}")
+
+    def _wait(self, who: tuple[str, str]) -> float:
+        return self._guesses.get(who, (0, 0.0))[1] - self._clock()
+
+    def _missed(self, *those: tuple[str, str]) -> None:
+        """Each guess too many doubles the wait; whoever has long been let in again is forgotten."""
+        with self._lock:
+            now = self._clock()
+            self._guesses = {who: one for who, one in self._guesses.items() if one[1] > now - SLOWEST_S}
+            for who in those:
+                count = self._guesses.get(who, (0, 0.0))[0] + 1
+                self._guesses[who] = count, now + (min(2.0 ** (count - FREE), SLOWEST_S) if count >= FREE else 0.0)
+
+    def _to(self, path: str, cookie: str) -> WebResponse:
+        kept = f"{cookie}; Secure; HttpOnly; SameSite=Strict; Path=/"
+        return WebResponse(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": path, "Set-Cookie": kept})
+
+    def _page(self, session: SignedIn | None, *, wrong: bool = False) -> WebResponse:
+        if session is not None:
+            roles: dict[Role, Text] = {
+                "read": say("may look at everything"),
+                "work": say("may make and change jobs and certificates"),
+            }
+            told = PageParagraph(say("{name} {may}.", name=Verbatim(session.name), may=roles[session.account.role]))
+            return _rendered(WebPage(say("Signed in"), ACCOUNT, NOTHING, (told, Press(SIGN_OUT, say("Sign out")))))
+        fields = (FormEntry("name", say("Name")), FormEntry("password", say("Password"), sort="password"))
+        form = PageForm(ACCOUNT, fields, (("sign-in", say("Sign in")),))
+        notice = (PageNotice(say("Name or password is wrong"), "bad"),) if wrong else ()
+        page = WebPage(say("Sign in"), ACCOUNT, NOTHING, (*notice, form))
+        return _rendered(page._replace(status=HTTPStatus.FORBIDDEN) if wrong else page)
+
+
+def _rendered(page: WebPage, headers: Mapping[str, str] | None = None) -> WebResponse:
+    foot = (say("cmm-uq {version}", version=Verbatim(__version__)),)
+    return WebResponse(
+        render_page(page, foot, account=True), status=page.status, referrer="same-origin", headers=headers or {}
+    )
