@@ -20,7 +20,7 @@ from cmm_uq import __version__  # noqa: E402
 CONTENTS: dict[str, list[str]] = {
     "Start here": ["tutorial", "desk", "overview", "gallery"],
     "How to": [
-        "howto/laboratory", "howto/service", "howto/auditor", "howto/part", "howto/scheduled", "howto/python", "notebooks/*",
+        "howto/laboratory", "howto/service", "howto/auditor", "howto/part", "notebooks/*",
         "import/index", "import/*", "instruments/index", "instruments/*",
     ],
     "Records": ["records/index", "records/*"],
@@ -36,15 +36,15 @@ CONTENTS: dict[str, list[str]] = {
         "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
         "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",
-        "machine/parts", "machine/field", "machine/part-page", "machine/other-methods", "machine/part-iota",
+        "machine/parts", "machine/field", "machine/other-methods",
         "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
     ],
     "What it rests on": [
-        "validation", "validation-parts", "parts-study", "coverage-study", "noise-ranks", "diagnosis-study",
-        "diagnosis-second-study", "diagnosis-third-study", "mutation-study",
-        "hostile-study", "tampering-study", "records/drift-study", "records/drift-kinds-study", "uncertainty/validation",
+        "validation", "validation-parts", "parts-study", "coverage-study", "noise-ranks", "diagnosis-studies",
+        "mutation-study",
+        "hostile-study", "tampering-study", "records/drift-study", "uncertainty/validation",
         "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks",
-        "peers", "sources", "machine/source-errors", "uncertainty/harris-2004",
+        "peers", "sources", "uncertainty/harris-2004",
     ],
     "The project": ["/README", "/CHANGELOG", "/CONTRIBUTING", "layout"],
 }  # fmt: skip

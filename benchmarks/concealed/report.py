@@ -11,6 +11,7 @@ import numpy as np
 from scipy.stats import norm
 
 from benchmarks.concealed.generator import DESIGNS, NOTHING, SIGNALS
+from benchmarks.marked import put
 
 Pairs = list[tuple[dict, dict]]
 
@@ -21,18 +22,20 @@ _LIKE = 3.0
 EXPLAINED = """\
 ![Detected and named by strength; said and right; held-out rms before and after](images/diagnosis-study.png)
 
-Written by `python benchmarks/concealed/study.py FOLDER --summary docs`. √λ is the length of what is hidden over the noise,
-after projecting out all that the job names and the other hidden effects: 4.5 to 7 with twenty placings of a ballbar, else 6
-to 15. *One*, *two*, *three*: effects of the catalogue. *Roughly*: an effect of another form, or a periodic error with a
-second harmonic. *Outside*: functions that no effect has (steps, waves, bumps, cubics, dents, jumps in time, loads, lobes);
-apart are those of which a known effect leaves less than √λ = 3. *Inseparable*: an effect with a twin. The rest hides
-nothing: noise stated at half or twice its size, set-up offsets of half or one standard deviation, noise correlated in time
-(0.5, 0.8), t noise of three or four degrees of freedom. A case is right when the verdict is, and all that is hidden and
-nothing else is named."""
+`python benchmarks/concealed/study.py FOLDER --summary docs`. √λ is the length of what is hidden over the noise, after
+projecting out all that the job names and the other hidden effects: 4.5 to 7 with twenty placings of a ballbar, else 6 to
+15. *One*, *two*, *three*: effects of the catalogue. *Roughly*: an effect of another form, or a periodic error with a second
+harmonic. *Outside*: functions that no effect has (steps, waves, bumps, cubics, dents, jumps in time, loads, lobes); apart
+are those of which a known effect leaves less than √λ = 3. *Inseparable*: an effect with a twin. The rest hides nothing:
+noise stated at half or twice its size, set-up offsets of half or one standard deviation, noise correlated in time (0.5,
+0.8), t noise of three or four degrees of freedom. A case is right when the verdict is, and all that is hidden and nothing
+else is named."""
+
+BEGIN, END = "<!-- written by benchmarks.concealed.study -->", "<!-- end of the first -->"
 
 PEER = """\
-The same cases by a plain greedy χ² search that is given the true noise, takes it for white, and knows the catalogue's
-common effects (`benchmarks/concealed/greedy.py`):"""
+The same by a greedy χ² search that knows the true noise and the catalogue's common effects, and takes the noise for white
+(`benchmarks/concealed/greedy.py`):"""
 
 MIMICKED = "outside, but as a known effect"
 
@@ -73,8 +76,9 @@ def write(pairs: Pairs, peers: Pairs, right: Callable, covered: Callable, sealed
     seconds = np.array([f["seconds"] for _, f in pairs])
     lines += ["", f"False alarms: {sum(nothing)} of {len(nothing)}."]
     if every:
-        lines += [f"Intervals at 95 % hold the truth in {sum(every)} of {len(every)} ({100 * np.mean(every):.1f} %): "
-                  + ", ".join(f"{k} {sum(v)}/{len(v)}" for k, v in sorted(hits.items())) + "."]  # fmt: skip
+        lines += ["", f"Intervals at 95 % hold the truth in {sum(every)} of {len(every)} ({100 * np.mean(every):.1f} %):", "",
+                  "| " + " | ".join(sorted(hits)) + " |", "|" + " --- |" * len(hits),
+                  "| " + " | ".join(f"{sum(v)}/{len(v)}" for _, v in sorted(hits.items())) + " |", ""]  # fmt: skip
     if len(p):
         lines += [
             f"Effects named {len(p)}, mean probability {p.mean():.3f}, right {good.mean():.3f}; expected calibration error "
@@ -86,8 +90,7 @@ def write(pairs: Pairs, peers: Pairs, right: Callable, covered: Callable, sealed
     print("\n".join(lines))
     if docs is not None:
         docs.mkdir(parents=True, exist_ok=True)
-        page = ["# Concealed cases", "", *lines, "", EXPLAINED, ""]
-        (docs / "diagnosis-study.md").write_text("\n".join(page), encoding="utf-8")
+        put(docs / "diagnosis-studies.md", BEGIN, END, "\n".join([*lines, "", EXPLAINED]))
         _plots(pairs, right, p, good, docs / "images")
 
 

@@ -17,10 +17,10 @@ WANTED, CELL, CRIES = (93.0, 97.0), (92.0, 98.0), 2.0
 """Per cent: of what is pooled by kind of noise, of every cell's interval, and of false alarms at most."""
 
 EXPLAINED = """\
-Written by `python -m benchmarks.coverage.study FOLDER --page`. Recordings come from equations that share no code with the
-package; true errors, sizes and noise are drawn anew for each, and the job names all physics that acts. The reading noise
-is 0.7 to 2 µm and not stated, unless a row says so. Every second recording, and all of slow noise, have the time. Of a
-gauge either the whole line is measured three times over, or each face three times before the next.
+Recordings by equations that share no code with the package (`python -m benchmarks.coverage.study FOLDER --page`); true
+errors, sizes and noise are drawn anew for each, and the job names all physics that acts. The reading noise is 0.7 to 2 µm
+and not stated, unless a row says so. Every second recording, and all of slow noise, have the time. Of a gauge either the
+whole line is measured three times over, or each face three times before the next.
 
 | noise | what |
 | --- | --- |
@@ -34,10 +34,9 @@ gauge either the whole line is measured three times over, or each face three tim
 | resolution | white, displayed in steps of 5 µm |
 
 *Hold*: 95 % intervals that contain the truth: of factors (all parameters of all effects), of sizes, of figures of
-performance. The true figure of a ballbar is the mean over 400 repetitions of the recording with all its noise drawn anew;
-that of a gauge line is its slope without noise, indicated over true distance. In brackets, the exact binomial interval of
-99.9 %, too narrow in that it takes intervals of one recording for independent. *Noisy axis*: the scale of the axis that
-reads worse. *Cries*: diagnoses other than consistent, all of them false."""
+performance (of a ballbar the mean over 400 repetitions with the noise drawn anew; of a gauge line its slope without noise).
+In brackets the exact binomial interval of 99.9 %, too narrow in that it takes intervals of one recording for independent.
+*Noisy axis*: the scale of the axis that reads worse. *Cries*: diagnoses other than consistent, all of them false."""
 
 
 def page(found: Mapping[str, Tally], beside: Mapping[str, Tally], power: Path | None) -> str:

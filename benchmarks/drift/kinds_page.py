@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-from benchmarks.drift.page import ASKED_COVERAGE, held, percent, table, told
+from benchmarks.drift.page import ASKED_COVERAGE, PAGE, held, percent, table, told
+from benchmarks.marked import put
 
-PAGE = Path(__file__).parents[2] / "docs" / "records" / "drift-kinds-study.md"
+BEGIN, END = (
+    "<!-- written by python -m benchmarks.drift.kinds_study --page: edit that instead -->",
+    "<!-- end of kinds -->",
+)
 
 HOW = """
-    {machines} machines of each of five kinds were made by a generator that shares no code with the package
+    {machines} machines of each of five kinds by a generator that shares no code with the package
     (`benchmarks/drift/kinds.py`, SHA-256 `{seal}…`), with two to ten calibrations, a year or half a year apart, three
-    in ten of them always in the same month; otherwise as in [the study of a fleet](drift-study.md). All have a rate
-    (Student's t, four degrees of freedom), a random walk, and a step in thirty years. *Plain* machines have no more.
+    in ten of them always in the same month; otherwise, and sealed (`kinds_seal.json`), as the fleet below. All have a
+    rate (Student's t, four degrees of freedom), a random walk, and a step in thirty years; *plain* machines no more.
     *Settling* ones settle by 0.2 to 0.8 of the limit after the first certificate, with decay times from 0.15 to 2
     years; an adjustment does not begin that anew. *Season*: amplitudes from 0.1 to 0.4 of the limit, 15 % more or
     less each year, with a second harmonic. *Wear*: a power from 1.3 to 2.5 of the time since an installation up to
     four years before the first certificate, across the limit in 4 to 15 years. *Step*: one of 0.2 to 0.8 of the limit
-    between the first certificate and the last. Season, wear and rates have other forms than in the model. Generator
-    and judging were committed with their hashes (`benchmarks/drift/kinds_seal.json`) before the run; the seed is the
-    first digits of the generator's hash.
+    between the first certificate and the last. Season, wear and rates have other forms than in the model.
 """
 READ = """
     *With* is the model as `due` and `history` have it without a fleet; *without*, the same without settling, season
@@ -36,7 +37,7 @@ STEPS = """
 FLEET = """
     The first {of_fleet} machines of all five kinds as one fleet, each with the prior of all others, without settling,
     season or wear ([a fleet](fleet.md)). Machines at rest after they settled or stepped are predicted to move too
-    early, since the fleet's walk, steps and rates include that; without a fleet a machine's own certificates tell.
+    early, since the fleet's walk, steps and rates include that.
 """
 WHY = """
     90 % is what a right prior gives over machines of all kinds, not of one: a kind whose days are much alike (wear
@@ -49,19 +50,16 @@ GROUPS = ("2 or 3 certificates", "4 to 6", "7 and more", "both ends are dates")
 
 
 def write(result: dict[str, Any]) -> None:
-    PAGE.write_text(page(result), encoding="utf-8")
+    put(PAGE, BEGIN, END, "\n\n".join(parts(result)))
 
 
-def page(result: dict[str, Any]) -> str:
-    parts = [
-        "# The drift model on machines that settle, follow the seasons, wear or step",
-        "<!-- written by python -m benchmarks.drift.kinds_study --page from kinds_result.json: edit that instead -->",
+def parts(result: dict[str, Any]) -> list[str]:
+    return [
         told(HOW, machines=result["machines"], seal=result["seal"]["kinds.py"][:16]), _asked(result),
-        "## The day of crossing", told(READ), _coverage(result["kinds"]), _by_group(result["kinds"]),
-        "## Steps", told(STEPS, dated=result["dated"]), _steps(result["kinds"]),
-        "## With a fleet", *_fleet(result), "## Why not 90 % everywhere", told(WHY),
+        "### The day of crossing", told(READ), _coverage(result["kinds"]), _by_group(result["kinds"]),
+        "### Steps", told(STEPS, dated=result["dated"]), _steps(result["kinds"]),
+        "### With a fleet", *_fleet(result), "### Why not 90 % everywhere", told(WHY),
     ]  # fmt: skip
-    return "\n\n".join(parts) + "\n"
 
 
 def _asked(result: dict[str, Any]) -> str:

@@ -19,21 +19,21 @@ _FEWEST = 10
 """Recordings from which on a width is told."""
 
 EXPLAINED = f"""\
-Written by `python -m benchmarks.ranks.study FOLDER --page`: simulation-based calibration (Talts et al. 2018,
-arXiv:1804.06788) of `inference/sampling.py`. Parameters are drawn from their priors, sizes of the noise from theirs
-([noise.md](noise.md)), the noise of a coordinate from that of a stated {STATED * 1e3:g} µm. The recording follows from the
-linear model and the components of noise of one of the coverage study's, of which every second has the time in it and so
-slow noise; for the digitizer, of its example. The posterior is sampled as a report samples it, and {DRAWS} draws of it, as
-far apart as they can be, say the rank of each true parameter, of each size of the noise, and of the likelihood of
-these sizes (Modrák et al. 2023). If the sampler draws what model and priors say, every rank is uniform; whether machines
-are as the priors say is another question, and the coverage study's.
+Simulation-based calibration (Talts et al. 2018, arXiv:1804.06788) of `cmm_uq/maths/inference/posterior.py` (`python
+-m benchmarks.ranks.study FOLDER --page`). Parameters are drawn from their priors, sizes of the noise from theirs
+([noise.md](noise.md)), the noise of a coordinate from that of a stated {STATED * 1e3:g} µm; the recording follows
+from the linear model and the noise of one of the coverage study's, of which every second has the time in it and so
+slow noise (for the digitizer, of its example). {DRAWS} draws of the posterior, as far apart as they can be, say the
+rank of each true parameter, of each size of the noise, and of the likelihood of these sizes (Modrák et al. 2023).
+If the sampler draws what model and priors say, every rank is uniform; whether machines are as the priors say is the
+coverage study's question.
 
-*χ²*: of ten bins of ranks, of fewer where a bin would expect fewer than five; p is of one quantity, and *adjusted* for all
-of its table (Bonferroni). *Band*: how many quantities leave the simultaneous {100 * (1 - LEVEL):g} % band of the distribution
-function (Säilynoja et al. 2022), of which one in twenty is expected to, or the smallest level whose band one leaves, not
-adjusted. *Width*: standard deviation of the posteriors over the right one, by how far from the middle the ranks lie, with
-its 95 % interval; ranks of one recording depend on each other, and the interval allows for that. *Not converged*: chains
-that were stopped before they converged, as a certificate would say; their ranks count."""
+*χ²*: of ten bins of ranks, of fewer where a bin would expect fewer than five; p is of one quantity, *adjusted* for
+all of its table (Bonferroni). *Band*: how many quantities leave the simultaneous {100 * (1 - LEVEL):g} % band of
+the distribution function (Säilynoja et al. 2022), of which one in twenty is expected to, or the smallest level
+whose band one leaves, not adjusted. *Width*: standard deviation of the posteriors over the right one, by how far
+from the middle the ranks lie, with its 95 % interval. *Not converged*: chains that were stopped before they
+converged, as a certificate would say; their ranks count."""
 
 
 @dataclass

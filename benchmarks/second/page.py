@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.marked import put
 from benchmarks.second import judging
 from benchmarks.second.cases import EFFECTS, FAULTS, NOTHING
 from benchmarks.second.judging import proportion
@@ -18,20 +19,19 @@ from benchmarks.second.oracle import DRAWS, EXCEED
 Records = dict[str, dict[str, Any]]
 Pairs = list[tuple[dict[str, Any], dict[str, Any]]]
 MISSED = "**not kept**"
+BEGIN, END = "<!-- written by benchmarks.second.study -->", "<!-- end of the second -->"
 ORACLES = ("estimates", "knows")
 LEAST_P = (1 + EXCEED) / (1 + DRAWS)
 """Of an oracle's alarm, by the rank of a recording among draws of noise alone."""
-Rule = Callable[[str, dict, dict], tuple[float, bool]]
 
 SAID = """\
 ![False alarms by kind of noise; found by strength; said and right](images/diagnosis-second-study.png)
 
-## What was done
+### What was done
 
-`python -m benchmarks.second.study FOLDER --cases {cases} --nulls {nulls} --seed {seed} --workers N --page docs` makes the
-cases as job folders, seals their truth by a hash, diagnoses them, searches them by two oracles and writes this page
-({hours} of one core); every result is a line in FOLDER, so that a run can be stopped and resumed. Generator and oracles
-(`benchmarks/second/`) share no code with the package; a test holds their equations to those of the package.
+`python -m benchmarks.second.study FOLDER --cases {cases} --nulls {nulls} --seed {seed} --workers N --page docs` makes,
+seals and diagnoses the cases, and searches them by two oracles ({hours} of one core; it can be resumed). Generator and
+oracles (`benchmarks/second/`) share no code with the package; a test holds their equations to those of the package.
 
 - **Recordings**: 20 × 2 ballbars, a step gauge in seven lines there and back, a plate of sixteen balls in one to three
   ways, a sphere in three places, and the twenty bars of the DEA Iota 1102 where they really stood. Columns (time, sides
@@ -77,7 +77,7 @@ temperature, the same or another in every set-up |
   own equation, or one that leaves less than √λ = 2 of it. A pattern, and temperatures that differ between set-ups, are
   two effects where the scale common to all can be seen by itself. Errors of a plate that are the same without noise (out
   of square, or turned row by row) are one statement, with the probability of all explanations that remain with any of
-  them. The rule before (up to 0.13.0) took each as right, with its own share."""
+  them."""
 
 
 def write(truths: list[dict], found: Records, oracles: Records, mark: str, asked: tuple[int, int, int],
@@ -86,7 +86,7 @@ def write(truths: list[dict], found: Records, oracles: Records, mark: str, asked
     faults = [(t["name"], found[t["name"]]["fault"]) for t in truths if "fault" in found.get(t["name"], {})]
     pairs = [(t, found[t["name"]]) for t in truths if t["name"] in found and "fault" not in found[t["name"]]]
     both = [(t, f, oracles[t["name"]]) for t, f in pairs if "estimates" in oracles.get(t["name"], {})]
-    page = ["# A second concealed study", "", *_state(truths, pairs, faults, mark, asked), *filter(None, [note]), ""]
+    page = [*_state(truths, pairs, faults, mark, asked), *filter(None, [note]), ""]
     for part in (_wanted(pairs, both), _nothing(pairs, oracles), _found(both), _artefact(pairs), _others(pairs, oracles),
                  _said(pairs), _coverage(pairs)):  # fmt: skip
         page += [*part, ""]
@@ -94,7 +94,7 @@ def write(truths: list[dict], found: Records, oracles: Records, mark: str, asked
     print("\n".join(page))
     if docs is not None and pairs:
         (docs / "images").mkdir(parents=True, exist_ok=True)
-        (docs / "diagnosis-second-study.md").write_text("\n".join(page), encoding="utf-8")
+        put(docs / "diagnosis-studies.md", BEGIN, END, "\n".join(page).strip())
         from benchmarks.second.picture import draw
 
         draw(pairs, both, docs / "images" / "diagnosis-second-study.png")
@@ -168,7 +168,7 @@ def _wanted(pairs: Pairs, both: list) -> list[str]:
     missed = [
         f"- {row[0]}: {where}."
         for row, where in zip(rows, why(pairs, both, kinds, off), strict=True)
-        if row[3] == MISSED
+        if row[3] == MISSED and not row[0].startswith("Said")  # the tenths have a table
     ]
     return ["| | asked | this run (95 % interval) | |", "| --- | --- | --- | --- |",
             *(f"| {a} | {b} | {c} | {d} |" for a, b, c, d in rows),
@@ -206,7 +206,7 @@ def _oracle(which: str) -> Callable[[dict, dict], dict]:
 
 
 def _nothing(pairs: Pairs, oracles: Records) -> list[str]:
-    lines = ["## Without a cause", "", "| noise | false alarms | an effect named | oracle | oracle that knows the noise |",
+    lines = ["### Without a cause", "", "| noise | false alarms | an effect named | oracle | oracle that knows the noise |",
              "| --- | --- | --- | --- | --- |"]  # fmt: skip
     for kinds, name in [*(((kind,), kind.removeprefix("nothing, ")) for kind in NOTHING), (NOTHING, "**all**")]:
         own = _of(pairs, kinds)
@@ -218,7 +218,7 @@ def _nothing(pairs: Pairs, oracles: Records) -> list[str]:
 
 
 def _found(both: list) -> list[str]:
-    lines = ["## Effects found", "",
+    lines = ["### Effects found", "",
              "| hidden | found | oracle | oracle that knows the noise | only here | only by the oracle | innocent named |",
              "| --- | --- | --- | --- | --- | --- | --- |"]  # fmt: skip
     for kinds, name in [
@@ -235,7 +235,7 @@ def _found(both: list) -> list[str]:
 
 
 def _artefact(pairs: Pairs) -> list[str]:
-    lines = ["## Faults of the artefact", "",
+    lines = ["### Faults of the artefact", "",
              "| fault | recording | machine blamed | artefact named | unexplained | not seen |",
              "| --- | --- | --- | --- | --- | --- |"]  # fmt: skip
     rows: dict[tuple[str, str], list] = defaultdict(list)
@@ -264,7 +264,7 @@ def _others(pairs: Pairs, oracles: Records) -> list[str]:
     wrong = sum(bool(judging.innocent(t, f)) for t, f in sets)
     shown = sum(judging.hit(t, f) for t, f in grown)
     return [
-        "## Beside these", "",
+        "### Beside these", "",
         f"- Outside the catalogue: {_share(sum(judging.recognised(f) for _, f in out), len(out))} recognised, "
         f"{sum(f['verdict'] == 'consistent' for _, f in out)} not seen, {len(explained)} explained by an innocent effect."
         + _told_the_form(out, oracles),
@@ -291,39 +291,30 @@ def _told_the_form(out: Pairs, oracles: Records) -> str:
     )
 
 
-def _assertions(pairs: Pairs, told: Rule = judging.told) -> tuple[list[float], list[float], list[bool], list[bool]]:
+def _assertions(pairs: Pairs) -> tuple[list[float], list[float], list[bool], list[bool]]:
     """Every effect that is named: its probability, alone and with its group, and whether it is there, alone and so."""
     rows = [
-        (*told(name, t, f), each["together"], judging.there(name, t, judging.group_of(name, f))[1])
+        (*judging.told(name, t, f), each["together"], judging.there(name, t, judging.group_of(name, f))[1])
         for t, f in pairs for name, each in f["effects"].items()
     ]  # fmt: skip
     alone, right, together, right_together = ([row[i] for row in rows] for i in range(4))
     return alone, together, right, right_together
 
 
-def _by_name(name: str, truth: dict, found: dict) -> tuple[float, bool]:
-    """The rule before: of effects that are one and the same each is right, and its probability is its own."""
-    return found["effects"][name]["probability"], judging.there(name, truth, ())[0]
-
-
 def _said(pairs: Pairs) -> list[str]:
     count, faulty = len(_assertions(pairs)[0]), len(_assertions(_of(pairs, FAULTS))[0])
-    apart = len(_apart(pairs, _by_name))
-    return [f"## Said and right: {count} assertions", "", *_tenths(pairs), "",
-            f"{faulty} of them are of a faulty artefact. The same by the rule before, by which each of the effects that are "
-            f"one and the same is right, with its own share of their probability ({apart} tenths of the effect apart):", "",
-            *_tenths(pairs, _by_name)]  # fmt: skip
+    return [f"### Said and right: {count} assertions, {faulty} of them of a faulty artefact", "", *_tenths(pairs)]
 
 
-def _apart(pairs: Pairs, told: Rule = judging.told) -> list[tuple]:
+def _apart(pairs: Pairs) -> list[tuple]:
     """Tenths in which what was said and what was right do not agree."""
-    said, _, right, _ = _assertions(pairs, told)
+    said, _, right, _ = _assertions(pairs)
     return [row for row in judging.tenths(said, right) if not _agree(row)]
 
 
-def _tenths(pairs: Pairs, told: Rule = judging.told) -> list[str]:
+def _tenths(pairs: Pairs) -> list[str]:
     """What was said and what was right, by tenths of said probability."""
-    alone, together, right, right_together = _assertions(pairs, told)
+    alone, together, right, right_together = _assertions(pairs)
     lines = ["| probability | of the effect: said | right (95 %) | with its group: said | right (95 %) |",
              "| --- | --- | --- | --- | --- |"]  # fmt: skip
     rows = [
@@ -344,5 +335,5 @@ def _coverage(pairs: Pairs) -> list[str]:
         for parameter, held in judging.covered(t, f):
             if t["kind"] != "unresolved period":
                 hits[parameter].append(held)
-    lines = ["## Intervals", "", "| parameter | hold the truth |", "| --- | --- |"]
+    lines = ["### Intervals", "", "| parameter | hold the truth |", "| --- | --- |"]
     return lines + [f"| `{name}` | {_share(sum(held), len(held))} |" for name, held in sorted(hits.items())]

@@ -11,28 +11,29 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.marked import put
 from benchmarks.second import judging as second
 from benchmarks.second.judging import proportion
 from benchmarks.third.cases import EFFECTS, KINDS, NOISES, OUTSIDE
 from benchmarks.third.judging import Judged, Name, calibration
 
+BEGIN, END = "<!-- written by benchmarks.third.study -->", "<!-- end of the third -->"
 FEW = 20
 """Cases below which a share is told and not judged."""
 VERDICTS = ("consistent", "undetermined", "unexplained", "empirical", "partial", "explained")
 
 SAID = """\
-## What was done
+### What was done
 
-`python -m benchmarks.third.study FOLDER --count {count} --seed {seed} --page docs` makes the cases as job folders, seals
-their truth by a hash, diagnoses them and asks an oracle; every result is a line in FOLDER, so that a run can be resumed
-with `--resume`. Generator and oracle (`benchmarks/third/`, and what they take of `benchmarks/second/`) share no code with
-the package.
+`python -m benchmarks.third.study FOLDER --count {count} --seed {seed} --page docs` makes, seals and diagnoses the cases,
+and asks an oracle (`--resume` goes on). Generator and oracle (`benchmarks/third/`, and what they take of
+`benchmarks/second/`) share no code with the package.
 
 - **Recordings**: 20 to 40 ballbars twice, a step gauge on 7 to 12 lines there and back twice, a plate of sixteen balls in
   one to three ways twice, and the twenty bars of the DEA Iota 1102, whose residuals, dealt anew, are the noise (*real*).
   Columns are there or not; the noise is stated in half, of these one in five wrong by a factor of two; rows stand in any
   order in three of ten; of one in seven the model is the prediction of another program.
-- **Noise** as in [the second study](diagnosis-second-study.md#what-was-done).
+- **Noise** as in the second study.
 - Chains are a tenth as long as those of a diagnosis, and the next measurement is left out.
 
 √λ is the length of what shows over the noise.
@@ -79,7 +80,7 @@ def write(
     further: Sequence[str] = (),
 ) -> None:  # fmt: skip
     """Print the page, with ``further`` tables, and write it into ``docs`` where that is given."""
-    page = ["# A third concealed study", "", state, ""]
+    page = [state, ""]
     for part in (_rows(every, before), _missed(every), _outside(every), _others(every), _verdicts(every), _nothing(every),
                  _inside(every), _said(every), further):  # fmt: skip
         page += [*part, ""] if part else []
@@ -87,7 +88,7 @@ def write(
     text = "\n".join(page) + "\n"
     print(text)
     if docs is not None:
-        (docs / "diagnosis-third-study.md").write_text(text, encoding="utf-8")
+        put(docs / "diagnosis-studies.md", BEGIN, END, text.strip())
 
 
 def share(hits: Iterable[Any]) -> str:
@@ -191,7 +192,7 @@ def _missed(every: Sequence[Judged]) -> list[str]:
             _of(one) for one in every if one.kind == "catalogue" and one.found == (False, True)
         ],
     }
-    return ["## What falls short", "", "| what | cases |", "| --- | --- |", *(
+    return ["### What falls short", "", "| what | cases |", "| --- | --- |", *(
         f"| {title} | {'; '.join(cases) if cases else 'none'} |" for title, cases in listed.items()
     )]  # fmt: skip
 
@@ -201,7 +202,7 @@ def _of(one: Judged) -> str:
 
 
 def _outside(every: Sequence[Judged]) -> list[str]:
-    lines = ["## Outside the catalogue, by form", "",
+    lines = ["### Outside the catalogue, by form", "",
              "| form | cases | the oracle sees | of these located | held-out rms, by the oracle | decided | of these named | "
              "else withheld | wrong names |", "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"]  # fmt: skip
     rows: dict[tuple[str, str], list[Judged]] = defaultdict(list)
@@ -237,7 +238,7 @@ def _others(every: Sequence[Judged]) -> list[str]:
 
 def _verdicts(every: Sequence[Judged]) -> list[str]:
     said = [*VERDICTS, *sorted({one.verdict for one in every} - set(VERDICTS))]
-    lines = ["## Verdicts by cause", "", f"| cause | {' | '.join(said)} |", "| --- |" + " --- |" * len(said)]
+    lines = ["### Verdicts by cause", "", f"| cause | {' | '.join(said)} |", "| --- |" + " --- |" * len(said)]
     for kind in KINDS:
         own = [one for one in every if one.kind == kind]
         causes = sorted({one.cause for one in own})
@@ -251,7 +252,7 @@ def _verdicts(every: Sequence[Judged]) -> list[str]:
 
 def _nothing(every: Sequence[Judged]) -> list[str]:
     nothing = [one for one in every if one.kind == "nothing"]
-    lines = ["## Without a cause", "", "| noise | false alarms | undetermined | a name |", "| --- | --- | --- | --- |"]
+    lines = ["### Without a cause", "", "| noise | false alarms | undetermined | a name |", "| --- | --- | --- | --- |"]
     for kind in (*NOISES, None):
         own = [one for one in nothing if kind in (one.noise, None)]
         lines.append(f"| {kind or '**all**'} | {share(o.alarm for o in own)} | "
@@ -260,7 +261,7 @@ def _nothing(every: Sequence[Judged]) -> list[str]:
 
 
 def _inside(every: Sequence[Judged]) -> list[str]:
-    lines = ["## Effects of the catalogue", "",
+    lines = ["### Effects of the catalogue", "",
              "| hidden | found | the oracle, which estimates the noise | names | of these wrong | members of a class |",
              "| --- | --- | --- | --- | --- | --- |"]  # fmt: skip
     for kind in EFFECTS:
@@ -278,7 +279,7 @@ def _tenths(names: Sequence[Name]) -> list[tuple[int, float, int, tuple[float, f
 
 def _said(every: Sequence[Judged]) -> list[str]:
     names = [name for one in every for name in one.names]
-    lines = [f"## Said and right: {len(names)} assertions", "", "| | said | right (95 %) | of forms | right |",
+    lines = [f"### Said and right: {len(names)} assertions", "", "| | said | right (95 %) | of forms | right |",
              "| --- | --- | --- | --- | --- |"]  # fmt: skip
     forms = {int(row[1] * 10): row for row in _tenths([n for n in names if n.form])}
     for count, mean, right, (low, high), _ in _tenths(names):

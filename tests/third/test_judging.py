@@ -174,7 +174,7 @@ def test_a_run_is_sealed_stopped_and_taken_up_again(tmp_path: Path, monkeypatch:
     assert json.loads(json.dumps(case(9, 3).one.truth)) == {
         k: v for k, v in truths[3].items() if k not in ("name", "number")
     }
-    page = (tmp_path / "diagnosis-third-study.md").read_text(encoding="utf-8")
+    page = (tmp_path / "diagnosis-studies.md").read_text(encoding="utf-8")
     assert "4 cases were diagnosed of 4 made with seed 9" in page
     monkeypatch.setattr(sys, "argv", arguments)
     with pytest.raises(SystemExit):
