@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.cli import options as opt
+from cmm_uq.app.cli import options as opt, terminal
 from cmm_uq.app.cli.options import Ending, argument, examples, flag, option
 from cmm_uq.app.cli.terminal import NEEDS_A_PERSON, NOT_CONFORMING, closed, put, put_json, say
 from cmm_uq.base.errors import CmmUqError, OutputError, printable
@@ -242,7 +242,7 @@ def ready(
 def run(options: ScheduledOptions, lines: Path | None) -> int:
     """A scheduled run from the command line; its exit code. A line that cannot be written never stops it.
 
-    ``lines``: file that they are added to, :data:`STANDARD_OUTPUT`, or ``None`` for nowhere.
+    ``lines``: file that they are added to, :data:`STANDARD_OUTPUT`, or ``None`` for nowhere: then errors alone are told.
     """
     from cmm_uq.app.commands.laboratory.schedule import run_scheduled
 
@@ -260,13 +260,16 @@ def run(options: ScheduledOptions, lines: Path | None) -> int:
             if lines == STANDARD_OUTPUT:
                 put_json(line)
                 sys.stdout.flush()  # a line that a program waits for, whatever comes of the next job
-            elif lines is not None:
+            elif lines is None:
+                if error := event.get("error"):
+                    terminal.tell(CmmUqError(error["problem"], where=error["where"], fix=error["fix"]), event["exit_code"])
+            else:
                 whole = line.encode("utf-8", "backslashreplace")  # in one piece, so that two runs may write at once
                 os.write(descriptor, whole)
-        except OutputError as error:
-            failed.append(error)
-        except (OSError, ValueError) as error:
-            to_file = f"cannot be written: {getattr(error, 'strerror', error)}"
+        except OutputError as refused:
+            failed.append(refused)
+        except (OSError, ValueError) as refused:
+            to_file = f"cannot be written: {getattr(refused, 'strerror', refused)}"
             failed.append(OutputError(to_file, where=str(lines)) if descriptor >= 0 else closed())
 
     code = run_scheduled(options, tell)

@@ -355,6 +355,19 @@ def test_a_trial_never_touches_a_measured_job(tmp_path: Path, options: tuple[str
     assert not (folder / "acquisition").exists()
 
 
+def test_a_trial_whose_plan_cannot_be_read_leaves_no_folder(tmp_path: Path) -> None:
+    job = job_folder(tmp_path / "job")
+    for content in (b"measurement,point,x_mm,y_mm,z_mm\n1,1,0,0\n", None):
+        if content is None:
+            (job / "plan.csv").unlink()
+        else:
+            (job / "plan.csv").write_bytes(content)
+        ended = run("acquire", job, "--simulate", "--out", tmp_path / "out", cwd=tmp_path)
+        assert ended.returncode == 2
+        assert "plan.csv" in ended.stderr
+        assert not (tmp_path / "out").exists()
+
+
 def test_a_trial_where_no_folder_can_be_is_refused_in_a_line(tmp_path: Path) -> None:
     job = job_folder(tmp_path / "job")
     (tmp_path / "taken").write_text("mine", encoding="utf-8")

@@ -121,6 +121,17 @@ def test_bad_jobs_are_lines_and_exit_code_2(jobs: Path, tmp_path: Path) -> None:
     assert "refused" in (tmp_path / "out" / "schedule.log").read_text()
 
 
+def test_a_quiet_run_says_nothing_but_what_is_wrong(jobs: Path, tmp_path: Path) -> None:
+    shutil.rmtree(jobs / "iota")
+    (jobs / "bad").mkdir()
+    (jobs / "bad" / "job.toml").write_text("x =")
+    done = run("report", "--scheduled", jobs, "--out", tmp_path / "out", "--quiet")
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("cmm-uq: ")
+    assert "job.toml" in line
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

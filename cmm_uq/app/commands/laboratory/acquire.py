@@ -135,12 +135,14 @@ def begin_acquisition(
 
 
 def plan_file(job: Job) -> dict[str, bytes]:
-    """The plan that a job names in a file, by its name; empty where it names none."""
+    """The plan that a job names in a file, by its name, once it can be read; empty where it names none."""
     name = job.facts.acquire.plan
     if name is None:
         return {}
     path = inside(job.folder, name, f"{job.folder / 'job.toml'}: [acquire] plan")
-    return {name: content_of(path, TABLE_BYTES, "cmm-uq plan writes plan.csv; name it in [acquire] plan")}
+    content = content_of(path, TABLE_BYTES, "cmm-uq plan writes plan.csv; name it in [acquire] plan")
+    read_recording(content, str(job.folder / name), job.points.machine)
+    return {name: content}
 
 
 def _check_origin(job: Job, *, simulate: bool) -> None:
@@ -179,8 +181,7 @@ def _plan(job: Job, story: Story) -> tuple[str, list[str]]:
         said = story.sessions[0].said
         return said["plan"], said["titles"]
     if job.facts.acquire.plan is not None:
-        ((name, content),) = plan_file(job).items()
-        read_recording(content, str(job.folder / name), job.points.machine)
+        (content,) = plan_file(job).values()
         return content.decode("utf-8-sig"), []
     from cmm_uq.app.commands.plan import recording_to_be
     from cmm_uq.app.commands.planning import make_plan
@@ -250,8 +251,9 @@ def write_trial(folder: Path, out: Path) -> Path:
     document["job"]["id"] = f"{job.facts.job.id}-trial"
     document["job"]["origin"] = SIMULATED
     left_out = {"job.toml", job.facts.recording.file, provenance_name(job.facts.recording.file)}
+    files = {**job.inputs, **plan_file(job)}
     made_folder(out)
-    for name, content in {**job.inputs, **plan_file(job)}.items():
+    for name, content in files.items():
         if name not in left_out:
             made_folder((out / name).parent)
             replace_file(out / name, content)
