@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.base.files.content import check_file
 from cmm_uq.base.output.staging import synced
 from cmm_uq.laboratory.live.instruments.source import Moment
 
@@ -59,6 +60,7 @@ class JournalLine(NamedTuple):
 
 def lines_in(path: Path) -> Iterator[JournalLine]:
     """Every line of a journal, one at a time."""
+    check_file(path, "Put a copy of the file in its place")
     with path.open("rb") as file:
         for number, line in enumerate(file, 1):
             yield JournalLine(number, line, record_of(line[:-1]) if line.endswith(b"\n") else None)

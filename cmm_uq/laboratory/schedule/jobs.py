@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.files.content import content_of, text_of
+from cmm_uq.base.files.content import check_file, content_of, text_of
 from cmm_uq.base.files.limits import JOB_BYTES
 from cmm_uq.base.files.toml_file import toml_of
 from cmm_uq.base.output import finish_interrupted, sha256_of
@@ -110,11 +110,12 @@ def _read(folder: Path, root: Path) -> JobFolder:
     ):
         return JobFolder(folder, root)
     try:
-        with (folder / name).open("rb") as file:
-            planned = is_planned(file.read(_HEAD))
-    except FileNotFoundError:
         planned = "plan" in data
-    except (OSError, ValueError):
+        if (recording := folder / name).exists():
+            check_file(recording, "")  # a pipe would be waited for
+            with recording.open("rb") as file:
+                planned = is_planned(file.read(_HEAD))
+    except (CmmUqError, OSError, ValueError):
         planned = False
     return JobFolder(folder, root, identity, name, planned)
 

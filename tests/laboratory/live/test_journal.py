@@ -110,6 +110,18 @@ def test_a_damaged_line_is_named_and_only_passed_over_when_told(tmp_path: Path) 
     assert [text for _, text in later.story.notes] == ["second"]
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_a_journal_that_is_no_file_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "0001-events.jsonl"
+    path.symlink_to(tmp_path / "nowhere")
+    with pytest.raises(CmmUqError, match="cannot be read"):
+        read_story(tmp_path)
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(CmmUqError, match="is a pipe"):
+        read_story(tmp_path)
+
+
 def test_a_session_that_lost_whole_lines_at_its_end_is_found_out_by_the_next_one(tmp_path: Path) -> None:
     journals = begin(tmp_path / "a", {}, NOW)
     journals.say("note", {"text": "last"}, NOW)

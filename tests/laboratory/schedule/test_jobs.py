@@ -74,6 +74,16 @@ def test_a_plan_without_a_recording_is_still_to_be_measured_and_a_job_without_on
     assert job.planned
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_a_pipe_in_the_place_of_a_recording_is_not_waited_for(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "job.toml").write_text('[job]\nid = "a"\n[recording]\nfile = "x.csv"\n[plan]\n')
+    os.mkfifo(tmp_path / "a" / "x.csv")
+    assert [one.planned for one in job_folders(tmp_path)] == [False]
+    (tmp_path / "a" / "x.csv").unlink()
+    assert [one.planned for one in job_folders(tmp_path)] == [True]
+
+
 def test_a_change_of_content_is_seen_where_size_and_times_stay(tmp_path: Path) -> None:
     folder = made(tmp_path / "x")
     (job,) = job_folders(tmp_path)
