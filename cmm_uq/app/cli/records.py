@@ -242,7 +242,7 @@ def ready(
 def run(options: ScheduledOptions, lines: Path | None) -> int:
     """A scheduled run from the command line; its exit code. A line that cannot be written never stops it.
 
-    ``lines``: file that they are added to, :data:`STANDARD_OUTPUT`, or ``None`` for nowhere: then errors alone are told.
+    ``lines``: file that they are added to, :data:`STANDARD_OUTPUT`, or ``None``: errors alone are told.
     """
     from cmm_uq.app.commands.laboratory.schedule import run_scheduled
 
@@ -262,7 +262,9 @@ def run(options: ScheduledOptions, lines: Path | None) -> int:
                 sys.stdout.flush()  # a line that a program waits for, whatever comes of the next job
             elif lines is None:
                 if error := event.get("error"):
-                    terminal.tell(CmmUqError(error["problem"], where=error["where"], fix=error["fix"]), event["exit_code"])
+                    terminal.tell(
+                        CmmUqError(error["problem"], where=error["where"], fix=error["fix"]), event["exit_code"]
+                    )
             else:
                 whole = line.encode("utf-8", "backslashreplace")  # in one piece, so that two runs may write at once
                 os.write(descriptor, whole)
