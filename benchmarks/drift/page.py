@@ -56,9 +56,8 @@ LIMITS = """
     The run is of version {version}, without settling, season and wear that speeds up, and with a prior without a
     fleet that knew of no machine that hardly drifts. No real fleet with a known future was at hand. Rates do not
     change, errors are taken one by one, every adjustment is recorded. The cost function is one of many; a target of
-    the drift model is not its reliability, since an error may come back within its limit. Hyper-parameters for the
-    ten years were learnt once. Machines of another seed were looked at while the model was made: of 400 and 500,
-    88 and 89 % were held.
+    the drift model is not its reliability, since an error may come back within its limit. Machines of another seed
+    were looked at while the model was made: of 400 and 500, 88 and 89 % were held.
 """
 
 

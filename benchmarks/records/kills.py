@@ -161,13 +161,13 @@ def page(tally: Tally, seconds: float) -> str:
     return f"""# A thousand kills
 
 `python -m benchmarks.records.kills` has {WRITERS} processes write reports into one set of records
-(SQLite, {platform.system()}), each into {FOLDERS} folders of its own, over and over, with files and entry
-as one as `cmm-uq report` does it. At random moments, up to {LONGEST_S:g} s apart, one of them is killed by
-SIGKILL and begun again. After every kill the records are opened, while the other process goes on writing, and
+(SQLite, {platform.system()}), each into {FOLDERS} folders of its own, as `cmm-uq report` does it. At random
+moments, up to {LONGEST_S:g} s apart, one of them is killed by SIGKILL and begun again. After every kill, while the other
+process goes on writing,
 
 - every report that the killed process had said to be done must be recorded;
-- in each of its folders files and newest entry must be those of the same report, or neither may be there
-  (within {SETTLED_S:g} s: the other process may be just settling it);
+- in each of its folders files and newest entry must be those of the same report, or neither may be there (within
+  {SETTLED_S:g} s);
 - every hundredth time chain and tables are verified, and at the end all files too.
 
 | | |
@@ -181,8 +181,8 @@ SIGKILL and begun again. After every kill the records are opened, while the othe
 
 Faults: {faults}
 
-It took {seconds / 60:.0f} minutes. A kill ends a process, not the power: that entries are on the disk when a report is said
-to be done follows from SQLite's `synchronous = FULL` and from the files' own `fsync`; no power was cut.
+It took {seconds / 60:.0f} minutes. A kill ends a process, not the power: what is on the disk then follows from SQLite's
+`synchronous = FULL` and from the files' own `fsync`; no power was cut.
 """
 
 
