@@ -45,6 +45,6 @@ MACHINE: Mapping[str, Any] = MappingProxyType({
 AT_20_C: Mapping[str, float] = MappingProxyType({"temp_artefact_c": 20.0})  # in a first recording
 
 
-def circumstances(**uncertainty: float) -> Mapping[str, Mapping[str, Any]]:
+def circumstances(**uncertainty: Any) -> Mapping[str, Mapping[str, Any]]:
     """Tables that a pass needs: these lines of the test uncertainty, and rated temperatures."""
     return {"test_uncertainty": uncertainty, "rated_conditions": {"temperature_c": [18.0, 22.0]}}

@@ -7,7 +7,7 @@ no part of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -15,7 +15,8 @@ import numpy as np
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.analysis.conformity.standard import NOT_STATED, Characteristic, Test
 from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, REPORTED, Clause, Statement, least_favourable
-from cmm_uq.base.messages import Text, say
+from cmm_uq.base.messages import Message, Text, Verbatim, at_key, commas, say
+from cmm_uq.base.points import AXES
 from cmm_uq.base.units import METRE, MICROMETRE
 from cmm_uq.jobs.tables.conformity import Circumstances
 from cmm_uq.machine.model.artefact import Artefact
@@ -139,7 +140,8 @@ def positioning(
             "changes between readings: {u:.2g} µm.",
             u=worst.u_um,
         )
-    remarks = [how, _CIRCULAR if of is circles else _FORMULAS, *([_IN_MOTION] if moving else [])]
+    remarks: list[Text] = [how, _CIRCULAR if of is circles else _FORMULAS, *([_IN_MOTION] if moving else [])]
+    remarks += _not_measured(runs) if of is axes else []
     items_of = say("circles") if of is circles else say("diagonals") if of is diagonals else say("axes")
     return test.stated(_TITLES[figure], items_of, tuple(items), remarks, signed=False)
 
@@ -148,6 +150,38 @@ def _crosses(run: PositioningRuns, artefact: Artefact) -> bool:
     """Whether a diagonal crosses most of the travel of every axis; of unknown travel none does."""
     travel = np.ptp(artefact.points.machine.travel_mm, axis=1)
     return bool(np.all(run.length_mm * np.abs(run.travel) >= _MOST * travel))
+
+
+def _short_of_travel(runs: Runs, artefact: Artefact) -> Iterator[Message]:
+    """Of each axis that no run goes over most of, in how far its figures are those of a part of it."""
+    travel = dict(zip(AXES, np.ptp(artefact.points.machine.travel_mm, axis=1).tolist(), strict=True))
+    longest = {axis: max(run.length_mm for run in runs.values() if run.axis == axis) for axis in _named(runs)}
+    for axis, length in longest.items():
+        if not np.isfinite(travel[axis]):
+            key = at_key("[machine] travel_mm")
+            yield say("the travel of {axis}{key}, of which its run is a part", axis=Verbatim(axis.upper()), key=key)
+        elif length < _MOST * travel[axis]:
+            yield say(
+                "two thirds of the travel of {axis} ({length:.0f} of {travel:.0f} mm)",
+                axis=Verbatim(axis.upper()),
+                length=length,
+                travel=travel[axis],
+            )
+
+
+def _named(runs: Runs) -> list[str]:
+    """Axes that runs are of."""
+    return [axis for axis in AXES if any(run.axis == axis for run in runs.values())]
+
+
+def _not_measured(runs: Runs) -> list[Text]:
+    """What a reader must know of axes that no run is of."""
+    measured = _named(runs)
+    others = [Verbatim(axis.upper()) for axis in AXES if axis not in measured]
+    if not measured or not others:
+        return []
+    those = commas([Verbatim(axis.upper()) for axis in measured])
+    return [say("Of {measured} alone: nothing is said of {others}.", measured=those, others=commas(others))]
 
 
 def _enough(run: PositioningRuns) -> bool:
@@ -159,7 +193,7 @@ def _enough(run: PositioningRuns) -> bool:
 def conditions(
     artefact: Artefact, *, recorded: bool, of: Callable[[Artefact], Runs], what: Text
 ) -> tuple[Condition, ...]:
-    """Targets and runs of everything that is there; a repeat that is another to the last digit is a copy of it."""
+    """Targets, runs and travel of everything there; a repeat that is another to the last digit is a copy of it."""
     try:
         runs = of(artefact)
     except MissingReadingError:
@@ -169,6 +203,7 @@ def conditions(
         whole = [run for run in runs.values() if _crosses(run, artefact)]
         count = len({tuple(np.sign(run.travel)) for run in whole})
         few += [say("{count} of the four body diagonals", count=count)] if count < DIAGONALS else []
+    few += list(_short_of_travel(runs, artefact)) if of is axes else []
     for number, run in runs.items():
         count = len(run.targets)
         if not _enough(run):
@@ -212,7 +247,7 @@ def _characteristics(
     )
 
 
-_RUNS = say("five runs in each direction, five targets a metre and five at least")
+_RUNS = say("five runs in each direction, five targets a metre and five at least, over two thirds of the travel")
 # Figures of axes against the laboratory's own limits, read at rest or in motion
 OWN_RULE = "laboratory's own rule"
 OF_AXES = tuple(
@@ -249,8 +284,8 @@ _ISO_230_2 = (
         "targets_and_runs",
         say("targets and runs"),
         "Five runs in each direction; five targets a metre and five at least, the axis at rest at each: readings in motion "
-        "are not decided. That targets are not evenly spaced is not asked for.",
-        "as commonly reported; at rest: GOST ISO 230-2-2016, its translation",
+        "are not decided. Each axis over two thirds of its travel. That targets are not evenly spaced is not asked for.",
+        "as commonly reported; at rest: GOST ISO 230-2-2016, its translation; two thirds: this project",
     ),
     Clause(
         "formulas", say("figures"), "A, E, R, B and M with twice the standard uncertainty estimators, n − 1.", REPORTED

@@ -49,6 +49,11 @@ def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Ci
             what = say("uncertainty: {line} is neither stated nor declared negligible", line=_NAMES[line])
             declared = f'{line} = {{ by = "…", reason = "…" }} in [test_uncertainty.negligible]'
             found.append(_lacks(what, f"{key}, or {declared}"))
+    stated = under.uncertainty
+    acts = stated.u_temperature_k and not stated.declared("temperature")
+    if "temperature" in lines and "expansion" not in lines and acts and not under.cte_per_k:
+        what = say("uncertainty: that of the temperature is stated, and no expansion coefficient by which it acts")
+        found.append(_lacks(what, "cte_per_k in [artefact], or temperature in [test_uncertainty.negligible]"))
     if "form" in lines and artefact.form <= 0:
         ball = say("uncertainty: the form deviation of the test sphere is not stated")
         plane = say("uncertainty: the form deviation of the surface is not stated")

@@ -83,7 +83,7 @@ class AxisRunsFacts(InterferometerFacts):
 CIRCLES = Beginning(
     title="Circles in three planes by telescoping ballbar (ISO 230-4)",
     numbering="One measurement is one circle; its points go round it, and back.",
-    artefact={"name": "Telescoping ballbar", "u_bar_um": 0.5},
+    artefact={"name": "Telescoping ballbar", "u_bar_um": 0.5, "cte_per_k": 11.5e-6},
     effects=(*SIX, "hysteresis_x", "hysteresis_y", "hysteresis_z"),
     plan={"ready": "circles", "repeats": 1, "length_mm": 300.0},
     recorded=AT_20_C,
@@ -113,7 +113,11 @@ AXIS_RUNS = Kind(
             **{f"turn_{a}": f"Axis about which a rotation is read, its part along {a}." for a in AXES},
         },
         conformity={"standard": "ISO 230-2:2014", "limit_um": 10.0, "rule": "ISO 14253-1"},
-        test=circumstances(u_alignment_um=0.2, u_temperature_k=0.1, u_repeat_um=0.1),
+        test=circumstances(
+            u_alignment_um=0.2,
+            u_repeat_um=0.1,
+            negligible={"temperature": {"by": "the laboratory", "reason": "light does not expand"}},
+        ),
         further={
             **dict.fromkeys((*APPROACHES, *(f"tip_{a}_mm" for a in AXES)), ""),
             "straightedge": "+1 against a straightedge as it lies first, −1 against it turned over, 0 without one.",
