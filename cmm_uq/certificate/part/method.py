@@ -16,7 +16,7 @@ from cmm_uq.analysis.parts.methods.of_job import METHODS
 from cmm_uq.analysis.parts.virtual import AGREES, CHECKED
 from cmm_uq.base import messages
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, number, plural, say
-from cmm_uq.base.units import unit
+from cmm_uq.base.units import REFERENCE_TEMPERATURE, unit
 from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.further import further_table
 from cmm_uq.certificate.origin import NAME
@@ -155,6 +155,24 @@ def _unstated(found: PartMeasurement) -> list[Text]:
         (facts.placing.u_fixture_um, say("clamping")), (operators, say("operators")),
     )  # fmt: skip
     return [what for given, what in stated if not given]
+
+
+def decided_without(found: PartMeasurement) -> tuple[Text, ...]:
+    """What a reader must know of decisions on an uncertainty that lacks styli, temperatures, expansion or form."""
+    facts, room = found.job.facts, found.job.facts.environment
+    touching = any(one.diameter_mm and not (one.u_diameter_um or one.lobing_um) for one in facts.stylus)
+    cold = room.part_c == REFERENCE_TEMPERATURE
+    left_out = (
+        (touching, say("qualification of the styli")),
+        (not room.u_part_k, say("temperatures")),
+        (not (facts.part.cte_per_k and (facts.part.u_cte_per_k or cold)), say("expansion of the part")),
+        (not found.given.forms, say("form and roughness of the part")),
+    )
+    without = [what for holds, what in left_out if holds]
+    if found.measured is None or not without or not any(found.judged):
+        return ()
+    what = messages.listed(without)
+    return (say("Decided as if these had no uncertainty, of which the job states none: {what}.", what=what),)
 
 
 _NOTHING = 5e-4  # share of a variance that is printed as none

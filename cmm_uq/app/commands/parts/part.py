@@ -43,6 +43,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.origin import file_name
 from cmm_uq.certificate.part.figures import part_summary
 from cmm_uq.certificate.part.measurement import MATTERS, PartMeasurement, UnseenError
+from cmm_uq.certificate.part.method import decided_without
 from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE, Behind, provenance_of
 from cmm_uq.certificate.wording import effect_title
@@ -133,13 +134,14 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
     decisions = decide_limits(job, plan, errors, measured)
     together = None if measured is None else _together(conforming(plan, errors, measured)[1], decisions)
     x, y, z = origin_of(job, machine.state.machine).tolist()
-    return PartMeasurement(
+    found = PartMeasurement(
         job, plan, circumstances, virtual, simulated, characteristics, measured, shares, unseen,
         further, decisions, together, tuple(reductions),
         point_errors(virtual, seed=seed), (x, y, z), machine.standing, compare_methods(characteristics, shares, methods),
         digits=options.digits, seed=seed, asked=trials, warnings=(*of_part.warnings, *machine.warnings),
         files=files, influence=influence,
     )  # fmt: skip
+    return replace(found, warnings=(*found.warnings, *decided_without(found)))
 
 
 def affordable(draws: int, plan: Plan) -> int:

@@ -26,6 +26,7 @@ from cmm_uq.base.messages import say
 from cmm_uq.certificate.further import NO_FURTHER
 from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
+from cmm_uq.certificate.part.method import decided_without
 from cmm_uq.jobs.part.job import TABLES
 from cmm_uq.machine.physics.catalogue import effects
 from tests.conftest import ROOT
@@ -344,6 +345,30 @@ def test_temperatures_outside_of_the_calibrations_are_told() -> None:
     warm = {"scales_c": [23.0, 23.0, 23.0]}
     told = state_machine(plate_of(by_results(), environment=warm, **THERE)).warnings
     assert any("23 to 23 °C; the temperature of the calibration is not known" in text for text in told)
+
+
+@pytest.mark.parametrize(("table", "changes", "lacks"), [
+    ("environment", {}, ""),
+    ("environment", {"u_part_k": 0.0}, "temperatures"),
+    ("part", {"cte_per_k": 0.0}, "expansion of the part"),
+    ("part", {"u_cte_per_k": 0.0}, ""),  # at 20 °C it acts on nothing
+    ("stylus", {"u_diameter_um": 0.0, "lobing_um": 0.0}, "qualification of the styli"),
+    ("stylus", {"u_diameter_um": 0.0, "lobing_um": 0.0, "diameter_mm": 0.0}, ""),
+])  # fmt: skip
+def test_a_decision_says_of_what_no_uncertainty_is_stated(table: str, changes: dict[str, float], lacks: str) -> None:
+    found = shifted()
+    facts, own = found.job.facts, getattr(found.job.facts, table)
+    other = [one.model_copy(update=changes) for one in own] if table == "stylus" else own.model_copy(update=changes)
+    there = replace(found, job=replace(found.job, facts=facts.model_copy(update={table: other})))
+    assert [str(text).rpartition(": ")[2] for text in decided_without(there)] == ([f"{lacks}."] if lacks else [])
+    assert not decided_without(replace(there, measured=None))
+
+
+def test_what_a_decision_lacks_is_a_warning_of_the_report() -> None:
+    environment, form = {"u_part_k": 0.0, "u_scales_k": 0.0}, {"field_um": 0.0, "roughness_um": 0.0}
+    job = plate_of(by_results(), np.zeros((60, 3)), environment=environment, form=form, **THERE)
+    (told,) = (str(text) for text in evaluate_part(job, PartOptions(trials=1000)).warnings if "Decided" in str(text))
+    assert told.endswith(": temperatures and form and roughness of the part.")
 
 
 def test_a_check_says_what_would_stop_the_command(tmp_path: Path) -> None:
