@@ -73,7 +73,7 @@ def _drawing(sheet: Sheet, head: int, where: str) -> Drawing:
     drawing, defined = Drawing(PROGRAM), set[str]()
     for i, facts in _rows(sheet, head, headings, where):
         name, kind, what = (str(facts.pop(key, "")) for key in ("feature", "kind", "what"))
-        number = str(facts.pop("characteristic", "")) or f"{what} of {name.replace('|', ' and ')}"
+        number = str(facts.pop("characteristic", "")) or str(len(drawing.characteristics) + 1)
         if not name or not (kind or what):
             problem = "names no feature" if not name else f"says of {name!r} neither its kind nor what is asked of it"
             raise CmmUqError(problem, where=sheet.at(where, i), fix="Fill in feature, and kind or what")

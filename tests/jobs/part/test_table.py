@@ -46,11 +46,11 @@ def test_a_table_says_what_the_job_says() -> None:
          "inner": True, "strategy": {"pattern": "points", "points": 8}},
     ]  # fmt: skip
     assert drawing.characteristics == [
-        {"name": "flatness of top", "what": "flatness", "features": ["top"], "tolerance_mm": 0.02},
-        {"name": "size of bore", "what": "size", "features": ["bore"], "lower_mm": 30.98, "upper_mm": 31.03},
-        {"name": "perpendicularity of bore", "what": "perpendicularity", "features": ["bore"], "datums": ["top"],
+        {"name": "1", "what": "flatness", "features": ["top"], "tolerance_mm": 0.02},
+        {"name": "2", "what": "size", "features": ["bore"], "lower_mm": 30.98, "upper_mm": 31.03},
+        {"name": "3", "what": "perpendicularity", "features": ["bore"], "datums": ["top"],
          "tolerance_mm": 0.1},
-        {"name": "distance of bore and hole 2", "what": "distance", "features": ["bore", "hole 2"], "lower_mm": 29.95,
+        {"name": "4", "what": "distance", "features": ["bore", "hole 2"], "lower_mm": 29.95,
          "upper_mm": 30.05},
     ]  # fmt: skip
     assert drawing.open_keys == {"bore": ["strategy"]}, "only what the table leaves open is an example"
@@ -133,5 +133,5 @@ def test_a_job_is_begun_from_it(tmp_path: Path) -> None:
     path = tmp_path / "plan.csv"
     path.write_text(PLAN)
     job = part_of_drawing(path, {}, id="plate")["job.toml"].decode()
-    assert 'name = "perpendicularity of bore"' in job
+    assert 'what = "perpendicularity"' in job
     assert 'strategy = { pattern = "sections", sections = 3, points = 8 }  # EXAMPLE' in job
