@@ -266,6 +266,9 @@ class KnownLength(JobTable):
     u_um: Uncertainty = required("Standard uncertainty (k = 1) of the known length.")
 
 
+UNSTATED_SHIFT_UM = 1000.0
+
+
 class ShiftFacts(ArtefactFacts):
     """A shifted artefact lies along an ``axis`` or, a plate, in a ``plane``."""
 
@@ -278,7 +281,9 @@ class ShiftFacts(ArtefactFacts):
     """Plane in which a plate is shifted and turned, in place of `axis` and `shifts_mm`."""
     shifts_mm: Annotated[list[Position], Field(max_length=LISTED.most)] = Field(default_factory=list)
     """Nominal shift of each series along the axis."""
-    u_shift_um: Uncertainty = key(0.0, "Standard uncertainty of the shifts; where it is not 0 they are estimated.")
+    u_shift_um: Uncertainty | None = None
+    """Standard uncertainty of the shifts, which are estimated; 0 where they are known exactly and give the scale. Left out,
+    they are taken as 1 mm off."""
     known: KnownLength | None = None
     """A known length between two points of the artefact, for the mean scale of the axis."""
     integrated_points: Annotated[list[Numbers], Field(max_length=20)] = Field(default_factory=list)
@@ -298,6 +303,11 @@ class ShiftFacts(ArtefactFacts):
     @property
     def traced(self) -> bool:
         return self.known is not None
+
+    @property
+    def sd_shift_um(self) -> float:
+        """Standard uncertainty of the shifts, large where nobody states it: nominal shifts give no scale."""
+        return UNSTATED_SHIFT_UM if self.u_shift_um is None else self.u_shift_um
 
 
 SHIFT = Kind(

@@ -326,7 +326,7 @@ def recorded_series(facts: ShiftFacts, points: Points, where: str) -> ShiftedSer
         raise CmmUqError("is missing", where="job.toml [artefact] shifts_mm",
                          fix="Give one shift a series, 0.0 for the first")  # fmt: skip
     return shifted_series(
-        points, facts.axis, np.array(facts.shifts_mm, dtype=np.float64), facts.u_shift_um * MICROMETRE, where
+        points, facts.axis, np.array(facts.shifts_mm, dtype=np.float64), facts.sd_shift_um * MICROMETRE, where
     )
 
 

@@ -276,8 +276,11 @@ def _open(result: ShiftResult) -> Section:
 
 def _artefact(result: ShiftResult) -> Section:
     facts = shared.shift_facts(result.job)
-    shifts, U = in_a_row(nominal(s) for s in facts.shifts_mm), significant(2 * facts.u_shift_um)
-    rows = ((say("Shifts"), say("{shifts} mm, U = {U} µm (k = 2)", shifts=shifts, U=U)),)
+    shifts, U = in_a_row(nominal(s) for s in facts.shifts_mm), significant(2 * facts.sd_shift_um)
+    told = say("{shifts} mm, U = {U} µm (k = 2)", shifts=shifts, U=U)
+    if facts.u_shift_um is None:
+        told = say("{shifts} mm nominal, estimated: how well they are known is not stated", shifts=shifts)
+    rows = ((say("Shifts"), told),)
     blocks: list[Block] = []
     if result.distances is not None:
         cells = tuple(

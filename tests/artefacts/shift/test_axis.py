@@ -271,6 +271,28 @@ def test_without_a_known_length_there_is_no_scale(tmp_path: Path) -> None:
     assert result.estimate.curve.error[0] == 0.0
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("u_shift", "scaled"), [("u_shift_um = 0.0\n", True), ("", False)])
+def test_shifts_of_which_nobody_says_how_well_they_are_known_give_no_scale(
+    tmp_path: Path, u_shift: str, scaled: bool
+) -> None:
+    """Two series, 10 µm of the shift of 20 mm off: as exact it is a scale of 500 ppm, which the machine has not."""
+    edits = (r"known = .*\n", ""), (r"u_shift_um = .*\n", u_shift), (r"shifts_mm = .*", "shifts_mm = [0.0, 20.0]")
+    job = edited(tmp_path, *edits)
+    of_series(job, {"1", "2"})
+    head, *rows = (job / "recording.csv").read_text("utf-8").splitlines()
+    at = head.split(",").index("x_mm")
+    cells = [row.split(",") for row in rows]
+    for row in cells:
+        row[at] = f"{float(row[at]) + 0.01 * (row[0] == '2'):.6f}"
+    (job / "recording.csv").write_text("\n".join([head, *map(",".join, cells)]) + "\n", "utf-8")
+    result = analyse(job)
+    assert isinstance(result, ShiftResult)
+    assert (result.scale is not None) == scaled
+    assert result.scale is None or abs(result.scale.value) > 300
+    assert ("not stated" in str(outcome_of(result).document)) != scaled
+
+
 WISH = (
     'effects = []\n[[conformity]]\nstandard = "laboratory\'s own rule"\ncharacteristic = "linearity"\nlimit_um = {limit}\n'
     "complete = {{ measurements = 3, repeats = 3, points = {points} }}\n[rated_conditions]\n"
