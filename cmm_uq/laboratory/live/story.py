@@ -329,6 +329,9 @@ def _read(folder: Path, skip_damaged: bool) -> tuple[Story, int, list[tuple[Path
         if not skip_damaged:
             refuse_damaged(path, content)
         damaged += [f"{path.name} line {number}" for number in content.damaged]
+        if content.records and content.records[0].kind != "session":  # whose times and plan all others go by
+            fix = "Put a copy of the file in its place, or move the file away and measure its points again"
+            raise CmmUqError("the line that begins the session is damaged", where=f"{path} line 1", fix=fix)
         for record in content.records:
             story.take(record)
         following = max(following, *(record.number + 1 for record in content.records), 1)

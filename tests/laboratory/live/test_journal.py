@@ -110,6 +110,21 @@ def test_a_damaged_line_is_named_and_only_passed_over_when_told(tmp_path: Path) 
     assert [text for _, text in later.story.notes] == ["second"]
 
 
+def test_no_session_is_read_without_the_line_that_begins_it(tmp_path: Path) -> None:
+    for k in range(2):
+        journals = begin(tmp_path / "a", {"plan": "x"}, NOW)
+        journals.say("note", {"text": f"{k}"}, NOW)
+        journals.commit()
+        journals.close()
+    for path in sessions_in(tmp_path / "a"):
+        content = path.read_bytes()
+        path.write_bytes(content.replace(b'"plan"', b'"plam"', 1))
+        with pytest.raises(CmmUqError, match=rf"{path.name} line 1: the line that begins the session"):
+            read_story(tmp_path / "a", skip_damaged=True)
+        path.write_bytes(content)
+    assert len(read_story(tmp_path / "a").sessions) == 2
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
 def test_a_journal_that_is_no_file_is_named(tmp_path: Path) -> None:
     path = tmp_path / "0001-events.jsonl"
