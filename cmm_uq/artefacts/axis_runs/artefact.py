@@ -41,7 +41,7 @@ from cmm_uq.artefacts.axis_runs.run import (
     squares,
 )
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import say
+from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, unit
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size
@@ -107,6 +107,7 @@ class AxisRuns(Artefact):
         spans = [np.ptp(self._base[run.rows]) for run in self.runs if run.kind == ALONG]
         self._length = self._instrument(float(max(spans))) if spans else ()
         further = list(self._references(square, np.any(edges != 0, axis=1), where))
+        self.exact = tuple(self._taken_as_exact(np.any(edges != 0, axis=1)))
         self._shapes = -np.column_stack([shape for _, shape in further]) if further else np.zeros((len(own), 0))
         self.sizes = (*self._length, *(size for size, _ in further))
         self.noise_scale = self._noise_scale()
@@ -235,6 +236,15 @@ class AxisRuns(Artefact):
                 Size(f"reference_{run.measurement}_{symbol}", title, _UNITS[run.kind], 0.0, stated, role="set-up"),
                 shape,
             )
+
+    def _taken_as_exact(self, edge: Any) -> Iterator[Text]:
+        """References of kinds of reading, each but a straightedge turned over, of which the job states no uncertainty."""
+        for kind, stated, title in (
+            (ACROSS, self._facts.u_straightness_um, say("The reference of straightnesses")),
+            (TURNING, self._facts.u_rotation_arcsec, say("The reference of rotations")),
+        ):
+            if stated is None and any(run.kind == kind and not edge[run.rows].any() for run in self.runs):
+                yield title
 
     def _noise_scale(self) -> Floats:
         """As repeats show that the scatter of the kinds compares; else as readings are off their neighbours.
