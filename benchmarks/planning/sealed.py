@@ -57,7 +57,9 @@ def plans(setting):
 
 def predicted(setting, placings, rivals):
     model = without_fault(setting.observed, setting.model(join(placings)), Noise(setting.sigma), 0)
-    found = powers(model, rivals, stated=setting.sigma, sigma=setting.sigma, alpha=ALPHA, seed=0, draws=96)
+    found = powers(
+        model, rivals, stated=setting.sigma, sigma=setting.sigma, alpha=ALPHA, seed=0, draws=96, quantile=0.0
+    )
     return {power.effect: power for power in found}
 
 

@@ -19,7 +19,7 @@ from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import DRAWS, draw_nothing, statistic_of
 from cmm_uq.analysis.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
-from cmm_uq.base.points import Floats
+from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import Unit
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.kind import Observed
@@ -34,6 +34,8 @@ _LARGER = np.array([1.0, 1.3])  # noise as it looks, over what it is, at which t
 _TAIL = 0.2
 # Log odds of an effect against everything else from which on no other is said to be as possible
 CERTAIN = float(np.log(0.95 / 0.05))
+_TOGETHER = 5  # effects whose recordings are judged together
+_UNASKED = -1e300  # margin at a size that is smaller than what is asked
 ALLOWED = 3.0  # prior standard deviations up to which an effect is reckoned with
 
 
@@ -46,7 +48,8 @@ class Power:
     unit: Unit
     allowed: float  # largest amplitude that physics allows, in its unit
     per_unit: float  # size, as in SIZES, of an effect of one unit; 0 where nothing of it shows
-    # detected_at, named_at: (d,) size from which on each drawn recording is alarmed, and named rightly; may be infinite
+    # detected_at, named_at: (d,) size from which on each drawn recording is alarmed, and named rightly; may be infinite.
+    # Of recordings in which less than the quantile asked for does, at most
     detected_at: Floats
     named_at: Floats
 
@@ -104,25 +107,31 @@ def without_fault(observe: Observed, model: RecordingModel, noise: Noise, seed: 
 
 def powers(
     model: RecordingModel, effects: Sequence[Effect], *, stated: float | None, sigma: float, alpha: float, seed: int,
-    draws: int = 20, noise: DrawnNoise | None = None,
+    draws: int = 20, noise: DrawnNoise | None = None, quantile: float = POWER,
 ) -> Iterator[Power]:  # fmt: skip
-    """Of the diagnosis for effects that the model does not name; ``stated``, ``sigma`` of a coordinate, claimed, true, mm."""
+    """Of the diagnosis for effects that the model does not name; ``stated``, ``sigma`` of a coordinate, claimed, true, mm.
+
+    Sizes are exact from a ``quantile`` of the recordings on, which spares those that a smaller one would need.
+    """
     compared = model_comparison(model, stated, 0)
-    rule = _Rule(compared.comparison, sigma, alpha, noise)
+    rule = _Rule(compared.comparison, sigma, alpha, noise, compared.null)
     points = model.artefact.points.at(model.placed(compared.values))
-    for effect in effects:
-        column = model.seen(effect.basis(points)[:, :, :1], compared.values) / rule.comparison.noise_scale[:, None]
-        shown = rule.comparison.rest(column)
-        length, first, index = float(np.linalg.norm(shown)), effect.coefficients[0], rule.index(effect.name)
-        common = (effect.name, effect.reported[0].name, first.unit, ALLOWED * first.prior_sd)
-        if length * ALLOWED * first.prior_sd < SIZES[0] * sigma or index is None:
-            never = np.full(draws, np.inf)
-            yield Power(*common, 0.0, never, never)
-            continue
-        drawn = rule.noise(shown / length, seed, draws)
-        each = [rule(sigma * (drawn + size * shown / length), index) for size in SIZES]
-        alarm, margin = (np.array(rows) for rows in zip(*each, strict=True))
-        yield Power(*common, length / sigma, _reached(alarm), _reached(np.minimum(alarm, margin)))
+    never = np.full(draws, np.inf)
+    for begin in range(0, len(effects), _TOGETHER):
+        sizes: list[tuple[str, str, Unit, float, float]] = []
+        tried: list[tuple[Floats, Floats, int]] = []
+        for effect in effects[begin : begin + _TOGETHER]:
+            column = model.seen(effect.basis(points)[:, :, :1], compared.values) / rule.comparison.noise_scale[:, None]
+            shown = rule.comparison.rest(column)
+            length, first, index = float(np.linalg.norm(shown)), effect.coefficients[0], rule.index(effect.name)
+            allowed = ALLOWED * first.prior_sd
+            shows = length * allowed >= SIZES[0] * sigma and index is not None
+            sizes.append((effect.name, effect.reported[0].name, first.unit, allowed, length / sigma if shows else 0.0))
+            if shows and index is not None:
+                tried.append((rule.noise(shown / length, seed, draws), shown / length, index))
+        found = iter(rule.reached(tried, quantile))
+        for each in sizes:
+            yield Power(*each, *(next(found) if each[-1] else (never, never)))
 
 
 def _reached(margin: Floats) -> Floats:
@@ -151,17 +160,19 @@ class Naming:
         prior = CombinationPrior(self.explanations)
         return np.array([prior.log([i]) for i in range(len(self.explanations))])
 
-    def __call__(self, odds: Floats, true: int) -> Floats:
-        """By how much (b,) the true effect passes what would let others stand beside it; ``odds`` (c, b) log evidence."""
+    def __call__(self, odds: Floats, true: Ints) -> Floats:
+        """By how much (b,) the true ones (b,) pass what would let others stand beside them; ``odds`` (c, b) log evidence."""
         weight = odds + self.priors[:, None]
         kinds = np.array([explanation.kind for explanation in self.explanations])
         nothing = np.full((1, odds.shape[1]), CombinationPrior(self.explanations).log([]))
         none = scipy.special.logsumexp(np.vstack([nothing, weight[kinds == UNKNOWN]]), axis=0)
-        others = weight[(kinds == EFFECT) & (np.arange(len(kinds)) != true)]
+        own = np.take_along_axis(weight, true[None], axis=0)[0]
+        np.put_along_axis(weight, true[None], -np.inf, axis=0)
+        others = weight[kinds == EFFECT]
         other = others.max(axis=0, initial=-np.inf)
-        asserted = weight[true] - np.maximum(none, other)
-        without_rival = np.minimum(asserted, weight[true] - other + np.log(NOT_TOLD_APART))
-        all_but_certain = weight[true] - scipy.special.logsumexp(np.vstack([none, others]), axis=0) - CERTAIN
+        asserted = own - np.maximum(none, other)
+        without_rival = np.minimum(asserted, own - other + np.log(NOT_TOLD_APART))
+        all_but_certain = own - scipy.special.logsumexp(np.vstack([none, others]), axis=0) - CERTAIN
         return np.asarray(np.maximum(without_rival, all_but_certain))
 
 
@@ -172,15 +183,15 @@ class _Rule:
     comparison: CandidateComparison
     sigma: float
     alpha: float
-    coloured: DrawnNoise | None = None
+    coloured: DrawnNoise | None
+    null: Floats  # (draws,) statistic under nothing, of the draws that the thresholds are of
 
     @cached_property
     def _thresholds(self) -> Floats:
-        """(t,) statistic at which the test rejects when the noise, which a fault enlarges, looks :data:`_LARGER` times it."""
+        """(2,) statistic at which the test rejects when the noise, which a fault enlarges, looks :data:`_LARGER` times it."""
         random = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(2,)))
         draws, found = draw_nothing(self.comparison, random, DRAWS), []
-        for larger in _LARGER:
-            statistic = statistic_of(self.comparison, larger * draws)[0]
+        for statistic in (self.null, statistic_of(self.comparison, _LARGER[1] * draws)[0]):
             start = float(np.quantile(statistic, 1 - _TAIL))
             beyond = float((statistic[statistic > start] - start).mean())
             found.append(start + beyond * float(np.log(_TAIL / self.alpha)))
@@ -219,10 +230,28 @@ class _Rule:
     def _naming(self) -> Naming:
         return Naming(self.comparison.explanations)
 
-    def __call__(self, data: Floats, true: int) -> tuple[Floats, Floats]:
-        """By how much the statistic (b,) passes the threshold, and the true effect what would let others stand beside it."""
-        statistic, odds = statistic_of(self.comparison, data)
-        return statistic - self.threshold(data), self._naming(odds, true)
+    def reached(self, tried: Sequence[tuple[Floats, Floats, int]], quantile: float) -> Iterator[tuple[Floats, Floats]]:
+        """Sizes (d,) from which on recordings are alarmed, and named, of noise (m, d), a direction (m, 1) and its effect each.
+
+        From the largest size down: to where a recording is not alarmed, or no more than a quantile of them are.
+        """
+        if not tried:
+            return
+        noise, direction = (np.hstack(each) for each in ([n for n, *_ in tried], [s for _, s, _ in tried]))
+        count = tried[0][0].shape[1]
+        direction, true = np.repeat(direction, count, axis=1), np.repeat([i for *_, i in tried], count)
+        alarm, named = np.full((2, len(SIZES), len(true)), _UNASKED)
+        rest = np.arange(len(true))
+        for row in reversed(range(len(SIZES))):
+            data = self.sigma * (noise[:, rest] + SIZES[row] * direction[:, rest])
+            statistic, odds = statistic_of(self.comparison, data)
+            alarm[row, rest] = statistic - self.threshold(data)
+            named[row, rest] = np.minimum(alarm[row, rest], self._naming(odds, true[rest]))
+            alarmed = alarm[row].reshape(-1, count) > 0
+            rest = np.flatnonzero(alarmed & (alarmed.sum(axis=1, keepdims=True) > np.ceil(quantile * (count - 1))))
+            if not len(rest):
+                break
+        yield from zip(*(np.split(_reached(each), len(tried)) for each in (alarm, named)), strict=True)
 
 
 # Visible lengths within which one is looked for; beyond the last nothing is said to be found

@@ -303,9 +303,8 @@ def _moved(
 def as_recorded(model: RecordingModel, field: RecordedField, posterior: NoisyPosterior) -> Floats:
     """(k, j) by which the estimates of the named errors change with a unit of each coefficient of others."""
     estimate = model.estimate()
-    seen = [shown_by(model, one) for one in field.effects]
-    weights = gain(estimate.linear, float(np.median(posterior.sigma)))
-    return np.asarray(weights[: field.modelled] @ np.hstack(seen))
+    weights = gain(estimate.linear, float(np.median(posterior.sigma)))[: field.modelled]
+    return np.hstack([weights @ shown_by(model, one) for one in field.effects])
 
 
 def disagreeing(model: RecordingModel, posterior: NoisyPosterior, recorded: Floats) -> tuple[Key, ...]:

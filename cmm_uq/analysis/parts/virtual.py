@@ -20,7 +20,7 @@ import numpy as np
 from cmm_uq.analysis.machine.influence import PriorInfluence, influence_of
 from cmm_uq.analysis.machine.state import MachineState
 from cmm_uq.analysis.parts.causes.cause import LARGE, CommonCause, Drawn, PartCause, condensed, normal
-from cmm_uq.analysis.parts.causes.machine import MACHINE, Qualified, mean_errors, modelled, noise, not_modelled, styli
+from cmm_uq.analysis.parts.causes.machine import MACHINE, Qualified, modelled, noise, not_modelled, styli
 from cmm_uq.analysis.parts.causes.surroundings import (
     Reproducibility,
     SurfaceForm,
@@ -91,8 +91,9 @@ class AtPose:
         unmodelled, self.lacking = not_modelled(given.machine, qualified, pose)
         own, on_surface = forms(given.forms, plan)
         beside = None if given.measured is None else given.measured - plan.points
+        machine, self.base = modelled(given.machine, qualified, pose, beside)
         self.causes: list[PartCause] = [
-            modelled(given.machine, qualified, pose, beside),
+            machine,
             *unmodelled,
             *noise(given.machine, points, pose, given.repeats, int(plan.order[0]) if len(plan.order) else 0),
             *styli(plan, pose),
@@ -100,8 +101,7 @@ class AtPose:
             *given.further,
             *own,
         ]
-        self.base = mean_errors(given.machine, qualified, pose, beside)
-        self.base = self.base + mean_expansion(surroundings, plan, points, pose)
+        self.base += mean_expansion(surroundings, plan, points, pose)
         self.pilot = max(pilot // 4, min(pilot, pilot * LARGE // len(plan.points)))
         self._inverses = dict[bool, dict[int, Inverse]]()
         drawn = any(len(feature.surface) for feature in plan.features)

@@ -141,6 +141,7 @@ _HELD = 1e12  # of a size that its certificate gives without uncertainty, 0.1 nm
 SEEN = 1e-6  # part of an effect's information, of what it would be by itself, below which rounding hides it
 FAINT = 1.0  # below which an effect of its prior standard deviation does not stand out of the noise
 _RIDGE = 1e-13
+_TOGETHER = 10  # set-ups whose designs are made together
 _PART = 0.1  # share from which on a column counts as part of what looks like another
 
 
@@ -170,12 +171,14 @@ def set_up_information(setting: Setting, placings: Sequence[SetUp], also: tuple[
     if setting.planning.shared:
         return shared(setting.model(points, also), setting.noise)
     numbers = np.unique(points.measurement)
-    models = [setting.model(points.select(points.measurement == number), also) for number in numbers]
-    matrices = [gram(model, np.array([u.prior_mean for u in model.unknowns]), setting.noise) for model in models]
-    unknowns, sizes = models[0].unknowns, models[0].artefact.sizes
+    matrices = []
+    for part in np.split(numbers, range(_TOGETHER, len(numbers), _TOGETHER)):
+        model = setting.model(points.select(np.isin(points.measurement, part)), also)
+        matrices.append(by_measurement(model, np.array([u.prior_mean for u in model.unknowns]), setting.noise))
+    unknowns, sizes = model.unknowns, model.artefact.sizes
     names = {(ARTEFACT, size.name) for size in sizes if size.role == "sought"}
     sought = tuple(i for i, unknown in enumerate(unknowns) if unknown.key in names)
-    return Information(unknowns, np.stack(matrices), certified(unknowns), sought)
+    return Information(unknowns, np.concatenate(matrices), certified(unknowns), sought)
 
 
 def recording_information(setting: Setting, points: Points, also: tuple[Effect, ...] = ()) -> Floats:
@@ -192,9 +195,9 @@ def gram(model: RecordingModel, values: Floats, noise: PlannedNoise | None = Non
     return np.asarray(white.T @ white, dtype=np.float64)
 
 
-def by_measurement(model: RecordingModel, values: Floats) -> Floats:
-    """The same for each measurement (c, k, k), in ascending order, under the white noise that the model states."""
-    white = _white(model, values, None)
+def by_measurement(model: RecordingModel, values: Floats, noise: PlannedNoise | None = None) -> Floats:
+    """The same for each measurement (c, k, k), in ascending order."""
+    white = _white(model, values, noise)
     index = np.unique(model.artefact.measurement[model.used], return_inverse=True)[1].ravel()
     return np.stack([rows.T @ rows for rows in (white[index == i] for i in range(int(index.max()) + 1))])
 

@@ -9,8 +9,13 @@ new job and messages.
 
 from __future__ import annotations
 
+import ast
+import inspect
 import re
+import sys
 from collections.abc import Iterable, Mapping
+from functools import cache
+from itertools import pairwise
 from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
@@ -23,9 +28,7 @@ class JobTable(BaseModel):
     """A table: no key beyond the known ones, no text where a number belongs, no NaN."""
 
     # most tables are never read: what checks them is made when it is first needed
-    model_config = ConfigDict(
-        strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     @model_validator(mode="after")
     def _without_problems(self) -> Self:
@@ -115,8 +118,25 @@ def sentences(table: type[BaseModel]) -> Mapping[str, str]:
     own: dict[str, str] = {}
     for base in reversed(table.__mro__):
         for name, field in getattr(base, "model_fields", {}).items():
-            own[name] = re.sub(r"\s+", " ", field.description or own.get(name, ""))
+            below = _below(base.__module__).get((base.__qualname__, name))
+            own[name] = re.sub(r"\s+", " ", field.description or below or own.get(name, ""))
     return {field.alias or name: own[name] for name, field in table.model_fields.items()}
+
+
+@cache
+def _below(module: str) -> Mapping[tuple[str, str], str]:
+    """Sentences below the keys of a module's tables, by table and key: from its source, so that only who tells them pays."""
+    try:
+        tree = ast.parse(inspect.getsource(sys.modules[module]))
+    except (OSError, TypeError, KeyError):
+        return {}
+    tables = [table for table in tree.body if isinstance(table, ast.ClassDef)]
+    below = ((table.name, key, said) for table in tables for key, said in pairwise(table.body))
+    return {
+        (name, ast.unparse(key.target)): inspect.cleandoc(str(said.value.value))
+        for name, key, said in below
+        if isinstance(key, ast.AnnAssign) and isinstance(said, ast.Expr) and isinstance(said.value, ast.Constant)
+    }
 
 
 def unit_of(name: str) -> str:

@@ -51,6 +51,7 @@ READ: Mapping[str, Text] = {  # of axes of which it is stated how they are read
 # root mean square that physics allows: µm along an axis beyond its scale, µm across it, ″
 ALLOWED = {POSITION: 20.0, STRAIGHTNESS: 50.0, ROTATION: 30.0}
 _SAME = 1e-6  # of the shortest period: a distance over which nothing changes
+_AT_ONCE = 1_000_000  # covariances of readings that are held at once
 _LOOKED_AT = 61  # readings
 TRIED = 64  # periods: correlations of errors at two places are then off by less than a tenth in the root mean square
 _EACH = 4  # of these in each band, where the size of an error goes by its period
@@ -195,9 +196,11 @@ class GivenPeriod(Effect):
 
     def at(self, reading: Floats) -> Floats:
         """(n, j) mm of error at readings (n,): of the trials, then of the combinations."""
+        parts = np.array_split(reading, 1 + len(reading) * len(self.readings) // _AT_ONCE)
+        said = np.concatenate([covariance(self.of, part, self.readings) @ self.into for part in parts])
         angle = 2 * np.pi * reading[:, None] / np.ravel(self.sum.at)
         waves = MICROMETRE * np.stack([np.sin(angle), np.cos(angle)], axis=2).reshape(len(reading), -1)
-        return np.hstack([waves, covariance(self.of, reading, self.readings) @ self.into])
+        return np.hstack([waves, said])
 
     def beforehand(self, random: np.random.Generator, count: int) -> Floats:
         """Draws (N, j) of the coefficients over their standard deviations, without the recording.

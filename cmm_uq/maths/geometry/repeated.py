@@ -8,7 +8,7 @@ in three or four steps. Blocks that fit the processor's cache keep the memory at
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,8 +104,9 @@ class Repeated:
         """The least-squares feature of each draw, to 1e-9 mm."""
         errors = self._checked(displacements)
         state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
+        begun = self._begun(errors)
         for rows in self._blocks(len(errors)):
-            state[rows], d = self._descended(self._local(errors[rows], rows.start), errors[rows], rows.start)
+            state[rows], d = self._descended(self._local(errors[rows], rows.start), begun(rows), rows.start)
             form[rows] = 2 * d.max(axis=1) if self.placed.shape is LINE else np.ptp(d, axis=1)
         return self._drawn(state, form)
 
@@ -120,7 +121,7 @@ class Repeated:
         """
         errors, steps = self._checked(displacements[None]), np.diag(step / self._units)
         points = self.points + displacements
-        state = self._descended(self._local(errors, 0), errors, 0)[0][0]
+        state = self._descended(self._local(errors, 0), self._begun(errors)(slice(None)), 0)[0][0]
         states = np.concatenate([state + steps, state - steps])
         up, down = np.split(np.array([self._each(one, points).sum(axis=0) for one in states]), 2)
         pulled = (self._pulls(state, points, step) - self._pulls(state, points, -step)) / step
@@ -141,10 +142,11 @@ class Repeated:
             return self.least_squares(displacements)
         errors = self._checked(displacements)
         state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
+        begun = self._begun(errors)
         for rows in self._blocks(len(errors), 20 * BLOCK):
             local = self._local(errors[rows], rows.start)
             many = local.shape[2] >= SCREENED and self.placed.shape is not LINE
-            state[rows] = self._begun(errors[rows]) if many else self._descended(local, errors[rows], rows.start)[0]
+            state[rows] = begun(rows) if many else self._descended(local, begun(rows), rows.start)[0]
             left = np.arange(local.shape[1])
             if self.placed.shape is not LINE:
                 state[rows], form[rows], left = least_zones(self.placed.shape, state[rows], local, self._units)
@@ -166,10 +168,11 @@ class Repeated:
                              fix="Ask for circles, spheres and cylinders")  # fmt: skip
         errors, alone = self._checked(displacements), largest_inside if inscribed else circumscribed
         state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
+        begun = self._begun(errors)
         for rows in self._blocks(len(errors), 20 * BLOCK):
             local = self._local(errors[rows], rows.start)
-            begun, _ = self._descended(local, errors[rows], rows.start)
-            state[rows], left = held(self.placed.shape, begun, local, self._units, -1.0 if inscribed else 1.0)
+            near, _ = self._descended(local, begun(rows), rows.start)
+            state[rows], left = held(self.placed.shape, near, local, self._units, -1.0 if inscribed else 1.0)
             for i in left:
                 state[rows.start + i] = alone(self.placed, local[:, i]).state
             form[rows] = np.ptp(self.placed.shape.distances(state[rows], local)[0], axis=1)
@@ -228,16 +231,19 @@ class Repeated:
         d, J = self.placed.shape.distances(state[None], self.placed.local(points[None]))
         return np.asarray((J[:, 0] * d[0]).T)
 
-    def _begun(self, errors: Floats | Raised) -> Floats:
+    def _begun(self, errors: Floats | Raised) -> Callable[[slice], Floats]:
+        """States (B, k) to begin with, of some draws: what follows to first order."""
         if not isinstance(errors, Raised):
-            return np.asarray(self.placed.state + errors.reshape(len(errors), -1) @ self._response)
+            return lambda rows: np.asarray(
+                self.placed.state + errors[rows].reshape(-1, len(self._response)) @ self._response
+            )
         n, d = errors.directions.shape
         response = np.einsum("nd,ndk->nk", errors.directions, self._response.reshape(n, d, -1))
-        return np.asarray(self.placed.state + errors.offset.ravel() @ self._response + errors.heights @ response)
+        still = self.placed.state + errors.offset.ravel() @ self._response
+        return lambda rows: np.asarray(still + errors.heights[rows] @ response)
 
-    def _descended(self, local: Floats, errors: Floats | Raised, first: int) -> tuple[Floats, Floats]:
-        """States (B, k) of the least-squares features, and distances (B, n)."""
-        state = self._begun(errors)
+    def _descended(self, local: Floats, state: Floats, first: int) -> tuple[Floats, Floats]:
+        """States (B, k) of the least-squares features, from those to begin with, which change, and distances (B, n)."""
         for done in range(MOST_STEPS):
             step, d, J = self._step(state, local, own=done >= SHARED_STEPS)
             state -= step

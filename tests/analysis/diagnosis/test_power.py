@@ -27,10 +27,10 @@ POINTS = join(ready_plan(SETTING)[1])
 
 
 @cache
-def predicted() -> dict[str, Power]:
+def predicted(quantile: float = POWER) -> dict[str, Power]:
     model = without_fault(SETTING.observed, SETTING.model(POINTS), Noise(SETTING.sigma), 0)
     rivals = effects(("rotation_y_y", "rotation_x_y", "rotation_y_x", "rotation_z_z"))
-    found = powers(model, rivals, stated=SETTING.sigma, sigma=SETTING.sigma, alpha=ALPHA, seed=0)
+    found = powers(model, rivals, stated=SETTING.sigma, sigma=SETTING.sigma, alpha=ALPHA, seed=0, quantile=quantile)
     return {power.effect: power for power in found}
 
 
@@ -44,6 +44,18 @@ def test_power_grows_with_the_effect_and_naming_needs_more_than_detection() -> N
     assert curve == sorted(curve)
     assert curve[2] >= POWER
     assert np.all(power.named_at >= power.detected_at)
+
+
+@pytest.mark.long
+def test_sizes_that_no_quantile_asks_for_change_no_amplitude() -> None:
+    """With every size asked for, no recording is alarmed, or named, from a larger one on, and what counts from the same."""
+    for name, whole in predicted(0.0).items():
+        one = predicted()[name]
+        for few, every in ((one.detected_at, whole.detected_at), (one.named_at, whole.named_at)):
+            counts = every >= np.quantile(every, POWER, method="higher")
+            np.testing.assert_allclose(few[counts], every[counts], rtol=1e-9)
+            assert np.all(few >= every * (1 - 1e-9))
+    assert np.any(predicted()["rotation_y_y"].detected_at > predicted(0.0)["rotation_y_y"].detected_at * 1.01)
 
 
 @pytest.mark.long

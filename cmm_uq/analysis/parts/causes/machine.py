@@ -51,6 +51,7 @@ _LATITUDES = ((90.0, 1, 0.0), (67.5, 4, 0.0), (45.0, 8, 22.5), (22.5, 4, 45.0), 
 # mm: the last step towards where the machine indicates; what is left is smaller by what errors change over a millimetre
 _SETTLED = 1e-7
 _ROUNDS = 12
+_TURNED = 64  # points that are turned at once: their columns stay in the cache of a core
 
 
 def styli(plan: Plan, pose: PartPose) -> list[PartCause]:
@@ -148,18 +149,36 @@ class Qualified:
         return found
 
 
-def mean_errors(state: MachineState, qualified: Qualified, pose: PartPose, measured: Floats | None = None) -> Floats:
+def modelled(
+    state: MachineState, qualified: Qualified, pose: PartPose, measured: Floats | None = None
+) -> tuple[CommonCause, Floats]:
+    """What the calibration modelled, and by how much (n, 3) the machine displaces points without any draw, mm.
+
+    ``measured``: (n, 3) by how much points were measured beside the plan's, in the frame of the part: what scales read there
+    says the phase of a short period.
+    """
+    columns = _columns_of(state, qualified, pose, measured)
+    return _modelled(state, qualified, pose, columns), _mean_errors(state, qualified, pose, columns)
+
+
+def _mean_errors(state: MachineState, qualified: Qualified, pose: PartPose, columns: Floats) -> Floats:
     """(n, 3) by how much the machine displaces points without any draw, in the frame of the part, mm.
 
-    Where the machine indicates by the mean of what is known, and what it corrects there.
+    Where the machine indicates by the mean of what is known, and what it corrects there; of errors with a period it
+    corrects none.
     """
+    e, start = np.zeros((len(qualified.both), 3)), 0
+    for effect in state.effects:
+        own = slice(start, start := start + len(effect.coefficients))
+        if isinstance(effect, GivenPeriod):
+            e += np.ascontiguousarray(columns[:, :, own]) @ state.mean[own]
+    periodic = -pose.back(qualified.left(e[:, :, None])[:, :, 0])
     if np.array_equal(state.corrects, state.mean):
-        return _mean_periodic(state, qualified, pose, measured)
+        return periodic
     points, (acting, mean, corrects) = qualified.both, _plain(state)
     indicated = _indicated(acting, mean, points, points.xyz)
     indicated = indicated + acting.errors(points.at(indicated), corrects)
-    plain = pose.back(qualified.left((indicated - points.xyz)[:, :, None])[:, :, 0])
-    return plain + _mean_periodic(state, qualified, pose, measured)
+    return pose.back(qualified.left((indicated - points.xyz)[:, :, None])[:, :, 0]) + periodic
 
 
 def _plain(state: MachineState) -> tuple[Superposition, Floats, Floats]:
@@ -167,22 +186,6 @@ def _plain(state: MachineState) -> tuple[Superposition, Floats, Floats]:
     kept = np.array([not isinstance(one, GivenPeriod) for one in state.effects for _ in one.coefficients], dtype=bool)
     effects = tuple(one for one in state.effects if not isinstance(one, GivenPeriod))
     return Superposition(effects, state.shapes), state.mean[kept], state.corrects[kept]
-
-
-def _mean_periodic(state: MachineState, qualified: Qualified, pose: PartPose, measured: Floats | None) -> Floats:
-    """(n, 3) displacements by the means of errors with a period, which no machine corrects."""
-    given = [isinstance(effect, GivenPeriod) for effect in state.effects]
-    if not any(given):
-        return np.zeros_like(qualified.part.xyz)
-    read, about = _read(state, qualified, pose, measured), _about(state, qualified)
-    e = np.zeros((len(qualified.both), 3))
-    start = 0
-    for effect in state.effects:
-        own = state.mean[start : start + len(effect.coefficients)]
-        start += len(effect.coefficients)
-        if isinstance(effect, GivenPeriod):
-            e += _as_read(about, read).columns(effect) @ own
-    return -pose.back(qualified.left(e[:, :, None])[:, :, 0])
 
 
 def _about(state: MachineState, qualified: Qualified) -> About:
@@ -216,18 +219,12 @@ def _indicated(acting: Superposition, coefficients: Floats, points: Points, true
     return indicated
 
 
-def modelled(state: MachineState, qualified: Qualified, pose: PartPose, measured: Floats | None = None) -> CommonCause:
-    """What the calibration modelled: differences of whole draws of its posterior from their mean, and drift since then.
-
-    The columns are those of small changes about the mean (:meth:`Superposition.about`), axes leaning as they do.
-
-    ``measured``: (n, 3) by how much points were measured beside the plan's, in the frame of the part: what scales read there
-    says the phase of a short period.
-    """
+def _columns_of(state: MachineState, qualified: Qualified, pose: PartPose, measured: Floats | None = None) -> Floats:
+    """(n + q, 3, k) errors by small changes of what was modelled about its mean (:meth:`Superposition.about`)."""
     about = _about(state, qualified)
     given = any(isinstance(effect, GivenPeriod) for effect in state.effects)
     read = _read(state, qualified, pose, measured) if given else qualified.both
-    columns = np.concatenate([
+    return np.concatenate([
         np.zeros((len(qualified.both), 3, 0)),
         *(
             _as_read(about, read).columns(effect) if isinstance(effect, GivenPeriod)
@@ -235,6 +232,10 @@ def modelled(state: MachineState, qualified: Qualified, pose: PartPose, measured
             for effect in state.effects
         ),
     ], axis=2)  # fmt: skip
+
+
+def _modelled(state: MachineState, qualified: Qualified, pose: PartPose, columns: Floats) -> CommonCause:
+    """What the calibration modelled: differences of whole draws of its posterior from their mean, and drift since then."""
     factors = [effect.name for effect in state.effects for _ in effect.coefficients]
     deviations, drift = state.deviations, np.append(state.drift, np.zeros(len(factors) - len(state.drift)))
 
@@ -249,7 +250,7 @@ def modelled(state: MachineState, qualified: Qualified, pose: PartPose, measured
     why |= {effect.name: said for effect in state.effects if effect.stated and effect.name in why}
     as_others = say("the calibration shows little of it; as large as it shows errors of this kind to be")
     why |= dict.fromkeys(state.as_family, as_others)
-    basis = -_in_part(qualified.left(columns), pose)
+    basis = _in_part(qualified.left(columns), pose)
     return CommonCause(name=MACHINE, factors=tuple(factors), draw=draw, named=why, basis=basis)
 
 
@@ -287,7 +288,7 @@ def _unmodelled(one: Unmodelled, qualified: Qualified, pose: PartPose) -> Common
 
     as_shown = say("the calibration did not model it; as large as its recording would not have shown")
     as_allowed = say("the calibration did not model it; as large as physics allows")
-    name, basis = one.effect.name, -_in_part(qualified.left(columns), pose)
+    name, basis = one.effect.name, _in_part(qualified.left(columns), pose)
     as_stated = say("the calibration did not show it; as large as the bound that is stated allows")
     why = {name: as_stated if one.effect.stated else as_shown if one.bounded else as_allowed}
     return CommonCause(name=MACHINE, factors=(name,) * columns.shape[2], draw=draw, named=why, basis=basis)
@@ -333,5 +334,9 @@ def _one_of(ratio: Floats) -> Draw | None:
 
 
 def _in_part(columns: Floats, pose: PartPose) -> Floats:
-    """Columns (n, 3, k) of the machine as displacements (k, n, 3) in the frame of the part."""
-    return pose.back(np.moveaxis(columns, 2, 0))
+    """Errors (n, 3, k) of the machine as displacements (k, n, 3) in the frame of the part."""
+    found = np.empty((columns.shape[2], *columns.shape[:2]))
+    for start in range(0, len(columns), _TURNED):
+        rows = slice(start, start + _TURNED)
+        found[:, rows] = -np.moveaxis(pose.rotation.T @ columns[rows], 2, 0)
+    return found
