@@ -70,6 +70,9 @@ class JobFacts(Identification):
             )
 
 
+NO_DATE = dt.date(1970, 1, 1)  # of a job that says none: the clock is never read
+
+
 class SetAside(JobTable):
     """A measurement that the laboratory leaves out of the estimates."""
 

@@ -21,7 +21,7 @@ from cmm_uq.jobs.importing.documents import DCC
 from cmm_uq.jobs.importing.encodings import begins_with
 from cmm_uq.jobs.importing.format import HEAD, Recognition
 from cmm_uq.jobs.importing.recording import read_recording_file
-from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
+from cmm_uq.jobs.job import NO_DATE, Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logo import checked_logo
 from cmm_uq.jobs.recording import compared
 from cmm_uq.jobs.recording.beside import LOG, SHORT_GAUGE, ShortGauge, log_of, short_gauge_of, with_logged
@@ -97,14 +97,26 @@ def _read(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     return replace(job, inputs={**job.inputs, **_contents(source, [REPLACED], TABLE_BYTES, written=True)})
 
 
+def _refuse_unfit_earlier(facts: JobFile, path: Path) -> None:
+    """Refuse an earlier recording of a kind that compares none, and one that is later."""
+    recorded, when = facts.recording, facts.job.date
+    if recorded.earlier is not None and not facts.artefact.with_earlier:
+        kind = facts.artefact.kind
+        raise CmmUqError(f"earlier compares two recordings at two dates, which a job of kind {kind!r} has not",
+                         where=f"{path}: [recording] earlier", fix="Leave it out")  # fmt: skip
+    if recorded.earlier_date is not None and NO_DATE != when < recorded.earlier_date:
+        problem = f"{recorded.earlier_date} lies after the recording's date, {when}"
+        raise CmmUqError(
+            problem, where=f"{path}: [recording] earlier_date", fix="Exchange both recordings, or mend a date"
+        )
+
+
 def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     path, folder = source.toml, source.toml.parent
     content, facts, says = _facts(source, nameable)
     inputs = {"job.toml": content}
     earlier = facts.recording.earlier
-    if earlier is not None and not facts.artefact.with_earlier:
-        raise CmmUqError(f"earlier compares two recordings at two dates, which a job of kind {facts.artefact.kind!r} has not",
-                         where=f"{path}: [recording] earlier", fix="Leave it out")  # fmt: skip
+    _refuse_unfit_earlier(facts, path)
     machine = _machine(facts.machine)
     maps, logs, calibrations = _of_the_machine(facts.machine)
     predicted, predicting_maps = files_of(facts, path)
@@ -160,6 +172,7 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     if earlier is not None:
         then, recognised = read_recording_file(inputs[earlier], str(folder / earlier), machine, facts.recording)
         told.append(recognised)
+        compared.refuse_copy(points, then, planned, f"{path}: [recording] earlier")
         points = compared.against_earlier(points, then, facts.artefact.cte_per_k, where)
     found = as_found_of(before, inputs, folder, facts.job.origin, facts.machine.name, facts.machine.serial)
     gauge = _short_gauge(facts, inputs, folder, machine)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -124,6 +125,25 @@ def test_a_job_names_the_earlier_recording_and_carries_it_along() -> None:
     job = read_job(ROOT / "examples" / "plate-two-dates-simulated")
     assert set(job.inputs) == {"job.toml", "recording.csv", "earlier.csv"}
     np.testing.assert_allclose(job.points.columns["noise_ratio"], np.sqrt(2.0))
+
+
+def test_an_earlier_date_that_lies_after_and_a_copy_are_refused(tmp_path: Path) -> None:
+    """Either would be a change of the machine with the wrong sign, or none with a U of nanometres."""
+    job = tmp_path / "job"
+    shutil.copytree(ROOT / "examples" / "plate-two-dates-simulated", job)
+    text = (job / "job.toml").read_text("utf-8")
+    (job / "job.toml").write_text(text.replace("earlier_date = 2025-01-01", "earlier_date = 2026-01-02"), "utf-8")
+    with pytest.raises(CmmUqError, match="2026-01-02 lies after the recording's date, 2026-01-01"):
+        read_job(job)
+    (job / "job.toml").write_text(text, "utf-8")
+    head, *rows = (job / "recording.csv").read_text("utf-8").splitlines()
+    (job / "earlier.csv").write_text("\n".join([head, *reversed(rows)]) + "\n", "utf-8")
+    with pytest.raises(CmmUqError, match=r"earlier: is the recording itself to the last digit"):
+        read_job(job)
+    other = rows[0].split(",")
+    other[-1] = f"{float(other[-1]) + 1e-5:.6f}"
+    (job / "earlier.csv").write_text("\n".join([head, *rows[1:], ",".join(other)]) + "\n", "utf-8")
+    assert len(read_job(job).points)
 
 
 def test_only_plates_are_compared(tmp_path: Path) -> None:

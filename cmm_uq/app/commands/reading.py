@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.jobs import reading
 from cmm_uq.jobs.derived_job import against
-from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.job import NO_DATE, Job
 from cmm_uq.jobs.reading import Nameable
 from cmm_uq.jobs.tables.conformity import Standards
 
@@ -59,7 +58,6 @@ def in_language(job: Either, language: Code | None) -> Either:
 
 
 RECORDING, PREDICTION = "recording.csv", "predicted.csv"
-NO_DATE = dt.date(1970, 1, 1)  # of a job that says none: the clock is never read
 NO_DATE_REMARK = "The date of the measurement was not given."
 
 

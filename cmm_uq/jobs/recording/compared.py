@@ -137,6 +137,19 @@ def _rows_by_point(numbers: list[float], lines: list[int], place: str) -> dict[i
 NOISE_RATIO = "noise_ratio"  # column: standard uncertainty of a difference over that of one coordinate
 
 
+def refuse_copy(points: Points, earlier: Points, planned: bool, where: str) -> None:
+    """Refuse an earlier recording that has the same coordinates to the last digit: it says nothing of a change."""
+    now, then = (
+        np.column_stack([one.measurement, one.point, one.repeat, one.xyz])[
+            np.lexsort((one.repeat, one.point, one.measurement))
+        ]
+        for one in (points, earlier)
+    )
+    if not planned and np.array_equal(now, then):
+        problem = "is the recording itself to the last digit, of which no reading was made again"
+        raise CmmUqError(problem, where=where, fix="Name the recording of the earlier date")
+
+
 def against_earlier(later: Points, earlier: Points, cte_per_k: float, where: str) -> Points:
     """The later recording, means over repeats, with the earlier one as its reference positions, and :data:`NOISE_RATIO`.
 
