@@ -6,7 +6,6 @@ import datetime as dt
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
-from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -187,7 +186,6 @@ class JobFile(JobTable):
             self.test_uncertainty, self.rated_conditions, probe, self.artefact.cte_per_k if stated else None,
             cmc=self.laboratory.cmc,
             set_aside={entry.measurement: entry.reason for entry in self.recording.set_aside},
-            calibration_dof=self.artefact.degrees_of_freedom or inf,
         )  # fmt: skip
 
     @model_validator(mode="before")

@@ -324,7 +324,7 @@ def length_budget(
         length_mm, float(_own(np.array(u_mm), u_beside_mm)), temperature_c=temperature_c,
         cte_per_k=circumstances.cte_per_k or 0.0, u_cte_per_k=stated.u_cte_per_k, u_temperature_k=stated.u_temperature_k,
         u_alignment_mm=stated.u_alignment_um * MICROMETRE, u_fixturing_mm=stated.u_fixturing_um * MICROMETRE,
-        u_beside_mm=u_beside_mm, calibration_dof=circumstances.calibration_dof,
+        u_beside_mm=u_beside_mm,
     )  # fmt: skip
 
 

@@ -48,7 +48,8 @@ class ShortGaugeFacts(JobTable):
     """Expanded uncertainty, as a certificate states it, in place of `u_um`; needs `k` or `degrees_of_freedom`."""
     k: Factor | None = key(None, "Coverage factor of `U_um`.")
     degrees_of_freedom: Freedom | None = None
-    """Effective degrees of freedom by the certificate; without `k` the factor is Student's t for 95 % by them."""
+    """Effective degrees of freedom by the certificate; without `k` the factor is Student's t for 95 % by them. Figures and
+    decisions take u of the normal distribution with the same 95 % interval."""
     cte_per_k: AnyFloat = key(0.0, "Coefficient of thermal expansion of the gauge, 1/K.")
     name: str = key("", "Name of the gauge on the certificate.")
     serial: str = key("", "Serial number of the gauge.")

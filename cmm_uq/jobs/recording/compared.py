@@ -34,7 +34,7 @@ from cmm_uq.jobs.importing.format import Recognition
 from cmm_uq.jobs.importing.header import COVERAGE
 from cmm_uq.jobs.importing.recording import imported_references
 from cmm_uq.jobs.tables.artefact import LARGEST_CTE, ArtefactFacts
-from cmm_uq.jobs.tables.length_formula import factor_of
+from cmm_uq.jobs.tables.length_formula import divisor_of
 from cmm_uq.jobs.tables.machine import ErrorMapFile
 
 EXPANDED = "reference_U_um"
@@ -92,7 +92,7 @@ def with_references(
 
 def with_uncertainties(points: Points, artefact: ArtefactFacts, where: str, unread: Sequence[str] = ()) -> Points:
     """A recording with the standard uncertainty of its certified values in place of the expanded one."""
-    columns, factor = points.columns, factor_of(artefact.k, artefact.degrees_of_freedom)
+    columns, factor = points.columns, divisor_of(artefact.k, artefact.degrees_of_freedom)
     unread = [*unread, *(name for name in columns if name not in OPTIONAL)]
     if (other := next((name for name in unread if _ANOTHER_U.fullmatch(name)), None)) is not None:
         raise CmmUqError(f"the column {other!r} looks like an uncertainty, and is none that is read", where=where,
@@ -108,6 +108,9 @@ def with_uncertainties(points: Points, artefact: ArtefactFacts, where: str, unre
         columns = {**columns, STANDARD: columns[EXPANDED] / factor}
         columns = {name: values for name, values in columns.items() if name != EXPANDED}
         here = [STANDARD]
+    elif here and artefact.degrees_of_freedom is not None:
+        divisor = divisor_of(1.0, artefact.degrees_of_freedom) or 1.0
+        columns = {**columns, **{name: columns[name] / divisor for name in here}}
     elif artefact.k is not None and artefact.U_um is None and not here:
         raise CmmUqError("k is given without U_um, and no column has expanded uncertainties", where="job.toml [artefact] k",
                          fix=f"Give U_um, or a column {EXPANDED} beside the certified values; or leave k out")  # fmt: skip

@@ -148,7 +148,8 @@ class ArtefactFacts(JobTable):
     as `"0.2 + 0.5·L/1000"` or `"Q[0.2; 0.5·L/1000]"`, L in mm; needs `k` or `degrees_of_freedom`."""
     k: Factor | None = key(None, "Coverage factor of `U_um`, or of a column `reference_U_um`.")
     degrees_of_freedom: Freedom | None = None
-    """Effective degrees of freedom by the certificate; without `k` the factor is Student's t for 95 % by them."""
+    """Effective degrees of freedom by the certificate; without `k` the factor is Student's t for 95 % by them. Figures and
+    decisions take u of the normal distribution with the same 95 % interval."""
     cte_per_k: AnyFloat = 0.0
     """Coefficient of thermal expansion of the artefact, 1/K; its recorded temperature `temp_artefact_c` is corrected
     by it."""

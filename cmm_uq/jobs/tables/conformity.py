@@ -9,7 +9,6 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import inf
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator, model_validator
@@ -185,7 +184,6 @@ class Circumstances:
     cmc: Capability | None = None
     clauses: Mapping[str, ClausesForm] = field(default_factory=dict)
     set_aside: Mapping[int, str] = field(default_factory=dict)
-    calibration_dof: float = inf
 
 
 class MaximumPermissibleError(JobTable):

@@ -168,8 +168,23 @@ def factor_of(k: float | None, degrees_of_freedom: float | None) -> float | None
     return float(stdtrit(degrees_of_freedom, 0.5 + 0.5 * _LEVEL))
 
 
+def divisor_of(k: float | None, degrees_of_freedom: float | None) -> float | None:
+    """What an expanded uncertainty is divided by; ``None`` where neither is stated.
+
+    Estimates and decisions take what is certified as normal. With few degrees of freedom it is Student's t, so that U/k would
+    have a smaller 95 % interval than the certificate: u is that of the normal distribution with the same one.
+    """
+    factor = factor_of(k, degrees_of_freedom)
+    if factor is None or degrees_of_freedom is None:
+        return factor
+    from scipy.special import ndtri
+
+    return factor * float(ndtri(0.5 + 0.5 * _LEVEL)) / (factor_of(None, degrees_of_freedom) or 1.0)
+
+
 def with_standard_uncertainty(data: Any, *, columns: bool = False) -> Any:
     """A table with ``u_um`` beside ``U_um``; ``columns``: whether ``k`` may belong to a column of the recording alone."""
+    data = _with_expanded(data)
     if not (isinstance(data, dict) and {"U_um", "k"} & data.keys()):
         return data
     if columns and not {"U_um", "u_um"} & data.keys():
@@ -177,10 +192,27 @@ def with_standard_uncertainty(data: Any, *, columns: bool = False) -> Any:
     if "U_um" not in data or "u_um" in data or not {"k", "degrees_of_freedom"} & data.keys():
         raise ValueError("give u_um, or U_um together with its coverage factor k (or its degrees_of_freedom)")
     expanded, k, freedom = data["U_um"], data.get("k"), data.get("degrees_of_freedom")
-    stated = [value for value in (expanded, k, freedom) if value is not None and not isinstance(value, str)]
+    stated = [value for value in (expanded, k, freedom) if value is not None and not isinstance(value, str | Growing)]
     numbers = all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in stated)
     if not numbers or isinstance(k, str) or not 1 <= (2 if k is None else k) <= 10 or (freedom or 1) < 1:
         raise ValueError("give U_um as a number in µm or as a formula of the length, and k as one from 1 to 10")
-    factor = factor_of(k, freedom) or 1.0
     whole = growing_of(expanded) if isinstance(expanded, str) else expanded
-    return {**data, "u_um": whole.over(factor) if isinstance(whole, Growing) else whole / factor}
+    return {**data, "u_um": _over(whole, divisor_of(k, freedom) or 1.0)}
+
+
+def _with_expanded(data: Any) -> Any:
+    """A table with ``U_um`` in place of a ``u_um`` that has degrees of freedom."""
+    if not (isinstance(data, dict) and "u_um" in data and not {"U_um", "k"} & data.keys()):
+        return data
+    standard, freedom = data["u_um"], data.get("degrees_of_freedom")
+    if isinstance(freedom, bool) or not isinstance(freedom, int | float) or not freedom >= 1:
+        return data
+    if isinstance(standard, bool) or not isinstance(standard, int | float | str) or standard in (0, ""):
+        return data
+    whole = growing_of(standard) if isinstance(standard, str) else standard
+    rest = {name: value for name, value in data.items() if name != "u_um"}
+    return {**rest, "U_um": _over(whole, 1.0 / (factor_of(None, freedom) or 1.0))}
+
+
+def _over(u: Growing | float, divisor: float) -> Growing | float:
+    return u.over(divisor) if isinstance(u, Growing) else u / divisor

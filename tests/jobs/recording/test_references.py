@@ -157,6 +157,23 @@ def test_degrees_of_freedom_stand_for_a_factor_where_none_is_stated() -> None:
     assert factor_of(None, 4.0) == pytest.approx(2.78, abs=5e-3)  # t at 95 % (GUM, table G.2)
 
 
+@pytest.mark.parametrize(
+    "stated", [{"U_um": 4.303}, {"u_um": 1.0}, {"U_um": 2.0, "k": 2.0}, {"u_um": "0.4 + 0.6·L/1000"}]
+)
+def test_few_degrees_of_freedom_keep_the_interval_of_the_certificate(stated: dict[str, float | str]) -> None:
+    # t at 95 % of two degrees of freedom is 4.303 (GUM, table G.2), of a normal distribution 1.960
+    u = with_standard_uncertainty({**stated, "degrees_of_freedom": 2})["u_um"]
+    assert 1.960 * float(u if isinstance(u, float) else u.at(1000.0)) == pytest.approx(4.303, rel=2e-4)
+
+
+@pytest.mark.parametrize(("heading", "over"), [("u (µm)", 1.0), ("U (um) k=2", 2.0), ("U (um)", 4.303)])
+def test_few_degrees_of_freedom_of_a_column_too(heading: str, over: float) -> None:
+    toml = TOML.format(kind="step_gauge", file="certificate.csv").replace("u_um = 0.2", "degrees_of_freedom = 2")
+    files = {"job.toml": toml, "recording.csv": GAUGE, "certificate.csv": CERTIFICATE.replace("U (um) k=2", heading)}
+    found = job_of({name: text.encode() for name, text in files.items()}).points.columns["reference_u_um"]
+    assert found[:4].tolist() == pytest.approx([u * 4.303 / 1.960 / over for u in (0.10, 0.12, 0.14, 0.16)], rel=2e-4)
+
+
 def test_a_heading_of_a_certificate_divides_by_two_and_a_quarter() -> None:
     found = job(GAUGE, "certificate.csv", CERTIFICATE.replace("U (um) k=2", "U (um) k=2.25"))
     assert found.points.columns["reference_u_um"][:4].tolist() == pytest.approx(

@@ -8,7 +8,6 @@ uncertainty of a measurement made with the machine (ISO 15530) contains them. Ne
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
 
 import numpy as np
 
@@ -47,16 +46,15 @@ def length_test_uncertainty(
     u_alignment_mm: float = 0.0,
     u_fixturing_mm: float = 0.0,
     u_beside_mm: float = 0.0,
-    calibration_dof: float = inf,
 ) -> Budget:
     """Test uncertainty of an error of length measurement E (ISO/TS 23165:2006), mm.
 
     ``u_fixturing_mm``: by what the clamping does to the length. ``u_beside_mm``: of the short gauge measured beside lengths
-    that are not bidirectional by themselves; no line where 0. ``calibration_dof``: as the artefact's certificate states.
+    that are not bidirectional by themselves; no line where 0.
     """
     mm, slope, warm = unit("mm"), length_mm * cte_per_k, say("temperature of the artefact")
     lines = [
-        BudgetLine(say("calibration of the artefact"), u_calibration_mm, CERTIFICATE, unit=mm, dof=calibration_dof),
+        BudgetLine(say("calibration of the artefact"), u_calibration_mm, CERTIFICATE, unit=mm),
         _expansion(say("expansion coefficient of the artefact"), u_cte_per_k, length_mm, temperature_c),
         BudgetLine(warm, u_temperature_k, JUDGEMENT, temperature_c, unit("K"), sensitivity=slope),
         BudgetLine(say("alignment of the artefact"), u_alignment_mm, JUDGEMENT, unit=mm),
