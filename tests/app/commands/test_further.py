@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import cmm_uq
-from cmm_uq.app.commands.certificates.further import VerifiedCertificate, refuse_adjusted
+from cmm_uq.app.commands.certificates.further import VerifiedCertificate, _recording, refuse_adjusted
 from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.app.commands.parts.machine import StatedMachine, refuse_machine, state_machine
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
@@ -168,3 +168,14 @@ def test_a_part_takes_over_what_its_machines_calibration_was_taken_together_with
     again = {"job": "../machine", "further": [{"certificate": "gauge.pdf"}]}
     with pytest.raises(CmmUqError, match="is of a recording that is reckoned with already"):
         refuse_machine(read_part(put(tmp_path / "twice", {**plate_files({}, machine_state=again), **GAUGE})))
+
+
+def test_readings_in_another_order_and_numbered_otherwise_are_the_same() -> None:
+    """Else they counted twice, and u over the range fell by a sixth."""
+    job = read_job(ROOT / "examples" / "axis-runs-simulated")
+    turned = job.points.select(np.arange(len(job.points))[::-1])
+    assert _recording(replace(job, points=replace(turned, measurement=turned.measurement + 7))) == _recording(job)
+    reading = job.points.columns["reading_um"].copy()
+    reading[3] += 1e-4
+    other = replace(job.points, columns={**job.points.columns, "reading_um": reading})
+    assert _recording(replace(job, points=other)) != _recording(job)
