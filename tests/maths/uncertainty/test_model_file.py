@@ -12,7 +12,7 @@ import pytest
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.uncertainty.budget_results import comparison_rows, results_of, statement, summary_rows
 from cmm_uq.maths.uncertainty.models.expression import parse
-from cmm_uq.maths.uncertainty.models.input_keys import derived_unit, number_in, unit_of
+from cmm_uq.maths.uncertainty.models.input_keys import contradiction, derived_unit, number_in, unit_of
 from cmm_uq.maths.uncertainty.models.model_file import ModelFile, read_model_file
 
 Read = Callable[[str], ModelFile]
@@ -308,6 +308,39 @@ UNITS = {"L": "mm", "M": "mm", "d": "nm", "a": "1/K", "t": "degC", "V": "V", "I"
 )
 def test_derived_units(text: str, unit: str | None) -> None:
     assert derived_unit(parse(text, UNITS), UNITS) == unit
+
+
+@pytest.mark.parametrize(
+    ("text", "stated", "wrong"),
+    [
+        ("L + d", "mm", "adds mm and nm as they stand"),
+        ("L - d", "", "adds mm and nm as they stand"),
+        ("L + M", "µm", "gives mm, and its unit is stated as µm"),
+        ("V/I", "kohm", "gives V/A, and its unit is stated as kohm"),
+        ("L/M", "percent", "gives 1, and its unit is stated as percent"),
+        ("L*a", "mm", "gives mm/K, and its unit is stated as mm"),
+        ("V/I", "ohm", None),
+        ("L*a", "mm/delta_degC", None),
+        ("t", "degC", None),
+        ("atan2(L, M)", "1", None),
+        ("sqrt(L**2 + M**2)", "mm", None),
+        ("L + 1e-6*d", "mm", None),  # a number may convert
+        ("1000*L", "µm", None),
+        ("L + q", "mm", None),
+        ("L + V", "mm", None),
+    ],
+)
+def test_units_that_contradict_each_other(text: str, stated: str, wrong: str | None) -> None:
+    assert contradiction(parse(text, UNITS), UNITS, stated) == wrong
+
+
+def test_a_sum_of_micrometres_and_millimetres_is_refused(tmp_path: Path) -> None:
+    one, other = (f'[inputs.{name}]\ndistribution = "normal"\nvalue = 1\nu = 0.1\nunit = "{unit}"\n' for name, unit in
+                  (("x", "µm"), ("z", "mm")))  # fmt: skip
+    path = tmp_path / "model.toml"
+    path.write_text(f'[model]\noutputs = {{ y = "x + z" }}\nunits = {{ y = "mm" }}\n{one}{other}', encoding="utf-8")
+    with pytest.raises(CmmUqError, match="y adds µm and mm as they stand"):
+        read_model_file(path)
 
 
 @pytest.mark.parametrize(

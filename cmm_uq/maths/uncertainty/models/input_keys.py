@@ -222,6 +222,9 @@ def number_in(text: str, unit: str, *, difference: bool, where: str | None = Non
     return float(converted.magnitude)
 
 
+_ROUNDING = 1e-9  # of a factor between two units
+
+
 class _UndeterminedError(Exception):
     """The expression does not say its unit."""
 
@@ -235,16 +238,41 @@ def derived_unit(expression: Expression, units: Mapping[str, str]) -> str | None
 
     Terms of different units, a dimensional argument of a function, or a quantity without a stated unit leave it open.
     """
-    stack: list[Any] = []
     try:
-        for step in expression.steps:
-            operands = stack[len(stack) - step.operands :]
-            del stack[len(stack) - step.operands :]
-            stack.append(_unit_of_step(step, operands, units))
+        unit = _unit_of(expression, units)
     except _UndeterminedError:
         return None
-    unit = stack[0]
     return "1" if isinstance(unit, _Number) else f"{unit:~P}" or "1"
+
+
+def contradiction(expression: Expression, units: Mapping[str, str], stated: str) -> str | None:
+    """What is wrong with units of an expression whose numbers convert none: a sum of µm and mm, another unit than stated.
+
+    Where a number other than 1 and 2 stands in it, that may be a conversion; where a unit is not stated, nothing is said.
+    """
+    if not expression.names or any(step.kind == "number" and step.item not in (1, 2) for step in expression.steps):
+        return None
+    try:
+        unit = _unit_of(expression, units)
+    except _UndeterminedError as error:
+        return str(error) or None
+    other = unit_of(_CELSIUS.sub("kelvin", stated)) if stated else unit
+    return None if _alike(unit, other) else f"gives {f'{unit:~P}' or 1}, and its unit is stated as {stated}"
+
+
+def _alike(a: Any, b: Any) -> bool:
+    """Whether numbers in two units mean the same."""
+    one = pint_units().Quantity(1.0, a)
+    return bool(one.is_compatible_with(b) and abs(one.to(b).magnitude - 1.0) < _ROUNDING)
+
+
+def _unit_of(expression: Expression, units: Mapping[str, str]) -> Any:
+    stack: list[Any] = []
+    for step in expression.steps:
+        operands = stack[len(stack) - step.operands :]
+        del stack[len(stack) - step.operands :]
+        stack.append(_unit_of_step(step, operands, units))
+    return stack[0]
 
 
 def _unit_of_step(step: Step, operands: list[Any], units: Mapping[str, str]) -> Any:
@@ -271,6 +299,8 @@ def _sum(a: Any, b: Any) -> Any:
         return b
     if isinstance(b, _Number) or a == b:
         return a
+    if a.is_compatible_with(b) and not _alike(a, b):
+        raise _UndeterminedError(f"adds {a:~P} and {b:~P} as they stand")
     raise _UndeterminedError
 
 

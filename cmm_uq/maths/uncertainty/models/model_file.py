@@ -30,7 +30,7 @@ from cmm_uq.maths.uncertainty.evaluation import METHODS, Evaluation, Request, ev
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.models import input_keys
 from cmm_uq.maths.uncertainty.models.expression import Expression, name_problem, parse
-from cmm_uq.maths.uncertainty.models.input_keys import KINDS, NUMERIC, derived_unit, unit_of
+from cmm_uq.maths.uncertainty.models.input_keys import KINDS, NUMERIC, contradiction, derived_unit, unit_of
 from cmm_uq.maths.uncertainty.models.ready import KEY, READY, ReadyBudget, read_ready_budget, ready_model
 from cmm_uq.maths.uncertainty.type_a import simultaneous_readings
 
@@ -322,7 +322,9 @@ class _Reader:
         for name, expression in expressions.items():
             if unit := self._text(stated, name, "[model] units"):
                 unit_of(unit, self._where(f"[model] units.{name}"))
-            elif any(units[used] not in ("", "1") for used in expression.names):
+            if wrong := contradiction(expression, units, unit):
+                raise self._refused(f"{name} {wrong}", "[model] outputs", "State inputs and output in units that fit")
+            if not unit and any(units[used] not in ("", "1") for used in expression.names):
                 unit = derived_unit(expression, units) or ""
             units[name] = unit
         return Labels(units, _origins(given))
