@@ -16,15 +16,13 @@ from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.points import Machine
 from cmm_uq.jobs.importing.answers import matching, path_of
-from cmm_uq.jobs.importing.arrangement import text_of
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, Recognition, Sheet, letters, sources_of
-from cmm_uq.jobs.importing.header import NAME, Header, understood
-from cmm_uq.jobs.importing.length_tables import RUN, of_lengths
+from cmm_uq.jobs.importing.header import NAME, Header, text_of, understood
 from cmm_uq.jobs.importing.recording import example, imported, points_of, tables_in
+from cmm_uq.jobs.importing.roles import said as role_said
 
 BEFORE, AFTER, WIDEST = 4, 8, 40  # rows ahead of the first figures and after it, and columns, that are shown
 IGNORED, UNKNOWN = "ignored", "unknown"
-_FIGURES = ("length_mm", "deviation_um", "deviation_mm")
 
 
 def first_keys(path: str) -> dict[str, Any]:
@@ -89,12 +87,10 @@ def read(path: str, keys: Mapping[str, Any]) -> dict[str, Any]:
             if not str.__str__(label).startswith("Column ")
         ]
     found["sheets"] = [sheet.name for sheet in sheets if sheet.name]
-    return found | _grid(sheets, tables, recognised)
+    return found | _grid(sheets, tables)
 
 
-def _grid(
-    sheets: Sequence[Sheet], tables: Sequence[tuple[Sheet, Header]], recognised: Recognition | None
-) -> dict[str, Any]:
+def _grid(sheets: Sequence[Sheet], tables: Sequence[tuple[Sheet, Header]]) -> dict[str, Any]:
     """Headings, meanings and rows of the first table, or of the largest sheet where none is understood."""
     if tables:
         table, header = tables[0]
@@ -102,7 +98,7 @@ def _grid(
         line = table.lines[header.first]
         # of a table that a format made of a report the head has the line of the first row
         first = header.first if raw.listed else raw.lines.index(line) if line in raw.lines else 0
-        headings, taken = list(header.headings), meanings(header, recognised)
+        headings, taken = list(header.headings), meanings(header)
     else:
         raw = max(sheets, key=lambda sheet: len(sheet.rows))
         first, headings, taken = min(BEFORE, len(raw.rows)), [], {}
@@ -132,15 +128,14 @@ def _shown(cell: Cell) -> str:
     return text_of(cell) if isinstance(cell, str) else f"{cell:.12g}"
 
 
-def meanings(header: Header, recognised: Recognition | None) -> dict[int, str]:
+def meanings(header: Header) -> dict[int, str]:
     """What each column of a table is taken for, by its index."""
-    figures = next((name for name in _FIGURES if recognised is not None and name in recognised.columns), _FIGURES[0])
-    return {i: figures if name == RUN else name for name, own in header.columns.items() for i in own}
+    return {i: name for name, own in header.columns.items() for i in own}
 
 
 def _untaken(heading: str) -> str:
     """Of a column that is not used, whether its heading is understood."""
-    known = not heading or understood(heading.strip()).column or of_lengths(heading.strip()).column
+    known = not heading or understood(heading.strip()).column or role_said([heading])
     return IGNORED if known else UNKNOWN
 
 
@@ -149,12 +144,7 @@ def corrected(path: str, keys: Mapping[str, Any], chosen: Mapping[str, str], sai
     before = keys_of(keys)
     tables = tables_in(content_of(Path(path), TABLE_BYTES, "Drop it again"), Path(path).name, before)[1]
     header = tables[0][1] if tables else None
-    recognised = None
-    if header is not None and RUN in header.columns:
-        recognised_columns = read(path, keys)["columns"]
-        taken = {i: meaning for i, (_, meaning) in enumerate(recognised_columns) if meaning not in (IGNORED, UNKNOWN)}
-    else:
-        taken = meanings(header, recognised) if header is not None else {}
+    taken = meanings(header) if header is not None else {}
     new = {int(i): meaning for i, meaning in chosen.items() if meaning and meaning not in (IGNORED, UNKNOWN, NAME)}
     columns: dict[str, Any] = dict(before.columns)
     for name in {*taken.values(), *new.values()} - {NAME}:

@@ -6,7 +6,6 @@ together, numbers of measurement, point and repeat, follows from columns of the 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import compress
@@ -20,10 +19,20 @@ from cmm_uq.base.messages import Text, Verbatim, commas, names, number, say, sem
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
-from cmm_uq.jobs.importing.arrangement import REMARK, SUMMARY, filled_down, is_summary, shown
 from cmm_uq.jobs.importing.encodings import decimal_sign, is_number, split_units, values_of
-from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Fact, ImportKeys, Sheet, WrittenUnit, length_named
-from cmm_uq.jobs.importing.header import NAME, Header, understood
+from cmm_uq.jobs.importing.format import (
+    LENGTH,
+    UNITS,
+    Cell,
+    Fact,
+    ImportKeys,
+    NotReadError,
+    Sheet,
+    WrittenUnit,
+    length_named,
+)
+from cmm_uq.jobs.importing.header import NAME, REMARK, SUMMARY, Header, filled_down, is_summary, shown
+from cmm_uq.jobs.importing.numbering import MEASUREMENT, NUMBERS, POINT, completed, numbered
 
 LARGEST_MACHINE_MM = 40_000.0  # longest diagonal of a measuring machine: gantries of 30 m are the largest made
 SIGNS = {".": say("point"), ",": say("comma")}
@@ -33,7 +42,7 @@ Written = Mapping[str, Sequence[tuple[Floats, WrittenUnit | None, int]]]
 """Values of each column as written, with its unit and its index."""
 
 
-def _by_extent(written: Written, where: str, reach_mm: float | None) -> tuple[WrittenUnit, Text]:
+def by_extent(written: Written, where: str, reach_mm: float | None) -> tuple[WrittenUnit, Text]:
     """Millimetres, where inches would lead out of the machine."""
     lengths = [name for name in COORDINATES if name in written] or [name for name in written if name.endswith("_mm")]
     extents = [np.ptp(np.concatenate([values for values, _, _ in written[name]])) for name in lengths if written[name]]
@@ -42,8 +51,8 @@ def _by_extent(written: Written, where: str, reach_mm: float | None) -> tuple[Wr
     if extent <= reach < in_inches:
         return UNITS["mm"], say("since in inches the points would lie {extent:.3g} mm apart, and {reach:.3g} mm is the most",
                                 extent=in_inches, reach=reach)  # fmt: skip
-    raise CmmUqError(f"nothing says the unit of lengths: points {extent:.4g} apart may be in mm or in inch", where=where,
-                     fix='Say unit = "mm" or unit = "inch"')  # fmt: skip
+    what = f"nothing says the unit of lengths: points {extent:.4g} apart may be in mm or in inch"
+    raise NotReadError(what, where=where, fix='Say unit = "mm" or unit = "inch"')
 
 
 Columns = tuple[dict[str, Floats], Ints, dict[str, str], tuple[Fact, ...]]
@@ -61,6 +70,7 @@ def columns_of(
         [table.cells[i] for i in numeric], lambda i, row: table.place(numeric[i], row), keys.decimal
     )
     written = {name: table.written(name, sign) for name in plain}
+    _refuse_lengths_along_axes(written, table.start)
     unit, of_unit = table.lengths_unit(keys, written, reach_mm)
     values = {name: table.in_units(name, parts, unit) for name, parts in written.items() if parts}
     numbers, facts = table.numbers(sign)
@@ -69,13 +79,23 @@ def columns_of(
     if not points and POINT not in numbers and labels and all(label.isdecimal() for label in labels):
         numbers[POINT] = np.array([float(label) for label in labels])
     if points:
-        numbers, further = completed(numbers, labels, len(lines), keys, table.start)
+        xyz = np.column_stack([values[name] for name in COORDINATES])
+        numbers, further = completed(numbers, labels, xyz, keys, table.start)
         facts += further
     left_out = [name for name, parts in written.items() if not parts]
     facts = [of_unit, Fact("decimal", say("Decimal sign"), SIGNS[sign]), *table.facts(left_out), *facts]
     taken = (*(name for name in NUMBERS if name in header.columns), *values)
     sources = {name: ", ".join(header.headings[i] for i in header.columns[name]) for name in taken}
     return {**numbers, **values}, lines, sources, tuple(facts)
+
+
+def _refuse_lengths_along_axes(written: Written, place: str) -> None:
+    """Columns called X, Y and Z that hold the same lengths row by row are lines along the axes, and no coordinates."""
+    xyz = [np.column_stack([values for values, _, _ in written[axis]]) for axis in COORDINATES if written.get(axis)]
+    alike = len(xyz) == 3 and all(np.abs(xyz[0] - own).max() <= 0.04 + 0.002 * np.abs(own).max() for own in xyz[1:])
+    if alike and len(xyz[0]) > 2 and np.ptp(xyz[0]) > 1:
+        fix = "Say which columns are lengths: columns = { length_mm = […] }"
+        raise NotReadError("X, Y and Z have the same lengths in each row", where=place, fix=fix)
 
 
 class ExportTable:
@@ -198,7 +218,7 @@ class ExportTable:
         if len({unit.name for unit, _ in stated}) > 1:
             each = " and ".join(f"{unit.name} {how}" for unit, how in stated)
             raise CmmUqError(f"the unit is {each}", where=self.where, fix="Mend the file, or leave out unit")
-        unit, how = stated[0] if stated else _by_extent(written, self.where, reach_mm)
+        unit, how = stated[0] if stated else by_extent(written, self.where, reach_mm)
         return unit, Fact("unit", say("Unit of lengths"), say("{unit}, {how}", unit=Verbatim(unit.name), how=how))
 
     def in_units(
@@ -272,121 +292,12 @@ def left_out_fact(rows: Sequence[str]) -> list[Fact]:
 
 def _refuse_another_length(sheet: Sheet, header: Header, i: int, needed: Sequence[int], where: str) -> None:
     row, width = sheet.rows[i], len(header.headings)
-    if any(cell != "" for cell in row[width:]):
+    if any(cell != "" and (not sheet.spreadsheet or is_number(cell)) for cell in row[width:]):
         halves = " (a decimal comma in cells that commas separate?)" if len(row) >= 2 * width - 1 else ""
-        raise CmmUqError(f"has {len(row)} cells where the header has {width}{halves}", where=sheet.at(where, i),
-                         fix="Export with semicolons or tabs between cells, or mend the row")  # fmt: skip
+        problem = NotReadError if sheet.spreadsheet else CmmUqError
+        raise problem(f"has {len(row)} cells where the header has {width}{halves}", where=sheet.at(where, i),
+                      fix="Export with semicolons or tabs between cells, or mend the row")  # fmt: skip
     if len(row) <= max(needed) and not sheet.spreadsheet:
         last = not any(cell != "" for later in sheet.rows[i + 1 :] for cell in later)
         raise CmmUqError(f"the row ends after {len(row)} of {width} cells", where=sheet.at(where, i),
                          fix="The file was cut off: export it again" if last else "Complete the row")  # fmt: skip
-
-
-MEASUREMENT, POINT, REPEAT = "measurement", "point", "repeat"
-NUMBERS = (MEASUREMENT, POINT, REPEAT)
-_DIGITS = re.compile(r"\d+")
-_WORD = re.compile(r"([^\W\d_]*)[^\w]*_*\d+")
-_LETTER = re.compile(r"(?<![^\W\d_])[A-Ha-h](?![^\W_])")
-# short words in the names of features
-_BY_LETTER = {"m": MEASUREMENT, "p": POINT, "b": POINT, "k": POINT, "r": REPEAT, "bar": MEASUREMENT, "stab": MEASUREMENT,
-              "barre": MEASUREMENT, "barra": MEASUREMENT, "pos": MEASUREMENT, "line": MEASUREMENT,
-              "pass": REPEAT, "trial": REPEAT, "durchgang": REPEAT, "passage": REPEAT}  # fmt: skip
-_NAMED = 6
-_FIX = (
-    'Say how many rows in turn are one, points_per_measurement = N (or "all"), or which columns number them: '
-    'columns = { measurement = "…", point = "…" }'
-)
-
-
-def numbered(cells: Sequence[Cell], sign: str, at: Callable[[int], str]) -> tuple[Floats, Text | None]:
-    """Numbers (n,) of a column that numbers measurements, points or repeats; names are numbered as they first appear.
-
-    Returns also what names became which numbers, where they are names. ``at``: place of a cell by the index of its row.
-    """
-    if cells and is_number(cells[0]):
-        return values_of(cells, sign, at), None
-    if "" in cells:
-        raise CmmUqError("no value", where=at(list(cells).index("")), fix="Complete the row")
-    for row, cell in enumerate(cells):
-        if is_number(cell):
-            raise CmmUqError(f"{cell!r} among names such as {cells[0]!r}", where=at(row), fix="Number all, or name all")
-    known: dict[str, int] = {}
-    values = [known.setdefault(str(cell), len(known) + 1) for cell in cells]
-    first = list(known.items())[:_NAMED]
-    shown = commas([say("{name} is {number}", name=Verbatim(name), number=i) for name, i in first])
-    return np.array(values, dtype=np.float64), shown if len(known) <= _NAMED else say("{shown}, …", shown=shown)
-
-
-def completed(
-    columns: Mapping[str, Floats], labels: Sequence[str] | None, count: int, keys: ImportKeys, place: str
-) -> tuple[dict[str, Floats], list[Fact]]:
-    """Numbers (count,) of every point, where the columns of the file leave some out."""
-    numbers = dict(columns)
-    if MEASUREMENT in numbers:
-        if POINT in numbers:
-            return numbers, []
-        follow = say("numbered as they follow in their measurement")
-        how, numbers[POINT] = say("{columns} {how}", columns=Verbatim(POINT), how=follow), _within(numbers)
-    elif keys.points_per_measurement is not None:
-        size = count if isinstance(keys.points_per_measurement, str) else keys.points_per_measurement
-        if count % size:
-            raise CmmUqError(f"{count} points are no whole number of measurements of {size}", where=place,
-                             fix="Mend points_per_measurement, or the table: a point is missing, or one too many")  # fmt: skip
-        rows, how = np.arange(count), say("{size} rows in turn are one measurement", size=size)
-        numbers[MEASUREMENT] = (rows // size + 1).astype(np.float64)
-        numbers.setdefault(POINT, (rows % size + 1).astype(np.float64))
-    else:
-        named = _of_names(labels) if labels and POINT not in numbers else None
-        if named is None or labels is None:
-            raise CmmUqError("nothing says which points belong to one measurement", where=place, fix=_FIX)
-        first = commas([say("{column} {number:g}", column=Verbatim(column), number=float(values[0]))
-                        for column, values in named.items()])  # fmt: skip
-        how = say("from names: {name} is {first}", name=Verbatim(labels[0]), first=first)
-        numbers |= named
-    return numbers, [Fact("numbering", say("Numbering"), how)]
-
-
-def _within(columns: Mapping[str, Floats]) -> Floats:
-    """1, 2, … in each (measurement, repeat)."""
-    repeat = columns.get(REPEAT, np.ones(len(columns[MEASUREMENT])))
-    last: dict[tuple[float, float], int] = {}
-    values = []
-    for key in zip(columns[MEASUREMENT].tolist(), repeat.tolist(), strict=True):
-        last[key] = last.get(key, 0) + 1
-        values.append(last[key])
-    return np.array(values, dtype=np.float64)
-
-
-def split_names(labels: Sequence[str]) -> tuple[list[str | None], Floats] | None:
-    """What the words of names say that their two or three numbers number, and the numbers (n, k); ``None`` of other names."""
-    form = _DIGITS.sub("0", labels[0])
-    parts = form.count("0")
-    if parts not in (2, 3) or any(_DIGITS.sub("0", label) != form for label in labels):
-        return None
-    known = [_BY_LETTER.get(word.casefold()) or understood(word).column for word in _WORD.findall(labels[0])]
-    return known, np.array([[float(digits) for digits in _DIGITS.findall(label)] for label in labels])
-
-
-def _of_names(labels: Sequence[str]) -> dict[str, Floats] | None:
-    """Measurement, point (and repeat) from names that are alike but for two (or three) numbers.
-
-    The word before a number says what it numbers; where none is known, they stand in this order. A letter from A to H that
-    stands alone, or after a number, tells balls apart: then ``P`` numbers positions, ``M`` measurements at one.
-    """
-    letters = [_LETTER.findall(label) for label in labels]
-    if all(len(one) == 1 for one in letters) and len({one[0] for one in letters}) > 1:
-        labels = [_LETTER.sub(lambda of: f"_ball{ord(of[0].upper()) - ord('A') + 1}", label) for label in labels]
-    split = split_names(labels)
-    if split is None:
-        return None
-    known, numbers = split
-    for i, word in enumerate(_WORD.findall(labels[0])):
-        if known.count(known[i]) > 1:
-            known[i] = {"p": MEASUREMENT, "m": REPEAT}.get(word.casefold(), known[i])
-    columns = NUMBERS[: len(known)]
-    claimed = [column for column in known if column in columns]
-    if len(set(claimed)) < len(claimed):
-        return None
-    left = iter([column for column in columns if column not in claimed])
-    order = [column if column in columns else next(left) for column in known]
-    return {column: numbers[:, order.index(column)] for column in columns}

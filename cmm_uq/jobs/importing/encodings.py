@@ -33,12 +33,15 @@ _TITLES = {
     "latin-1": "ISO 8859-1",
     "cp932": "Shift JIS",
 }
-_TITLES |= {"cp1250": "Windows-1250", "cp1251": "Windows-1251", "gb18030": "GB 18030"}
+_TITLES |= {"cp1250": "Windows-1250", "cp1251": "Windows-1251", "gb18030": "GB 18030", "cp949": "Windows-949"}
 # two characters of Shift JIS after each other, as words of Japanese are; letters with accents in Windows-1252 are single
 _JAPANESE, _ACCENTED = (
     re.compile(rb"(?:[\x81-\x9f][\x40-\x7e\x80-\xfc]){2}"),
     re.compile(rb"[\xc0-\xff](?![\x80-\xff])"),
 )
+# letters within words that are none of one western language, but of Czech or Polish in Windows-1250
+_EASTERN = (re.compile("(?<=[a-z])(?:ø|(?=.*ø)[ìè])|ø(?=[a-z])"), re.compile("(?<=[^\\W\\d_])[³¹¿œ](?=[^\\W\\d_])"))
+_PAIRED = re.compile(rb"[\xa1-\xfe]{2}")  # of Chinese (GB 2312) and Korean (KS X 1001), which come in words
 _FIX = "Export it again, or name encoding"
 _REPORT_LINE = 2000  # characters of a line of a report, which has 80 to 200
 
@@ -71,10 +74,16 @@ def _without_mark(content: bytes) -> str:
     if len(head) >= 4 and head.count(0) > len(head) // 4:
         return "utf-16-le" if head[1::2].count(0) > head[::2].count(0) else "utf-16-be"
     japanese = len(_JAPANESE.findall(content)) > len(_ACCENTED.findall(_JAPANESE.sub(b"", content)))
-    for codec in ("utf-8", "cp932") if japanese else ("utf-8",):
+    paired = len(_PAIRED.findall(content)) > 2 * len(_PAIRED.sub(b"", content).translate(None, bytes(range(128)))) + 3
+    for codec in ("utf-8", *(["cp932"] if japanese else []), *(["cp949", "gb18030"] if paired else [])):
         with suppress(UnicodeDecodeError):
-            content.decode(codec)
-            return codec
+            text = content.decode(codec)
+            letters = [c for c in text if c >= "\u3400"]
+            if codec != "cp949" or sum("\uac00" <= c <= "\ud7a3" for c in letters) > 0.9 * len(letters):
+                return codec
+    western = content.decode("cp1252", errors="replace")
+    if any(len({*found.findall(western)} - {""}) > 1 for found in _EASTERN):
+        return "cp1250"
     return "cp1252" if not any(byte in content for byte in b"\x81\x8d\x8f\x90\x9d") else "latin-1"
 
 

@@ -38,9 +38,16 @@ class WrittenUnit:
 LENGTH, TEMPERATURE, TIME, PRESSURE, SHARE = "length", "temperature", "time", "pressure", "share"
 
 _UNITS = (
-    (WrittenUnit("mm", LENGTH), "mm millimeter millimeters millimetre millimetres millimetri milimetro milimetros"),
-    (WrittenUnit("um", LENGTH, 1, 1000), "µm um μm micrometer micrometre micron microns mikrometer mikron micrometri"),
+    (
+        WrittenUnit("mm", LENGTH),
+        "mm millimeter millimeters millimetre millimetres millimetri milimetro milimetros milimetr ㎜ 毫米 밀리미터 ミリ",
+    ),
+    (
+        WrittenUnit("um", LENGTH, 1, 1000),
+        "µm um μm ㎛ 微米 micrometer micrometre micron microns mikrometer mikron micrometri",
+    ),
     (WrittenUnit("nm", LENGTH, 1, 1_000_000), "nm nanometer nanometre"),
+    (WrittenUnit("microinch", LENGTH, 127, 5_000_000), "microinch microinches µin μin uin"),
     (WrittenUnit("cm", LENGTH, 10), "cm centimeter centimetre zentimeter"),
     (WrittenUnit("m", LENGTH, 1000), "m meter metre metri metros"),
     (WrittenUnit("inch", LENGTH, 127, 5), "in inch inches zoll pouce pouces pollice pollici pulgada pulgadas \" ″ ''"),
@@ -124,7 +131,9 @@ class FileKeys(JobTable):
     decimal: Literal[".", ","] | None = key(None, "The file's decimal sign, where its numbers can be read either way.")
     delimiter: Literal[",", ";", "tab", "blank", "|"] | None = None
     """What separates the cells of a text file, where that is not found."""
-    encoding: Literal["utf-8", "utf-16", "cp1252", "latin-1", "cp932", "cp1250", "cp1251", "gb18030"] | None = None
+    encoding: (
+        Literal["utf-8", "utf-16", "cp1252", "latin-1", "cp932", "cp1250", "cp1251", "gb18030", "cp949"] | None
+    ) = None
     """Encoding of a text file, where it is mistaken for another."""
 
     @field_validator("unit")
@@ -161,6 +170,10 @@ class ImportKeys(FileKeys):
     def asked(self) -> bool:
         """Whether anything is said, so that the file is to be imported whatever it looks like."""
         return any(getattr(self, name) not in (None, {}) for name in ImportKeys.model_fields)
+
+
+class NotReadError(CmmUqError):
+    """Words do not say what the columns of a file are, or what belongs together; its figures may."""
 
 
 HEAD = 65_536  # bytes of a file by which it is recognised

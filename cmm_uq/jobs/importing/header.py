@@ -11,16 +11,17 @@ from __future__ import annotations
 import re
 import tomllib
 import unicodedata
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
+from itertools import pairwise
 from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.columns import COORDINATES, OPTIONAL, READINGS, REQUIRED
 from cmm_uq.jobs.importing.encodings import is_number
-from cmm_uq.jobs.importing.format import ImportKeys, Sheet, WrittenUnit, sources_of, unit_named
+from cmm_uq.jobs.importing.format import Cell, ImportKeys, NotReadError, Sheet, WrittenUnit, sources_of, unit_named
 
 NAME = "name"  # of the point or feature, by which it may be numbered; no column of a recording
 
@@ -243,14 +244,14 @@ def unambiguous(found: Assigned, headings: Sequence[str], place: str, points: in
         if len(own) > 1 and not several:
             shown, first = " and ".join(repr(headings[i]) for _, i in own[:3]), own[0][1]
             which = first + 1 if headings.count(headings[first]) > 1 else f'"{headings[first]}"'
-            raise CmmUqError(f"columns {shown} could all be {name}", where=place,
+            raise NotReadError(f"columns {shown} could all be {name}", where=place,
                              fix=f"Say which: columns = {{ {name} = {which} }}")  # fmt: skip
         columns[name] = tuple(i for _, i in sorted(own, key=lambda pair: pair[0] or 0))
     count = max(map(len, columns.values()))
     odd = [name for name, own in columns.items() if len(own) not in (1, count)]
     odd += [name for name in COORDINATES if len(columns.get(name, ())) not in (0, count)]
     if odd:
-        raise CmmUqError(f"{count} points in a row, and {len(columns[odd[0]])} columns {odd[0]}", where=place,
+        raise NotReadError(f"{count} points in a row, and {len(columns[odd[0]])} columns {odd[0]}", where=place,
                          fix=f"Say which: columns = {{ {odd[0]} = [ … ] }}, one heading for each point")  # fmt: skip
     return columns
 
@@ -282,7 +283,7 @@ def no_header(sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Seq
     score, place, headings = best
     if not score:
         given = f" ({', '.join(map(repr, texts))})" if keys.columns else ""
-        return CmmUqError(f"no line names the columns{given} of a table of points", where=where,
+        return NotReadError(f"no line names the columns{given} of a table of points", where=where,
                           fix="Say which column is which: columns = { x_mm = …, y_mm = …, z_mm = … }")  # fmt: skip
     named = keys.columns.items()
     lacking = [name for name, given in named if any(_place(one, headings) is None for one in sources_of(given))]
@@ -291,5 +292,43 @@ def no_header(sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Seq
     listed = ", ".join(map(repr, headings[:_SHOWN])) + (" …" if len(headings) > _SHOWN else "")
     nominal = any(_NOMINAL & {*plain_words(without_unit(heading)[0])} for heading in headings)
     hint = " (nominal values are not taken for measured ones)" if nominal else ""
-    return CmmUqError(f"no column is {missing} among {listed}{hint}", where=place,
+    return NotReadError(f"no column is {missing} among {listed}{hint}", where=place,
                       fix=f'Say which: columns = {{ {missing} = "…" }}')  # fmt: skip
+
+
+_TOLD = 40  # characters of a row that is left out
+SUMMARY, REMARK = "a summary", "a remark"
+
+
+def text_of(cell: Cell) -> str:
+    return cell if isinstance(cell, str) else f"{cell:g}"
+
+
+def is_summary(row: Sequence[Cell]) -> bool:
+    """Whether one of the first two cells is a word for a figure of other rows, or the first has a unit: ``Form (µm)``."""
+    labels = [cell for cell in row if cell != ""][:2]
+    if any(isinstance(cell, str) and " ".join(plain_words(cell)) in words_of("rows")["summary"] for cell in labels):
+        return True
+    label = text_of(labels[0]) if labels else ""
+    return label.endswith((")", "]")) and not re.search(r"\d", label) and without_unit(label)[1] is not None
+
+
+def shown(sheet: Sheet, i: int, why: str) -> str:
+    """A row that is left out, with its place and why."""
+    text = " ".join(text_of(cell) for cell in sheet.rows[i] if cell != "")
+    return f"{sheet.at('', i).removeprefix(': ').strip()}: {text[:_TOLD]!r}, {why}"
+
+
+def filled_down(cells: Sequence[Cell]) -> Sequence[Cell]:
+    """Labels of all rows, where each stands in the first row of those that it is of; else the cells as they are."""
+    places = [i for i, cell in enumerate(cells) if cell != ""]
+    if len(places) == len(cells) or not places or places[0] or any(cells[a] == cells[b] for a, b in pairwise(places)):
+        return cells
+    return list(_down(cells))
+
+
+def _down(cells: Sequence[Cell]) -> Iterator[Cell]:
+    last: Cell = ""
+    for cell in cells:
+        last = cell if cell != "" else last
+        yield last

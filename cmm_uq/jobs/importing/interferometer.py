@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.csv_table import number_problem
-from cmm_uq.base.messages import Verbatim, say
+from cmm_uq.base.messages import Verbatim, say, semicolons
 from cmm_uq.base.points import AXES
-from cmm_uq.jobs.importing.format import Fact, ImportKeys, Sheet, sheets_of
+from cmm_uq.jobs.importing.format import Fact, ImportKeys, Row, Sheet, sheets_of
 from cmm_uq.jobs.importing.lengths import place_of
 from cmm_uq.jobs.importing.reports import TextReport
 
@@ -27,6 +28,43 @@ HEADINGS = [
     "measurement", "point", "repeat", *(f"{a}_mm" for a in AXES), "reading_um", *(f"read_{a}" for a in AXES),
     *(f"approach_{a}" for a in AXES),
 ]  # fmt: skip
+
+
+@dataclass
+class AxisRun:
+    """A run along an axis: its sense (0 where nobody knows), its number, and targets in mm with deviations in µm and lines."""
+
+    axis: str
+    way: int
+    number: int
+    targets: list[tuple[float, float, int]]
+
+
+def placed_runs(runs: Sequence[AxisRun], keys: ImportKeys, where: str, facts: Sequence[Fact] = ()) -> list[Sheet]:
+    """Readings of runs as places along the lines that the job gives for their axes; a run back has points of its own."""
+    rows: list[Row] = []
+    axes = [*dict.fromkeys(run.axis for run in runs)]
+    for axis in axes:
+        if axis not in keys.lines:
+            fix = f'Say it, with the place where its scale reads 0, in mm: lines = {{ "{axis}" = "along X from 0,200,300" }}'
+            raise CmmUqError(f"nothing says where line {axis!r} lies, along which was measured", where=where, fix=fix)
+    for run in runs:
+        start, direction = place_of(keys.lines[run.axis])
+        first = 0 if run.way >= 0 else len(run.targets)
+        for k, (target, deviation, line) in enumerate(run.targets, 1):
+            place = start + target * direction
+            cells = [
+                axes.index(run.axis) + 1,
+                first + k,
+                run.number,
+                *place,
+                deviation,
+                *direction,
+                *(run.way * np.sign(direction) + 0.0),
+            ]
+            rows.append(("", [f"{cell:.10g}" for cell in cells], line))
+    told = Fact("lines", say("Lines"), semicolons([Verbatim(f"{axis}: {keys.lines[axis]}") for axis in axes]))
+    return sheets_of(rows, HEADINGS, unit="mm", decimal=".", facts=(*facts, told))
 
 
 class _Runs:
@@ -60,9 +98,9 @@ class _Runs:
         self._check(where)
 
     def _check(self, where: str) -> None:
-        kind = self.facts.get("owner", "").lower()
-        if kind not in _LINEAR:
-            problem = f"holds a measurement of the kind {self.facts['owner']!r}, whose unit no public text says"
+        kind = self.facts.get("owner", "")
+        if not {kind.lower(), self.facts.get("filetype", "").lower()} & _LINEAR:
+            problem = f"holds a measurement of the kind {kind!r}, whose unit no public text says"
             raise CmmUqError(problem, where=where, fix="Export it as CSV, with reading_um or reading_arcsec")
         for name, count in (("target-count", len(self.targets)), ("run-count", len(self.runs))):
             if not count or self.facts.get(name, str(count)) != str(count):
@@ -100,16 +138,6 @@ class Rtl(TextReport):
     def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
         found = _Runs(lines, where)
         axis = found.facts.get("axis", "") or "1"
-        if axis not in keys.lines:
-            fix = f'Say it, with the place where its scale reads 0, in mm: lines = {{ "{axis}" = "along X from 0,200,300" }}'
-            raise CmmUqError(f"nothing says where line {axis!r} lies, along which was measured", where=where, fix=fix)
-        start, direction = place_of(keys.lines[axis])
-        rows = []
-        for targets, (repeat, way) in zip(found.runs.values(), found.ways(), strict=True):
-            for k, (target, deviation, line) in enumerate(targets, 1):
-                place = start + found.targets[target] * direction
-                first = 0 if way >= 0 else len(found.targets)
-                cells = [1, first + k, repeat, *place, deviation, *direction, *(way * np.sign(direction) + 0.0)]
-                rows.append(("", [f"{cell:.10g}" for cell in cells], line))
-        told = [Fact("lines", say("Lines"), Verbatim(f"{axis}: {keys.lines[axis]}"))]
-        return sheets_of(rows, HEADINGS, unit="mm", facts=(encoding, *told))
+        runs = [AxisRun(axis, int(way), number, [(found.targets[k], deviation, line) for k, deviation, line in own])
+                for own, (number, way) in zip(found.runs.values(), found.ways(), strict=True)]  # fmt: skip
+        return placed_runs(runs, keys, where, (encoding,))

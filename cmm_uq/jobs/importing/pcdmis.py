@@ -9,9 +9,9 @@ from itertools import islice
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
-from cmm_uq.jobs.importing.columns import split_names
-from cmm_uq.jobs.importing.format import Fact, ImportKeys, Row, Sheet, sheets_of
+from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Row, Sheet, sheets_of
 from cmm_uq.jobs.importing.header import printed_words
+from cmm_uq.jobs.importing.numbering import split_names
 from cmm_uq.jobs.importing.reports import AXES, WITH_DIRECTION, ReportedPlace, TextReport, facts_of
 
 _WORDS = {name: "|".join(map(re.escape, words)) for name, words in printed_words("report").items()}
@@ -64,7 +64,9 @@ class PcDmis(TextReport):
             ]
         if not places:
             problem = f"reports {others + len(every)} dimensions and no place of a feature by X, Y and Z"
-            raise CmmUqError(problem, where=where, fix="Report the location of every ball or point with its X, Y and Z")
+            raise NotReadError(
+                problem, where=where, fix="Report the location of every ball or point with its X, Y and Z"
+            )
         units = {place.unit.upper(): place for place in places}
         if len(units) > 1:
             first, second = islice(units.values(), 2)

@@ -7,9 +7,9 @@ those of a recording is kept as a covariate.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import compress
 from pathlib import PurePath
 
@@ -23,19 +23,19 @@ from cmm_uq.base.messages import Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest
 from cmm_uq.jobs.importing.answers import head_of
-from cmm_uq.jobs.importing.arrangement import figures_follow, with_blocks, with_one_head, with_points
-from cmm_uq.jobs.importing.columns import columns_of, left_out_fact
+from cmm_uq.jobs.importing.columns import columns_of
 from cmm_uq.jobs.importing.encodings import is_number
 from cmm_uq.jobs.importing.format import (
-    Cell,
     Fact,
     FileKeys,
     Format,
     ImportKeys,
+    NotReadError,
     Recognition,
     Sheet,
     format_of,
     length_named,
+    sheets_of,
 )
 from cmm_uq.jobs.importing.header import (
     LINES_BEFORE,
@@ -44,19 +44,11 @@ from cmm_uq.jobs.importing.header import (
     Header,
     header_of,
     no_header,
-    numbered_words,
-    understood,
 )
-from cmm_uq.jobs.importing.length_tables import (
-    DEVIATION_MM,
-    DEVIATION_UM,
-    LINE,
-    MEASURED,
-    NOMINAL,
-    of_lengths,
-    tables_of,
-)
-from cmm_uq.jobs.importing.lengths import MeasuredLengths, lengths_of, placed
+from cmm_uq.jobs.importing.interferometer import placed_runs
+from cmm_uq.jobs.importing.lengths import COLUMNS, MeasuredLengths, placed
+from cmm_uq.jobs.importing.tabular import alternatives
+from cmm_uq.jobs.importing.understanding import Understanding, understand
 
 # lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled
 SHORTEST_NORMAL, LONGEST_NORMAL = 1e-3, 1e3
@@ -228,59 +220,103 @@ def _imported(
     if len(content) > TABLE_BYTES.most:
         raise CmmUqError(f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file", where=where,
                          fix="Split it")  # fmt: skip
-    form = format_of(content, where)
-    sheets = _sheets_of(form, content, where, keys)
-    found = _chosen(sheets, keys, where, wanted)
-    file = PurePath(where).name
-    sheet, header = found[0] if isinstance(found, list) else found
-    head = _raw_head(sheets, sheet, sheet.lines[header.row]) if header.row < header.first else ()
-    if isinstance(found, list):
-        return _lengths(found, keys, where, reach_mm, Recognition(file, form.name, form.title, (), {}, 0, head))
-    values, lines, sources, facts = columns_of(sheet, header, keys, where, reach_mm=reach_mm, points=wanted is POINTS)
+    form, file = format_of(content, where), PurePath(where).name
+    recognised = Recognition(file, form.name, form.title, (), {}, 0)
+    problem: CmmUqError | None = None
+    try:
+        sheets = _sheets_of(form, content, where, keys)
+        sheet, header = _chosen(sheets, keys, where, wanted)
+        if sheet.rows[header.row] in sheet.rows[header.row + 1 :]:
+            raise NotReadError("its head comes again", where=sheet.at(where, header.row), fix="Export one table")
+        head = _raw_head(sheets, sheet, sheet.lines[header.row]) if header.row < header.first else ()
+        return _points(sheet, header, keys, where, reach_mm, replace(recognised, head=head), points=wanted is POINTS)
+    except NotReadError as error:
+        problem = error
+    if wanted is POINTS and {*keys.columns} <= {*COLUMNS, *OPTIONAL}:
+        understood = understand(_alternatives(form, content, where, keys), keys.columns, where, points=not keys.lines)
+        if understood is not None:
+            return _understood(understood, keys, where, reach_mm, recognised)
+    raise problem or no_header(sheets, keys, where, wanted)
+
+
+def _understood(
+    understood: Understanding, keys: ImportKeys, where: str, reach_mm: float | None, begun: Recognition
+) -> ImportedTable:
+    """A recording of what was understood of a file."""
+    head, grid = understood.header, understood.grid
+    begun = replace(begun, head=tuple(head_of(grid.sheet.rows[head.row])) if head.row < head.first else ())
+    if understood.kind == "lengths":
+        lengths = understood.lengths(keys, where, reach_mm)
+        keys = keys.model_copy(update={"lines": {**understood.places, **keys.lines}})
+        recognised = replace(begun, facts=lengths.facts, columns=lengths.sources, points=2 * len(lengths.names))
+        try:
+            columns, of_lines, lines = placed([lengths], keys, where)
+        except CmmUqError as error:
+            raise UnplacedError(error, recognised, [lengths]) from None
+        return ImportedTable(columns, np.array(lines), replace(recognised, facts=(*lengths.facts, *of_lines)))
+    if understood.kind == "runs":
+        sheet = placed_runs(understood.runs(where), keys, where)[0]
+        header = header_of(sheet, keys.model_copy(update={"columns": {}}), where, POINTS)
+        assert header is not None  # of the head that was written  # noqa: S101
+        return _points(sheet, header, keys, where, reach_mm, begun, points=True)
+    columns, facts = understood.points(keys, where, reach_mm)
+    lines_ = understood.reading.lines
+    return ImportedTable(
+        columns, np.array(lines_), replace(begun, facts=facts, columns=understood.sources, points=len(lines_))
+    )
+
+
+def _alternatives(form: Format, content: bytes, where: str, keys: ImportKeys) -> Iterator[Sequence[Sheet]]:
+    """Ways of cutting a file into cells."""
+    if form.name != "text":
+        with suppress(CmmUqError):
+            yield [_with_unit(sheet) for sheet in form.read(content, where, keys) if keys.sheet in (None, sheet.name)]
+    if form.name in ("text", "calypso", "pc-dmis", "features"):
+        for sheets in alternatives(content, where, keys):
+            yield [_with_unit(replace(sheet, decimal=keys.decimal)) for sheet in sheets]
+
+
+def _points(
+    sheet: Sheet,
+    header: Header,
+    keys: ImportKeys,
+    where: str,
+    reach_mm: float | None,
+    begun: Recognition,
+    *,
+    points: bool,
+) -> ImportedTable:
+    values, lines, sources, facts = columns_of(sheet, header, keys, where, reach_mm=reach_mm, points=points)
     named = (Fact("sheet", say("Sheet"), Verbatim(sheet.name)),) if sheet.name else ()
     facts = (*named, *sheet.facts, *facts)
-    return ImportedTable(values, lines, Recognition(file, form.name, form.title, facts, sources, len(lines), head))
-
-
-def _lengths(
-    tables: Sequence[tuple[Sheet, Header]], keys: ImportKeys, where: str, reach_mm: float | None, begun: Recognition
-) -> ImportedTable:
-    """Both ends of each length of tables of lengths."""
-    every = [lengths_of(sheet, header, keys, where, reach_mm) for sheet, header in tables]
-    if len(every) > 1 and all(len({*one.names}) == 1 for one in every):  # a sheet a line
-        every = [
-            replace(one, names=[sheet.name] * len(one.names)) for one, (sheet, _) in zip(every, tables, strict=True)
-        ]
-    first, count = every[0], sum(len(one.names) for one in every)
-    facts = [*tables[0][0].facts, *first.facts, *left_out_fact([row for one in every for row in one.left_out])]
-    if tables[0][0].name:
-        facts.insert(0, Fact("sheet", say("Sheet"), commas(names([sheet.name for sheet, _ in tables]))))
-    recognised = replace(begun, facts=tuple(facts), columns=first.sources, points=2 * count)
-    try:
-        columns, of_lines, lines = placed(every, keys, where)
-    except CmmUqError as error:
-        raise UnplacedError(error, recognised, every) from None
-    return ImportedTable(columns, np.array(lines), replace(recognised, facts=(*facts, *of_lines)))
+    return ImportedTable(values, lines, replace(begun, facts=facts, columns=sources, points=len(lines)))
 
 
 def tables_in(content: bytes, where: str, keys: ImportKeys) -> tuple[list[Sheet], list[tuple[Sheet, Header]]]:
-    """Sheets of a file, and its tables with their headers; none where they are not understood."""
-    sheets = _sheets_of(format_of(content, where), content, where, keys)
-    try:
-        found = _chosen(sheets, keys, where, POINTS)
-    except CmmUqError:
-        return sheets, []
-    return sheets, found if isinstance(found, list) else [found]
-
-
-LENGTHS_ALONE = (LINE, MEASURED, NOMINAL, DEVIATION_UM, DEVIATION_MM)  # columns that no table of points has
+    """Sheets of a file, and its table with its header; none where it is not understood."""
+    form = format_of(content, where)
+    sheets = _sheets_of(form, content, where, keys)
+    with suppress(CmmUqError):
+        sheet, header = _chosen(sheets, keys, where, POINTS)
+        if sheet.rows[header.row] not in sheet.rows[header.row + 1 :]:
+            columns_of(sheet, header, keys, where)
+        return sheets, [(sheet, header)]
+    with suppress(CmmUqError):
+        if found := understand(_alternatives(form, content, where, keys), keys.columns, where, points=not keys.lines):
+            if found.kind == "points" and len(found.reading.taken) == 1:  # a row for each coordinate, shown as points
+                columns, _ = found.points(keys, where, None)
+                rows = [
+                    ("", [f"{cell:.9g}" for cell in row], line)
+                    for *row, line in zip(*columns.values(), found.reading.lines, strict=True)
+                ]
+                sheets = sheets_of(rows, [*columns], unit="mm")
+                return sheets, [(sheets[0], Header(0, 1, [*columns], {name: (i,) for i, name in enumerate(columns)}))]
+            return [*found.sheets], [(found.grid.sheet, found.header)]
+    return sheets, []
 
 
 def _sheets_of(form: Format, content: bytes, where: str, keys: ImportKeys) -> list[Sheet]:
-    """Sheets of a file, each with a row for each point or length; what is said to be lengths is no coordinate."""
-    sheets = [with_blocks(_with_unit(sheet)) for sheet in form.read(content, where, keys)]
-    lengths = keys.lines or not {*keys.columns}.isdisjoint(LENGTHS_ALONE)
-    return sheets if lengths else [with_points(sheet, of_lengths) for sheet in sheets]
+    return [_with_unit(sheet) for sheet in form.read(content, where, keys)]
 
 
 def _with_unit(sheet: Sheet) -> Sheet:
@@ -296,67 +332,22 @@ def _with_unit(sheet: Sheet) -> Sheet:
 
 def _chosen(
     sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Sequence[Sequence[str]]
-) -> tuple[Sheet, Header] | list[tuple[Sheet, Header]]:
-    """The sheet with the table, and its header; of tables of lengths all."""
+) -> tuple[Sheet, Header]:
+    """The sheet with the table of points, and its header."""
     if keys.sheet is not None:
         known = [sheet.name for sheet in sheets if sheet.name]
         sheets = [sheet for sheet in sheets if sheet.name.casefold() == keys.sheet.casefold()]
         if not sheets:
             fix = suggestion(keys.sheet, known) if known else "Leave sheet out: the file has only one table"
             raise CmmUqError(f"has no sheet {keys.sheet!r}", where=where, fix=fix)
-    tables = [table for sheet in sheets if (table := _table(sheet, keys, where, wanted)) is not None]
-    if not tables and wanted is POINTS and (lengths := tables_of(sheets, keys, where)):
-        return lengths
+    tables = [(sheet, header) for sheet in sheets if (header := header_of(sheet, keys, where, wanted)) is not None]
     if not tables:
         raise no_header(sheets, keys, where, wanted)
-    if len(tables) > 1 and (runs := _runs_of(tables)) is not None:
-        tables = [runs]
     if len(tables) > 1:
         listed = ", ".join(repr(sheet.name) for sheet, _ in tables)
-        raise CmmUqError(f"holds {len(tables)} tables of points: {listed}", where=where,
+        raise NotReadError(f"holds {len(tables)} tables of points: {listed}", where=where,
                          fix=f'Say which: sheet = "{tables[0][0].name}"')  # fmt: skip
     return tables[0]
-
-
-def _runs_of(tables: Sequence[tuple[Sheet, Header]]) -> tuple[Sheet, Header] | None:
-    """Sheets with one head that are called runs, "Run 1", "Run 2", as one table with a column of repeats."""
-    names = [numbered_words(sheet.name) for sheet, _ in tables]
-    first, header = tables[0]
-    alike = all(len(one[1]) == 1 and one[0] == names[0][0] for one in names)
-    same = all(head.headings == header.headings and head.columns == header.columns for _, head in tables)
-    if not (alike and same) or understood(" ".join(names[0][0])).column != "repeat" or "repeat" in header.columns:
-        return None
-    width, lines, head_row = len(header.headings), [first.lines[header.row]], [*header.headings, "Repeat"]
-    rows: list[list[Cell]] = [[*head_row]]
-    for (sheet, head), (_, (number,)) in zip(tables, names, strict=True):
-        for row, line in zip(sheet.rows[head.first :], sheet.lines[head.first :], strict=True):
-            cells = [*row, *[""] * (width - len(row))]
-            rows.append([*cells[:width], str(number) if any(cell != "" for cell in cells) else "", *cells[width:]])
-            lines.append(line)
-    columns = {**header.columns, "repeat": (width,)}
-    header = replace(header, row=0, first=1, headings=head_row, columns=columns)
-    return replace(first, name=", ".join(sheet.name for sheet, _ in tables), rows=rows, lines=lines), header
-
-
-def _table(sheet: Sheet, keys: ImportKeys, where: str, wanted: Sequence[Sequence[str]]) -> tuple[Sheet, Header] | None:
-    """A sheet with its header, which may be one of several rows: two columns of one name may stand below different heads."""
-    find = partial(header_of, keys=keys, where=where, wanted=wanted)
-    problem: CmmUqError | None = None
-    header = None
-    try:
-        header = find(sheet)
-    except CmmUqError as error:
-        problem = error
-    plain = sheet.listed or wanted is not POINTS
-    if (
-        not plain
-        and (header is None or not figures_follow(sheet, header))
-        and (found := with_one_head(sheet, find, understood))
-    ):
-        return found[:2]
-    if problem is not None:
-        raise problem
-    return None if header is None else (sheet, header)
 
 
 def read_recording_file(

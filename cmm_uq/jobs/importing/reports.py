@@ -12,7 +12,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LINE, ROWS
 from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.jobs.importing.encodings import decoded, head_text, report_lines
-from cmm_uq.jobs.importing.format import Cell, Fact, Format, ImportKeys, Row, Sheet, sheets_of
+from cmm_uq.jobs.importing.format import Cell, Fact, Format, ImportKeys, NotReadError, Row, Sheet, sheets_of
 
 AXES = ("X", "Y", "Z")
 WITH_DIRECTION = ["name", "x", "y", "z", "i", "j", "k"]
@@ -83,10 +83,10 @@ class Calypso(TextReport):
                 raise CmmUqError("is the head of a Calypso table (hdr.txt), which has no measured value", where=where,
                                  fix="Name the file that ends in _chr.txt and was written with it")  # fmt: skip
             fix = "Name the file ending in _chr.txt, or say which columns hold x, y, z: columns"
-            raise CmmUqError("is a Calypso table whose columns are not known here (fet.txt?)", where=where, fix=fix)
+            raise NotReadError("is a Calypso table whose columns are not known here (fet.txt?)", where=where, fix=fix)
         places, units, others = _characteristics(rows, where)
         if not places or len(places) > ROWS.most:
-            raise CmmUqError(f"holds {others} characteristics and no coordinate of a feature", where=where,
+            raise NotReadError(f"holds {others} characteristics and no coordinate of a feature", where=where,
                              fix="Report the X, Y and Z value of every ball or point as characteristics")  # fmt: skip
         for place in places:
             if missing := [axis for axis in AXES if axis not in place.xyz]:

@@ -27,14 +27,15 @@ from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.jobs.importing.encodings import HOSTILE_FIX, decoded, head_text, local
 from cmm_uq.jobs.importing.format import DELIMITERS, Cell, Fact, Format, ImportKeys, Sheet
 from cmm_uq.jobs.importing.header import LINES_BEFORE, REFERENCES, header_of, understood
-from cmm_uq.jobs.importing.length_tables import of_lengths
+from cmm_uq.jobs.importing.roles import said
 
-_SEVERAL = "  "  # two blanks or more between cells, so that single ones may stand in headings
+_BLANK = " "  # cells of a text without separators, by where they stand
 _TITLES: dict[str, Text] = {
-    ",": say("comma"), ";": say("semicolon"), "\t": say("tab"), "|": say("bar"), " ": say("blanks"),
-    _SEVERAL: say("two blanks or more"),
+    ",": say("comma"), ";": say("semicolon"), "\t": say("tab"), "|": say("bar"), _BLANK: say("blanks"),
 }  # fmt: skip
-_BLANKS = {" ": re.compile(r"\s+"), _SEVERAL: re.compile(r"\s{2,}|\t")}
+_TOKEN, _PHRASE = re.compile(r"\S+"), re.compile(r"\S+(?: \S+)*")
+_POINT = re.compile("[.,]")
+_NUMBER = re.compile(r"[±+-]?\d[\d.,]*%?|[±+-]?[.,]\d+")
 _KNOWN = 2  # headings that are understood, by which another separator than single blanks is taken
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 Rows = tuple[list[list[str]], list[int]]  # cells of every line, and their lines
@@ -51,11 +52,8 @@ class Delimited(Format):
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         text, encoding = decoded(content, where, keys.encoding)
         delimiter = _delimiter(text, where, keys)
-        facts = (
-            Fact("encoding", say("Encoding"), Verbatim(encoding)),
-            Fact("delimiter", say("Between cells"), _TITLES[delimiter]),
-        )
-        return [Sheet("", *_rows(text, delimiter, where), unended=not text.endswith(("\n", "\r")), facts=facts)]
+        ended = text.endswith(("\n", "\r"))
+        return [Sheet("", *_rows(text, delimiter, where), unended=not ended, facts=_facts(encoding, delimiter))]
 
 
 def _delimiter(text: str, where: str, keys: ImportKeys) -> str:
@@ -64,15 +62,13 @@ def _delimiter(text: str, where: str, keys: ImportKeys) -> str:
     scores = {",": 0}
     for candidate in _TITLES:
         rows, lines = _rows(text, candidate, where, LINES_BEFORE)
-        if candidate in text or candidate in _BLANKS:
+        if candidate in text:
             try:
                 if header_of(Sheet("", rows, lines), keys, where, REFERENCES) is not None:
                     return candidate
             except CmmUqError:  # two columns of one name
                 return candidate
-            known = (
-                max(sum(of(cell).column is not None for cell in row) for of in (understood, of_lengths)) for row in rows
-            )
+            known = (sum(bool(understood(cell).column or said([cell])) for cell in row) for row in rows)
             scores[candidate] = max(known, default=0)
     if max(score for candidate, score in scores.items() if candidate != " ") >= _KNOWN:
         scores.pop(" ", None)  # a heading of several words has more of them, cut apart
@@ -81,9 +77,8 @@ def _delimiter(text: str, where: str, keys: ImportKeys) -> str:
 
 def _rows(text: str, delimiter: str, where: str, most: int | None = None) -> Rows:
     """Of every line, or of the first ``most``."""
-    if delimiter in _BLANKS:
-        split, lines = _BLANKS[delimiter].split, lines_within(text, where)
-        return _filled(islice(((i, split(line.strip())) for i, line in enumerate(lines, 1)), most), where)
+    if delimiter == _BLANK:
+        return _filled(enumerate(in_columns(list(islice(lines_within(text, where), most))), 1), where)
     if '"' not in text:
         return _unquoted(text, delimiter, where, most)
     reader = csv.reader(lines_within(text, where), delimiter=delimiter, skipinitialspace=True)
@@ -95,6 +90,61 @@ def _rows(text: str, delimiter: str, where: str, most: int | None = None) -> Row
             return rows
         raise CmmUqError(f"cells cannot be told apart: {error}", where=f"{where} line {reader.line_num}",
                          fix="Close every quotation mark on its own line, or leave them out") from None  # fmt: skip
+
+
+def alternatives(content: bytes, where: str, keys: ImportKeys) -> Iterator[list[Sheet]]:
+    """A text cut into cells by each separator that it has, in turn."""
+    text, encoding = decoded(content, where, keys.encoding)
+    for candidate in _TITLES if keys.delimiter is None else (DELIMITERS[keys.delimiter],):
+        if candidate in text:
+            yield [Sheet("", *_rows(text, candidate, where), facts=_facts(encoding, candidate))]
+
+
+def _facts(encoding: str, delimiter: str) -> tuple[Fact, ...]:
+    return (
+        Fact("encoding", say("Encoding"), Verbatim(encoding)),
+        Fact("delimiter", say("Between cells"), _TITLES[delimiter]),
+    )
+
+
+def in_columns(lines: Sequence[str]) -> Iterator[list[str]]:
+    """Cells of lines by where they stand: columns are where figures stand below each other, heads go to the nearest."""
+    tokens = [[(m.start(), m.end(), m[0]) for m in _TOKEN.finditer(line.expandtabs())] for line in lines]
+    figured = [len([t for t in own if _NUMBER.fullmatch(t[2])]) for own in tokens]
+    both = zip(figured, tokens, strict=True)
+    counted = [
+        2 * n >= len(own) > 0 and (n > 1 or (len(own) <= 3 and any(_POINT.search(t[2]) for t in own)))
+        for n, own in both
+    ]
+    spans = _spans([t for own, is_row in zip(tokens, counted, strict=True) if is_row for t in own])
+    for own, is_row, line in zip(tokens, counted, lines, strict=True):
+        phrases = own if is_row else [(m.start(), m.end(), m[0]) for m in _PHRASE.finditer(line.expandtabs())]
+        if not is_row and len(phrases) < 2 and (not phrases or phrases[0][0] < 8):
+            yield [line.strip()]
+            continue
+        if not is_row and len(phrases) == len(spans):
+            yield [text for _, _, text in phrases]
+            continue
+        cells = [""] * max(1, len(spans))
+        for start, end, text in phrases:
+            over = [k for k, (a, b) in enumerate(spans) if a < end and start < b]
+            k = over[0] if over else min(range(len(spans)), key=lambda k: abs(spans[k][1] - end), default=0)
+            if is_row or not cells[k]:
+                cells[k] = f"{cells[k]} {text}".strip()
+            else:
+                cells[k] = f"{cells[k]} {text}"
+        yield cells
+
+
+def _spans(tokens: Sequence[tuple[int, int, str]]) -> list[tuple[int, int]]:
+    """Where tokens stand, those that overlap together."""
+    spans: list[tuple[int, int]] = []
+    for start, end, _ in sorted(tokens):
+        if spans and start < spans[-1][1]:
+            spans[-1] = (spans[-1][0], max(spans[-1][1], end))
+        else:
+            spans.append((start, end))
+    return spans
 
 
 def _unquoted(text: str, delimiter: str, where: str, most: int | None) -> Rows:

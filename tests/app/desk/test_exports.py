@@ -155,4 +155,4 @@ def test_a_row_for_each_coordinate_is_shown_as_points(tmp_path: Path) -> None:
     export.write_text(f"Messung;Punkt;Achse;Ist (mm)\n{rows}", encoding="utf-8")
     found = read(str(export), {})
     assert [meaning for _, meaning in found["columns"]] == ["measurement", "point", "x_mm", "y_mm", "z_mm"]
-    assert found["rows"][1][1] == ["1", "1", "1,5", "2,5", "-3,5"]
+    assert found["rows"][1][1] == ["1", "1", "1.5", "2.5", "-3.5"]

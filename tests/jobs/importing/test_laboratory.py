@@ -12,9 +12,7 @@ from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, exampl
 from tests.jobs.importing import laboratory, unseen
 from tests.jobs.importing.laboratory import Export, text
 
-ASKED = {"lines_side_by_side": "could all be length_mm"}
-"""Of those that were written after the reading was built, what is refused with a question."""
-EVERY = {**laboratory.EXPORTS, **{name: made for name, made in unseen.EXPORTS.items() if name not in ASKED}}
+EVERY = {**laboratory.EXPORTS, **unseen.EXPORTS}
 
 
 def read(content: bytes | str, name: str = "a.csv", **keys: object) -> ImportedTable:
@@ -58,13 +56,6 @@ def test_an_export_is_read_as_it_was_written(name: str) -> None:
         np.tile([0.6, 0.8, 0.0], (len(first), 1))
     )
     assert len({*zip(points.measurement.tolist(), points.repeat.tolist(), strict=True)}) == len(first)
-
-
-@pytest.mark.parametrize("name", ASKED)
-def test_what_a_table_leaves_open_is_a_question(name: str) -> None:
-    file, made = unseen.EXPORTS[name]
-    with pytest.raises(CmmUqError, match=ASKED[name]):
-        read(made().content, file)
 
 
 LINE = {"lines": {"1": "along -Y from 10,20,30"}}

@@ -1,0 +1,311 @@
+"""A sheet cut into blocks: rows of figures, the head above them (one to four rows, units among them), and their titles.
+
+A head holds until another one stands above figures; titles hold until another one that begins with the same word. Nothing is
+read here: which column is what follows from words and figures together (:mod:`~cmm_uq.jobs.importing.roles`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+
+from cmm_uq.base.points import Floats
+from cmm_uq.jobs.importing.factors import LINE, RUN, hint
+from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Sheet, Sources, WrittenUnit, apart, sources_of, unit_named
+from cmm_uq.jobs.importing.header import plain_words, without_unit, words_of
+
+_FIGURE = re.compile(r"[±<>≤≥~]?\s*([+-]?\d[\d .,'’]*|[+-]?[.,]\d+)(?:[eE][+-]?\d+)?")
+_GROUPS = {sign: re.compile(rf"(?<=\d)[{other} '’](?=\d{{3}})") for sign, other in ((",", "."), (".", ","))}
+_PLAIN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_RULE = re.compile(r"[-=_*+|.\s]*")
+DATED = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}|\d:\d\d|年")
+_PRINTED = re.compile(r"\d[.,]\d")
+_DECIMAL = re.compile(r"^[^\d]*\d+[.,]\d+\D*$")
+_SAYS_UNIT = re.compile(r"\bunits?\s*[=:]\s*(\w+)", re.IGNORECASE)
+_MENTION = re.compile(r"[^\W\d_]+|µ\w+|\"")
+SMALL = ("um", "nm", "microinch")  # units of deviations
+DEEPEST = 4  # rows of a head
+WORD = re.compile(r"[^\W\d_]+")
+
+
+def figure(cell: Cell, sign: str) -> tuple[float, float] | None:
+    """Value of a cell and the step of its last digit; ``None`` where it is no number."""
+    if not isinstance(cell, str):
+        text = f"{cell:.9f}".rstrip("0")
+        return float(cell), 10.0 ** -len(text.partition(".")[2])
+    text = cell.replace("−", "-").replace("\u00a0", " ").replace("\u202f", " ").strip()
+    if (own := apart(text.lstrip("±<>≤≥~ "))) is not None:
+        text = own[0].strip()
+    if not _FIGURE.fullmatch(text):
+        return None
+    text = _GROUPS[sign].sub("", text.lstrip("±<>≤≥~ "))
+    text = text.replace(",", ".") if sign == "," else text
+    if not _PLAIN.fullmatch(text):
+        return None
+    mantissa, _, power = text.lower().partition("e")
+    return float(text), 10.0 ** (int(power or 0) - len(mantissa.partition(".")[2]))
+
+
+def sign_of(rows: Sequence[Sequence[Cell]]) -> str:
+    """The decimal sign that most figures of a sheet show."""
+    counts = Counter(
+        "," if cell.rfind(",") > cell.rfind(".") else "."
+        for row in rows
+        for cell in row
+        if isinstance(cell, str) and _DECIMAL.match(cell) and len(cell) < 24
+    )
+    return "," if counts[","] > counts["."] else "."
+
+
+@dataclass
+class Block:
+    """Rows of figures below one head: ``paths`` are the texts of each column's head, from above."""
+
+    paths: list[list[str]]
+    rows: list[int] = field(default_factory=list)  # indices in the sheet
+    titles: list[dict[str, str]] = field(default_factory=list)  # of each row
+    above: list[int] = field(default_factory=list)  # rows of text and of other figures since the block before
+    number: int = 0
+    head: list[int] = field(default_factory=list)
+
+
+class CutSheet:
+    """Cells of a sheet as figures, cut into blocks."""
+
+    def __init__(self, sheet: Sheet, keys: Mapping[str, Sources] | None = None, where: str = "") -> None:
+        self.sheet, self.keys, self.where = sheet, dict(keys or {}), where
+        self.sign = sheet.decimal or sign_of(sheet.rows)
+        self.width = max(map(len, sheet.rows), default=0)
+        self.figures = [[None if c == "" else figure(c, self.sign) for c in row] for row in sheet.rows]
+        self.places_of: dict[int, str] = {}  # of each row of figures, as LINE_PLACE has it
+        self.blocks = list(self._blocks())
+
+    def at(self, row: int, i: int | None = None) -> str:
+        """Place of a row or a cell, for messages."""
+        return self.sheet.at(self.where, row, i, "" if i is None else " ".join(self.path(row, i)))
+
+    def text(self, row: int, column: int) -> str:
+        cells = self.sheet.rows[row]
+        cell = cells[column] if column < len(cells) else ""
+        return cell.strip() if isinstance(cell, str) else f"{cell:g}"
+
+    def column(self, rows: Sequence[int], i: int) -> tuple[Floats, Floats]:
+        """Values and steps of a column; NaN where there is no figure."""
+        own = [(self.figures[r][i] if i < len(self.figures[r]) else None) or (np.nan, 0.0) for r in rows]
+        return np.array([value for value, _ in own]), np.array([step for _, step in own])
+
+    def place(self, i: int) -> dict[str, tuple[float, ...]]:
+        """Start and end of a line, where a row gives three figures after a word for one of them."""
+        found = {}
+        for k, cell in enumerate(self.sheet.rows[i]):
+            if not isinstance(cell, str) or not cell or self.figures[i][k] is not None:
+                continue
+            which = _ends_named(cell)
+            after = [f for f in self.figures[i][k + 1 : k + 4] if f is not None]
+            if len(which) == 1 and len(after) == 3:
+                found[which[0]] = tuple(f[0] for f in after)
+        return found
+
+    def unit_in(self, rows: Sequence[int], i: int) -> WrittenUnit | None:
+        """The unit that every cell of a column has after its figure."""
+        parts = [apart(self.text(row, i).lstrip("±")) for row in rows if self.text(row, i)]
+        return parts[0][1] if parts and parts[0] and all(part and part[1] == parts[0][1] for part in parts) else None
+
+    def other_quantity(self, row: int) -> bool:
+        """Whether a row names a unit that is none of lengths."""
+        named = (unit_named(self.text(row, k)) for k, own in enumerate(self.figures[row]) if own is None)
+        return any(unit.sort != LENGTH for unit in named if unit is not None)
+
+    def named(self, i: int, path: Sequence[str]) -> str:
+        """What the job says that a column is."""
+        whole = " ".join(" ".join(text.split()) for text in path if text)
+        own = {f"{i + 1}", *(text.strip().casefold() for text in (whole, *path) if text)}
+        every = ((name, str(one)) for name, sources in self.keys.items() for one in sources_of(sources))
+        return next((name for name, one in every if one.strip().casefold() in own), "")
+
+    def path(self, row: int, i: int) -> list[str]:
+        """Texts above a cell."""
+        return next((block.paths[i] for block in self.blocks if row in block.rows), [])
+
+    def of_block(self, row: int) -> list[int]:
+        """Rows of the block that a row is in."""
+        return next((block.rows for block in self.blocks if row in block.rows), [])
+
+    def _is_head(self, i: int) -> bool:
+        """Whether a row with figures counts columns, as ``1 2 3 1 2 3``."""
+        own = [f for f in self.figures[i] if f is not None]
+        counted = [int(f[0]) for f in own if f[1] >= 1 and f[0] == int(f[0])]
+        if len(counted) < len(own) or len(own) < 2:
+            return False
+        steps = [b - a for a, b in pairwise(counted)]
+        return (
+            counted[0] in (0, 1)
+            and 1 in steps
+            and all(s == 1 or b in (0, 1) for s, b in zip(steps, counted[1:], strict=True))
+        )
+
+    def _kind(self, i: int) -> str:
+        """``figures``, ``text``, or ``rule`` of a row."""
+        row = self.sheet.rows[i]
+        filled = [k for k, cell in enumerate(row) if cell != ""]
+        if all(isinstance(row[k], str) and _RULE.fullmatch(row[k]) for k in filled):  # type: ignore[arg-type]
+            return "rule"
+        numbers = [k for k in filled if self.figures[i][k] is not None]
+        if not numbers or self.place(i):
+            return "text"
+        whole = all((self.figures[i][k] or (0, 0))[1] >= 1 for k in numbers)
+        if (
+            whole
+            and len(filled) == 2
+            and numbers == filled[1:]
+            and hint(self.text(i, filled[0]), lengths=True) in (LINE, RUN)
+        ):
+            return "text"  # as Position;1 above a block
+        if self._is_head(i) and i + 1 < len(self.sheet.rows):
+            below = [k for k in numbers if k < len(self.figures[i + 1]) and self.figures[i + 1][k] is not None]
+            follows = any((self.figures[i + 1][k] or (0, 1))[1] < 1 for k in below)
+            if follows or self._only_units(i + 1):
+                return "text"
+        texts = {k for k in filled if k not in numbers and unit_named(self.text(i, k)) is None}
+        around = [self.figures[j] for j in (i - 1, i + 1) if 0 <= j < len(self.figures)]
+        beside = [[k for k, f in enumerate(own) if f is not None] for own in around]
+        told = len(numbers) > 1 and all(k - 1 in texts for k in numbers) and numbers not in beside
+        return "text" if told else "figures"
+
+    def _only_units(self, i: int) -> bool:
+        cells = [str(cell).strip("[]()<>{} ") for cell in self.sheet.rows[i] if cell != ""]
+        return bool(cells) and all(unit_named(cell) for cell in cells)
+
+    def _blocks(self) -> Iterator[Block]:
+        pending: list[int] = []
+        titles: dict[str, str] = {}
+        block: Block | None = None
+        count = 0
+        self.kinds = [self._kind(i) for i in range(len(self.sheet.rows))]
+        self._ruled = {self.sheet.lines[i] for i, kind in enumerate(self.kinds) if kind == "rule"}
+        for i, kind in enumerate(self.kinds):
+            if kind == "rule":
+                continue
+            if kind == "text":
+                pending.append(i)
+                continue
+            numbers = [k for k, f in enumerate(self.figures[i]) if f is not None]
+            head = self._head(pending, numbers) if pending else []
+            for row in pending:
+                if row not in head:
+                    texts = [self.text(row, k) for k in range(len(self.sheet.rows[row]))]
+                    place = self.place(row)
+                    stop = next((k for k, one in enumerate(texts) if place and _ends_named(one)), None)
+                    text = " ".join(texts[:stop]).strip()
+                    first = WORD.search(text)
+                    alone = {"": text} if len([c for c in self.sheet.rows[row] if c != ""]) == 1 else {}
+                    titles = {**titles, (first[0].casefold() if first else text): text, **alone}
+            if head or block is None:
+                if block is not None:
+                    yield block
+                count += 1
+                block = Block(self._paths(head), number=count, head=head)
+            block.above += [row for row in pending if row not in head]
+            block.rows.append(i)
+            place = {name: xyz for row in block.above for name, xyz in self.place(row).items()}
+            if len(place) == 2:
+                self.places_of[i] = " to ".join(",".join(f"{one:g}" for one in place[end]) for end in ("start", "end"))
+            block.titles.append(titles)
+            pending = []
+        if block is not None:
+            yield block
+
+    def _head(self, pending: Sequence[int], numbers: Sequence[int]) -> list[int]:
+        """Rows of a head at the end of rows of text, above a row with figures in these columns."""
+        head: list[int] = []
+        for row in reversed(pending):
+            cells = self.sheet.rows[row]
+            filled = [k for k, cell in enumerate(cells) if cell != ""]
+            if not head and filled == [0] and len(numbers) > 1:
+                continue  # a title below its head
+            between = range(self.sheet.lines[row] + 1, self.sheet.lines[head[0]] if head else 0)
+            gap = any(line not in self._ruled for line in between)
+            texts = [self.text(row, k) for k in filled]
+            dated = sum(DATED.search(text) is not None for text in texts)
+            odd = (0 < dated < 3 or len(text) > 60 or "=" in text or len(_PRINTED.findall(text)) > 1 for text in texts)
+            if len(head) == DEEPEST or gap or any(odd):
+                break
+            over = [k for k in filled if k in numbers]
+            apart = not head and (len(filled) < 2 or not over) and filled != over
+            ahead = head and (2 * filled[-1] < numbers[-1] or texts[0].endswith(":") or filled == [0])
+            if apart or ahead or any(f is not None and f[1] < 1 for f in self.figures[row]):
+                break
+            head.insert(0, row)
+        return head
+
+    def _paths(self, head: Sequence[int]) -> list[list[str]]:
+        """Texts above each column; a text of an upper row stands over the columns up to the next one."""
+        levels = []
+        for depth, row in enumerate(head):
+            texts = [self.text(row, k) for k in range(self.width)]
+            if depth < len(head) - 1:
+                below = [any(self.text(lower, k) for lower in head[depth + 1 :]) for k in range(self.width)]
+                for k in range(1, self.width):
+                    texts[k] = texts[k] or (texts[k - 1] if below[k] else "")
+            levels.append(texts)
+        return [[level[k] for level in levels] for k in range(self.width)]
+
+
+def _ends_named(text: str) -> list[str]:
+    """Which ends of a line a text names."""
+    words = [word for word in plain_words(text) if len(word) > 2 or not word.isascii()]
+    return [name for name, those in words_of("places").items() if not those.isdisjoint(words)]
+
+
+def unit_of(path: Sequence[str]) -> WrittenUnit | None:
+    """The unit in the texts above a column: the lowest one."""
+    for text in reversed(path):
+        if text and (unit := unit_named(text.strip("[]()<>{} ")) or without_unit(text.replace("\n", " "))[1]):
+            return unit
+    return None
+
+
+def transposed(sheet: Sheet) -> Sheet | None:
+    """The widest part of a sheet with its rows as columns."""
+    wide = [i for i, row in enumerate(sheet.rows) if len(row) > 3]
+    if not wide or len(wide) > 300 or max(len(sheet.rows[i]) for i in wide) > 300:
+        return None
+    width = max(len(sheet.rows[i]) for i in wide)
+    rows = [[*sheet.rows[i], *[""] * (width - len(sheet.rows[i]))] for i in wide]
+    return replace(
+        sheet,
+        rows=[list(row) for row in zip(*rows, strict=True)],
+        lines=[sheet.lines[wide[0]]] * width,
+        spreadsheet=False,
+    )
+
+
+def unit_elsewhere(sheets: Sequence[Sheet], *, small: bool) -> WrittenUnit | None:
+    """The one unit of lengths, or of deviations, that the texts of a file say (``UNITS=IN``), else mention."""
+    texts = {
+        cell
+        for sheet in sheets
+        for row in sheet.rows
+        for cell in row
+        if isinstance(cell, str) and not cell[:1].isdigit()
+    }
+    for pattern in (_SAYS_UNIT, _MENTION):
+        words = {
+            word
+            for text in texts
+            for word in pattern.findall(text)
+            if pattern is _SAYS_UNIT or (len(word) > 1 and word.casefold() != "in")
+        }
+        named = {
+            unit.name
+            for word in words
+            if (unit := unit_named(word)) and unit.sort == LENGTH and (unit.name in SMALL) == small
+        }
+        if len(named) == 1:
+            return UNITS[named.pop()]
+    return None

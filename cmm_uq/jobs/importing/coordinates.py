@@ -1,0 +1,176 @@
+"""Columns of coordinates, once or several times side by side or one below the other, and of deviations at targets of an axis.
+
+Coordinates stand below the letters X, Y, Z or beside them; where a nominal value and a deviation stand beside a third figure,
+that one is measured.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from itertools import permutations
+
+import numpy as np
+
+from cmm_uq.base.points import Floats
+from cmm_uq.jobs.importing.blocks import SMALL, Block, CutSheet
+from cmm_uq.jobs.importing.factors import hint, ways_of
+from cmm_uq.jobs.importing.format import WrittenUnit
+from cmm_uq.jobs.importing.header import plain_words, without_unit, words_of
+from cmm_uq.jobs.importing.roles import (
+    DEVIATION,
+    MEASURED,
+    NOMINAL,
+    REFERENCE,
+    SUMMARY,
+    TARGET,
+    FigureColumn,
+    SheetReading,
+    agrees,
+    columns_in,
+    down,
+    factors,
+    labels_of,
+    like,
+    mean_of,
+    unit_beside,
+)
+
+_LETTER = re.compile(r"(?<![A-Za-zÀ-ÿ])([xyzXYZ])(?![A-Za-zÀ-ÿ])|^([XYZ])(?=[A-Z]?[a-z])")
+_ENDS = re.compile(r"(.*?)[\s_.:/-]*([XYZxyz])(?:[- ]?(?:axis|achse|axe|wert|value))?", re.IGNORECASE)
+
+
+def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> SheetReading | None:
+    """Places of rows below one head that names X, Y and Z, once or for several points side by side."""
+    columns = columns_in(grid, blocks, rows)
+    checked, triples = 0, []
+    for letter in "xyz":
+        own = [c for c in columns if c.role != SUMMARY and c.may_be_length and _axis(c.path) == letter]
+        own = [c for c in own if not _directed(c.path)]
+        nominal = _nominal_of(own)
+        checked += len(nominal) // 2
+        rest = [c for c in own if c.i not in nominal and c.role not in (NOMINAL, DEVIATION, REFERENCE)]
+        triples.append([c for c in rest if not mean_of(c, [o for o in rest if o is not c])] or rest)
+    every = [c for own in triples for c in own]
+    if not triples[0] or len({*map(len, triples)}) > 1 or len({c.unit.name for c in every if c.unit}) > 1:
+        return None
+    if len({tuple(map(_LETTER.sub, [" "] * len(c.path), c.path)) for c in triples[0]}) < len(triples[0]):
+        return None  # side by side, and nothing tells them apart
+    reading = SheetReading("points", unit=next((c.unit for c in every if c.unit), None), checked=checked)
+    reading.taken = {f"{letter}_mm": own for letter, own in zip("xyz", triples, strict=True)}
+    reading.collect(grid, rows, columns)
+    for k, row in enumerate(rows):
+        for three in zip(*triples, strict=True):
+            xyz = tuple(float(c.values[k]) for c in three)
+            if all(np.isfinite(xyz)):
+                reading.add(row, k, three[0], triples[0], xyz)
+            elif any(np.isfinite(xyz)):
+                return None
+    for labels in reading.labels:
+        labels |= {key: _LETTER.sub(" ", text).strip() or text for key, text in labels.items() if key[0] == "head"}
+    xyz_ = np.array(reading.figures).reshape(-1, 3)
+    alike = len(xyz_) > 2 and all(like(xyz_[:, 0], xyz_[:, k]) for k in (1, 2))  # lengths on lines called X, Y, Z
+    return reading if len(xyz_) and not alike and _apart(xyz_, reading.unit) else None
+
+
+def _nominal_of(columns: Sequence[FigureColumn]) -> set[int]:
+    """Nominal values and deviations beside measured ones, which are their sum."""
+    found: set[int] = set()
+    for nominal, measured, d in permutations(columns, 3):
+        words = d.role in (None, DEVIATION) and measured.role not in (NOMINAL, REFERENCE) and nominal.role != MEASURED
+        if words and np.any(d.values) and any(agrees(d, measured, nominal, f) for f in factors(d, nominal)):
+            found |= {nominal.i, d.i}
+    return found
+
+
+def _apart(xyz: Floats, unit: WrittenUnit | None) -> bool:
+    """Whether figures may be places, and no deviations."""
+    return bool(len(xyz) == 1 or np.ptp(xyz, axis=0).max() > 4 or (unit is not None and unit.name not in SMALL))
+
+
+def _axis(path: Sequence[str]) -> str | None:
+    """The axis that the lowest text above a column names."""
+    for text in reversed(path):
+        if found := {(m[1] or m[2]).lower() for m in _LETTER.finditer(without_unit(text)[0].strip())}:
+            return found.pop() if len(found) == 1 else None
+    return None
+
+
+def _directed(path: Sequence[str]) -> bool:
+    """Whether a column is part of a direction."""
+    of, words = words_of("axis"), {word for text in path for word in plain_words(text)}
+    return bool(words & (of["normal"] | of["approach"] - {"axis"})) and not words & of["coordinate"]
+
+
+def rows_of_axes(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> SheetReading | None:
+    """Places of which each coordinate has a row, called X, Y or Z in a column or at the end of a name."""
+    for i in range(grid.width):
+        ends = [_ENDS.fullmatch(grid.text(row, i)) for row in rows]
+        stems = [end[1] for end in ends if end]
+        if len(stems) < 3 or "".join(end[2].upper() for end in ends if end) != "XYZ" * (len(stems) // 3):
+            continue
+        own = [row for row, end in zip(rows, ends, strict=True) if end]
+        columns = [c for c in columns_in(grid, blocks, own) if c.i != i and c.full]
+        fine = [c for c in columns if c.step < 1]
+        measured, checked = [c for c in fine if c.role == MEASURED], 0
+        nominal = _nominal_of(fine)
+        if nominal:
+            checked = len(nominal) // 2
+            measured = measured or [c for c in fine if c.i not in nominal and c.role is None]
+        measured = measured or [c for c in fine if c.role is None]
+        if not measured or (not checked and len(measured) > 1 and any(c.role is None for c in measured)):
+            continue
+        reading = SheetReading("points", unit=measured[0].unit or unit_beside(grid, own), checked=checked, others=rows)
+        reading.taken = {"x_mm, y_mm, z_mm": measured}
+        reading.collect(grid, own, columns, [i, *(c.i for c in fine)])
+        if not _threes([{**one, ("name", ""): stem} for one, stem in zip(reading.beside, stems, strict=True)]):
+            return None
+        for k in range(0, len(own), 3):
+            if own[k + 2] - own[k] > 6 or len({*stems[k : k + 3]}) > 1:
+                return None
+            for c in measured:
+                reading.add(own[k], k, c, measured, tuple(map(float, c.values[k : k + 3])))
+                reading.labels[-1] |= {("column", f"{i} "): stems[k]} if any(stems) else {}
+        return reading if _apart(np.array(reading.figures), reading.unit) else None
+    return None
+
+
+def _threes(labels: Sequence[Mapping[tuple[str, str], str]]) -> bool:
+    """Whether every three rows have a name of their own, or the number of a point, and none names each otherwise."""
+    named = False
+    for key in labels[0]:
+        own = [one.get(key, "") for one in labels]
+        of = hint(key[1].partition(" ")[2] if key[0] == "column" else key[1], lengths=False)
+        if key[0] == "column" and of in ("line", "point") and own[0] != own[1] != own[2]:
+            return False  # lines along the axes
+        counts = key[0] != "block" and of != "run" and (of is not None or not all(one.isdecimal() for one in own))
+        named = named or (counts and own[::3] == own[1::3] == own[2::3] and (len({*own}) > 1 or len(own) == 3))
+    return named
+
+
+def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> SheetReading | None:
+    """Deviations at targets along an axis, there and back."""
+    columns = columns_in(grid, blocks, rows)
+    ends = [c for c in columns if c.role in (TARGET, NOMINAL) and np.ptp(c.values[np.isfinite(c.values)]) > 1]
+    target = ends[0] if ends else None
+    if target is None or not np.isfinite(target.values[0]):
+        return None
+    values = down(target.values)
+    small = [c for c in columns if c is not target and c.role in (None, DEVIATION, MEASURED) and c.may_be_length]
+    small = [c for c in small if c.step < 1 and not like(c.values + 1000, values + 1000)]
+    source = [c for c in small if not mean_of(c, [o for o in small if o is not c and _same_way(o, c)])]
+    if not source:
+        return None
+    reading = SheetReading("runs", unit=target.unit, small=next((c.unit for c in source if c.unit), None))
+    reading.taken = {"target": [target], "reading_um": source}
+    reading.collect(grid, rows, columns)
+    for k, row in enumerate(rows):
+        for c in source:
+            if np.isfinite(c.values[k]):
+                reading.add(row, k, c, source, (float(values[k]), float(c.values[k])))
+    return reading if any(ways_of(label.values) is not None for label in labels_of(reading)) else None
+
+
+def _same_way(a: FigureColumn, b: FigureColumn) -> bool:
+    ways = ways_of([a.heading, b.heading])
+    return ways is None or ways[0] == ways[1]

@@ -1,0 +1,351 @@
+"""What labels count: lines and runs of lengths; measurements, points and repeats of places.
+
+A label is a column of names or numbers, a title, a head above a column, a sheet, or a part of a name (``POS1_BALL2_M3``).
+Words say what most of them count; figures say the rest: what differs where the same place, or the same length, is met again is
+a repeat, what the nominal length fixes counts lengths. Nothing is taken where two observations would be one.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.jobs.importing.format import NotReadError
+from cmm_uq.jobs.importing.header import plain_words, words_of
+
+LINE, RUN, POINT = "line", "run", "point"
+_TOKEN = re.compile(r"[^\W_]+")
+_GLUED = re.compile(r"(?<=\d)(?=[^\W\d_])|(?<=[^\W\d_])(?=\d)")
+_CAMEL = re.compile(r"(?<=[a-zäöüéèà])(?=[A-Z])")
+_SAME_PLACE_MM = 0.5
+_SHORT = {"m": LINE, "p": POINT, "b": POINT, "k": POINT, "r": RUN, "w": RUN, "l": LINE}
+
+
+@dataclass(frozen=True)
+class Label:
+    """What stands beside each observation, and the words that say what it counts."""
+
+    words: str
+    values: tuple[str, ...]
+    sort: str = "column"  # or title, head, sheet, part
+
+
+_Counted = tuple[Label, Ints, str | None]  # a label, the number of its value for each observation, and what it counts
+
+
+def ways_of(values: Sequence[str]) -> list[int] | None:
+    """Sense of travel that labels name, +1 or −1; ``None`` where one of them names none, or all the same."""
+    words = words_of("ways")
+    marks = {"+": 1, "-": -1, "−": -1, "↑": 1, "↓": -1, "→": 1, "←": -1}
+    found: list[int] = []
+    for value in values:
+        text = value.strip()
+        own = {marks[c] for c in text if c in "↑↓→←"}
+        ends = (text[-1:], text[:1] if not text[1:2].isdigit() else "")
+        own |= set() if own else {marks[c] for c in ends if c in marks}
+        own |= {sense for name, sense in (("forward", 1), ("backward", -1)) if _has(value, words[name])}
+        if len(own) != 1:
+            return None
+        found += own
+    return found if len({*found}) > 1 else None
+
+
+def _has(text: str, words: frozenset[str]) -> bool:
+    return any(
+        w in words or any(len(one) > 1 and not one.isascii() and one in w for one in words) for w in plain_words(text)
+    )
+
+
+def counted(label: Label, *, lengths: bool) -> str | None:
+    """What a label counts, by the words above it, else by those in it."""
+    if label.sort == "column" and (of := hint(label.words, lengths=lengths)) and (of != RUN or _counting(label.values)):
+        return of
+    if label.sort == "title" and not label.words:
+        every = {hint(value, lengths=lengths) for value in {*label.values}}
+        return every.pop() if len(every) == 1 else None
+    if label.sort == "part" and {*label.values} <= {*"ABCDEFGHabcdefgh"}:
+        return POINT
+    words = (label.words, label.values[0]) if label.sort in ("title", "part") else label.values[:1]
+    found = next((found for text in words if (found := hint(text, lengths=lengths))), None)
+    alike = label.sort == "head" and _counting(label.values)
+    return RUN if alike and found not in (LINE, POINT) else found
+
+
+def _counting(values: Sequence[str]) -> bool:
+    """Whether labels are alike but for their number."""
+    return len({re.sub(r"\d+", "0", value) for value in values}) == 1
+
+
+def hint(text: str, *, lengths: bool) -> str | None:
+    """What words say that a label counts."""
+    of, columns = words_of("lengths"), words_of("columns")
+    run, line, point = of["run"] | columns["repeat"], of["line"], columns["point"] | (of["face"] if lengths else set())
+    if not lengths:
+        run, line = run - (columns["measurement"] - columns["repeat"]), line | columns["measurement"]
+    words = plain_words(text)
+    fits = [
+        (len(one) if one == word else len(one) - 0.5, -k, name)
+        for k, word in enumerate(words)
+        for name, those in ((LINE, line), (POINT, point), (RUN, run))
+        for one in those
+        if one == word or (len(one) > 1 and not one.isascii() and one in word)
+    ]
+    exact = [fit for fit in fits if fit[0] == int(fit[0])]
+    if fits:
+        return max(exact, key=lambda fit: fit[1])[2] if exact else max(fits)[2]
+    return _SHORT.get(words[0]) if words and len(words[0]) == 1 and all(word.isdigit() for word in words[1:]) else None
+
+
+def parts_of(label: Label) -> list[Label]:
+    """The parts of names that are alike but for words and numbers; else what is ahead of a last number, and that number."""
+    for names in (label.values, tuple(_CAMEL.sub(" ", _GLUED.sub(" ", value)) for value in label.values)):
+        tokens = [[(m[0], m.start(), m.end()) for m in _TOKEN.finditer(name)] for name in names]
+        found: list[Label] = []
+        if len({*map(len, tokens)}) > 1 or len(tokens[0]) < 2:
+            continue
+        before = ""
+        for k, column in enumerate(zip(*tokens, strict=True)):
+            values = tuple(token[0] for token in column)
+            if len({*values}) > 1:
+                if before:  # with the word ahead of it
+                    values = tuple(name[own[k - 1][1] : own[k][2]] for name, own in zip(names, tokens, strict=True))
+                found += _halves(Label(before, values, "part"))
+            before = values[0] if len({*values}) == 1 and not values[0].isdigit() else ""
+        if len(found) > 1 or (found and names is not label.values and found[0].values != label.values):
+            return found
+    last = [re.fullmatch(r"(.*?)[\W_]*(\d+)\D*", value) for value in label.values]
+    return [Label(label.words, tuple(m[k] for m in last if m), "part") for k in (1, 2)] if all(last) else []
+
+
+def _halves(label: Label) -> list[Label]:
+    """A part such as ``1A`` as its number and its letter."""
+    halves = [re.fullmatch(r"(.*\d)([A-Za-z])", value) for value in label.values]
+    return (
+        [Label(label.words if k == 1 else "", tuple(m[k] for m in halves if m), "part") for k in (1, 2)]
+        if all(halves)
+        else [label]
+    )
+
+
+def codes(values: Sequence[object]) -> Ints:
+    known: dict[object, int] = {}
+    return np.array([known.setdefault(value, len(known)) for value in values], dtype=np.int64)
+
+
+def fixes(a: Ints, b: Ints) -> bool:
+    """Whether the one says the other."""
+    return len({*zip(a.tolist(), b.tolist(), strict=True)}) == len({*a.tolist()})
+
+
+def together(*every: Ints) -> Ints:
+    return codes([*zip(*(one.tolist() for one in every), strict=True)])
+
+
+def _varying(labels: Sequence[Label], *, lengths: bool) -> Iterator[tuple[Label, Ints]]:
+    """Labels that differ and are there for all, without those that say the same again."""
+    seen: dict[bytes, tuple[Label, Ints]] = {}
+    for label in labels:
+        own = codes(label.values)
+        if own.max(initial=0) and "" not in label.values:
+            before = seen.get(own.tobytes())
+            if before is None or (
+                counted(before[0], lengths=lengths) is None and counted(label, lengths=lengths) is not None
+            ):
+                seen[own.tobytes()] = label, own
+    yield from seen.values()
+
+
+def in_turn(key: Ints) -> Ints:
+    """1, 2, … of each key."""
+    seen: Counter[int] = Counter()
+    out = []
+    for one in key.tolist():
+        seen[one] += 1
+        out.append(seen[one])
+    return np.array(out, dtype=np.int64)
+
+
+def numbered_runs(values: Sequence[str]) -> Ints:
+    """Numbers of runs: those that their labels have, else as they come."""
+    numbers = [re.findall(r"\d+", value) for value in values]
+    if all(len(one) == 1 for one in numbers) and len({*values}) == len({one[0] for one in numbers}):
+        return np.array([int(one[0]) for one in numbers])
+    return codes(values) + 1
+
+
+def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tuple[list[str], Ints, list[str]]:
+    """Name of the line and number of the run of each length, and by what labels; an error asks where nothing says."""
+    count, several = len(reference), bool(reference.max(initial=0) > 0)
+    found: list[_Counted] = [
+        (one, own, counted(one, lengths=True)) for one, own in _varying(with_parts(labels), lengths=True)
+    ]
+    plain = [f for f in found if not (several and (fixes(reference, f[1]) or f[1].max() + 1 == count))]
+    run = _one_run(labels, [f for f in found if f[2] == RUN and not (several and fixes(reference, f[1]))], place)
+    line: list[_Counted] = []
+    for one in sorted((f for f in plain if f[2] == LINE), key=lambda f: (f[0].sort == "part", -f[1].max())):
+        if not line or not fixes(together(*(f[1] for f in line)), one[1]):
+            line.append(one)
+
+    def apart(*more: Ints) -> int:
+        """How many of the lengths are told apart."""
+        return int(together(reference, *(f[1] for f in line), *([run[1]] if run else []), *more).max()) + 1
+
+    rank = {sort: k for k, sort in enumerate(("title", "sheet", "head", "block", "part", "column"))}
+    for one in sorted(
+        (f for f in plain if f[2] in (None, POINT)), key=lambda f: (f[2] == POINT, rank[f[0].sort], f[1].max())
+    ):
+        if apart() == count or apart(one[1]) == apart():
+            continue
+        whole = run is not None and apart(one[1]) == (reference.max() + 1) * (one[1].max() + 1) * (run[1].max() + 1)
+        if run is None and any(f[2] == LINE for f in found) and _digits(one[0]):
+            run = one
+        elif line or whole or one[0].sort != "column":
+            line.append(one)
+        else:
+            fix = f'Say by which column: columns = {{ line = "{one[0].words}" }}'
+            raise NotReadError("nothing says which lengths lie on one line", where=place, fix=fix)
+    # else one length on each line, which are named and not counted
+    line = line or [f for f in found if f[2] == LINE and not (several and _digits(f[0]))][:1]
+    key = together(reference, *(f[1] for f in line))
+    if apart() < count if run is not None else len({*Counter(key.tolist()).values()}) > 1:
+        what = "lengths of one line and one run have the same nominal length"
+        fix = 'Say what tells them apart: columns = { line = "…", repeat = "…" }'
+        raise NotReadError(what, where=place, fix=fix)
+    names = [" ".join(dict.fromkeys(parts)) for parts in zip(*(f[0].values for f in line), strict=True)]
+    titles = [label.values[0] for label in labels if label.values[0] and (label.sort == "sheet" or _titled(label))]
+    numbers = in_turn(key) if run is None else numbered_runs(run[0].values)
+    return (
+        names or [titles[-1] if titles else "1"] * count,
+        numbers,
+        [f[0].words for f in (*line, *([run] if run else []))],
+    )
+
+
+def _one_run(labels: Sequence[Label], runs: Sequence[_Counted], place: str) -> _Counted | None:
+    """The label that counts runs; an error where two do, each in its own way."""
+    if unnamed := [label.words for label in labels if label.sort == "unnamed"]:
+        raise NotReadError("no line is named", where=unnamed[0], fix="Complete the row")
+    run = min(runs, key=lambda f: f[1].max(), default=None)
+    heads = next((len({*f[0].values}) for f in runs if f[0].sort == "head"), 0)
+    columns = [
+        one.words
+        for one in labels
+        if one.sort == "column" and _counting(one.values) and hint(one.words, lengths=True) == RUN
+    ]
+    if (heads and columns) or (run is not None and any(not fixes(run[1], f[1]) for f in runs)):
+        what = f"{(columns or [runs[0][0].words])[0]!r} counts runs, and so do {heads or 'other'} columns"
+        raise NotReadError(what, where=place, fix="Name one of them alone: columns")
+    return run
+
+
+def _digits(label: Label) -> bool:
+    return all(value.strip().isdigit() for value in label.values)
+
+
+def with_parts(labels: Sequence[Label]) -> list[Label]:
+    """Labels, and the parts of names among them."""
+    names = (label for label in labels if label.sort in ("column", "head") and len({*label.values}) > 1)
+    return [*labels, *(part for label in names for part in parts_of(label))]
+
+
+def _titled(label: Label) -> bool:
+    return label.sort == "title" and counted(label, lengths=True) == LINE
+
+
+def places(xyz: Floats) -> Ints:
+    """Number of the place of each point (n, 3): those within half a millimetre of the first there are one."""
+    found = np.full(len(xyz), -1, dtype=np.int64)
+    firsts = np.empty((0, 3))
+    for i, one in enumerate(xyz):
+        near = np.flatnonzero(np.abs(firsts - one).max(axis=1, initial=0) < _SAME_PLACE_MM)
+        found[i] = near[0] if len(near) else len(firsts)
+        firsts = firsts if len(near) else np.vstack([firsts, one])
+    return found
+
+
+_LAST = ("column", "part", "head", "title", "sheet", "block")
+
+
+def points_of_names(labels: Sequence[Label], xyz: Floats) -> dict[str, list[str]] | None:
+    """Measurement, point and repeat of each place; ``None`` where nothing says which belong together.
+
+    What differs at one place is a repeat. Of two others the one that changes more slowly counts measurements, unless words
+    say which of them does. Points that have one name each are of one measurement, unless their distances come again in turn.
+    """
+    count, place = len(xyz), places(xyz)
+    again = bool(place.max() + 1 < count)
+    found: list[_Counted] = [
+        (label, own, counted(label, lengths=False)) for label, own in _varying(with_parts(labels), lengths=False)
+    ]
+    if any({*f[0].values} <= {*"ABCDEFGHabcdefgh"} for f in found):  # then P counts positions
+        found = [(f[0], f[1], LINE if f[0].words.casefold() == "p" else f[2]) for f in found]
+    each = [f for f in found if f[1].max() + 1 == count]
+    found = [f for f in found if f[1].max() + 1 < count]
+    run = _run_of(found, place) if again or any(f[2] == RUN for f in found) else None
+    repeat = None if run is None else numbered_runs(run[0].values)
+    if again and run is None and not any(f[2] == LINE and not fixes(place, f[1]) for f in found):
+        repeat = in_turn(place)
+    rest = [f for f in found if run is None or (f[0] is not run[0] and not fixes(run[1], f[1]))]
+    order = sorted(rest, key=lambda f: (_LAST.index(f[0].sort), np.count_nonzero(np.diff(f[1]))))
+    lines, faces, free = ([f for f in order if f[2] == word] for word in (LINE, POINT, None))
+    slow = sorted(free, key=lambda f: (f[0].sort == "block", np.count_nonzero(np.diff(f[1])), f[0].sort == "part"))
+    for measurement in (*lines, *([] if lines else [*slow, None])):
+        for point in (*faces, *slow[::-1]):
+            keys = [f[1] for f in (measurement, point) if f is not None] + ([] if repeat is None else [repeat])
+            if (
+                point is measurement
+                or together(*keys).max() + 1 < count
+                or (measurement and fixes(measurement[1], point[1]))
+            ):
+                continue
+            if measurement is None and point[2] != POINT:
+                continue
+            return _columns(measurement, point, repeat, count)
+    if lines or again or not each:
+        return None
+    size = alike_in_turn(xyz)
+    if size is not None:
+        rows = np.arange(count)
+        return {"measurement": [f"{k // size + 1}" for k in rows], "point": [f"{k % size + 1}" for k in rows]}
+    return next((_columns(None, f, None, count) for f in each if f[2] == POINT), None)
+
+
+def _run_of(found: Sequence[_Counted], place: Ints) -> _Counted | None:
+    """The label that counts repeats: by its words, else the one by which all points at one place differ."""
+    apart = [f for f in found if not fixes(place, f[1])]
+    by_words = [f for f in found if f[2] == RUN]
+    fixed = any(f[2] == LINE and fixes(place, f[1]) for f in found)  # then another word for measurements counts repeats
+    by_place = [f for f in apart if f[2] is None or (f[2] == LINE and (fixed or hint(f[0].words, lengths=True) == RUN))]
+    by_place = [f for f in by_place if together(place, f[1]).max() + 1 == len(place)]
+    choices = [f for f in by_words if f in apart] or by_words or [f for f in by_place if f[2] is None] or by_place
+    return min(choices, key=lambda f: (f[1].max(), _LAST.index(f[0].sort)), default=None)
+
+
+def _columns(measurement: _Counted | None, point: _Counted, repeat: Ints | None, count: int) -> dict[str, list[str]]:
+    columns = {
+        "measurement": ["1"] * count if measurement is None else [*measurement[0].values],
+        "point": [*point[0].values],
+    }
+    return columns if repeat is None else {**columns, "repeat": [f"{n}" for n in repeat]}
+
+
+def alike_in_turn(xyz: Floats) -> int | None:
+    """How many points in turn are one measurement of a rigid artefact that was turned, by the distances that come again."""
+    for size in range(2, len(xyz) // 3 + 1):
+        if len(xyz) % size:
+            continue
+        own = xyz.reshape(-1, size, 3)
+        distances = np.linalg.norm(own[:, :, None] - own[:, None, :], axis=3)
+        along = (own[:, -1] - own[:, 0]) / np.maximum(distances[:, 0, -1:], 1e-9)
+        if (
+            np.ptp(distances, axis=0).max() < 0.1
+            and distances[:, 0, -1].min() > 1
+            and np.abs(along @ along[0]).min() < 0.99
+        ):
+            return size
+    return None

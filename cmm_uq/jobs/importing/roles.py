@@ -1,0 +1,295 @@
+"""What the columns of a block are, by words and by arithmetic: each says what the other leaves open, and neither may deny it.
+
+Lengths stand in columns that are alike row by row; a deviation is measured minus reference to the printed digit, a mean the
+mean of its runs. Coordinates stand below the letters X, Y, Z or beside them; where a nominal value and a deviation stand
+beside a third figure, that one is measured.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cmm_uq.base.points import Floats
+from cmm_uq.jobs.columns import OPTIONAL
+from cmm_uq.jobs.importing.blocks import DATED, SMALL, Block, CutSheet, unit_of
+from cmm_uq.jobs.importing.factors import Label, hint
+from cmm_uq.jobs.importing.format import LENGTH, UNITS, WrittenUnit, converted, sort_of, unit_named
+from cmm_uq.jobs.importing.header import plain_words, understood, without_unit, words_of
+
+SUMMARY, DEVIATION, MEASURED, REFERENCE, NOMINAL, TARGET = (
+    "summary",
+    "deviation",
+    "measured",
+    "reference",
+    "nominal",
+    "target",
+)
+_ROLES = {
+    "reference_mm": REFERENCE,
+    "nominal_mm": REFERENCE,
+    "length_mm": MEASURED,
+    "deviation_um": DEVIATION,
+    "deviation_mm": DEVIATION,
+}
+_CLAIMS = {REFERENCE: {REFERENCE, NOMINAL, TARGET}, MEASURED: {MEASURED, DEVIATION}, DEVIATION: {DEVIATION, MEASURED}}
+_ABBREVIATED = re.compile(r"[^\W\d_]{4,}(?=\.)")
+_FURTHER = tuple(name for name in OPTIONAL if name != "repeat" and not name.startswith("reference"))
+
+
+@dataclass
+class SheetReading:
+    """Observations of a sheet, in order: labels beside each, and figures in the units of the file."""
+
+    kind: str  # lengths, points or runs
+    unit: WrittenUnit | None = None
+    small: WrittenUnit | None = None  # of deviations
+    checked: int = 0  # columns that arithmetic confirms
+    deviations: bool = False  # whether measured lengths are references and deviations together
+    rows: list[int] = field(default_factory=list)  # of the sheet
+    lines: list[int] = field(default_factory=list)  # of the file
+    labels: list[dict[tuple[str, str], str]] = field(default_factory=list)  # by sort and words
+    figures: list[tuple[float, ...]] = field(default_factory=list)  # reference, measured; x, y, z; target, deviation
+    taken: dict[str, Sequence[FigureColumn]] = field(default_factory=dict)  # by column of a recording
+    unused: list[str] = field(default_factory=list)
+    covariates: dict[str, list[float]] = field(default_factory=dict)  # further columns of a recording, in their units
+    blank: list[tuple[int, int]] = field(default_factory=list)  # row and column of measured values that are not there
+    others: Sequence[int] = ()  # rows that belong to it
+    beside: list[dict[tuple[str, str], str]] = field(default_factory=list)  # labels of each row
+    further: Mapping[str, Floats] = field(default_factory=dict)
+
+    @property
+    def columns(self) -> set[int]:
+        return {c.i for name, own in self.taken.items() for c in own if name not in ("reference_mm", "target")}
+
+    def collect(
+        self, grid: CutSheet, rows: Sequence[int], columns: Sequence[FigureColumn], more: Sequence[int] = ()
+    ) -> None:
+        """What stands beside the columns that are taken."""
+        used = {c.i for own in self.taken.values() for c in own} | {*more}
+        self.further = further_of([c for c in columns if c.i not in used])
+        self.beside = _beside(grid, rows, used)
+        names = ((c.i, c.heading) for c in columns if understood(c.heading).column not in self.further)
+        self.unused = [name for i, name in names if i not in used and name and not hint(name, lengths=True)]
+
+    def add(
+        self, row: int, k: int, column: FigureColumn, beside: Sequence[FigureColumn], figures: tuple[float, ...]
+    ) -> None:
+        """An observation: row ``k`` of the columns, in ``column`` of those side by side."""
+        self.rows.append(row)
+        self.labels.append({**self.beside[k], **heads_of(column, beside)})
+        self.figures.append(figures)
+        for name, values in self.further.items():
+            self.covariates.setdefault(name, []).append(float(values[k]))
+
+
+def further_of(columns: Sequence[FigureColumn]) -> dict[str, Floats]:
+    """Columns such as temperatures and directions of approach, which a recording has beside its coordinates."""
+    found = {}
+    for c in columns:
+        meaning = understood(c.heading)
+        sort = sort_of(meaning.column or "")
+        if meaning.column in _FURTHER and c.full and not (sort and c.unit and sort[0] != c.unit.sort):
+            found[meaning.column] = converted(c.values, c.unit, meaning.column) if c.unit and sort else c.values
+    return found
+
+
+def known(word: str, role: str) -> bool:
+    """Whether a word is one for a role, or, in a language without blanks, has one in it."""
+    words = words_of("lengths")[role]
+    return word in words or (not word.isascii() and any(len(one) > 1 and one in word for one in words))
+
+
+def said(path: Sequence[str]) -> str | None:
+    """The role that the words above a column say: that of a mean ahead of what it is of, in Asian words the longest."""
+    texts = [without_unit(text.replace("\n", " "))[0] for text in path]
+    words = [word for text in texts for word in plain_words(text)]
+    short = [own[-1] for text in texts for part in _ABBREVIATED.findall(text) if (own := plain_words(part))]
+    of, roles = words_of("lengths"), (SUMMARY, DEVIATION, REFERENCE, MEASURED, TARGET, NOMINAL)
+    for role in roles:
+        if not of[role].isdisjoint(words) or any(one.startswith(part) for part in short for one in of[role]):
+            return role
+    asian = [word for word in words if not word.isascii()]
+    fits = [(len(one), role) for role in roles for one in of[role] if any(one in word for word in asian)]
+    return max(fits)[1] if fits and max(fits)[0] > 1 else None
+
+
+def heading(path: Sequence[str]) -> str:
+    return " ".join(dict.fromkeys(" ".join(text.split()) for text in path if text))
+
+
+@dataclass
+class FigureColumn:
+    i: int
+    path: list[str]
+    values: Floats
+    step: float
+    unit: WrittenUnit | None
+    role: str | None
+
+    @property
+    def full(self) -> bool:
+        return bool(np.isfinite(self.values).all())
+
+    @property
+    def may_be_length(self) -> bool:
+        return self.unit is None or self.unit.sort == LENGTH
+
+    @property
+    def minute(self) -> bool:
+        """Whether it is in a unit of deviations."""
+        return self.unit is not None and self.unit.name in SMALL
+
+    @property
+    def heading(self) -> str:
+        return heading(self.path)
+
+    @property
+    def counts(self) -> bool:
+        """Whether its figures are 1, 2, 3 and on, or begin with 0."""
+        own = np.unique(self.values[np.isfinite(self.values)])
+        return bool(own[0] in (0, 1) and np.array_equal(own, np.arange(own[0], own[0] + len(own))))
+
+
+def columns_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> list[FigureColumn]:
+    """Columns with figures; a figure that stands in the first of its rows alone is that of all."""
+    found, claimed = [], {one for name in grid.keys if name in _ROLES for one in _CLAIMS[_ROLES[name]]}
+    for i in range(grid.width):
+        path = blocks[0].paths[i] if i < len(blocks[0].paths) else [""]
+        values, steps = grid.column(rows, i)
+        if not np.isfinite(values).any():
+            continue
+        role = said(path) or (MEASURED if any(hint(text, lengths=True) == "run" for text in path) else None)
+        unit, name = unit_of(path) or grid.unit_in(rows, i), grid.named(i, path)
+        if grid.keys:
+            role = _ROLES.get(name, SUMMARY if name or role in claimed else role)
+            unit = unit or (UNITS[name[-2:]] if name.startswith("deviation_") else None)
+        found.append(FigureColumn(i, path, values, float(min(steps[np.isfinite(values)])), unit, role))
+    return found
+
+
+def like(a: Floats, b: Floats, far: float = 0.04) -> bool:
+    """Whether two columns are one length each, row by row, to a part of 0.002 or ``far``."""
+    both = np.isfinite(a) & np.isfinite(b)
+    return bool(both.any()) and bool((np.abs(a - b)[both] <= np.maximum(0.002 * np.abs(a), far)[both]).all())
+
+
+def agrees(deviation: FigureColumn, measured: FigureColumn, reference: FigureColumn, factor: float) -> bool:
+    """Whether a column is measured minus reference to the last printed digits."""
+    step = deviation.step * factor + sum(
+        one.step for one in (measured, reference) if one.step < 1
+    )  # whole mm are exact
+    away = np.abs(measured.values - reference.values - deviation.values * factor)
+    away = away[np.isfinite(away)]
+    return away.size > 0 and bool((away <= 0.525 * step + 1e-9).all())
+
+
+def mean_of(column: FigureColumn, others: Sequence[FigureColumn], *, worst: bool = False) -> bool:
+    """Whether a column is the mean, range or standard deviation of others; with ``worst`` also the largest of them."""
+    if len(others) < 2:
+        return False
+    own = np.column_stack([one.values for one in others])
+    if not np.isfinite(own).all() or not column.full:
+        return False
+    step = column.step / 2 + max(one.step for one in others) / 2
+    far = own[np.arange(len(own)), np.abs(own).argmax(axis=1)]
+    sums = [own.mean(axis=1), np.ptp(own, axis=1), own.std(axis=1, ddof=1)]
+    sums += [own.max(axis=1), own.min(axis=1), far, np.abs(far)] if worst else []
+    return any(bool((np.abs(column.values - one) <= 1.05 * step + 1e-9).all()) for one in sums)
+
+
+def said_by(name: str, columns: Sequence[FigureColumn], more: str) -> str:
+    """How a message asks for columns."""
+    quoted = [f'"{c.heading}"' for c in columns]
+    listed = quoted[0] if len(quoted) == 1 else f"[{', '.join(quoted)}]"
+    return f"Say which: columns = {{ {name} = {listed} }}{more}"
+
+
+def down(values: Floats) -> Floats:
+    filled = np.flatnonzero(np.isfinite(values))
+    return values[filled[np.searchsorted(filled, np.arange(len(values)), side="right") - 1]]
+
+
+def factors(deviation: FigureColumn, length: FigureColumn) -> tuple[float, ...]:
+    """By what a deviation is multiplied to be in the unit of lengths."""
+    if deviation.unit is not None and length.unit is not None and deviation.unit.sort == length.unit.sort == LENGTH:
+        return ((deviation.unit.up / deviation.unit.down) / (length.unit.up / length.unit.down),)
+    return (1.0, 1e-3, 1e-6)
+
+
+def heads_of(column: FigureColumn, beside: Sequence[FigureColumn]) -> dict[tuple[str, str], str]:
+    """Labels by the head of a column, a level each, where columns beside it differ."""
+    found = {}
+    for level in range(len(column.path)):
+        texts = [without_unit(c.path[level].replace("\n", " "))[0].strip() for c in beside]
+        if len({*texts}) > 1 and not unit_named(texts[0]):
+            found["head", f"{level}"] = without_unit(column.path[level].replace("\n", " "))[0].strip()
+    if len(beside) > 1 and not found:
+        found["head", "0"] = f"{[c.i for c in beside].index(column.i) + 1}"
+    return found
+
+
+def _beside(grid: CutSheet, rows: Sequence[int], used: set[int]) -> list[dict[tuple[str, str], str]]:
+    """Names and numbers that stand beside rows, and titles above them."""
+    of_row = {row: (block, n) for block in grid.blocks for n, row in enumerate(block.rows)}
+    out: list[dict[tuple[str, str], str]] = [{} for _ in rows]
+    paths = of_row[rows[0]][0].paths
+    for i in sorted({*range(len(paths))} - used):
+        cells = [grid.text(row, i) for row in rows]
+        numbers = [grid.figures[row][i] if i < len(grid.figures[row]) else None for row in rows]
+        name = {"repeat": "run", "line": "line"}.get(grid.named(i, paths[i]), heading(paths[i]))
+        of_line = hint(name, lengths=True) == "line"
+        if of_line and not cells[0]:
+            out[0]["unnamed", grid.at(rows[0], i)] = name
+        decimals = any(n is not None and n[1] < 1 for n in numbers) and not of_line
+        if decimals or not cells[0] or any(DATED.search(cell) for cell in cells[:3]):
+            continue
+        last = ""
+        for k, cell in enumerate(cells):
+            last = cell or last
+            out[k]["column", f"{i} {name}"] = last
+    for k, row in enumerate(rows):
+        block, n = of_row[row]
+        out[k] |= {("title", first): text for first, text in block.titles[n].items()}
+        out[k]["block", ""] = f"{block.number}"
+    return out
+
+
+def unit_beside(grid: CutSheet, rows: Sequence[int]) -> WrittenUnit | None:
+    """The unit that a column names in every row."""
+    for i in range(grid.width):
+        named = {u.name if (u := unit_named(grid.text(row, i))) else "" for row in rows if not grid.other_quantity(row)}
+        if len(named) == 1 and len(name := named.pop()) > 1 and name in UNITS and UNITS[name].sort == LENGTH:
+            return UNITS[name]
+    return None
+
+
+def joined(readings: Sequence[SheetReading]) -> SheetReading:
+    """Readings of several blocks or sheets as one."""
+    whole = replace(readings[0], checked=sum(one.checked for one in readings))
+    for one in readings[1:]:
+        whole.lines, whole.labels = whole.lines + one.lines, whole.labels + one.labels
+        whole.figures = whole.figures + one.figures
+    alike = [name for name in whole.covariates if all(name in one.covariates for one in readings)]
+    whole.covariates = {name: [value for one in readings for value in one.covariates[name]] for name in alike}
+    return whole
+
+
+def labels_of(reading: SheetReading) -> list[Label]:
+    """Labels of all observations; those that are not there for each have none."""
+    keys = dict.fromkeys(key for own in reading.labels for key in own if key[0] != "place")
+    keys = dict.fromkeys(sorted(keys, key=lambda key: key[0] != "sheet"))
+    words = {key: key[1].partition(" ")[2] if key[0] == "column" else key[1] for key in keys}
+    return [Label(words[key], tuple(own.get(key, "") for own in reading.labels), key[0]) for key in keys]
+
+
+def each(grid: CutSheet) -> Iterator[tuple[list[Block], list[int]]]:
+    """Blocks below the same head, with their rows."""
+    by_head: dict[tuple[tuple[str, ...], ...], list[Block]] = {}
+    for block in grid.blocks:
+        by_head.setdefault(tuple(map(tuple, block.paths)), []).append(block)
+    for blocks in by_head.values():
+        yield blocks, [row for block in blocks for row in block.rows]

@@ -1,0 +1,380 @@
+"""A file read by understanding: sheets cut into blocks, every way of reading them tried, the one that figures confirm taken.
+
+It is asked where no head says at once what the columns are. Nothing is guessed: rows between those that are read must be
+summaries by word or by arithmetic, observations must be told apart by what stands beside them, and what the file leaves open
+(where lines lie, a unit, which points belong together) is asked as of any other.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Verbatim, commas, names, say
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.jobs.columns import COORDINATES
+from cmm_uq.jobs.importing import format as units
+from cmm_uq.jobs.importing.blocks import CutSheet, transposed, unit_elsewhere
+from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact
+from cmm_uq.jobs.importing.coordinates import points_in, rows_of_axes, runs_in
+from cmm_uq.jobs.importing.factors import (
+    LINE,
+    RUN,
+    Label,
+    codes,
+    counted,
+    hint,
+    in_turn,
+    lines_and_runs,
+    numbered_runs,
+    parts_of,
+    together,
+    ways_of,
+)
+from cmm_uq.jobs.importing.format import (
+    UNITS,
+    Cell,
+    Fact,
+    ImportKeys,
+    NotReadError,
+    Sheet,
+    Sources,
+    WrittenUnit,
+    length_named,
+)
+from cmm_uq.jobs.importing.header import REMARK, SUMMARY, Header, is_summary, plain_words, shown, words_of
+from cmm_uq.jobs.importing.interferometer import AxisRun
+from cmm_uq.jobs.importing.length_columns import lengths_in
+from cmm_uq.jobs.importing.lengths import MeasuredLengths
+from cmm_uq.jobs.importing.numbering import numbered_points
+from cmm_uq.jobs.importing.roles import SheetReading, each, heading, joined, labels_of, said, said_by
+
+ROWS_MOST = 20_000  # of a sheet that is understood this way
+
+
+def reading_of(
+    sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
+) -> tuple[SheetReading, list[str], CutSheet] | None:
+    """What all sheets hold, rows that are left out, and the first sheet that is read; ``None`` where nothing is understood.
+
+    What one sheet asks is asked where no other is read.
+    """
+    found: list[tuple[SheetReading, CutSheet]] = []
+    problem: NotReadError | None = None
+    for sheet in sheets:
+        own: list[tuple[SheetReading, CutSheet]] = []
+        both = (sheet, transposed(sheet)) if len(sheet.rows) <= ROWS_MOST else ()
+        for one in filter(None, both):
+            try:
+                own = own or _of_sheet(one, keys, where, turned=one is not sheet)
+            except NotReadError as error:
+                problem = problem or error
+        found += own
+    kinds = Counter[str]()
+    for reading, _ in found:
+        kinds[reading.kind] += len(reading.figures)
+    kind = next((kind for kind in ("runs", "points", "lengths") if kind in kinds), "")
+    chosen = [one for one in found if one[0].kind == kind]
+    # deviations of lengths that are there, and small tables beside a large one, are the same again
+    chosen = [one for one in chosen if not one[0].deviations] or chosen
+    chosen = [one for one in chosen if len(one[0].figures) * 8 > max(len(other[0].figures) for other in chosen)]
+    if not chosen and problem is not None:
+        raise problem
+    if not chosen or (
+        kind == "points" and not _counted_sheets([*dict.fromkeys(grid.sheet.name for _, grid in chosen)])
+    ):
+        return None
+    left_out: list[str] = []
+    for reading, grid in chosen:
+        if (told := _left_out(reading, grid)) is None:
+            return None
+        left_out += told
+        for labels, row in zip(reading.labels, reading.rows, strict=True):
+            labels["sheet", ""] = grid.sheet.name
+            labels |= {("place", ""): grid.places_of[row]} if row in grid.places_of else {}
+    return joined([reading for reading, _ in chosen]), left_out, chosen[0][1]
+
+
+def _called(reading: SheetReading) -> bool:
+    """Whether words say which lengths, or targets, those that were measured are of: else rows are no columns."""
+    return any(c.role for name in ("reference_mm", "target") for c in reading.taken.get(name, ()))
+
+
+def _counted_sheets(sheets: Sequence[str]) -> bool:
+    """Whether names of sheets count measurements or repeats, and are no tables of different things."""
+    return len({re.sub(r"\d+", "0", name) for name in sheets}) == 1 or all(hint(name, lengths=False) for name in sheets)
+
+
+def _of_sheet(
+    sheet: Sheet, keys: Mapping[str, Sources], where: str, *, turned: bool
+) -> list[tuple[SheetReading, CutSheet]]:
+    grid = CutSheet(sheet, keys, where)
+    found = []
+    for blocks, rows in each(grid):
+        usable = [
+            row for row in rows if not is_summary(sheet.rows[row]) and not _void(sheet.rows[row], "void", "feature")
+        ]
+        own = _layout(grid, usable) if usable else []
+        for read in (
+            () if not own else (runs_in, lengths_in) if keys else (points_in, rows_of_axes, runs_in, lengths_in)
+        ):
+            if (reading := read(grid, blocks, own)) is not None and (_called(reading) or not turned):
+                reading.lines = [sheet.lines[row] for row in reading.rows]
+                found.append((reading, grid))
+                break
+    return found
+
+
+def _layout(grid: CutSheet, rows: list[int]) -> list[int]:
+    """Rows that have figures where most of them have."""
+    signs = {row: frozenset(k for k, f in enumerate(grid.figures[row]) if f is not None and f[1] < 1) for row in rows}
+    common = Counter(k for own in signs.values() for k in own)
+    needed = {k for k, n in common.items() if n > 0.6 * len(rows)}
+    return [row for row in rows if not needed or len(signs[row] & needed) * 2 > len(needed)]
+
+
+def _void(row: Sequence[Cell], *tables: str) -> bool:
+    """Whether a cell of a row says that it is no measured point or length."""
+    known = frozenset().union(*(words_of("rows")[table] for table in tables))
+    return any(isinstance(cell, str) and " ".join(plain_words(cell)) in known for cell in row)
+
+
+def _left_out(reading: SheetReading, grid: CutSheet) -> list[str] | None:
+    """Rows with figures beside those that are read; ``None`` where one of them may be measured."""
+    taken, heads = {*reading.rows, *reading.others}, {row for block in grid.blocks for row in block.head}
+    told = []
+    for row in range(min(taken), len(grid.sheet.rows)):
+        figures = [k for k, f in enumerate(grid.figures[row]) if f is not None and f[1] < 1]
+        if grid.kinds[row] == "text" and row < max(taken) and row not in heads and not _counts(grid, row):
+            told.append(shown(grid.sheet, row, REMARK))
+        if row in taken or not figures or grid.kinds[row] != "figures":
+            continue
+        if row < max(taken) and not _explained(grid, row, figures, reading):
+            return None
+        told.append(shown(grid.sheet, row, SUMMARY))
+    places = (grid.sheet.at("", row, i, heading(grid.path(row, i))) for row, i in reading.blank)
+    return told + [f"{place.removeprefix(': ').strip()}: nothing in the cell" for place in places]
+
+
+def _counts(grid: CutSheet, row: int) -> bool:
+    """Whether a row of text is the title of a line or a run."""
+    texts = [grid.text(row, k) for k in range(len(grid.sheet.rows[row])) if grid.text(row, k)]
+    return any(hint(text, lengths=True) in (LINE, RUN) for text in texts[:1])
+
+
+def _explained(grid: CutSheet, row: int, figures: Sequence[int], reading: SheetReading) -> bool:
+    """Whether a row is void or a summary by its words or by arithmetic, or has none of the columns that are read."""
+    cells = grid.sheet.rows[row]
+    if (
+        is_summary(cells)
+        or _void(cells, "void", "feature")
+        or said([grid.text(row, k) for k in range(len(cells)) if k not in figures]) == "summary"
+    ):
+        return True
+    alone = len(figures) < 2 or {*grid.of_block(row)}.isdisjoint(reading.rows)
+    if (alone and reading.columns.isdisjoint(figures)) or grid.other_quantity(row):
+        return True
+    for k in {*figures} & reading.columns:
+        above = [
+            f[0]
+            for r in grid.of_block(row)
+            if r in {*reading.rows} and k < len(grid.figures[r]) and (f := grid.figures[r][k])
+        ]
+        value, step = grid.figures[row][k] or (0.0, 1.0)
+        sums = (np.mean(above), max(above), min(above), np.ptp(above), np.std(above, ddof=1)) if len(above) > 1 else ()
+        if not any(abs(value - one) <= 1.05 * step for one in sums):
+            return False
+    return True
+
+
+@dataclass
+class Understanding:
+    """What a file holds: places with their numbers, lengths on lines, or runs along axes."""
+
+    reading: SheetReading
+    sheets: Sequence[Sheet]
+    left_out: list[str]
+    grid: CutSheet
+    labels: list[Label]
+    places: dict[str, str] = field(default_factory=dict)  # of lines, where the file says them
+
+    @property
+    def kind(self) -> str:
+        return self.reading.kind
+
+    def unit(self, keys: ImportKeys, where: str, reach_mm: float | None) -> tuple[WrittenUnit, Fact]:
+        """The unit of lengths: of heads, file or job, the one that the file mentions, or by the size of the machine."""
+        of_file, of_job = length_named(self.sheets[0].unit or ""), length_named(keys.unit or "")
+        every = [
+            (self.reading.unit, say("in the headings")),
+            (of_file, say("in the file")),
+            (of_job, say("by the key unit")),
+        ]
+        stated = [(unit, how) for unit, how in every if unit is not None]
+        if len({unit.name for unit, _ in stated}) > 1:
+            each_ = " and ".join(f"{unit.name} {how}" for unit, how in stated)
+            raise CmmUqError(f"the unit is {each_}", where=where, fix="Mend the file, or leave out unit")
+        if not stated and (unit := unit_elsewhere(self.sheets, small=False)) is not None:
+            stated = [(unit, say("the only one that the file mentions"))]
+        figures = np.array(self.reading.figures).T
+        named = zip(COORDINATES if self.kind == "points" else ("reference_mm", "length_mm"), figures, strict=True)
+        written = {name: [(own, None, 0)] for name, own in named if np.isfinite(own).all()}
+        unit, how = stated[0] if stated else by_extent(written, where, reach_mm)
+        return unit, Fact("unit", say("Unit of lengths"), say("{unit}, {how}", unit=Verbatim(unit.name), how=how))
+
+    def facts(self, of_unit: Fact, used: Sequence[str]) -> tuple[Fact, ...]:
+        words = commas(names([word for word in dict.fromkeys(used) if word] or ["–"]))
+        arithmetic = say("words and figures, {count} of them by arithmetic", count=self.reading.checked)
+        unused = [*dict.fromkeys(self.reading.unused)]
+        found = [of_unit, Fact("decimal", say("Decimal sign"), SIGNS[self.grid.sign])]
+        found.append(Fact("understood", say("Columns understood by"), arithmetic))
+        found.append(Fact("told_apart", say("Told apart by"), words))
+        found += [Fact("not_used", say("Columns not used"), commas(names(unused)))] if unused else []
+        sheet = (
+            [Fact("sheet", say("Sheet"), commas(names([one.name for one in self.sheets])))]
+            if self.sheets[0].name
+            else []
+        )
+        return (*sheet, *self.sheets[0].facts, *found, *left_out_fact(self.left_out))
+
+    @property
+    def sources(self) -> dict[str, str]:
+        further = {name: name for name in self.reading.covariates}
+        return {
+            name: ", ".join(heading(c.path) for c in own) for name, own in self.reading.taken.items() if own
+        } | further
+
+    @property
+    def header(self) -> Header:
+        """Head of the first block that is read, and which of its columns are taken."""
+        row = self.reading.rows[0]
+        block = next(block for block in self.grid.blocks if row in block.rows)
+        taken = {name: tuple(c.i for c in own if c.i >= 0) for name, own in self.reading.taken.items()}
+        return Header(
+            block.head[-1] if block.head else row, block.rows[0], [heading(path) for path in block.paths], taken
+        )
+
+    def lengths(self, keys: ImportKeys, where: str, reach_mm: float | None) -> MeasuredLengths:
+        unit, of_unit = self.unit(keys, where, reach_mm)
+        figures, place = np.array(self.reading.figures), self.grid.at(self.header.row)
+        lines, runs, used = lines_and_runs(
+            self.labels, codes([None if np.isnan(one) else one for one in figures[:, 0]]), place
+        )
+        reference, measured = (units.converted(own, unit, "length_mm") for own in figures.T)
+        if self.reading.deviations:
+            said_mm = UNITS["mm"] if "deviation_mm" in keys.columns else None
+            if (small := self.reading.small or said_mm or unit_elsewhere(self.sheets, small=True)) is None:
+                bare = self.reading.taken["deviation_um"]
+                what = f"nothing says the unit of {heading(bare[0].path)!r}: µm or mm"
+                raise NotReadError(what, where=place, fix=said_by("deviation_um", bare, ", or deviation_mm"))
+            measured = reference + units.converted(figures[:, 1], small, "length_mm")
+        self.places = _places(lines, self.reading, measured, unit)
+        bare_ = [None if np.isnan(one) else float(one) for one in reference]
+        facts, own, out = self.facts(of_unit, used), self.reading, tuple(self.left_out)
+        numbers, values = runs.tolist(), measured.tolist()
+        return MeasuredLengths(lines, bare_, numbers, values, own.lines, own.covariates, self.sources, facts, out)
+
+    def points(
+        self, keys: ImportKeys, where: str, reach_mm: float | None
+    ) -> tuple[dict[str, Floats], tuple[Fact, ...]]:
+        unit, of_unit = self.unit(keys, where, reach_mm)
+        xyz = np.column_stack([units.converted(own, unit, "x_mm") for own in np.array(self.reading.figures).T])
+        numbers, facts = numbered_points(self.labels, xyz, keys, where)
+        further = {name: np.array(own) for name, own in self.reading.covariates.items()}
+        return {**numbers, **dict(zip(COORDINATES, xyz.T, strict=True)), **further}, (*self.facts(of_unit, []), *facts)
+
+    def runs(self, where: str) -> list[AxisRun]:
+        """Runs along axes, each with its targets in turn."""
+        figures = np.array(self.reading.figures)
+        small = self.reading.small or unit_elsewhere(self.sheets, small=True) or UNITS["um"]
+        unit = self.reading.unit or unit_elsewhere(self.sheets, small=False) or UNITS["mm"]
+        target = units.converted(figures[:, 0], unit, "x_mm")
+        deviation = units.converted(figures[:, 1], small, "reading_um")
+        texts = ([f"{label.words} {value}" for value in label.values] for label in self.labels)
+        named = ([_axis_in(text) for text in own] for own in texts)
+        axes = next((own for own in named if all(own)), [_axis_of(self.sheets)] * len(target))
+        ways = next((found for label in self.labels if (found := ways_of(label.values)) is not None), None)
+        parts = [part for label in self.labels for part in (label, *parts_of(label))]
+        run = next((part for part in parts if counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)
+        key = codes([*zip(axes, ways or [0] * len(target), strict=True)])
+        numbers = numbered_runs(run.values) if run is not None else in_turn(together(key, codes(target.tolist())))
+        if ways is None:
+            ways = _by_order(target, numbers)
+        runs: dict[tuple[str, int, int], AxisRun] = {}
+        for k, one in enumerate(zip(axes, ways, numbers.tolist(), strict=True)):
+            runs.setdefault(one, AxisRun(*one, [])).targets.append(
+                (float(target[k]), float(deviation[k]), self.reading.lines[k])
+            )
+        if any(len({t for t, _, _ in one.targets}) < len(one.targets) for one in runs.values()):
+            raise NotReadError("a run has a target twice", where=where, fix="Number the runs in a column")
+        return list(runs.values())
+
+
+def _places(names: Sequence[str], reading: SheetReading, measured: Floats, unit: WrittenUnit) -> dict[str, str]:
+    """Where lines lie, by the starts and ends that stand above them, which must be as far apart as their lengths need."""
+    places = {}
+    for name in dict.fromkeys(names):
+        own = [k for k, one in enumerate(names) if one == name]
+        said_ = {reading.labels[k].get(("place", ""), "") for k in own}
+        if len(said_) == 1 and (text := said_.pop()):
+            ends = units.converted(
+                np.array([[float(one) for one in part.split(",")] for part in text.split(" to ")]), unit, "x_mm"
+            )
+            if measured[own].max() * 0.98 - 1 <= np.linalg.norm(ends[1] - ends[0]) <= 3 * measured[own].max():
+                places[name] = "from " + " to ".join(",".join(f"{one:.10g}" for one in end) for end in ends)
+    return places
+
+
+_AXES = "axis|achse|axe|asse|eje|eixo|osa|oś|axel|軸|轴|축"
+_AXIS_NAME = re.compile(rf"(?:{_AXES})\W{{0,3}}([XYZ])\b|\b([XYZ])[- ]?(?:{_AXES})", re.IGNORECASE)
+
+
+def _axis_in(text: str) -> str:
+    found = _AXIS_NAME.search(text)
+    return (found[1] or found[2]).upper() if found else ""
+
+
+def _axis_of(sheets: Sequence[Sheet]) -> str:
+    """The axis that the first texts of a file name."""
+    texts = (text for sheet in sheets for text in (sheet.name, *(" ".join(map(str, row)) for row in sheet.rows[:60])))
+    return next(filter(None, map(_axis_in, texts)), "1")
+
+
+def _by_order(target: Floats, numbers: Ints) -> list[int]:
+    """Senses of runs by the order of their targets; 0 where all are listed in one order."""
+    senses = {n: int(np.sign(target[numbers == n][-1] - target[numbers == n][0])) for n in np.unique(numbers).tolist()}
+    return [senses[n] if len({*senses.values()}) > 1 else 0 for n in numbers.tolist()]
+
+
+def understand(
+    alternatives: Iterable[Sequence[Sheet]], keys: Mapping[str, Sources], where: str, *, points: bool
+) -> Understanding | None:
+    """The reading that figures confirm most, of the ways of cutting a file into cells; ``None`` where there is none.
+
+    points : whether one of points is looked for; what words and figures leave open is asked where no way is read.
+    """
+    best: Understanding | None = None
+    problem: NotReadError | None = None
+    for sheets in alternatives:
+        try:
+            found = reading_of(sheets, keys, where)
+        except NotReadError as error:
+            problem, found = problem or error, None
+        if found is None or (found[0].kind == "points" and not points):
+            continue
+        own = Understanding(found[0], sheets, found[1], found[2], labels_of(found[0]))
+        if best is None or (own.reading.checked, len(own.reading.figures)) > (
+            best.reading.checked,
+            len(best.reading.figures),
+        ):
+            best = own
+        if sheets[0].listed:
+            break
+    if best is None and problem is not None:
+        raise problem
+    return best
