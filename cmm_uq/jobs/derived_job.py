@@ -99,6 +99,8 @@ def _changed(
     # certified values stand in every recording that is written
     if "file" in document["artefact"].get("certificate", {}):
         _drop(document["artefact"]["certificate"], ("file", *FileKeys.model_fields))
+    if not {"u_um", "U_um"} & document["artefact"].keys():  # of columns alone, which are written with what it adds to u
+        _drop(document["artefact"], ("degrees_of_freedom",))
     _state(document["artefact"], certified)
     if file is not None:  # the recording in the project's own format, without the keys by which it was imported
         document["recording"]["file"] = file
