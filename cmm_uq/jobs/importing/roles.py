@@ -187,9 +187,18 @@ def agrees(deviation: FigureColumn, measured: FigureColumn, reference: FigureCol
     return away.size > 0 and bool((away <= 0.525 * step + 1e-9).all())
 
 
+def _counts_with(a: FigureColumn, b: FigureColumn) -> bool:
+    """Whether the heads of two columns are alike but for their numbers."""
+    heads = [re.sub(r"\d+", "0", one.heading) for one in (a, b)]
+    return heads[0] == heads[1] and a.heading != b.heading
+
+
 def mean_of(column: FigureColumn, others: Sequence[FigureColumn], *, worst: bool = False) -> bool:
-    """Whether a column is the mean, range or standard deviation of others; with ``worst`` also the largest of them."""
-    if len(others) < 2:
+    """Whether a column is the mean, range or standard deviation of others; with ``worst`` also the largest of them.
+
+    One whose head counts as theirs do is another run, though the last printed digit would let it be their mean.
+    """
+    if len(others) < 2 or any(_counts_with(column, one) for one in others):
         return False
     own = np.column_stack([one.values for one in others])
     if not np.isfinite(own).all() or not column.full:

@@ -377,4 +377,22 @@ def understand(
             break
     if best is None and problem is not None:
         raise problem
+    if best is not None:
+        _refuse_either_sign(best.grid)
     return best
+
+
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+")
+
+
+def _refuse_either_sign(grid: CutSheet) -> None:
+    """Figures that may be thousands or thousandths, where none of the sheet tells."""
+    texts = [
+        (row, i) for row, own in enumerate(grid.figures) for i, f in enumerate(own) if f and "," in grid.text(row, i)
+    ]
+    if grid.sheet.decimal is None and texts and all(_THOUSANDS.fullmatch(grid.text(*one)) for one in texts):
+        first = grid.text(*texts[0])
+        both = (
+            f"{first!r} can be {first.replace(',', '')} or {first.replace(',', '.')}, and no number of the sheet tells"
+        )
+        raise CmmUqError(both, where=grid.at(*texts[0]), fix='Say decimal = "," or decimal = "."')

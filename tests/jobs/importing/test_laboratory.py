@@ -129,3 +129,29 @@ def test_a_reading_is_shown_by_an_example_in_words() -> None:
     assert example(raised.value.lengths) == "line Position 1, run 1: 100.0000 mm measured as 99.9980 mm, -2 µm"
     points = read("Measurement;Point;X [mm];Y [mm];Z [mm]\n1;1;120.00123;0;1\n")
     assert example(points) == "measurement 1, point 1, x 120.0012 mm, y 0.0000 mm, z 1.0000 mm"
+
+
+RUNS_OF_THREE = """Verification record;;;
+Line {n};;;
+Nominal mm;Run 1 mm;Run 2 mm;Run 3 mm
+1{sign}0{zeros};1{sign}0{zeros};1{sign}2{zeros};1{sign}1{zeros}
+2{sign}0{zeros};2{sign}1{zeros};2{sign}3{zeros};2{sign}2{zeros}
+3{sign}0{zeros};3{sign}2{zeros};3{sign}0{zeros};3{sign}1{zeros}
+"""
+
+
+def test_the_third_run_is_no_mean_of_the_first_two_though_its_last_digit_would_let_it_be() -> None:
+    content = "".join(RUNS_OF_THREE.format(n=n, sign=".", zeros="") for n in (1, 2)).replace(".", ".00")
+    with pytest.raises(UnplacedError) as asked:
+        read(content)
+    assert [sorted({*one.repeat}) for one in asked.value.lengths] == [[1, 2, 3]]
+    assert sum(len(one.measured) for one in asked.value.lengths) == 18
+
+
+def test_thousands_or_thousandths_are_asked_where_no_figure_tells() -> None:
+    content = "".join(RUNS_OF_THREE.format(n=n, sign=",", zeros="00") for n in (1, 2))
+    with pytest.raises(CmmUqError, match=r"can be 1000 or 1\.000") as refused:
+        read(content)
+    assert 'decimal = ","' in (refused.value.fix or "")
+    with pytest.raises(UnplacedError):
+        read(content.replace("3,200", "3,2000"))
