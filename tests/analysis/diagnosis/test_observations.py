@@ -9,15 +9,17 @@ from functools import partial
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.held_out import LEAST_OF_SET_UP, MOST, improvement, thin_out
+from cmm_uq.analysis.diagnosis.held_out import LEAST_OF_SET_UP, MOST, improvement, thin_out, with_quantities
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, kind_of
+from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.sphere import SphereArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
+from tests.artefacts.test_axis_runs import joined, run
 from tests.conftest import ROOT
 from tests.recordings import TRAVEL, bar_facts, bars
 
@@ -84,6 +86,22 @@ def test_a_point_ahead_of_a_surface_stays_with_its_placing() -> None:
     found = thin_out(RecordingModel(observe(job.points), ()), observe, 0, most=40).artefact
     assert sorted(found.points.measurement[found.points.point == 0].tolist()) == [1, 2]
     assert len(found.measurement) == 2 * LEAST_OF_SET_UP
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.01])
+def test_runs_read_at_the_same_places_keep_their_repeats_and_those_in_motion_are_thinned(apart: float) -> None:
+    """Repeats at one place cost a model of the machine nothing; read elsewhere each is a place more."""
+    facts = artefact_facts(kind="axis_runs", u_scale_um_per_m=0.1)
+    at = np.arange(10.0, 890.0, 4.0)
+    rows = run(1, np.eye(3)[0], at=at, repeats=3)
+    rows["xyz"] = rows["xyz"] + apart * rows["repeat"][:, None] * np.eye(3)[0]
+    rows["reading_um"] = np.sin(rows["xyz"][:, 0] / 100)
+    artefact = AxisRuns(facts, joined(rows))
+    whole = RecordingModel(artefact, ())
+    found = with_quantities(whole, partial(AxisRuns, facts), 0, 100)
+    assert len(artefact.points) > 3 * 400
+    count = int(found.used.sum())
+    assert 400 <= count < 403 if apart else 1200 <= count < 1203  # whole quantities, three readings each
 
 
 def test_what_is_not_used_is_not_drawn() -> None:
