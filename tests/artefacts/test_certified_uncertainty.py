@@ -140,10 +140,10 @@ def test_one_length_has_the_u_of_the_formula_at_it(kind: str) -> None:
     assert (found.U_um, found.k) != (None, None)
 
 
-def test_degrees_of_freedom_give_the_factor_where_none_is_stated() -> None:
-    """Student's t for 95 % and 10: 2.228 (JCGM 100:2008, table G.2: 2.23)."""
-    assert facts(U_um=0.4, degrees_of_freedom=10.0).u_of(100.0) == pytest.approx(0.4 / 2.228, rel=1e-4)
-    assert facts(U_um=0.4, k=2.0, degrees_of_freedom=10.0).u_of(100.0) == pytest.approx(0.2)
+def test_with_few_degrees_of_freedom_u_is_that_of_the_normal_distribution_with_the_same_interval() -> None:
+    """U = t·u with Student's t for 95 % and 10, 2.228 (JCGM 100:2008, table G.2: 2.23); 1.960 of a normal one."""
+    assert facts(U_um=0.4, degrees_of_freedom=10.0).u_of(100.0) == pytest.approx(0.4 / 1.960, rel=1e-4)
+    assert facts(U_um=0.4, k=2.0, degrees_of_freedom=10.0).u_of(100.0) == pytest.approx(0.2 * 2.228 / 1.960, rel=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -171,9 +171,16 @@ def set_up_information(setting: Setting, placings: Sequence[SetUp], also: tuple[
     if setting.planning.shared:
         return shared(setting.model(points, also), setting.noise)
     numbers = np.unique(points.measurement)
-    matrices = []
-    for part in np.split(numbers, range(_TOGETHER, len(numbers), _TOGETHER)):
-        model = setting.model(points.select(np.isin(points.measurement, part)), also)
+    matrices, parts = list[Floats](), np.split(numbers, range(_TOGETHER, len(numbers), _TOGETHER))
+    while parts:
+        part = parts.pop(0)
+        try:
+            model = setting.model(points.select(np.isin(points.measurement, part)), also)
+        except CmmUqError:  # of a kind that refuses some together, and none alone
+            if len(part) == 1:
+                raise
+            parts = [*np.split(part, len(part)), *parts]
+            continue
         matrices.append(by_measurement(model, np.array([u.prior_mean for u in model.unknowns]), setting.noise))
     unknowns, sizes = model.unknowns, model.artefact.sizes
     names = {(ARTEFACT, size.name) for size in sizes if size.role == "sought"}
