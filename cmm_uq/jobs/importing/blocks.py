@@ -28,6 +28,10 @@ _PRINTED = re.compile(r"\d[.,]\d")
 _DECIMAL = re.compile(r"^[^\d]*\d+[.,]\d+\D*$")
 _SAYS_UNIT = re.compile(r"\bunits?\s*[=:]\s*(\w+)", re.IGNORECASE)
 _MENTION = re.compile(r"[^\W\d_]+|µ\w+|\"")
+_BETWEEN = r"[\s;,]+(?:[YZ]\s*[=:]?\s*)?"
+_THREE = {
+    sign: re.compile(r"[^\d+−-]{0,20}?" + _BETWEEN.join([rf"([+−-]?\d+(?:[{sign}]\d+)?)"] * 3), re.I) for sign in ".,"
+}
 SMALL = ("um", "nm", "microinch")  # units of deviations
 DEEPEST = 4  # rows of a head
 WORD = re.compile(r"[^\W\d_]+")
@@ -100,16 +104,8 @@ class CutSheet:
         return np.array([value for value, _ in own]), np.array([step for _, step in own])
 
     def place(self, i: int) -> dict[str, tuple[float, ...]]:
-        """Start and end of a line, where a row gives three figures after a word for one of them."""
-        found = {}
-        for k, cell in enumerate(self.sheet.rows[i]):
-            if not isinstance(cell, str) or not cell or self.figures[i][k] is not None:
-                continue
-            which = _ends_named(cell)
-            after = [f for f in self.figures[i][k + 1 : k + 4] if f is not None]
-            if len(which) == 1 and len(after) == 3:
-                found[which[0]] = tuple(f[0] for f in after)
-        return found
+        """Start, end and direction of a line, where a row gives three figures after a word for one of them."""
+        return places_in(" ".join(self.text(i, k) for k in range(len(self.sheet.rows[i]))), self.sign)
 
     def unit_in(self, rows: Sequence[int], i: int) -> WrittenUnit | None:
         """The unit that every cell of a column has after its figure."""
@@ -126,7 +122,7 @@ class CutSheet:
         whole = " ".join(" ".join(text.split()) for text in path if text)
         own = {f"{i + 1}", *(text.strip().casefold() for text in (whole, *path) if text)}
         every = ((name, str(one)) for name, sources in self.keys.items() for one in sources_of(sources))
-        return next((name for name, one in every if one.strip().casefold() in own), "")
+        return next((name for name, one in every if one.replace("\n", " ").strip().casefold() in own), "")
 
     def path(self, row: int, i: int) -> list[str]:
         """Texts above a cell."""
@@ -199,9 +195,8 @@ class CutSheet:
             for row in pending:
                 if row not in head:
                     texts = [self.text(row, k) for k in range(len(self.sheet.rows[row]))]
-                    place = self.place(row)
-                    stop = next((k for k, one in enumerate(texts) if place and _ends_named(one)), None)
-                    text = " ".join(texts[:stop]).strip()
+                    text = " ".join(texts).strip()
+                    text = _before_place(text) if self.place(row) else text
                     first = WORD.search(text)
                     alone = {"": text} if len([c for c in self.sheet.rows[row] if c != ""]) == 1 else {}
                     titles = {**titles, (first[0].casefold() if first else text): text, **alone}
@@ -213,8 +208,9 @@ class CutSheet:
             block.above += [row for row in pending if row not in head]
             block.rows.append(i)
             place = {name: xyz for row in block.above for name, xyz in self.place(row).items()}
-            if len(place) == 2:
-                self.places_of[i] = " to ".join(",".join(f"{one:g}" for one in place[end]) for end in ("start", "end"))
+            if "start" in place and len(place) > 1:
+                other = "end" if "end" in place else "direction"
+                self.places_of[i] = f" {other} ".join(",".join(map(repr, place[one])) for one in ("start", other))
             block.titles.append(titles)
             pending = []
         if block is not None:
@@ -256,10 +252,25 @@ class CutSheet:
         return [[level[k] for level in levels] for k in range(self.width)]
 
 
-def _ends_named(text: str) -> list[str]:
-    """Which ends of a line a text names."""
-    words = [word for word in plain_words(text) if len(word) > 2 or not word.isascii()]
-    return [name for name, those in words_of("places").items() if not those.isdisjoint(words)]
+def _named_places(text: str) -> Iterator[tuple[re.Match[str], str]]:
+    """Words for the start, the end or the direction of a line, and which of them they are."""
+    for match in WORD.finditer(text):
+        word = " ".join(plain_words(match[0]))
+        if len(word) > 2 or not word.isascii():
+            yield from ((match, name) for name, those in words_of("places").items() if word in those)
+
+
+def places_in(text: str, sign: str) -> dict[str, tuple[float, ...]]:
+    """Start, end and direction of a line that a text gives, three figures after a word for each."""
+    found = {}
+    for match, name in _named_places(text) if sum(map(str.isdigit, text)) > 2 else ():
+        if three := _THREE[sign].match(text, match.end()):
+            found[name] = tuple(float(figure.replace("−", "-").replace(",", ".")) for figure in three.groups())
+    return found
+
+
+def _before_place(text: str) -> str:
+    return text[: next(_named_places(text))[0].start()].strip()
 
 
 def unit_of(path: Sequence[str]) -> WrittenUnit | None:

@@ -280,7 +280,13 @@ def left_out_fact(rows: Sequence[str]) -> list[Fact]:
     """Rows that are left out, by their place and why."""
     if not rows:
         return []
-    shown, more = semicolons(list(map(Verbatim, rows[:_SHOWN]))), len(rows) - _SHOWN
+    alike: dict[tuple[str, str], list[str]] = {}  # numbers of rows, by what stands there and why it is left out
+    for row in rows:
+        place, _, what = row.partition(": ")
+        before, _, last = place.rpartition(" ")
+        alike.setdefault((before, what), []).append(last)
+    told = [f"{before} {', '.join(numbers)}: {what}".strip() for (before, what), numbers in alike.items()]
+    shown, more = semicolons(list(map(Verbatim, told[:_SHOWN]))), len(told) - _SHOWN
     return [
         Fact(
             "left_out",

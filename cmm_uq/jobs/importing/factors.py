@@ -118,8 +118,12 @@ def parts_of(label: Label) -> list[Label]:
             before = values[0] if len({*values}) == 1 and not values[0].isdigit() else ""
         if len(found) > 1 or (found and names is not label.values and found[0].values != label.values):
             return found
-    last = [re.fullmatch(r"(.*?)[\W_]*(\d+)\D*", value) for value in label.values]
-    return [Label(label.words, tuple(m[k] for m in last if m), "part") for k in (1, 2)] if all(last) else []
+    last = [re.fullmatch(r"(.*?([^\W\d_]*))[\W_]*(\d+)\D*", value) for value in label.values]
+    own = [(label.words, [m[1] for m in last if m]), (label.words, [m[3] for m in last if m])]
+    words = {m[2] for m in last if m}
+    if len(words) == 1 and hint(word := words.pop(), lengths=True) == RUN:
+        own[1] = (word, own[1][1])
+    return [Label(of, tuple(values), "part") for of, values in own] if all(last) else []
 
 
 def _halves(label: Label) -> list[Label]:
@@ -184,6 +188,8 @@ def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tupl
     found: list[_Counted] = [
         (one, own, counted(one, lengths=True)) for one, own in _varying(with_parts(labels), lengths=True)
     ]
+    if any(f[0].sort == "title" and f[2] == LINE for f in found):  # then M numbers measurements of a line
+        found = [(f[0], f[1], RUN if f[0].sort == "head" and _counting(f[0].values) else f[2]) for f in found]
     plain = [f for f in found if not (several and (fixes(reference, f[1]) or f[1].max() + 1 == count))]
     run = _one_run(labels, [f for f in found if f[2] == RUN and not (several and fixes(reference, f[1]))], place)
     line: list[_Counted] = []
@@ -249,7 +255,7 @@ def _digits(label: Label) -> bool:
 
 def with_parts(labels: Sequence[Label]) -> list[Label]:
     """Labels, and the parts of names among them."""
-    names = (label for label in labels if label.sort in ("column", "head") and len({*label.values}) > 1)
+    names = (label for label in labels if label.sort in ("column", "head", "title") and len({*label.values}) > 1)
     return [*labels, *(part for label in names for part in parts_of(label))]
 
 

@@ -227,7 +227,8 @@ def _place(source: str | int, headings: Sequence[str]) -> int | None:
     """Index of the column that a job names by heading or number."""
     if isinstance(source, int):
         return source - 1 if source <= len(headings) else None
-    for name, among in ((source.strip(), headings), (source.strip().casefold(), [h.casefold() for h in headings])):
+    source = " ".join(source.split("\n")).strip()
+    for name, among in ((source, headings), (source.casefold(), [h.casefold() for h in headings])):
         if name in among:
             return list(among).index(name)
     return None

@@ -160,6 +160,9 @@ def _lengths(
     units = [c.unit for c in (*(() if deviations else source), *([base] if base else [])) if c.unit and not c.minute]
     if not units and abs(factor - 1e-3) < 1e-12 and any(c.unit is not None and c.unit.name == "um" for c in small):
         units = [UNITS["mm"]]  # by which measured minus reference is the deviation in µm
+    left = [c for c in group if c not in source and c is not base and c.role not in (*_BASES, SUMMARY)]
+    if any(c.step < 1 and c.full and not mean_of(c, source, worst=True) for c in left):
+        return None  # measured as well, for all that is known
     reading = SheetReading("lengths", units[0] if units else unit_beside(grid, rows), None, checked, deviations)
     reading.small = UNITS[named.pop()] if named else None
     reading.taken = {"reference_mm": [base] if base else [], ("deviation_um" if deviations else "length_mm"): source}

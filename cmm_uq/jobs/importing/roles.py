@@ -15,9 +15,10 @@ import numpy as np
 
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.columns import OPTIONAL
+from cmm_uq.jobs.importing import header
 from cmm_uq.jobs.importing.blocks import DATED, SMALL, Block, CutSheet, unit_of
-from cmm_uq.jobs.importing.factors import Label, hint
-from cmm_uq.jobs.importing.format import LENGTH, UNITS, WrittenUnit, converted, sort_of, unit_named
+from cmm_uq.jobs.importing.factors import LINE, RUN, Label, hint
+from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, WrittenUnit, converted, sort_of, unit_named
 from cmm_uq.jobs.importing.header import plain_words, understood, without_unit, words_of
 
 SUMMARY, DEVIATION, MEASURED, REFERENCE, NOMINAL, TARGET = (
@@ -36,6 +37,7 @@ _ROLES = {
     "deviation_mm": DEVIATION,
 }
 _CLAIMS = {REFERENCE: {REFERENCE, NOMINAL, TARGET}, MEASURED: {MEASURED, DEVIATION}, DEVIATION: {DEVIATION, MEASURED}}
+_SEVERAL = re.compile(r"([+-]?\d+[.,]\d+\s+){1,}[+-]?\d+[.,]\d+")
 _ABBREVIATED = re.compile(r"[^\W\d_]{4,}(?=\.)")
 _FURTHER = tuple(name for name in OPTIONAL if name != "repeat" and not name.startswith("reference"))
 
@@ -302,3 +304,65 @@ def each(grid: CutSheet) -> Iterator[tuple[list[Block], list[int]]]:
         by_head.setdefault(tuple(map(tuple, block.paths)), []).append(block)
     for blocks in by_head.values():
         yield blocks, [row for block in blocks for row in block.rows]
+
+
+def is_void(row: Sequence[Cell], *tables: str) -> bool:
+    """Whether a cell of a row says that it is no measured point or length."""
+    known = frozenset().union(*(words_of("rows")[table] for table in tables))
+    return any(isinstance(cell, str) and " ".join(plain_words(cell)) in known for cell in row)
+
+
+def rows_left_out(reading: SheetReading, grid: CutSheet) -> list[str] | None:
+    """Rows with figures beside those that are read; ``None`` where one of them may be measured."""
+    taken, heads = {*reading.rows, *reading.others}, {row for block in grid.blocks for row in block.head}
+    if any(
+        isinstance(cell, str) and _SEVERAL.fullmatch(cell.strip()) for row in taken for cell in grid.sheet.rows[row]
+    ):
+        return None  # cells that were not cut apart
+    told = []
+    for row in range(min(taken), len(grid.sheet.rows)):
+        figures = [k for k, f in enumerate(grid.figures[row]) if f is not None and (f[1] < 1 or k in reading.columns)]
+        if grid.kinds[row] == "text" and row < max(taken) and row not in heads and not _counts(grid, row):
+            told.append(header.shown(grid.sheet, row, header.REMARK))
+        if row in taken or not figures or grid.kinds[row] != "figures":
+            continue
+        last = max(taken)
+        within = row < last or grid.sheet.lines[row] - grid.sheet.lines[last] == row - last  # without a gap
+        if within and not _explained(grid, row, figures, reading):
+            return None
+        told.append(header.shown(grid.sheet, row, header.SUMMARY))
+    if any(map(str.isdigit, "".join(grid.text(row, i) for row, i in reading.blank))):
+        return None
+    places = (grid.sheet.at("", row, i, heading(grid.path(row, i))) for row, i in reading.blank)
+    return told + [f"{place.removeprefix(': ').strip()}: nothing in the cell" for place in places]
+
+
+def _counts(grid: CutSheet, row: int) -> bool:
+    """Whether a row of text is the title of a line or a run."""
+    texts = [grid.text(row, k) for k in range(len(grid.sheet.rows[row])) if grid.text(row, k)]
+    return any(hint(text, lengths=True) in (LINE, RUN) for text in texts[:1])
+
+
+def _explained(grid: CutSheet, row: int, figures: Sequence[int], reading: SheetReading) -> bool:
+    """Whether a row is void or a summary by its words or by arithmetic, or has none of the columns that are read."""
+    cells = grid.sheet.rows[row]
+    if (
+        header.is_summary(cells)
+        or is_void(cells, "void", "feature")
+        or said([grid.text(row, k) for k in range(len(cells)) if k not in figures]) == "summary"
+    ):
+        return True
+    alone = len(figures) < 2 or {*grid.of_block(row)}.isdisjoint(reading.rows)
+    if (alone and reading.columns.isdisjoint(figures)) or grid.other_quantity(row):
+        return True
+    for k in {*figures} & reading.columns:
+        above = [
+            f[0]
+            for r in grid.of_block(row)
+            if r in {*reading.rows} and k < len(grid.figures[r]) and (f := grid.figures[r][k])
+        ]
+        value, step = grid.figures[row][k] or (0.0, 1.0)
+        sums = (np.mean(above), max(above), min(above), np.ptp(above), np.std(above, ddof=1)) if len(above) > 1 else ()
+        if not any(abs(value - one) <= 1.05 * step for one in sums):
+            return False
+    return True

@@ -24,6 +24,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.csv_table import lines_within
 from cmm_uq.base.files.limits import CELL, COLUMNS, LINE, LINES, ROWS, UNPACKED
 from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.jobs.importing.blocks import places_in
 from cmm_uq.jobs.importing.encodings import HOSTILE_FIX, decoded, head_text, local
 from cmm_uq.jobs.importing.format import DELIMITERS, Cell, Fact, Format, ImportKeys, Sheet
 from cmm_uq.jobs.importing.header import LINES_BEFORE, REFERENCES, header_of, understood
@@ -36,6 +37,7 @@ _TITLES: dict[str, Text] = {
 _TOKEN, _PHRASE = re.compile(r"\S+"), re.compile(r"\S+(?: \S+)*")
 _POINT = re.compile("[.,]")
 _NUMBER = re.compile(r"[±+-]?\d[\d.,]*%?|[±+-]?[.,]\d+")
+_LINES = re.compile(r"\s*[\r\n]\s*")  # of a heading in a cell
 _KNOWN = 2  # headings that are understood, by which another separator than single blanks is taken
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 Rows = tuple[list[list[str]], list[int]]  # cells of every line, and their lines
@@ -111,10 +113,11 @@ def in_columns(lines: Sequence[str]) -> Iterator[list[str]]:
     """Cells of lines by where they stand: columns are where figures stand below each other, heads go to the nearest."""
     tokens = [[(m.start(), m.end(), m[0]) for m in _TOKEN.finditer(line.expandtabs())] for line in lines]
     figured = [len([t for t in own if _NUMBER.fullmatch(t[2])]) for own in tokens]
-    both = zip(figured, tokens, strict=True)
     counted = [
-        2 * n >= len(own) > 0 and (n > 1 or (len(own) <= 3 and any(_POINT.search(t[2]) for t in own)))
-        for n, own in both
+        2 * n >= len(own) > 0
+        and (n > 1 or (len(own) <= 3 and any(_POINT.search(t[2]) for t in own)))
+        and not (n > 2 and any(places_in(line, sign) for sign in ".,"))
+        for n, own, line in zip(figured, tokens, lines, strict=True)
     ]
     spans = _spans([t for own, is_row in zip(tokens, counted, strict=True) if is_row for t in own])
     for own, is_row, line in zip(tokens, counted, lines, strict=True):
@@ -302,7 +305,7 @@ def _excel_cell(value: Any) -> Cell:
         return float(value)
     if isinstance(value, (dt.date, dt.time)):
         return value.isoformat()
-    return "" if value is None else str(value).strip()
+    return "" if value is None else _LINES.sub(" ", str(value)).strip()
 
 
 class OpenDocument(Format):
@@ -372,7 +375,7 @@ def _ods_value(element: Element) -> Cell:
     for key in ("date-value", "time-value", "boolean-value"):
         if text := element.get(f"{_OFFICE}{key}"):
             return text
-    return "\n".join("".join(part.itertext()) for part in element if local(part) == "p").strip()
+    return " ".join("".join(part.itertext()) for part in element if local(part) == "p").strip()
 
 
 def _count(element: Element, key: str) -> int:

@@ -23,7 +23,6 @@ from cmm_uq.jobs.importing.blocks import CutSheet, transposed, unit_elsewhere
 from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact
 from cmm_uq.jobs.importing.coordinates import points_in, rows_of_axes, runs_in
 from cmm_uq.jobs.importing.factors import (
-    LINE,
     RUN,
     Label,
     codes,
@@ -38,7 +37,6 @@ from cmm_uq.jobs.importing.factors import (
 )
 from cmm_uq.jobs.importing.format import (
     UNITS,
-    Cell,
     Fact,
     ImportKeys,
     NotReadError,
@@ -47,12 +45,12 @@ from cmm_uq.jobs.importing.format import (
     WrittenUnit,
     length_named,
 )
-from cmm_uq.jobs.importing.header import REMARK, SUMMARY, Header, is_summary, plain_words, shown, words_of
+from cmm_uq.jobs.importing.header import Header, is_summary
 from cmm_uq.jobs.importing.interferometer import AxisRun
 from cmm_uq.jobs.importing.length_columns import lengths_in
 from cmm_uq.jobs.importing.lengths import MeasuredLengths
 from cmm_uq.jobs.importing.numbering import numbered_points
-from cmm_uq.jobs.importing.roles import SheetReading, each, heading, joined, labels_of, said, said_by
+from cmm_uq.jobs.importing.roles import SheetReading, each, heading, is_void, joined, labels_of, rows_left_out, said_by
 
 ROWS_MOST = 20_000  # of a sheet that is understood this way
 
@@ -91,7 +89,7 @@ def reading_of(
         return None
     left_out: list[str] = []
     for reading, grid in chosen:
-        if (told := _left_out(reading, grid)) is None:
+        if (told := rows_left_out(reading, grid)) is None:
             return None
         left_out += told
         for labels, row in zip(reading.labels, reading.rows, strict=True):
@@ -117,7 +115,7 @@ def _of_sheet(
     found = []
     for blocks, rows in each(grid):
         usable = [
-            row for row in rows if not is_summary(sheet.rows[row]) and not _void(sheet.rows[row], "void", "feature")
+            row for row in rows if not is_summary(sheet.rows[row]) and not is_void(sheet.rows[row], "void", "feature")
         ]
         own = _layout(grid, usable) if usable else []
         for read in (
@@ -132,64 +130,11 @@ def _of_sheet(
 
 def _layout(grid: CutSheet, rows: list[int]) -> list[int]:
     """Rows that have figures where most of them have."""
-    signs = {row: frozenset(k for k, f in enumerate(grid.figures[row]) if f is not None and f[1] < 1) for row in rows}
+    fine = {k for row in rows for k, f in enumerate(grid.figures[row]) if f is not None and f[1] < 1}
+    signs = {row: frozenset(k for k in fine if k < len(f := grid.figures[row]) and f[k] is not None) for row in rows}
     common = Counter(k for own in signs.values() for k in own)
     needed = {k for k, n in common.items() if n > 0.6 * len(rows)}
     return [row for row in rows if not needed or len(signs[row] & needed) * 2 > len(needed)]
-
-
-def _void(row: Sequence[Cell], *tables: str) -> bool:
-    """Whether a cell of a row says that it is no measured point or length."""
-    known = frozenset().union(*(words_of("rows")[table] for table in tables))
-    return any(isinstance(cell, str) and " ".join(plain_words(cell)) in known for cell in row)
-
-
-def _left_out(reading: SheetReading, grid: CutSheet) -> list[str] | None:
-    """Rows with figures beside those that are read; ``None`` where one of them may be measured."""
-    taken, heads = {*reading.rows, *reading.others}, {row for block in grid.blocks for row in block.head}
-    told = []
-    for row in range(min(taken), len(grid.sheet.rows)):
-        figures = [k for k, f in enumerate(grid.figures[row]) if f is not None and f[1] < 1]
-        if grid.kinds[row] == "text" and row < max(taken) and row not in heads and not _counts(grid, row):
-            told.append(shown(grid.sheet, row, REMARK))
-        if row in taken or not figures or grid.kinds[row] != "figures":
-            continue
-        if row < max(taken) and not _explained(grid, row, figures, reading):
-            return None
-        told.append(shown(grid.sheet, row, SUMMARY))
-    places = (grid.sheet.at("", row, i, heading(grid.path(row, i))) for row, i in reading.blank)
-    return told + [f"{place.removeprefix(': ').strip()}: nothing in the cell" for place in places]
-
-
-def _counts(grid: CutSheet, row: int) -> bool:
-    """Whether a row of text is the title of a line or a run."""
-    texts = [grid.text(row, k) for k in range(len(grid.sheet.rows[row])) if grid.text(row, k)]
-    return any(hint(text, lengths=True) in (LINE, RUN) for text in texts[:1])
-
-
-def _explained(grid: CutSheet, row: int, figures: Sequence[int], reading: SheetReading) -> bool:
-    """Whether a row is void or a summary by its words or by arithmetic, or has none of the columns that are read."""
-    cells = grid.sheet.rows[row]
-    if (
-        is_summary(cells)
-        or _void(cells, "void", "feature")
-        or said([grid.text(row, k) for k in range(len(cells)) if k not in figures]) == "summary"
-    ):
-        return True
-    alone = len(figures) < 2 or {*grid.of_block(row)}.isdisjoint(reading.rows)
-    if (alone and reading.columns.isdisjoint(figures)) or grid.other_quantity(row):
-        return True
-    for k in {*figures} & reading.columns:
-        above = [
-            f[0]
-            for r in grid.of_block(row)
-            if r in {*reading.rows} and k < len(grid.figures[r]) and (f := grid.figures[r][k])
-        ]
-        value, step = grid.figures[row][k] or (0.0, 1.0)
-        sums = (np.mean(above), max(above), min(above), np.ptp(above), np.std(above, ddof=1)) if len(above) > 1 else ()
-        if not any(abs(value - one) <= 1.05 * step for one in sums):
-            return False
-    return True
 
 
 @dataclass
@@ -322,9 +267,13 @@ def _places(names: Sequence[str], reading: SheetReading, measured: Floats, unit:
         own = [k for k, one in enumerate(names) if one == name]
         said_ = {reading.labels[k].get(("place", ""), "") for k in own}
         if len(said_) == 1 and (text := said_.pop()):
-            ends = units.converted(
-                np.array([[float(one) for one in part.split(",")] for part in text.split(" to ")]), unit, "x_mm"
-            )
+            start, which, other = text.split()
+            ends = np.array([[float(one) for one in part.split(",")] for part in (start, other)])
+            if which == "direction":
+                ends[1] = (
+                    ends[0] + ends[1] / max(np.linalg.norm(ends[1]), 1e-9) * measured[own].max() * unit.down / unit.up
+                )
+            ends = units.converted(ends, unit, "x_mm")
             if measured[own].max() * 0.98 - 1 <= np.linalg.norm(ends[1] - ends[0]) <= 3 * measured[own].max():
                 places[name] = "from " + " to ".join(",".join(f"{one:.10g}" for one in end) for end in ends)
     return places
