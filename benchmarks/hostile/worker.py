@@ -151,9 +151,13 @@ def run_of_command(
     after = {name: seal for name, seal in snapshot(root).items() if not name.endswith(("-wal", "-shm"))}
     held = {name: seal for name, seal in before.items() if not name.endswith("records.db") and not name.startswith(own)}
     found += lost(held, after)
-    new = {name for name in after if not name.endswith((".lock", "records.db")) and not name.startswith(own)} - set(
-        before
-    )
+    # a scheduled run keeps its log and what it has told
+    kept = (".lock", "records.db", "schedule.log")
+    new = {
+        name
+        for name in after
+        if not (name.endswith(kept) or "/.scheduled" in name or name.startswith(own) or name in before)
+    }
     if outcome.code == 2 and new and not allowed:
         found.append("something is written though refused")
     return {"number": this.number, "target": this.target, "what": this.what, "code": outcome.code, "ran": this.target,
