@@ -69,6 +69,10 @@ _HERE = {
     r"points_per_measurement = ": say("Choose the column of the set-up, or say below how many rows in turn are one"),
 }
 """What a remedy in words of job.toml is on this page."""
+_OF_ITEM = (
+    *("machine.", "artefact.", "job.customer", "job.address", "conformity.limit_um"),
+    *("rated_conditions.", "test_uncertainty."),
+)  # facts of one thing, or one customer, which another must not get unseen
 
 
 def steps(done: int, draft: str = "") -> p.Links:
@@ -205,12 +209,17 @@ def facts_form(
     buttons: tuple[tuple[str, Text], ...],
     hidden: tuple[tuple[str, str], ...],
     first: tuple[FormEntry, ...] = (),
+    last: Mapping[str, str] = {},
 ) -> PageForm:
-    """The dozen fields, and folded away those that only a whole certificate needs."""
+    """The dozen fields, and folded away those that only a whole certificate needs; ``last``: offered, and not filled in."""
     entries, further = list(first), list[FormEntry]()
     for one in fields:
         sort: Literal["date", "text"] = "date" if one["sort"] == "date" else "text"
-        entry = FormEntry(one["key"], Verbatim(one["label"]), filled.get(one["key"], ""), sort, example=one["example"])
+        value, again = filled.get(one["key"], ""), last.get(one["key"], "")
+        hint = say("The last time: {value}", value=Verbatim(again)) if again and not value else NOTHING
+        entry = FormEntry(
+            one["key"], Verbatim(one["label"]), value, sort, hint=hint, example=one["example"], again=again
+        )
         (further if one["further"] else entries).append(entry)
     legend = say("What ISO/IEC 17025 asks for besides: without it the certificate is a draft")
     return PageForm(path, tuple(entries), buttons, hidden, None, f"{DESK}/check", legend, tuple(further))
@@ -220,17 +229,21 @@ def fields_page(
     draft: Draft, kind: str, fields: list[dict[str, str]], last: Mapping[str, str], found: Mapping[str, Any] | None
 ) -> WebPage:
     """The dozen things that a job states, with what was filled in last; ``found``: what a check of them says."""
-    filled = draft.values if draft.values else last
+    again = {key: value for key, value in last.items() if key.startswith(_OF_ITEM)}
+    filled = draft.values if draft.values else {key: value for key, value in last.items() if key not in again}
     folder = draft.values.get("folder", "")
     named, hint = say("Name of the job, and of its folder"), say("Its certificate has this name too")
     name = FormEntry("folder", named, folder, hint=hint, example="K-2026-115")
     buttons = (("create", say("Make the job")), ("check", say("Check")))
     form = facts_form(
-        FIELDS, fields, filled, buttons, (("draft", draft.id), ("kind", kind), ("seen", draft.seen)), (name,)
+        FIELDS, fields, filled, buttons, (("draft", draft.id), ("kind", kind), ("seen", draft.seen)), (name,), again
     )
     blocks: list[Block] = [steps(3, draft.id)]
     if last and not draft.values:
-        blocks.append(PageParagraph(say("Filled in as last time: look at each."), "note"))
+        told = say(
+            "Filled in as last time: look at each. What is of one machine, artefact or customer is offered, and not filled in."
+        )
+        blocks.append(PageParagraph(told, "note"))
     blocks += [*(check_blocks(found) if found else ()), form]
     above = (*_above(draft), Cell(say("Artefact"), address(ARTEFACT, draft=draft.id)))
     lead = say("What is left empty is not stated. In grey stands an example.")

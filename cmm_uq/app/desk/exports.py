@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -142,15 +143,18 @@ def _untaken(heading: str) -> str:
 def corrected(path: str, keys: Mapping[str, Any], chosen: Mapping[str, str], said: Mapping[str, Any]) -> dict[str, Any]:
     """Keys after a form was sent: ``chosen`` meaning of each column by its index, ``said``: other keys, empty where none."""
     before = keys_of(keys)
-    tables = tables_in(content_of(Path(path), TABLE_BYTES, "Drop it again"), Path(path).name, before)[1]
-    header = tables[0][1] if tables else None
+    header = None
+    with suppress(CmmUqError):  # of a report that is no table
+        tables = tables_in(content_of(Path(path), TABLE_BYTES, "Drop it again"), Path(path).name, before)[1]
+        header = tables[0][1] if tables else None
     taken = meanings(header) if header is not None else {}
-    new = {int(i): meaning for i, meaning in chosen.items() if meaning and meaning not in (IGNORED, UNKNOWN, NAME)}
+    shown = {i: _told(meaning) for i, (_, meaning) in enumerate(read(path, keys)["columns"])}
+    now = {**taken, **shown, **{int(i): _told(meaning) for i, meaning in chosen.items()}}
+    changed = [i for i in map(int, chosen) if now[i] != shown.get(i, "")]
     columns: dict[str, Any] = dict(before.columns)
-    for name in {*taken.values(), *new.values()} - {NAME}:
-        own = [i for i in sorted(new) if new[i] == name]
-        if own == [i for i in sorted(taken) if taken[i] == name]:
-            continue
+    # what nobody touched is no answer: a table that is read by its rows shows less than it has
+    for name in {one[i] for i in changed for one in (shown, now) if i in one} - {"", NAME}:
+        own = [i for i in sorted(now) if now[i] == name]
         columns.pop(name, None)
         if own:
             sources = [_source(i, header) for i in own]
@@ -163,6 +167,11 @@ def corrected(path: str, keys: Mapping[str, Any], chosen: Mapping[str, str], sai
     if said.get("plan"):
         after = placed_by_plan(Path(path), after, Path(said["plan"]))
     return after.model_dump(exclude_defaults=True)
+
+
+def _told(meaning: str) -> str:
+    """The meaning of a column that stands in a list box; empty where it is not used."""
+    return "" if meaning in (IGNORED, UNKNOWN) else meaning
 
 
 def _source(i: int, header: Header | None) -> str | int:

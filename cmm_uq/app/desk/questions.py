@@ -53,6 +53,7 @@ _OF_CERTIFICATE = {
     "artefact.certificate.number": "Number of the artefact's certificate",
     "artefact.certificate.laboratory": "Who issued that",
     "artefact.certificate.issuer": "What that is: national institute, accredited, in-house",
+    "artefact.certificate.arrangement": "Under which arrangement: CIPM MRA, ILAC MRA",
     "artefact.certificate.date": "Date of that certificate",
     "artefact.certificate.due": "Last day on which it holds",
 }

@@ -179,7 +179,10 @@ class Press(NamedTuple):
 
 
 class FormEntry(NamedTuple):
-    """A field that is filled in: a line, a date, a text of many lines, or one of several options; ``hint``: below it."""
+    """A field that is filled in: a line, a date, a text of many lines, or one of several options; ``hint``: below it.
+
+    ``again``: what is offered to be taken as it was the last time.
+    """
 
     name: str
     label: Text
@@ -188,6 +191,7 @@ class FormEntry(NamedTuple):
     options: tuple[tuple[str, Text], ...] = ()
     hint: Text = NOTHING
     example: str = ""
+    again: str = ""
 
 
 class GridColumn(NamedTuple):

@@ -72,6 +72,20 @@ def test_every_column_that_is_used_is_coloured_where_it_stands(name: str, tmp_pa
     assert any(char.isdigit() for char in figures[first][column])
 
 
+UNSEEN = Path(__file__).parents[2] / "jobs" / "importing"
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for path in sorted(UNSEEN.glob("*_exports/*")) if not path.name.endswith((".json", ".source.txt", "SUMS"))],
+    ids=lambda path: path.name[:3],
+)
+def test_list_boxes_that_nobody_touched_are_no_answer(path: Path) -> None:
+    """Of tables that are read by their rows too, whose columns the page can show in part alone."""
+    chosen = {str(i): meaning for i, (_, meaning) in enumerate(read(str(path), {})["columns"])}
+    assert "columns" not in corrected(str(path), {}, chosen, {"unit": "mm"})
+
+
 @pytest.mark.parametrize("name", EXPORTS)
 def test_a_form_that_changes_nothing_says_nothing(name: str, tmp_path: Path) -> None:
     path, keys = laid_out(tmp_path, name)
