@@ -198,7 +198,8 @@ class CutSheet:
                     text = " ".join(texts).strip()
                     text = _before_place(text) if self.place(row) else text
                     first = WORD.search(text)
-                    alone = {"": text} if len([c for c in self.sheet.rows[row] if c != ""]) == 1 else {}
+                    single = len([c for c in self.sheet.rows[row] if c != ""]) == 1 or self.place(row)
+                    alone = {"": text} if single else {}
                     titles = {**titles, (first[0].casefold() if first else text): text, **alone}
             if head or block is None:
                 if block is not None:
@@ -229,11 +230,14 @@ class CutSheet:
             texts = [self.text(row, k) for k in filled]
             dated = sum(DATED.search(text) is not None for text in texts)
             odd = (0 < dated < 3 or len(text) > 60 or "=" in text or len(_PRINTED.findall(text)) > 1 for text in texts)
-            if len(head) == DEEPEST or gap or any(odd):
+            if len(head) == DEEPEST or gap or any(odd) or self.place(row):
                 break
             over = [k for k in filled if k in numbers]
             apart = not head and (len(filled) < 2 or not over) and filled != over
-            ahead = head and (2 * filled[-1] < numbers[-1] or texts[0].endswith(":") or filled == [0])
+            grouped = len(filled) > 2 and filled == [
+                *range(len(filled))
+            ]  # the last of them stands over all that follow
+            ahead = head and ((2 * filled[-1] < numbers[-1] and not grouped) or texts[0].endswith(":") or filled == [0])
             if apart or ahead or any(f is not None and f[1] < 1 for f in self.figures[row]):
                 break
             head.insert(0, row)
@@ -279,6 +283,25 @@ def unit_of(path: Sequence[str]) -> WrittenUnit | None:
         if text and (unit := unit_named(text.strip("[]()<>{} ")) or without_unit(text.replace("\n", " "))[1]):
             return unit
     return None
+
+
+def stacked(sheet: Sheet) -> Sheet:
+    """Tables side by side, between which a column is empty and whose heads are alike, below each other."""
+    for row in sheet.rows:
+        own = [
+            k
+            for k in range(3, len(row) // 2 + 1)
+            if row[:k] == row[k + 1 : 2 * k + 1] and row[k] == "" and all(row[:k])
+        ]
+        if not own or any(
+            len(one) > own[0] and one[own[0]] != "" and sum(cell != "" for cell in one) > 2 for one in sheet.rows
+        ):
+            continue
+        starts = range(0, max(map(len, sheet.rows)), own[0] + 1)
+        parts = [(row[k : k + own[0]], line) for k in starts for row, line in zip(sheet.rows, sheet.lines, strict=True)]
+        filled = [(cells, line) for cells, line in parts if any(cell != "" for cell in cells)]
+        return replace(sheet, rows=[cells for cells, _ in filled], lines=[line for _, line in filled])
+    return sheet
 
 
 def transposed(sheet: Sheet) -> Sheet | None:

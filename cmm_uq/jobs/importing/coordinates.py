@@ -14,7 +14,7 @@ import numpy as np
 
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.blocks import SMALL, Block, CutSheet
-from cmm_uq.jobs.importing.factors import hint, ways_of
+from cmm_uq.jobs.importing.factors import hint, places, ways_of
 from cmm_uq.jobs.importing.format import WrittenUnit
 from cmm_uq.jobs.importing.header import plain_words, without_unit, words_of
 from cmm_uq.jobs.importing.roles import (
@@ -51,12 +51,15 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
         checked += len(nominal) // 2
         rest = [c for c in own if c.i not in nominal and c.role not in (NOMINAL, DEVIATION, REFERENCE)]
         triples.append([c for c in rest if not mean_of(c, [o for o in rest if o is not c])] or rest)
+    bare = _bare(grid, columns, rows)
+    triples = [[c] for c in bare] or triples
     every = [c for own in triples for c in own]
     if not triples[0] or len({*map(len, triples)}) > 1 or len({c.unit.name for c in every if c.unit}) > 1:
         return None
-    if len({tuple(map(_LETTER.sub, [" "] * len(c.path), c.path)) for c in triples[0]}) < len(triples[0]):
+    if not bare and len({tuple(map(_LETTER.sub, [" "] * len(c.path), c.path)) for c in triples[0]}) < len(triples[0]):
         return None  # side by side, and nothing tells them apart
     reading = SheetReading("points", unit=next((c.unit for c in every if c.unit), None), checked=checked)
+    reading.bare = [c.i + 1 for c in bare]
     reading.taken = {f"{letter}_mm": own for letter, own in zip("xyz", triples, strict=True)}
     reading.collect(grid, rows, columns)
     for k, row in enumerate(rows):
@@ -71,6 +74,21 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
     xyz_ = np.array(reading.figures).reshape(-1, 3)
     alike = len(xyz_) > 2 and all(like(xyz_[:, 0], xyz_[:, k]) for k in (1, 2))  # lengths on lines called X, Y, Z
     return reading if len(xyz_) and not alike and _apart(xyz_, reading.unit) else None
+
+
+def _bare(grid: CutSheet, columns: Sequence[FigureColumn], rows: Sequence[int]) -> list[FigureColumn]:
+    """Three columns beside names, in a file that is nothing but them: each differs by more than a diameter does."""
+    fine = [c for c in columns if c.step < 1]
+    alone = len(grid.blocks) == 1 and not grid.blocks[0].head and len(rows) == len(grid.blocks[0].rows) > 3
+    if not alone or len(fine) != 3 or len(columns) > 4 or grid.width > fine[-1].i + 1 or fine[-1].i - fine[0].i != 2:
+        return []
+    apart = all(c.full and np.ptp(c.values) > 1 for c in fine) and fine[0].i in (0, 1)
+    alike = any(like(a.values, b.values, 1) for a, b in permutations(fine, 2))
+    names = {grid.text(row, 0) for row in rows}
+    again = len(names) < len(rows) or (
+        apart and places(np.column_stack([c.values for c in fine])).max() + 1 < len(rows)
+    )
+    return fine if apart and not alike and not again else []
 
 
 def _nominal_of(columns: Sequence[FigureColumn]) -> set[int]:

@@ -44,7 +44,7 @@ def ways_of(values: Sequence[str]) -> list[int] | None:
     marks = {"+": 1, "-": -1, "−": -1, "↑": 1, "↓": -1, "→": 1, "←": -1}
     found: list[int] = []
     for value in values:
-        text = value.strip()
+        text = value.strip(" ()[]")
         own = {marks[c] for c in text if c in "↑↓→←"}
         ends = (text[-1:], text[:1] if not text[1:2].isdigit() else "")
         own |= set() if own else {marks[c] for c in ends if c in marks}
@@ -289,7 +289,12 @@ def points_of_names(labels: Sequence[Label], xyz: Floats) -> dict[str, list[str]
         (label, own, counted(label, lengths=False)) for label, own in _varying(with_parts(labels), lengths=False)
     ]
     if any({*f[0].values} <= {*"ABCDEFGHabcdefgh"} for f in found):  # then P counts positions
-        found = [(f[0], f[1], LINE if f[0].words.casefold() == "p" else f[2]) for f in found]
+        letters = [re.match(r"([pm])(?![^\W\d_])", f"{f[0].words}{f[0].values[0]}".casefold()) for f in found]
+        known = {m[1] for m in letters if m}
+        found = [
+            (f[0], f[1], f[2] if m is None else LINE if m[1] == "p" else RUN if known == {"p", "m"} else f[2])
+            for f, m in zip(found, letters, strict=True)
+        ]
     each = [f for f in found if f[1].max() + 1 == count]
     found = [f for f in found if f[1].max() + 1 < count]
     run = _run_of(found, place) if again or any(f[2] == RUN for f in found) else None
@@ -328,6 +333,12 @@ def _run_of(found: Sequence[_Counted], place: Ints) -> _Counted | None:
     fixed = any(f[2] == LINE and fixes(place, f[1]) for f in found)  # then another word for measurements counts repeats
     by_place = [f for f in apart if f[2] is None or (f[2] == LINE and (fixed or hint(f[0].words, lengths=True) == RUN))]
     by_place = [f for f in by_place if together(place, f[1]).max() + 1 == len(place)]
+    if any(
+        f[2] == LINE == hint(f[0].words, lengths=True) and together(place, f[1]).max() + 1 == len(place) for f in apart
+    ):
+        by_place = [
+            f for f in by_place if f[2] is not None
+        ]  # an artefact turned about its middle comes to the same places
     choices = [f for f in by_words if f in apart] or by_words or [f for f in by_place if f[2] is None] or by_place
     return min(choices, key=lambda f: (f[1].max(), _LAST.index(f[0].sort)), default=None)
 

@@ -312,7 +312,15 @@ _UNREAD: tuple[tuple[bytes | tuple[bytes, ...], str, str], ...] = (
 # Asked in this order, after those of other packages; a text that is none of them is a text table.
 BUILT_IN = (
     *("tabular.Excel", "tabular.OpenDocument", "documents.Qif", "documents.Dcc"),
-    *("reports.Calypso", "reports.Dmis", "pcdmis.PcDmis", "pcdmis.FeatureReport", "reports.Ipp", "interferometer.Rtl"),
+    *(
+        "reports.Calypso",
+        "reports.Qdas",
+        "reports.Dmis",
+        "pcdmis.PcDmis",
+        "pcdmis.FeatureReport",
+        "reports.Ipp",
+        "interferometer.Rtl",
+    ),
 )
 
 

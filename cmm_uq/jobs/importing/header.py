@@ -263,7 +263,7 @@ def with_units(sheet: Sheet, row: int, headings: Sequence[str], columns: Mapping
     units = {i: meaning.unit for i, meaning in meanings.items() if meaning.unit}
     odd = {i: meaning.odd_unit for i, meaning in meanings.items() if meaning.odd_unit and not meaning.unit}
     below = sheet.rows[row + 1] if row + 1 < len(sheet.rows) else []
-    filled = ((i, cell) for i, cell in enumerate(below) if cell != "")
+    filled = ((i, cell) for i, cell in enumerate(below) if cell not in ("", "()", "[]", "-"))
     alone = {i: unit_named(cell.strip("[]()<>{} ")) if isinstance(cell, str) else None for i, cell in filled}
     if alone and all(alone.values()):
         return Header(row, row + 2, headings, columns, units | {i: unit for i, unit in alone.items() if unit}, odd)

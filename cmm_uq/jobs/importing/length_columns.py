@@ -191,7 +191,7 @@ def _fill(
                 reading.blank.append((row, c.i))
             elif base is None or np.isfinite(reference):
                 reading.add(row, k, c, source, (reference, float(c.values[k])))
-            elif not grid.other_quantity(row):
+            elif not grid.other_quantity(row) and said([grid.text(row, 0)]) != SUMMARY:
                 raise NotReadError("no value", where=grid.at(row, base.i), fix=_COMPLETE)
 
 

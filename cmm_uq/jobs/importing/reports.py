@@ -220,6 +220,45 @@ def _feature(match: re.Match[str], line: int, where: str) -> Row | None:
     return sort.lower(), [match["name"], *numbers[:3], *direction], line
 
 
+_FIELD = re.compile(r"K(\d{4})(?:/(\d+))?\s+(.*)")
+
+
+class Qdas(TextReport):
+    """Q-DAS transfer files: of each characteristic name (K2002), nominal value (K2101), unit (K2142) and values (K0001)."""
+
+    name = "q-das"
+    title = say("Q-DAS transfer file (.dfq)")
+    shows = (re.compile(r"\A\ufeff*\s*K0100\s"),)
+
+    def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
+        said: dict[tuple[str, str], str] = {}
+        counted: dict[str, int] = {}
+        rows: list[Row] = []
+        for line, content in enumerate(lines, 1):
+            if (match := _FIELD.fullmatch(content.strip())) is None:
+                if content.strip():
+                    raise NotReadError(
+                        "has no key K", where=f"{where} line {line}", fix="Export values with keys (K0001/1 …)"
+                    )
+                continue
+            key, which, text = match.groups()
+            said[key, which or "0"] = text
+            if key == "0002" and text.strip() != "0":
+                raise NotReadError("marks a value as invalid (K0002)", where=f"{where} line {line}", fix="Take it out")
+            if key == "0001":
+                name, nominal = (said.get((one, which), "") for one in ("2002", "2101"))
+                if not which or not nominal:
+                    raise NotReadError(
+                        "has no nominal value (K2101)", where=f"{where} line {line}", fix="Export K2001 ff. too"
+                    )
+                counted[which] = counted.get(which, 0) + 1
+                rows.append(("", [name or which, f"{counted[which]}", nominal, text], line))
+        units = {text for (key, _), text in said.items() if key == "2142"}
+        if len(units) > 1:
+            raise CmmUqError(f"is in {' and '.join(sorted(units))}", where=where, fix="Export it in one unit")
+        return sheets_of(rows, ["name", "run", "nominal", "measured"], unit=next(iter(units), None), facts=(encoding,))
+
+
 _LINE = re.compile(r"(?:^|[\s>\]:])(?P<tag>[E\d]\d{4})\s+(?P<what>[#&%!]|[A-Za-z]\w*\s*\()\s*(?P<rest>.*)$")
 _TERM = re.compile(r"\b(X|Y|Z|IJK)\s*\(([^)]*)\)")
 _IPP = re.compile(r"(?:\b\d{5}[ \t]+(?:StartSession[ \t]*\(|PtMeas[ \t]*\(|[&%#])(?s:.*?)){2}")

@@ -59,6 +59,7 @@ class SheetReading:
     unused: list[str] = field(default_factory=list)
     covariates: dict[str, list[float]] = field(default_factory=dict)  # further columns of a recording, in their units
     blank: list[tuple[int, int]] = field(default_factory=list)  # row and column of measured values that are not there
+    bare: Sequence[int] = ()  # numbers of columns that no head names
     others: Sequence[int] = ()  # rows that belong to it
     beside: list[dict[tuple[str, str], str]] = field(default_factory=list)  # labels of each row
     further: Mapping[str, Floats] = field(default_factory=dict)
@@ -235,9 +236,11 @@ def heads_of(column: FigureColumn, beside: Sequence[FigureColumn]) -> dict[tuple
     """Labels by the head of a column, a level each, where columns beside it differ."""
     found = {}
     for level in range(len(column.path)):
-        texts = [without_unit(c.path[level].replace("\n", " "))[0].strip() for c in beside]
+        whole = [c.path[level].strip() for c in beside]
+        texts = [without_unit(text)[0].strip() for text in whole]
+        texts = texts if len({*texts}) == len({*whole}) else whole  # as Run 1 (+)
         if len({*texts}) > 1 and not unit_named(texts[0]):
-            found["head", f"{level}"] = without_unit(column.path[level].replace("\n", " "))[0].strip()
+            found["head", f"{level}"] = texts[[c.i for c in beside].index(column.i)]
     if len(beside) > 1 and not found:
         found["head", "0"] = f"{[c.i for c in beside].index(column.i) + 1}"
     return found

@@ -19,7 +19,7 @@ from cmm_uq.base.messages import Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
-from cmm_uq.jobs.importing.blocks import CutSheet, transposed, unit_elsewhere
+from cmm_uq.jobs.importing.blocks import CutSheet, stacked, transposed, unit_elsewhere
 from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact
 from cmm_uq.jobs.importing.coordinates import points_in, rows_of_axes, runs_in
 from cmm_uq.jobs.importing.factors import (
@@ -66,6 +66,7 @@ def reading_of(
     problem: NotReadError | None = None
     for sheet in sheets:
         own: list[tuple[SheetReading, CutSheet]] = []
+        sheet = stacked(sheet)
         both = (sheet, transposed(sheet)) if len(sheet.rows) <= ROWS_MOST else ()
         for one in filter(None, both):
             try:
@@ -227,6 +228,12 @@ class Understanding:
     def points(
         self, keys: ImportKeys, where: str, reach_mm: float | None
     ) -> tuple[dict[str, Floats], tuple[Fact, ...]]:
+        if self.reading.bare and keys.points_per_measurement is None:
+            known = keys.unit or self.sheets[0].unit or unit_elsewhere(self.sheets, small=False)
+            what = f"no line names the columns: {', '.join(map(str, self.reading.bare))} may be x, y and z"
+            unit_ = "" if known else ', and unit = "mm" or "inch"'
+            fix = f'If they are, say how many rows in turn are one measurement, points_per_measurement = N (or "all"){unit_}'
+            raise NotReadError(what, where=where, fix=fix)
         unit, of_unit = self.unit(keys, where, reach_mm)
         xyz = np.column_stack([units.converted(own, unit, "x_mm") for own in np.array(self.reading.figures).T])
         numbers, facts = numbered_points(self.labels, xyz, keys, where)

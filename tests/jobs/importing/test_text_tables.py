@@ -422,3 +422,26 @@ FEATURE = "SPHERE : S{0}\n     Nominal    Actual\nX    1.0000    1.0010\nY    2.
 def test_a_report_of_features_drops_nothing(text: str, told: str) -> None:
     with pytest.raises(CmmUqError, match=told):
         read(text, points_per_measurement=1)
+
+
+def test_a_list_of_points_without_a_head_is_asked_about_once() -> None:
+    rows = [
+        ("P1", 10.125, 20.25, -5.5),
+        ("P2", 410.5, 22.125, -6.25),
+        ("P3", 11.25, 330.5, -8.125),
+        ("P4", 9.5, 19.25, 300.5),
+    ]
+    content = "\n".join(";".join(map(str, row)) for row in rows).encode()
+    with pytest.raises(CmmUqError, match=r"2, 3, 4 may be x, y and z.*points_per_measurement = N.*unit = "):
+        imported(content, "list.txt", ImportKeys())
+    found = imported(content, "list.txt", ImportKeys(points_per_measurement="all", unit="mm"))
+    np.testing.assert_array_equal(
+        np.column_stack([found.columns[f"{axis}_mm"] for axis in "xyz"]), [row[1:] for row in rows]
+    )
+
+
+def test_cells_of_two_figures_are_no_reading() -> None:
+    head = "Line;Nominal (mm);Run 1 (mm);Run 2 (mm)\n"
+    content = head + "1;100;100.0012;100.0008\n1;200;200.0021 200.0018;200.0013\n1;300;300.0002;299.9998\n"
+    with pytest.raises(CmmUqError, match=r"column|cell|line"):
+        imported(content.encode(), "e0.csv", ImportKeys(lines={"1": "along X from 0,0,0"}))

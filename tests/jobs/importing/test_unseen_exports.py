@@ -31,11 +31,12 @@ EXPECTED = {
 }
 ASKED = {"10": "unit", "15": "unit"}
 """By number: what is asked beside where lines lie, of files that name no unit."""
-REFUSED = {"S07": "is no measured length", "S08": "no line names", "S09": "may be lengths, or deviations",
-           "S15": "no line names", "S11": "have the same nominal length", "S16": "which points belong",
-           "S20": "which points belong",
-           "S22": "which points belong", "S25": "may be lengths, or deviations", "S27": "no column is", "S28": "no column is",
-           "S29": "no line names"}  # fmt: skip
+REFUSED = {
+    "S07": "is no measured length",
+    "S22": "which points belong",
+    "S27": "no column is",
+    "S29": "no line names",
+}
 """Of exports that are not read, what is said."""
 PLACED = {"02": [60, 350, -250], "S01": [40, 500, -300], "S05": [60, 400, -300]}
 """Start of the first line, of files that say where their lines lie."""
