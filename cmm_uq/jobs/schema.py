@@ -24,6 +24,7 @@ from cmm_uq.jobs.tables.identification import EXAMPLE
 Schema = dict[str, Any]
 DRAFT = "http://json-schema.org/draft-07/schema#"
 _REFERENCE = "#/$defs/"
+_BARE = re.compile("[A-Za-z0-9_-]+")
 
 
 class _Described(GenerateJsonSchema):
@@ -189,16 +190,25 @@ def written(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", r"\u007f")
     if isinstance(value, (int, float)):
         return repr(value)
     if isinstance(value, (dt.date, dt.datetime)):
         return value.isoformat()
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {written(item)}" for key, item in value.items()) + " }" if value else "{}"
+        return (
+            "{ " + ", ".join(f"{written_key(key)} = {written(item)}" for key, item in value.items()) + " }"
+            if value
+            else "{}"
+        )
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(written, value)) + "]"
     raise TypeError(f"TOML has no {type(value).__name__}")
+
+
+def written_key(key: str) -> str:
+    """A key as TOML has it: in quotes, where it is more than ASCII letters, digits, ``_`` and ``-``."""
+    return key if _BARE.fullmatch(key) else written(key)
 
 
 def without_place(description: str) -> str:
@@ -213,7 +223,7 @@ def _lines(
     for key in (name for name in keys if name in given):
         mark = f"{EXAMPLE}, put in your own: " if key in marked else ""
         lines.append(f"{key} = {written(given[key])}  # {mark}{without_place(keys[key]['description'])}")
-    lines += [f"{key} = {written(value)}" for key, value in given.items() if key not in keys]
+    lines += [f"{written_key(key)} = {written(value)}" for key, value in given.items() if key not in keys]
     left = [(key, item) for key, item in keys.items() if key not in given and comment]
     return lines + [f"# {key} = {written(_example(item))}  # {item['description']}" for key, item in left]
 

@@ -83,12 +83,14 @@ def new(
             recognised = read_export(export, keys).recognised
         if not silent:
             show_recognised(recognised)
-        files: Mapping[str, Path] = write_job_of_export(kind, export, target, tables, keys)
+        with _in_settings(tables):
+            files: Mapping[str, Path] = write_job_of_export(kind, export, target, tables, keys, fetched=True)
     else:
         if not (tables or silent) and kind != BUDGET and kind in known() and can_answer():
             tables = job_answers(kind)
         answers = part_answers() if kind == PART and not (export or tables or silent) and can_answer() else None
-        files = write_new(kind, target, tables, drawing=export, answers=answers)
+        with _in_settings(tables):
+            files = write_new(kind, target, tables, drawing=export, answers=answers)
     if end.json:
         put_manifest(files)
     elif not end.quiet:
@@ -103,11 +105,35 @@ def _tables(machine: str, serial: str, settings: list[str]) -> dict[str, dict[st
     for setting in settings:
         place, equals, text = setting.partition("=")
         table, dot, key = place.strip().partition(".")
-        if not (equals and dot and key):
+        if not (equals and dot and table) or "" in key.split("."):
             what = f"{setting!r} names no key of a table"
             raise CmmUqError(what, where="--set", fix="Write it as artefact.length_mm=500")
-        tables.setdefault(table, {})[key] = value_of(text.strip())
+        for other in tables.setdefault(table, {}):
+            if other.startswith(f"{key}.") or key.startswith(f"{other}."):
+                within, whole = sorted((f"{table}.{key}", f"{table}.{other}"), key=len, reverse=True)
+                raise CmmUqError(
+                    f"{whole} has a value, and {within} lies within it", where="--set", fix="Give one of them"
+                )
+        tables[table][key] = value_of(text.strip())
     return tables
+
+
+_IN_JOB = re.compile(r"job\.toml: \[{1,2}(\w+)\]{1,2}(?: \d+)?(?: ([\w.-]+))?")
+
+
+@contextmanager
+def _in_settings(tables: Mapping[str, Mapping[str, Any]]) -> Iterator[None]:
+    """What a message says of keys of a job.toml that is not written, as the options that give them."""
+    try:
+        yield
+    except CmmUqError as error:
+        for each in (error, *error.also):
+            if place := _IN_JOB.fullmatch(each.where or ""):
+                key = ".".join(filter(None, place.groups()))
+                each.where = f"--set {key}" if place[1] in tables else key
+                each.fix = (each.fix or "").replace("Add it to job.toml", f"Give --set {key}=…")
+                each.args = (str(each),)
+        raise
 
 
 def import_export(

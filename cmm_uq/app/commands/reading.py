@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -44,6 +46,18 @@ def read_machine(folder: Path) -> Job:
 def job_of(files: Mapping[str, bytes], *, recorded: bool = True) -> Job:
     """Read and check a job that lies in no folder yet; see :func:`cmm_uq.jobs.reading.job_of`."""
     return reading.job_of(files, NAMEABLE, recorded=recorded)
+
+
+@contextmanager
+def unwritten() -> Iterator[None]:
+    """Errors of a job.toml that lies nowhere yet name no line of it."""
+    try:
+        yield
+    except CmmUqError as error:
+        for each in (error, *error.also):
+            each.where = re.sub(r"\Ajob\.toml line \d+", "job.toml", each.where or "")
+            each.args = (str(each),)
+        raise
 
 
 Either = TypeVar("Either", Job, "PartJob")

@@ -153,6 +153,19 @@ def as_toml(data: Mapping[str, Any], where: str) -> bytes:
                          fix="Give texts, numbers, dates, lists and tables") from None  # fmt: skip
 
 
+def nested(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table in which dotted keys, such as ``certificate.file``, are keys of tables, over what stands in these."""
+    found = {key: value for key, value in table.items() if "." not in key}
+    for dotted in table.keys() - found.keys():
+        *above, last = dotted.split(".")
+        inner = found
+        for name in above:
+            there = inner.get(name)
+            inner[name] = inner = dict(there) if isinstance(there, Mapping) else {}
+        inner[last] = table[dotted]
+    return found
+
+
 def _plain(value: Any) -> Any:
     """Without keys that say nothing, and with Python's numbers instead of NumPy's."""
     if isinstance(value, Mapping):

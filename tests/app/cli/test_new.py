@@ -6,7 +6,7 @@ import json
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,10 @@ import pytest
 from cmm_uq.analysis.parts.setup import plan_of, refuse_unfit
 from cmm_uq.app.cli import asking
 from cmm_uq.app.cli.asking import value_of
-from cmm_uq.app.commands.jobs.new import write_new
+from cmm_uq.app.commands.jobs.new import put_new, write_new
 from cmm_uq.app.commands.parts.new import PART
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.output import Owner
 from cmm_uq.jobs.part.job import PartJob, read_part
 from tests.app.cli.process import run
 from tests.conftest import ROOT
@@ -42,8 +44,11 @@ def test_it_lists_the_kinds_and_begins_one_in_a_folder_of_its_name(tmp_path: Pat
     ("setting", "told"),
     [
         ("artefact", "names no key of a table"),
-        ("artefact.lenght_mm=3", "[artefact] lenght_mm: unknown key. Did you mean 'length_mm'?"),
-        ("artefacts.length_mm=3", "unknown key. Did you mean 'artefact'?"),
+        ("artefact..length_mm=3", "names no key of a table"),
+        ("artefact.lenght_mm=3", "cmm-uq: --set artefact.lenght_mm: unknown key. Did you mean 'length_mm'?"),
+        ("artefacts.length_mm=3", "cmm-uq: --set artefacts: unknown key. Did you mean 'artefact'?"),
+        ("artefact.certificate.fil=x.csv", "cmm-uq: --set artefact.certificate.fil: unknown key. Did you mean 'file'?"),
+        ("machine.travel_mm.w=[0,1]", "cmm-uq: --set machine.travel_mm.w: unknown key. Known: x, y, z"),
     ],
 )
 def test_a_wrong_setting_is_refused_and_nothing_is_written(setting: str, told: str, tmp_path: Path) -> None:
@@ -127,6 +132,87 @@ def test_new_from_an_export_shows_it_first(tmp_path: Path) -> None:
     assert made.returncode == 0
     assert made.stdout.index("Column x_mm") < made.stdout.index("job.toml")
     assert "ballbar-de.csv" in made.stdout
+
+
+LINES = {
+    "1 - osa X": "along X from 50,600,-350",
+    "LÄGE 1 (längs X)": "along Y from 450,200,-350",
+    "Linha 1": "along Z from 1,2,3",
+    'the "long" one': "from 0,0,0 to 300,400,0",
+}
+
+
+def lengths_of(lines: Iterable[str]) -> str:
+    rows = [f"{name};{at};{at}.001;{at}.002" for name in lines for at in (50, 150, 400, 600, 800)]
+    return "\n".join(["Position;Nominal [mm];Actual 1 [mm];Actual 2 [mm]", *rows, ""])
+
+
+def test_lines_of_any_name_stand_in_a_job_that_can_be_read(tmp_path: Path) -> None:
+    export = tmp_path / "lengths.csv"
+    export.write_text(lengths_of(name.replace('"', "'") for name in LINES), encoding="utf-8")
+    said = {name.replace('"', "'"): place for name, place in LINES.items()}
+    options = [option for name, place in said.items() for option in ("--line", f"{name}={place}")]
+    made = run(
+        "new",
+        "gauge_blocks",
+        "job",
+        "--from",
+        export,
+        "--machine",
+        "M",
+        "--set",
+        "job.date=2026-05-31",
+        *options,
+        cwd=tmp_path,
+    )
+    assert made.returncode == 0, made.stderr
+    told = tomllib.loads((tmp_path / "job" / "job.toml").read_text(encoding="utf-8"))
+    assert told["recording"]["lines"] == said
+    assert run("check", "job", cwd=tmp_path).returncode == 0
+
+
+def test_keys_within_tables_are_set_and_the_certificate_is_laid_beside_the_export(tmp_path: Path) -> None:
+    certificate = tmp_path / "mine" / "gauge.csv"
+    certificate.parent.mkdir()
+    certificate.write_bytes((ROOT / "docs" / "import" / "samples" / "step-gauge-certificate.csv").read_bytes())
+    rows = [f"{m},{p},{20 * (p - 1)},{100 * m},-50" for m in (1, 2) for p in (1, 2, 3, 4)]
+    export = tmp_path / "export.csv"
+    export.write_text("\n".join(["measurement,point,x_mm,y_mm,z_mm", *rows, ""]))
+    keys = (
+        "job.date=2026-05-31",
+        "artefact.certificate.number=K 7",
+        "artefact.certificate.file=mine/gauge.csv",
+        "machine.travel_mm.x=[0, 900]",
+        "machine.travel_mm.y=[0, 900]",
+        "machine.travel_mm.z=[-400, 0]",
+    )
+    settings = [option for key in keys for option in ("--set", key)]
+    made = run("new", "step_gauge", "job", "--from", export, "--machine", "M", *settings, cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    told = tomllib.loads((tmp_path / "job" / "job.toml").read_text(encoding="utf-8"))
+    assert told["artefact"]["certificate"] == {"number": "K 7", "file": "gauge.csv"}
+    assert told["machine"]["travel_mm"] == {"x": [0, 900], "y": [0, 900], "z": [-400, 0]}
+    assert (tmp_path / "job" / "gauge.csv").read_bytes() == certificate.read_bytes()
+
+
+def test_a_value_and_a_key_within_it_are_refused(tmp_path: Path) -> None:
+    both = ("--set", "artefact.certificate.number=7", "--set", "artefact.certificate={ date = 2026-01-02 }")
+    ended = run("new", "sphere", *both, cwd=tmp_path)
+    assert ended.returncode == 2
+    assert "artefact.certificate has a value, and artefact.certificate.number lies within it" in ended.stderr
+
+
+def test_one_axis_of_a_travel_leaves_the_others_an_example(tmp_path: Path) -> None:
+    assert run("new", "sphere", "--set", "machine.travel_mm.x=[0, 300]", cwd=tmp_path).returncode == 0
+    text = (tmp_path / "sphere" / "job.toml").read_text(encoding="utf-8")
+    (line,) = (line for line in text.splitlines() if line.startswith("travel_mm"))
+    assert line.startswith("travel_mm = { x = [0, 300], y = [0.0, 1000.0], z = [-600.0, 0.0] }  # EXAMPLE")
+
+
+def test_what_would_be_no_toml_is_not_written(tmp_path: Path) -> None:
+    with pytest.raises(CmmUqError, match=r"job\.toml: would be no valid TOML, and is not written: Expected '='"):
+        put_new(tmp_path / "job", Owner("new", "job"), {"job.toml": b"lines = { 1 - osa X = 3 }", "a.csv": b""})
+    assert list(tmp_path.iterdir()) == []
 
 
 CERTIFICATE = ROOT / "examples" / "part-plate-simulated" / "machine" / "certificate-simulated.pdf"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,20 @@ ANSWERS = {
     "artefact.length_mm": "404.205", "conformity.standard": "ASME B89.4.1-1997", "conformity.limit_um": "400",
     "job.customer": "",
 }  # fmt: skip
+
+
+def test_a_line_with_blanks_in_its_name_makes_a_job_that_can_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    lines = {f"LÄGE {i} (längs {axis})": f"along {axis} from {i},1,2" for i, axis in enumerate("XYZ", 1)}
+    rows = [f"{name};{at};{at}.001;{at}.002" for name in lines for at in (50, 150, 400, 600, 800)]
+    Path("e.csv").write_text("\n".join(["Position;Nominal [mm];Actual 1 [mm];Actual 2 [mm]", *rows]), encoding="utf-8")
+    values = {"job.date": "2026-05-31", "machine.name": "CMM 3"}
+    assert check_answers("gauge_blocks", "e.csv", {"lines": lines}, values)["sound"]
+    create("gauge_blocks", "e.csv", {"lines": lines}, values, "mine")
+    assert tomllib.loads(Path("mine", "job.toml").read_text(encoding="utf-8"))["recording"]["lines"] == lines
+    assert check_text("mine", None)["sound"]
 
 
 def test_every_kind_of_an_export_has_a_picture_and_its_dozen() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import DCC_BYTES, TABLE_BYTES
+from cmm_uq.base.files.toml_file import nested
 from cmm_uq.base.output import Owner
 from cmm_uq.base.output.new_file import refuse_taken, write_new
 from cmm_uq.base.plugins import naming_package
@@ -120,13 +121,20 @@ def write_recording(path: Path, found: ImportedTable, out: Path) -> None:
 
 @naming_package()
 def write_job_of_export(
-    kind: str, export: Path, folder: Path, given: Mapping[str, Mapping[str, Any]], keys: ImportKeys
+    kind: str,
+    export: Path,
+    folder: Path,
+    given: Mapping[str, Mapping[str, Any]],
+    keys: ImportKeys,
+    *,
+    fetched: bool = False,
 ) -> dict[str, Path]:
     """Write the folder of a new job around an export that was measured: the export itself lies in it, and is imported.
 
     Nothing is made up: artefact, limits and travel are those that are given, whatever a new job of the kind would begin with.
 
-    folder : that does not exist, or is empty.
+    folder : that does not exist, or is empty; fetched : whether the artefact's certificate, of any path that is given, is laid
+    into it too; not for those whose files these are not.
     """
     from cmm_uq.app.commands.jobs.new import check_empty, job_id, job_of_export, put_new
 
@@ -137,8 +145,16 @@ def write_job_of_export(
     said = {key: value for key, value in keys.model_dump().items() if value not in (None, {})}
     name = job_id(folder, given)
     tables = {**given, "recording": {"file": export.name, **said, **given.get("recording", {})}}
-    files = job_of_export(kind, tables, {export.name: content}, id=name)
-    return put_new(folder, Owner("new", name), files, (export,))
+    read, artefact = {export: content}, nested(given.get("artefact", {}))
+    stated = artefact.get("certificate")
+    if fetched and isinstance(stated, Mapping) and stated.get("file"):
+        certificate = Path(str(stated["file"]))
+        if certificate.name == export.name:
+            raise CmmUqError("has the name of the export", where=str(certificate), fix="Give a copy with another name")
+        read[certificate] = content_of(certificate, TABLE_BYTES, "Name the file of [artefact.certificate] file")
+        tables["artefact"] = nested({**artefact, "certificate.file": certificate.name})
+    files = job_of_export(kind, tables, {path.name: content for path, content in read.items()}, id=name)
+    return put_new(folder, Owner("new", name), files, tuple(read))
 
 
 _FIX = "Name the results.json of a report, or the folder it lies in"

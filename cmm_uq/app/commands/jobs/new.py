@@ -10,6 +10,7 @@ from __future__ import annotations
 import datetime as dt
 import json
 import re
+import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -19,10 +20,10 @@ import numpy as np
 
 from cmm_uq.app.commands.forms import shipped
 from cmm_uq.app.commands.parts.new import PART, Answers, part_files, part_of_answers, part_of_drawing
-from cmm_uq.app.commands.reading import job_of
+from cmm_uq.app.commands.reading import job_of, unwritten
 from cmm_uq.artefacts import kind_named, names
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.toml_file import as_toml
+from cmm_uq.base.files.toml_file import as_toml, nested, toml_of
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Points
@@ -66,7 +67,8 @@ def kind_or_refused(name: str) -> Kind:
 
 def read_new(kind: Kind, tables: Tables, files: Mapping[str, bytes]) -> Job:
     recorded = bool(files) or not kind.table.with_recording
-    return job_of({"job.toml": as_toml(tables, "job.toml"), **files}, recorded=recorded)
+    with unwritten():
+        return job_of({"job.toml": as_toml(tables, "job.toml"), **files}, recorded=recorded)
 
 
 def example_keys(tables: Mapping[str, Any], given: Tables) -> set[str]:
@@ -75,9 +77,18 @@ def example_keys(tables: Mapping[str, Any], given: Tables) -> set[str]:
     return dated | {
         f"{table}.{key}"
         for table in ("machine", "artefact", "conformity", "test_uncertainty", "rated_conditions")
-        for key in (tables[table][0] if table == "conformity" and table in tables else tables.get(table, {}))
-        if key not in (*given.get(table, ()), "kind", "error_map")
+        for key, value in (
+            tables[table][0] if table == "conformity" and table in tables else tables.get(table, {})
+        ).items()
+        if key not in ("kind", "error_map") and not _stated(key, value, given.get(table, {}))
     }
+
+
+def _stated(key: str, value: Any, given: Mapping[str, Any]) -> bool:
+    """Whether all of a key's value is given: itself, or every key of the table that it is."""
+    return key in given or (
+        isinstance(value, Mapping) and all(_stated(f"{key}.{k}", v, given) for k, v in value.items())
+    )
 
 
 def _job_text(kind: Kind, begin: Beginning, tables: Tables, examples: Collection[str]) -> bytes:
@@ -197,7 +208,7 @@ def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: s
         raise CmmUqError("an export does not say when it was measured", where="[job] date",
                          fix="Give the date of measurement: --set job.date=2026-05-31")  # fmt: skip
     bare = replace(begin, artefact={}, conformity=None, test={})
-    whole = _tables(found, bare, given, id, origin=MEASURED) | {"machine": dict(given.get("machine", {}))}
+    whole = _tables(found, bare, given, id, origin=MEASURED) | {"machine": nested(given.get("machine", {}))}
     if "effects" not in given.get("model", {}):  # what the export has no column for it cannot tell
         recorded = read_new(found, whole, files).points.columns
         known = (one for one in effects(begin.effects) if set(one.columns) <= set(recorded))
@@ -241,6 +252,16 @@ def write_new(
 
 
 def put_new(folder: Path, owner: Owner, files: Mapping[str, bytes], inputs: tuple[Path, ...] = ()) -> dict[str, Path]:
+    """Put the files of a new folder in place, if those of TOML can be read."""
+    for name in (name for name in files if name.endswith(".toml")):
+        try:
+            toml_of(files[name].decode(), name)
+        except tomllib.TOMLDecodeError as error:
+            raise CmmUqError(
+                f"would be no valid TOML, and is not written: {error}",
+                where=str(folder / name),
+                fix="Please report it with what was given; plain names may help",
+            ) from None
     with staged(folder, owner, expected=files, inputs=inputs) as place:
         check_empty(folder, but=".unfinished-")
         return place.write(files)
@@ -291,11 +312,12 @@ def _tables(kind: Kind, begin: Beginning, given: Tables, id: str, origin: Origin
     for table, keys in given.items():
         listed = table == "conformity"
         begun = (whole.get(table) or [{}])[0] if listed else whole.get(table, {})
-        whole[table] = [{**begun, **keys}] if listed else {**begun, **keys}
+        merged = nested({**begun, **keys})
+        whole[table] = [merged] if listed else merged
     if "U_um" in given.get("artefact", {}):
         whole["artefact"].pop("u_um", None)
-    limits = {"limit_um", "limit_arcsec", "mpe"}
-    for other in limits - set(conformity) if limits & set(conformity) else ():
+    limits, stated = {"limit_um", "limit_arcsec", "mpe"}, {key.partition(".")[0] for key in conformity}
+    for other in limits - stated if limits & stated else ():
         whole["conformity"][0].pop(other, None)
     return whole
 

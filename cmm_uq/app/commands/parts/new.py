@@ -17,10 +17,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from cmm_uq.app.commands.forms import shipped
+from cmm_uq.app.commands.reading import unwritten
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
-from cmm_uq.base.files.toml_file import as_toml
+from cmm_uq.base.files.toml_file import as_toml, nested
 from cmm_uq.jobs.importing.encodings import begins_with, head_text
 from cmm_uq.jobs.importing.format import HEAD
 from cmm_uq.jobs.part.checks import freedoms, members, unfit
@@ -31,7 +32,7 @@ from cmm_uq.jobs.part.job import POSTERIOR, TABLES, part_of
 from cmm_uq.jobs.part.probed import Probed
 from cmm_uq.jobs.part.qif import drawing_of_qif
 from cmm_uq.jobs.part.table import drawing_of_table
-from cmm_uq.jobs.schema import commented, written
+from cmm_uq.jobs.schema import commented, written, written_key
 from cmm_uq.jobs.source import RESULTS
 from cmm_uq.jobs.tables.identification import EXAMPLE, SIMULATED
 
@@ -205,7 +206,7 @@ def _with(tables: dict[str, Any], given: Tables, id: str) -> dict[str, Any]:  # 
         if name in _LISTS:
             raise CmmUqError(f"there may be several [[{name}]], which no option names", where="--set",
                              fix="Write them into job.toml")  # fmt: skip
-        tables[name] = {**tables.get(name, {}), **keys}
+        tables[name] = nested({**tables.get(name, {}), **keys})
     today = dt.datetime.now(tz=dt.UTC).date()
     return {**tables, "job": {"id": id, "date": today, "origin": SIMULATED, **tables.get("job", {})}}
 
@@ -214,7 +215,8 @@ def _files(
     tables: Mapping[str, Any], marked: Collection[str], opened: Mapping[str, Collection[str]],
     left_out: Collection[NotUnderstood] = (), beside: Mapping[str, bytes] = MappingProxyType({}),
 ) -> dict[str, bytes]:  # fmt: skip
-    part_of({"job.toml": as_toml(tables, "job.toml"), **beside}, machine=False)
+    with unwritten():
+        part_of({"job.toml": as_toml(tables, "job.toml"), **beside}, machine=False)
     return {
         "job.toml": _text(tables, marked, opened).encode(), README: _readme(left_out).encode(),
         SCHEMA: shipped(PART).encode(),
@@ -249,8 +251,10 @@ def _marks(name: str, said: Any, marked: Collection[str], opened: Mapping[str, C
 
 def _short(name: str, said: Mapping[str, Any], marks: Collection[str]) -> str:
     mark = f"  # {EXAMPLE}, put in your own"
-    lines = (f"{key} = {written(value)}{mark if f'{name}.{key}' in marks else ''}\n" for key, value in said.items())
-    return f"[[{name}]]\n{''.join(lines)}"
+    ends = {key: mark if f"{name}.{key}" in marks else "" for key in said}
+    return "\n".join(
+        [f"[[{name}]]", *(f"{written_key(key)} = {written(said[key])}{end}" for key, end in ends.items()), ""]
+    )
 
 
 def _keys(table: Any) -> list[str]:
@@ -259,7 +263,7 @@ def _keys(table: Any) -> list[str]:
 
 
 def _given_keys(given: Tables) -> set[str]:
-    return {f"{table}.{key}" for table, keys in given.items() for key in keys}
+    return {f"{table}.{key.partition('.')[0]}" for table, keys in given.items() for key in keys}
 
 
 def _copied(table: Any) -> Any:
