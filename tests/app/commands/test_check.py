@@ -57,6 +57,19 @@ def test_an_example_is_sound_unless_it_is_still_to_be_measured(folder: Path) -> 
         assert found.problems == ()
 
 
+def test_an_export_is_not_refused_beside_a_wrong_key_for_being_no_recording_of_our_own(tmp_path: Path) -> None:
+    export, toml = ROOT / "docs" / "tutorial" / "ballbar-export.xlsx", tmp_path / "job" / "job.toml"
+    given = {
+        "machine": {"name": "CMM 3"},
+        "job": {"date": dt.date(2026, 5, 31)},
+        "artefact": {"certificate": {"issuer": "accredited"}},
+    }
+    write_job_of_export("ballbar", export, toml.parent, given, ImportKeys())
+    change(toml, '"accredited"', '"NIST"')
+    (problem,) = check_job(toml.parent).problems
+    assert problem.key == "[artefact] certificate.issuer"
+
+
 def test_everything_that_is_wrong_is_told_at_once_with_line_key_and_fix(gauge: Path) -> None:
     toml, csv = gauge / "job.toml", gauge / "recording.csv"
     lines = {

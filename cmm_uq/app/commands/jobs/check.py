@@ -27,7 +27,8 @@ from cmm_uq.base.messages import html_table
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
 from cmm_uq.certificate.clauses import Requirement, certifies, clauses, contradictions, missing
-from cmm_uq.jobs.importing.recording import read_recording
+from cmm_uq.jobs.importing.format import ImportKeys
+from cmm_uq.jobs.importing.recording import is_own, read_recording
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import is_part, read_part
 from cmm_uq.jobs.reading import PART
@@ -272,7 +273,10 @@ def _parts_by_themselves(path: Path, wrong: Gathered) -> None:
         with wrong.going_on():
             found = inside(path.parent, name, str(path))
             content = content_of(found, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {path}")
-            read_recording(content, str(path.parent / name), Machine())
+            if (
+                is_own(content) and not tables[1].keys() & ImportKeys.model_fields.keys()
+            ):  # an export needs what was refused
+                read_recording(content, str(path.parent / name), Machine())
 
 
 def _placed(error: CmmUqError, path: Path) -> CmmUqError:
