@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Verbatim, commas, names, say
+from cmm_uq.base.messages import DASH, Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
@@ -174,9 +174,12 @@ class Understanding:
         return unit, Fact("unit", say("Unit of lengths"), say("{unit}, {how}", unit=Verbatim(unit.name), how=how))
 
     def facts(self, of_unit: Fact, used: Sequence[str]) -> tuple[Fact, ...]:
-        words = commas(names([word for word in dict.fromkeys(used) if word] or ["–"]))
+        heads = [
+            say("heads of columns") if word.isdecimal() else Verbatim(word) for word in dict.fromkeys(used) if word
+        ]
+        words = commas(heads or [DASH])
         arithmetic = say("words and figures, {count} of them by arithmetic", count=self.reading.checked)
-        unused = [*dict.fromkeys(self.reading.unused)]
+        unused = [name for name in dict.fromkeys(self.reading.unused) if name not in used]
         found = [of_unit, Fact("decimal", say("Decimal sign"), SIGNS[self.grid.sign])]
         found.append(Fact("understood", say("Columns understood by"), arithmetic))
         found.append(Fact("told_apart", say("Told apart by"), words))
@@ -238,7 +241,11 @@ class Understanding:
         xyz = np.column_stack([units.converted(own, unit, "x_mm") for own in np.array(self.reading.figures).T])
         numbers, facts = numbered_points(self.labels, xyz, keys, where)
         further = {name: np.array(own) for name, own in self.reading.covariates.items()}
-        return {**numbers, **dict(zip(COORDINATES, xyz.T, strict=True)), **further}, (*self.facts(of_unit, []), *facts)
+        used = [label.words.strip() for label in self.labels if len({*label.values}) > 1 and label.sort != "block"]
+        return {**numbers, **dict(zip(COORDINATES, xyz.T, strict=True)), **further}, (
+            *self.facts(of_unit, used),
+            *facts,
+        )
 
     def runs(self, where: str) -> list[AxisRun]:
         """Runs along axes, each with its targets in turn."""
