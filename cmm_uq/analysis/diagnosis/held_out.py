@@ -69,8 +69,8 @@ def with_quantities(model: RecordingModel, observe: Observed, seed: int, most: i
     artefact, rows = model.artefact, model.artefact.rows[model.used, 0]
     count = len(np.unique(np.column_stack([artefact.measurement[model.used], artefact.points.point[rows]]), axis=0))
     most = max(most, _CURVES) if artefact.curves else most
-    if artefact.curves and len(np.unique(artefact.points.xyz[rows], axis=0)) > count:
-        return thin_out(model, observe, seed, most)  # repeats that were read elsewhere, as in motion, are places more
+    if artefact.moving:  # each repeat is a place more
+        return thin_out(model, observe, seed, most)
     return thin_out(model, observe, seed, most * int(model.used.sum()) // max(count, 1))
 
 

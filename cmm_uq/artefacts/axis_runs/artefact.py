@@ -71,7 +71,7 @@ class AxisRuns(Artefact):
     curves = True
 
     def __init__(self, facts: AxisRunsFacts, points: Points, *, where: str | None = None) -> None:
-        self._facts = facts
+        self._facts, self.moving = facts, facts.on_the_fly is not None
         if END not in points.columns:
             points = self._with_ends(points, where)
         self.points, self._ends = points, _ends_of(points)
