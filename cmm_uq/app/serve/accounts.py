@@ -25,6 +25,7 @@ from cmm_uq import __version__
 from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse, read_form
 from cmm_uq.app.serve.page import FormEntry, PageForm, PageNotice, PageParagraph, Press, WebPage
 from cmm_uq.app.serve.rendering import ACCOUNT, refusal, render_page
+from cmm_uq.app.serve.server import peer_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import JOB_BYTES
@@ -183,7 +184,8 @@ class Accounts:
         if request.headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
             raise RefusedRequest(HTTPStatus.FORBIDDEN, say("the request came from another site"))
         if request.path == SIGN_OUT and request.method == "POST":
-            self._sessions.pop(self._token(request), None)
+            with self._lock:  # else it could come back with those that are kept when another signs in
+                self._sessions.pop(self._token(request), None)
             return self._to(ACCOUNT, f"{self._cookie}=; Max-Age=0")
         return None
 
@@ -221,16 +223,20 @@ class Accounts:
     def _signed_in(self, request: WebRequest) -> WebResponse:
         form = read_form(request)
         name, password = form.get("name", "")[:LONGEST], form.get("password", "")
-        wait = max(self._wait(who) for who in (("address", request.peer), ("name", name)))
+        with self._one:  # one guess at a time: of many sent at once none is free of waiting, and memory is that of one
+            return self._guessed(request, name, password)
+
+    def _guessed(self, request: WebRequest, name: str, password: str) -> WebResponse:
+        whose = ("address", str(peer_of(request.peer))), ("name", name)
+        wait = max(map(self._wait, whose))
         if wait > 0:
             problem = say("too many guesses: wait {seconds} s", seconds=int(wait) + 1)
             page = refusal(RefusedRequest(HTTPStatus.TOO_MANY_REQUESTS, problem))
             return _rendered(page, {"Retry-After": str(int(wait) + 1)})
         account = read_accounts(self._path).get(name)
-        with self._one:  # memory of one guess at a time
-            key = _key(password, account.salt if account else b"0" * 16)
+        key = _key(password, account.salt if account else b"0" * 16)
         if account is None or not secrets.compare_digest(key, account.key):
-            self._missed(("address", request.peer), ("name", name))
+            self._missed(*whose)
             self._tell(f"Not signed in from {request.peer}: name or password is wrong")
             return self._page(None, wrong=True)
         token = secrets.token_urlsafe(32)
@@ -238,8 +244,8 @@ class Accounts:
             now = self._clock()
             self._sessions = {one: session for one, session in self._sessions.items() if session.until > now}
             self._sessions[token] = SignedIn(name, account, now + SESSION_S)
-            self._guesses.pop(("address", request.peer), None)
-            self._guesses.pop(("name", name), None)
+            for who in whose:
+                self._guesses.pop(who, None)
         self._tell(f"{name} ({account.role}) signed in from {request.peer}")
         return self._to(self._home, f"{self._cookie}={token}")
 
@@ -253,7 +259,8 @@ class Accounts:
             self._guesses = {who: one for who, one in self._guesses.items() if one[1] > now - SLOWEST_S}
             for who in those:
                 count = self._guesses.get(who, (0, 0.0))[0] + 1
-                self._guesses[who] = count, now + (min(2.0 ** (count - FREE), SLOWEST_S) if count >= FREE else 0.0)
+                slow = min(2.0 ** min(count - FREE, 20), SLOWEST_S) if count >= FREE else 0.0
+                self._guesses[who] = count, now + slow
 
     def _to(self, path: str, cookie: str) -> WebResponse:
         kept = f"{cookie}; Secure; HttpOnly; SameSite=Strict; Path=/"

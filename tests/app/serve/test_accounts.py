@@ -8,7 +8,9 @@ import io
 import re
 import ssl
 import threading
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import urlencode
@@ -182,6 +184,33 @@ def test_guesses_wait_twice_as_long_each_from_the_fifth_on(clock: Clock) -> None
     assert waits == [2, 3, 5, 9, 17, 33, 65, 129, 257, 513, 901, 901]
     clock.now += 901
     assert statuses(accounts, asked(), asked(password="wrong")) == [303, 403], "who got in begins anew"
+
+
+def test_of_many_guesses_sent_at_once_no_more_are_tried_than_one_after_the_other(
+    clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def slow(password: str, salt: bytes) -> bytes:
+        time.sleep(0.01)
+        return password.encode().ljust(32)[:32]
+
+    monkeypatch.setattr(own, "_key", slow)
+    accounts = Accounts(Path(), 1, lambda line: None, clock=clock)
+    with ThreadPoolExecutor(20) as pool:
+        found = list(pool.map(lambda _: statuses(accounts, asked(password="wrong")), range(20)))
+    assert sorted(found) == [[403]] * 5 + [[429]] * 15
+
+
+def test_who_guesses_for_ever_waits_for_ever(clock: Clock) -> None:
+    accounts = Accounts(Path(), 1, lambda line: None, clock=clock)
+    accounts._guesses["name", "ben"] = 5000, 0.0
+    assert statuses(accounts, asked(password="wrong"), asked()) == [403, 429]
+
+
+def test_addresses_of_one_network_are_one(clock: Clock) -> None:
+    """Of IPv6 one network has all of the second half of an address."""
+    accounts = Accounts(Path(), 1, lambda line: None, clock=clock)
+    tries = [asked(name=f"name{i}", peer=f"2001:db8::{i + 1:x}") for i in range(6)]
+    assert statuses(accounts, *tries) == [403] * 5 + [429]
 
 
 def test_guesses_of_one_name_from_many_places_are_slowed_down_too(clock: Clock) -> None:
