@@ -35,7 +35,7 @@ CONTENTS: dict[str, list[str]] = {
         "report", "certificate", "verify", "ten-years-later", "languages", "dcc", "signing", "iso17025", "provenance", "qif",
         "standards", "noise", "screening", "diagnosis", "planning", "proving", "selfcalibration",
         "artefacts/index",
-        "artefacts/*", "machine/kinematics", "machine/error-maps", "machine/digitizer", "machine/features",
+        "artefacts/*", "machine/kinematics", "machine/rotary", "machine/error-maps", "machine/digitizer", "machine/features",
         "machine/parts", "machine/field", "machine/other-methods",
         "uncertainty/index", "uncertainty/methods", "uncertainty/budgets",
     ],

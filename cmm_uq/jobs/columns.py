@@ -14,6 +14,7 @@ from cmm_uq.base.files.csv_table import LARGEST
 from cmm_uq.base.files.table import LONGEST_MM
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.base.points import AXES
+from cmm_uq.base.rotary import ROTARY
 from cmm_uq.base.units import unit
 
 COORDINATES = ("x_mm", "y_mm", "z_mm")
@@ -53,11 +54,12 @@ COLUMNS: Mapping[str, str] = MappingProxyType({
     "depth_mm": "Scan depth of the point, along the digitizer's line of sight.",
     "turned_deg": "By how much a sphere was turned about Z against its first set-up: what turns with it is its own form.",
     **{f"tip_{a}_mm": f"Offset of the stylus tip from the end of the ram, along {a}." for a in AXES},
+    **{f"{a}_deg": f"Reading of the rotary table {a.upper()}, where the machine's chain has one." for a in ROTARY},
     "radius_mm": "Radius of the fit that gave the point.",
     "fit_rms_um": "Root mean square of the residuals of the fit that gave the point.",
     "n_points": "Number of points of the fit that gave the point.",
 })  # fmt: skip
-_OF_SOME_MACHINES = re.compile(r"temp_(bridge|ram)_.*|depth_mm|turned_deg")
+_OF_SOME_MACHINES = re.compile(r"temp_(bridge|ram)_.*|depth_mm|turned_deg|[abc]_deg")
 # columns that a recording may have, and that are refused in another unit than that of their name
 OPTIONAL = tuple(name for name in COLUMNS if name not in REQUIRED and not _OF_SOME_MACHINES.fullmatch(name))
 # what instruments read, which the kinds that go by it describe
@@ -98,6 +100,7 @@ WORDS: Mapping[str, Text] = MappingProxyType({
     "temp_air_c": say("temperature of the air"), "pressure_hpa": say("air pressure"), "humidity_pct": say("humidity"),
     "speed_mm_s": say("speed"), "gamma_deg": say("turn of the digitizer"), "turned_deg": say("turn of the sphere"),
     "depth_mm": say("scan depth"),
+    **{f"{a}_deg": say("angle of the table {axis}", axis=Verbatim(a.upper())) for a in ROTARY},
     "radius_mm": say("fitted radius"), "fit_rms_um": say("residuals of the fit"), "n_points": say("number of points fitted"),
 })  # fmt: skip
 _UNITS: Mapping[str, Text] = MappingProxyType({

@@ -14,7 +14,7 @@ from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.files.limits import JOB_BYTES, LOGO_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.output import finish_interrupted
-from cmm_uq.base.points import AXES, Machine, Points
+from cmm_uq.base.points import Machine, Points
 from cmm_uq.jobs.acquired import Provenance, provenance_name, provenance_of
 from cmm_uq.jobs.derived_job import files_of, prediction_of
 from cmm_uq.jobs.importing.documents import DCC
@@ -26,6 +26,7 @@ from cmm_uq.jobs.logo import checked_logo
 from cmm_uq.jobs.recording import compared
 from cmm_uq.jobs.recording.beside import LOG, SHORT_GAUGE, ShortGauge, log_of, short_gauge_of, with_logged
 from cmm_uq.jobs.recording.compared import EXPANDED, OF_POINTS, reference_file
+from cmm_uq.jobs.recording.machines import in_coordinates, machine_of
 from cmm_uq.jobs.reports import as_found_of, calibration_file, results_named
 from cmm_uq.jobs.source import FilesInFolder, FilesInMemory, JobFiles, check_distinct
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
@@ -39,7 +40,7 @@ from cmm_uq.jobs.tables.identification import (
     check_mark,
     is_planned,
 )
-from cmm_uq.jobs.tables.machine import FurtherFacts, MachineFacts, stated_axes
+from cmm_uq.jobs.tables.machine import FurtherFacts, MachineFacts
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.recording.certified import CertifiedValues
@@ -117,7 +118,7 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     inputs = {"job.toml": content}
     earlier = facts.recording.earlier
     _refuse_unfit_earlier(facts, path)
-    machine = _machine(facts.machine)
+    machine = machine_of(facts.machine)
     maps, logs, calibrations = _of_the_machine(facts.machine)
     predicted, predicting_maps = files_of(facts, path)
     certificate = reference_file(facts.artefact)
@@ -161,7 +162,7 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     points, recognised = read_recording_file(
         inputs[facts.recording.file], where, machine, facts.recording, acquired.without if acquired else ()
     )
-    points = replace(points, in_seconds=acquired is not None and not acquired.changed)
+    points = replace(in_coordinates(points, where), in_seconds=acquired is not None and not acquired.changed)
     told = [recognised, None if says is None else says.recognised]
     facts, points, further = _certified_points(facts, points, inputs, source, says, told)
     told.append(further)
@@ -171,6 +172,7 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
         points = with_logged(points, log_of(facts.machine, inputs, folder), path, where)
     if earlier is not None:
         then, recognised = read_recording_file(inputs[earlier], str(folder / earlier), machine, facts.recording)
+        then = in_coordinates(then, str(folder / earlier))
         told.append(recognised)
         compared.refuse_copy(points, then, planned, f"{path}: [recording] earlier")
         points = compared.against_earlier(points, then, facts.artefact.cte_per_k, where)
@@ -284,7 +286,7 @@ def read_machine(folder: Path, nameable: Nameable) -> Job:
     check_distinct([*maps, *logs, *calibrations], str(source.toml))
     inputs = {"job.toml": content} | _contents(source, maps, MAP_BYTES) | _contents(source, logs, TABLE_BYTES)
     inputs |= _contents(source, calibrations, TABLE_BYTES, written=True)
-    return Job(source.toml.parent, facts, _no_points(_machine(facts.machine)), inputs)
+    return Job(source.toml.parent, facts, _no_points(machine_of(facts.machine)), inputs)
 
 
 def _facts(source: JobFiles, nameable: Nameable) -> tuple[bytes, JobFile, CertifiedValues | None]:
@@ -378,10 +380,3 @@ def _contents(source: JobFiles, names: Sequence[str], limit: Limit, *, written: 
 def _no_points(machine: Machine) -> Points:
     none = np.zeros(0, dtype=np.int64)
     return Points(np.zeros((0, 3)), none, none, none, machine)
-
-
-def _machine(facts: MachineFacts) -> Machine:
-    travel = np.array([getattr(facts.travel_mm, axis) or [np.nan, np.nan] for axis in AXES], dtype=np.float64)
-    axes = tuple(axis for axis in AXES if axis.upper() in facts.chain)
-    origin = np.array(facts.origin_mm, dtype=np.float64)
-    return Machine(facts.name, facts.chain, travel, origin, axes=axes, read_by=stated_axes(facts.axes))

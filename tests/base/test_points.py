@@ -2,39 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.points import Floats, Machine, Points
+from cmm_uq.base.points import Machine, Points
+from cmm_uq.base.rotary import Turntable
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE
 
 ORIGIN = np.array([10.0, -20.0, 30.0])
 XYZ = np.array([[1.0, 2.0, 3.0], [400.0, 250.0, -7.0]])
 ONE = np.ones(2, dtype=np.int64)
-
-
-@dataclass(frozen=True, eq=False)
-class Turntable(Machine):
-    """Three carriages, and a table that turns the workpiece by c about z: coordinates lie in the table's frame."""
-
-    axes: tuple[str, ...] = ("x", "y", "z", "c")
-
-    def coordinates(self, readings: Floats) -> Floats:
-        return np.array([turn(-c) @ (r - self.origin_mm) for *r, c in readings])
-
-    def readings(self, xyz: Floats, columns: Mapping[str, Floats]) -> Floats:
-        c = columns["c_deg"]
-        carriages = [turn(angle) @ p + self.origin_mm for p, angle in zip(xyz, c, strict=True)]
-        return np.column_stack([carriages, c])
-
-
-def turn(degrees: float) -> Floats:
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 READ = np.array([[110.0, -20.0, 35.0, 0.0], [110.0, -20.0, 35.0, 90.0]])
@@ -78,8 +58,7 @@ def test_an_error_of_a_scale_goes_by_what_the_axis_reads_and_not_by_the_place() 
 def test_the_pitch_of_a_carriage_goes_by_what_it_reads_and_what_it_carries() -> None:
     """5 ″/m at 110 mm: 2.67 µrad, over the 35 mm that Z reads."""
     points = turned()
-    travel = np.array([[0.0, 500.0]] * 3 + [[0.0, 360.0]])
-    points = replace(points, machine=replace(points.machine, travel_mm=travel))
+    travel = np.array([[0.0, 500.0]] * 3)
+    points = replace(points, machine=Turntable("turntable", travel_mm=travel, origin_mm=ORIGIN))
     pitch = ROTATION["x", "y"].basis(points)[:, 0, 0] * 5
     np.testing.assert_allclose(pitch, [5 * np.pi / 180 / 3600 * 0.110 * 35.0] * 2, rtol=1e-12)
-    assert points.machine.travel("c") == (0.0, 360.0)

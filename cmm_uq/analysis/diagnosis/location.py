@@ -210,7 +210,8 @@ def residual_field(before: RecordingModel, after: RecordingModel) -> ResidualFie
     left = np.column_stack(each)
     if rows.shape[1] == 1:
         every = np.broadcast_to(np.eye(3), (len(artefact.points), 3, 3))
-        directions = artefact.project(artefact.points.xyz, every)[used]  # (m, 3) in which each sees its point move
+        # (m, 3) in which each sees its point move
+        directions = artefact.project(artefact.points.xyz, artefact.points.on_artefact(every))[used]
         point, order = rows[:, 0], np.argsort(rows[:, 0], kind="stable")
         sets = np.split(order, np.flatnonzero(np.diff(point[order])) + 1)
         field = np.array([np.linalg.pinv(directions[own], rcond=_SEEN) @ left[own] for own in sets])

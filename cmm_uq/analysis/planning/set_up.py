@@ -60,8 +60,9 @@ class Pattern:
     @classmethod
     def of_recording(cls, points: Points) -> tuple[Pattern, Floats, Floats]:
         """The pattern of one recorded set-up, with its attitude (3, 3) and its middle (3,) in scale readings."""
-        middle = np.asarray(points.machine_xyz.mean(axis=0))
-        about = points.machine_xyz - middle
+        placed = points.xyz + points.machine.origin_mm  # with a rotary table at 0°
+        middle = np.asarray(placed.mean(axis=0))
+        about = placed - middle
         attitude, columns, turned = _attitude(about), dict(points.columns), {}
         for key, name in VECTORS.items():
             names = [name.format(a) for a in AXES]

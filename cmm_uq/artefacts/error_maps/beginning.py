@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.base.points import Machine
+from cmm_uq.base.points import AXES, Machine
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.machine.physics.error_map import COLUMNS
 
@@ -18,12 +18,12 @@ def maps(machine: Machine) -> dict[str, bytes]:
     random, files = np.random.default_rng(1), {}
     for temperature in TEMPERATURES:
         lines = ["# simulated by cmm-uq new: put in the maps of your machine", f"axis,position_mm,{','.join(COLUMNS)}"]
-        for axis in machine.axes:
+        for axis in AXES:
             low, high = machine.travel(axis)
             for position in np.linspace(low, high, STEPS + 1):
                 figures = random.normal(0.0, NOISE, len(COLUMNS)) * (position != low)
                 grown = EXPANSION_UM_PER_M_K * (temperature - 20.0) * (position - low) / 1000.0
-                figures[machine.axes.index(axis)] += grown
+                figures[AXES.index(axis)] += grown
                 lines.append(",".join((axis, f"{position:g}", *(f"{figure:.2f}" for figure in figures))))
         files[f"error_map_{temperature:g}C.csv"] = ("\n".join(lines) + "\n").encode()
     return files

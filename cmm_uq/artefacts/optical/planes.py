@@ -16,7 +16,7 @@ from cmm_uq.artefacts.digitizer import ANGLES, SCAN, check_angles
 from cmm_uq.artefacts.kinds import DIGITIZER
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say, signed
-from cmm_uq.base.points import Floats, Machine, Points
+from cmm_uq.base.points import AXES, Floats, Machine, Points
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Column, Section, Table, figure_columns, text_columns
 from cmm_uq.certificate.origin import quantity_data
@@ -156,7 +156,7 @@ _PLANES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.5, 0.5, 0.7))  # normals of a fi
 def scans(machine: Machine) -> Points:
     """Three planes about the middle of the volume, seen with α = β = 90°, γ = 30°, the machine moving in all directions."""
     angles, parts = (90.0, 90.0, 30.0), []
-    middle = np.array([np.mean(machine.travel(axis)) for axis in machine.axes]) - machine.origin_mm
+    middle = np.array([np.mean(machine.travel(axis)) for axis in AXES]) - machine.origin_mm
     u, v = (part.ravel() for part in np.meshgrid(np.linspace(-15, 15, 4), np.linspace(-15, 15, 4)))
     scan = np.column_stack([u, v, np.zeros(16)]) @ euler_313(*np.radians(angles)).T
     for number_, normal in enumerate(np.array(_PLANES), 1):

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin, SimulationMistake, SimulationMistakes
+from cmm_uq.analysis.diagnosis.simulation import SimulationMistake, SimulationMistakes
 from cmm_uq.base.messages import NOTHING, Text, alternatives, lines, say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Column, Paragraph, Section, section, table
+from cmm_uq.certificate.result import SimulatedTwin
 from cmm_uq.certificate.wording import probability
 from cmm_uq.maths.uncertainty.quantity import alike
 

@@ -172,9 +172,35 @@ class DigitizerFacts(JobTable):
 
 
 def check_carriages(chain: str) -> None:
-    """Refuse a chain without each of its three carriages once."""
-    if sorted(chain.replace("F", "", 1)) != ["X", "Y", "Z"]:
+    """Refuse a chain without each of its three carriages once, or with more behind them than one rotary table."""
+    carriages, bar, tables = chain.partition("|")
+    if sorted(carriages.replace("F", "", 1)) != ["X", "Y", "Z"]:
         raise ValueError(f"chain = {chain!r}: give X, Y, Z once each, and F for the frame if the workpiece moves")
+    if bar and tables not in ("A", "B", "C"):
+        raise ValueError(
+            f"chain = {chain!r}: give one rotary table behind the bar, A, B or C as it turns about X, Y or Z, such as XYZ|C"
+        )
+
+
+class RotaryTableFacts(JobTable):
+    """``table``: the rotary table that a chain such as `XYZ|C` ends with."""
+
+    axis_mm: Triple | None = None
+    """A point on its axis in scale readings; the origin of the recording where left out. Location and tilt of the axis are
+    those at this point."""
+    coordinates: Literal["table", "machine"] = "table"
+    """Whether recorded coordinates are turned back by the table's angle, so that what stands on it keeps them, or are those of
+    the carriages."""
+    turns: Literal["anticlockwise", "clockwise"] = "anticlockwise"
+    """How the table turns while its reading grows, seen from the positive end of the axis that it is parallel to."""
+    travel_deg: Range | None = None
+    """Lowest and highest reading of the table."""
+
+    def problems(self) -> Iterator[str]:
+        if self.travel_deg and not self.travel_deg[0] < self.travel_deg[1]:
+            yield f"travel_deg = {self.travel_deg}: the first number must be the lower one"
+        if self.coordinates == "machine" and self.axis_mm is None:
+            yield 'coordinates = "machine" are turned back about the table\'s axis: give a point of it, axis_mm = [x, y, z]'
 
 
 Reading = Literal[
@@ -258,8 +284,10 @@ class MachineFacts(JobTable):
     model: str = key("", "Model or type of the machine.")
     serial: str = key("", "Serial number of the machine (7.8.2.1 g).")
     owner: str = key("", "Owner of the machine.")
-    chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}$")] = "XYZ"
-    """Carriages from the table to the ram, with F for the frame where the workpiece moves."""
+    chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}(\|[A-Z]*)?$")] = "XYZ"
+    """Carriages from the table to the ram, with F for the frame where the workpiece moves; behind a bar the rotary table that
+    it stands on, such as `XYZ|C`."""
+    table: RotaryTableFacts = key(RotaryTableFacts(), "The rotary table of the chain.")
     travel_mm: Travel = key(Travel(), "Lowest and highest scale reading of each axis.")
     origin_mm: Triple = [0.0, 0.0, 0.0]
     """Scale reading of the recording's origin: scale reading = recorded coordinate + origin."""
@@ -279,6 +307,8 @@ class MachineFacts(JobTable):
         for file in [each.file for each in self.error_map if each.squareness_arcsec and self.squareness_arcsec]:
             yield f"squareness_arcsec is given for the machine and for the map {file!r}: leave out one of the two"
         check_carriages(self.chain)
+        if self.table.model_fields_set and "|" not in self.chain:
+            yield f"[machine.table] is of a rotary table, which chain = {self.chain!r} has not: give it behind a bar, as XYZ|C"
 
 
 class ProbeFacts(JobTable):

@@ -120,7 +120,8 @@ class RecordingModel:
 
     def errors(self, xyz: Floats, coefficients: Floats) -> Floats:
         """Errors e (n, 3), mm, of points indicated at ``xyz``."""
-        return self._acting.errors(self.artefact.points.at(xyz), coefficients)
+        points = self.artefact.points.at(xyz)
+        return points.on_artefact(self._acting.errors(points, coefficients)[:, :, None])[:, :, 0]
 
     def indicated(self, true_xyz: Floats, coefficients: Floats) -> Floats:
         """What the machine indicates at true points (n, 3): solves indicated + e(indicated) = true to below 0.01 nm."""
@@ -237,7 +238,7 @@ class RecordingModel:
         artefact, used = self.artefact, self.used
         true, unexplained = self._unexplained(values)
         change = self._acting.derivatives(self._about(values))
-        design = np.hstack([-artefact.project(true, change), artefact.size_change()])
+        design = np.hstack([-artefact.project(true, artefact.points.on_artefact(change)), artefact.size_change()])
         return LinearModel(
             (unexplained + design @ values)[used], design[used], self.unknowns,
             Freedoms.of(artefact.placing(true)).at(used), artefact.noise_scale[used], self.sigma,
@@ -256,7 +257,8 @@ class RecordingModel:
 
     def seen(self, displacement: Floats, values: Floats) -> Floats:
         """What used observations show, (m, k) in mm, of an error e of the points (n, 3, k) that ``values`` do not contain."""
-        return -self.artefact.project(self.where(values), displacement)[self.used]
+        shown = self.artefact.points.on_artefact(displacement)
+        return -self.artefact.project(self.where(values), shown)[self.used]
 
     def where(self, values: Floats) -> Floats:
         """Points (n, 3), mm, about which the model is linear at ``values``."""
@@ -305,7 +307,9 @@ class RecordingModel:
         ``coefficients``: (k,) of the effects, in order. ``sizes``: (s,) true sizes of the artefact, mm.
         """
         exact = self.predicted(np.concatenate([coefficients, sizes]))
-        return noise.displayed(exact + noise.drawn(self.artefact.points, random))
+        points = self.artefact.points
+        drawn = points.on_artefact(noise.drawn(points, random)[:, :, None])[:, :, 0]
+        return noise.displayed(exact + drawn)
 
     def leans_beyond(self, values: Floats, sd: Floats, limit: float) -> bool:
         """Whether an angle between two axes may differ from 90° by more than ``limit``, rad, within four ``sd`` (k,)."""

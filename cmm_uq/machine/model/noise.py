@@ -90,7 +90,7 @@ def sensitivities(model: RecordingModel, xyz: Floats) -> Floats:
     for s, own in enumerate(owners):
         moved = np.zeros((len(xyz), 3, 3))
         moved[own] = np.eye(3)
-        found[:, s] = artefact.project(xyz, moved)
+        found[:, s] = artefact.project(xyz, artefact.points.on_artefact(moved))
     return found
 
 

@@ -21,6 +21,9 @@ from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import Unit, unit
 from cmm_uq.machine.physics.words import AXIS, OTHER, SECOND, SENSE, SIDE, SIZE, Amount, filled
 
+ARTEFACT = (
+    "artefact"  # the mechanism whose displacements are along the axes of the coordinates, which turn with a table
+)
 # tiers: effects that every job file may count on, rarer ones, and faults of the artefact itself
 CONTRACT, FURTHER, OWN = "contract", "further", "own"
 # how readily an effect of a tier is thought of: a judgement of how many machines show it
@@ -71,7 +74,9 @@ class Effect(ABC):
     name: str  # as in ``[model] effects``
     title: Text  # in words, for certificates
     formula: str  # e with its sign, for documents; a and b are the axes in the name
-    mechanism: str  # where the cause lies: scale, drive, guideway, frame, temperature, probe, controller, artefact, …
+    mechanism: str = (
+        ""  # where the cause lies: scale, drive, guideway, frame, temperature, probe, controller, artefact, …
+    )
     points_to: Text  # what a service technician should look at, to follow "What it points to:"; without a full stop
     coefficients: tuple[Parameter, ...]  # what enters e linearly, k of them
     shape: tuple[Shape, ...] = ()  # what shapes the basis, if anything
@@ -101,7 +106,7 @@ class Effect(ABC):
 
     @abstractmethod
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """Displacement e of every point for one unit of each coefficient, (n, 3, k) in mm.
+        """Displacement e of every point for one unit of each coefficient, (n, 3, k) in mm along the machine's axes.
 
         A ``CmmUqError`` where a column or a machine's figure is missing.
         """

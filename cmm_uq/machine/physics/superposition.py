@@ -15,7 +15,7 @@ import numpy as np
 
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.machine.physics import kinematics
-from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.effect import ARTEFACT, Effect
 from cmm_uq.machine.physics.kinematics import SQUARENESSES, along_directions, axis_directions, leaning
 
 _SETTLED = 1e-9  # mm
@@ -33,6 +33,8 @@ class About:
     def columns(self, effect: Effect, shape: Sequence[float] = ()) -> Floats:
         """Change of e, (n, 3, j) in mm, for one unit of each coefficient of one effect, named in the model or not."""
         basis = _along_motion(effect, effect.basis(self.points, shape), self.points)
+        if effect.mechanism == ARTEFACT:
+            return self.points.machine.turned(basis, self.points.columns)
         if self.change is None or not effect.plane:
             return basis
         turned = along_directions(self.points.carriages, self.change[SQUARENESSES.index(str(effect.plane))])
@@ -115,7 +117,7 @@ def _indicated(true: Points, directions: Floats) -> Points:
     """Where a machine whose motions have these directions, and no other error, indicates true points."""
     points = true
     for _ in range(_ROUNDS):
-        xyz = true.xyz - leaning(points.carriages, directions)
+        xyz = true.xyz - true.on_artefact(leaning(points.carriages, directions)[:, :, None])[:, :, 0]
         change = np.abs(xyz - points.xyz).max(initial=0.0)
         points = true.at(xyz)
         if not change > _SETTLED:

@@ -129,9 +129,10 @@ def recording(points: Points) -> bytes:
     writer = csv.writer(text, lineterminator="\n")
     names = ["measurement", "point", "repeat", *(f"{axis}_mm" for axis in AXES), *points.columns]
     writer.writerow(names)
+    xyz = points.machine.as_recorded(points.xyz, points.columns)
     for i in range(len(points)):
         numbers = [points.measurement[i], points.point[i], points.repeat[i]]
-        coordinates = [f"{value:.7f}" for value in points.xyz[i]]
+        coordinates = [f"{value:.7f}" for value in xyz[i]]
         writer.writerow([*numbers, *coordinates, *(f"{values[i]:.10g}" for values in points.columns.values())])
     return text.getvalue().encode()
 
