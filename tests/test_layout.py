@@ -25,7 +25,7 @@ SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
 MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.reference\.")
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
-    "": 140, "base": 2_910, "maths": 11_010, "jobs": 15_273, "machine": 6_792, "analysis": 19_651, "laboratory": 14_126,
+    "": 140, "base": 2_910, "maths": 11_010, "jobs": 15_417, "machine": 6_792, "analysis": 19_651, "laboratory": 14_126,
     "certificate": 16_295, "artefacts": 11_887, "app": 18_478,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.importing.factors import LINE, RUN, hint
+from cmm_uq.jobs.importing.factors import LINE, RUN, hint, ways_of
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Sheet, Sources, WrittenUnit, apart, sources_of, unit_named
 from cmm_uq.jobs.importing.header import plain_words, without_unit, words_of
 
@@ -32,6 +32,7 @@ _BETWEEN = r"[\s;,]+(?:[YZ]\s*[=:]?\s*)?"
 _THREE = {
     sign: re.compile(r"[^\d+−-]{0,20}?" + _BETWEEN.join([rf"([+−-]?\d+(?:[{sign}]\d+)?)"] * 3), re.I) for sign in ".,"
 }
+_PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
 SMALL = ("um", "nm", "microinch")  # units of deviations
 DEEPEST = 4  # rows of a head
 WORD = re.compile(r"[^\W\d_]+")
@@ -86,8 +87,11 @@ class CutSheet:
         self.sign = sheet.decimal or sign_of(sheet.rows)
         self.width = max(map(len, sheet.rows), default=0)
         self.figures = [[None if c == "" else figure(c, self.sign) for c in row] for row in sheet.rows]
+        self._targets: dict[int, list[int]] = {}
         self.places_of: dict[int, str] = {}  # of each row of figures, as LINE_PLACE has it
         self.blocks = list(self._blocks())
+        for block in self.blocks:
+            self.places_of |= self._places_beside(block)
 
     def at(self, row: int, i: int | None = None) -> str:
         """Place of a row or a cell, for messages."""
@@ -105,7 +109,8 @@ class CutSheet:
 
     def place(self, i: int) -> dict[str, tuple[float, ...]]:
         """Start, end and direction of a line, where a row gives three figures after a word for one of them."""
-        return places_in(" ".join(self.text(i, k) for k in range(len(self.sheet.rows[i]))), self.sign)
+        text = " ".join(self.text(i, k) for k in range(len(self.sheet.rows[i])))
+        return {} if self.targets(i) else places_in(text, self.sign)
 
     def unit_in(self, rows: Sequence[int], i: int) -> WrittenUnit | None:
         """The unit that every cell of a column has after its figure."""
@@ -162,6 +167,8 @@ class CutSheet:
             and hint(self.text(i, filled[0]), lengths=True) in (LINE, RUN)
         ):
             return "text"  # as Position;1 above a block
+        if self.targets(i):
+            return "text"
         if self._is_head(i) and i + 1 < len(self.sheet.rows):
             below = [k for k in numbers if k < len(self.figures[i + 1]) and self.figures[i + 1][k] is not None]
             follows = any((self.figures[i + 1][k] or (0, 1))[1] < 1 for k in below)
@@ -172,6 +179,24 @@ class CutSheet:
         beside = [[k for k, f in enumerate(own) if f is not None] for own in around]
         told = len(numbers) > 1 and all(k - 1 in texts for k in numbers) and numbers not in beside
         return "text" if told else "figures"
+
+    def targets(self, i: int) -> list[int]:
+        """Columns of a row of targets along an axis, below which deviations stand, there and back; none of another row."""
+        if i not in self._targets:
+            own = self.figures[i]
+            columns = [k for k, f in enumerate(own) if f is not None]
+            steps = np.diff([f[0] for f in own if f is not None])
+            in_turn = len(columns) > 2 and columns[0] > 0 and columns[-1] - columns[0] == len(columns) - 1
+            below = []
+            for j in range(i + 1, len(self.figures)) if in_turn and (np.all(steps > 0) or np.all(steps < 0)) else ():
+                if [k for k, f in enumerate(self.figures[j]) if f is not None and k >= columns[0]] != columns:
+                    break
+                below.append(j)
+            values = np.array([[(self.figures[j][k] or (0.0, 0.0))[0] for k in columns] for j in below])
+            small = len(below) > 1 and np.abs(values).max() < 0.2 * np.abs(steps).min()
+            ways = (ways_of([self.text(j, k) for j in below[:2]]) for k in range(columns[0] if small else 0))
+            self._targets[i] = columns if any(way is not None for way in ways) else []
+        return self._targets[i]
 
     def _only_units(self, i: int) -> bool:
         cells = [str(cell).strip("[]()<>{} ") for cell in self.sheet.rows[i] if cell != ""]
@@ -194,13 +219,7 @@ class CutSheet:
             head = self._head(pending, numbers) if pending else []
             for row in pending:
                 if row not in head:
-                    texts = [self.text(row, k) for k in range(len(self.sheet.rows[row]))]
-                    text = " ".join(texts).strip()
-                    text = _before_place(text) if self.place(row) else text
-                    first = WORD.search(text)
-                    single = len([c for c in self.sheet.rows[row] if c != ""]) == 1 or self.place(row)
-                    alone = {"": text} if single else {}
-                    titles = {**titles, (first[0].casefold() if first else text): text, **alone}
+                    titles = {**titles, **self._titles(row)}
             if head or block is None:
                 if block is not None:
                     yield block
@@ -216,6 +235,35 @@ class CutSheet:
             pending = []
         if block is not None:
             yield block
+
+    def _places_beside(self, block: Block) -> dict[int, str]:
+        """Places of lines that stand in the columns of a table, once for the rows that follow."""
+        columns: dict[str, list[int]] = {}
+        for i, path in enumerate(block.paths):
+            if any(i < len(self.figures[row]) and self.figures[row][i] for row in block.rows):
+                for name in [name for _, name in _named_places(" ".join(path))][:1]:
+                    columns.setdefault(name, []).append(i)
+        found, last = dict[int, str](), ""
+        other = next((name for name in ("end", "direction") if len(columns.get(name, ())) == 3), "")
+        for row in block.rows if other and len(columns.get("start", ())) == 3 else ():
+            figures = [
+                self.figures[row][i] if i < len(self.figures[row]) else None
+                for i in (*columns["start"], *columns[other])
+            ]
+            own = [repr(figure[0]) for figure in figures if figure]
+            last = f"{','.join(own[:3])} {other} {','.join(own[3:])}" if len(own) == 6 else last
+            found |= {row: last} if last else {}
+        return found
+
+    def _titles(self, row: int) -> dict[str, str]:
+        """Titles in a row of text, by the word that each begins with; without one where it has nothing else."""
+        text = " ".join(self.text(row, k) for k in range(len(self.sheet.rows[row]))).strip()
+        text = _before_place(text) if self.place(row) else text
+        pairs = _PAIRS.split(text)
+        parts = pairs if all(":" in pair for pair in pairs) else [text]
+        titles = {(first[0].casefold() if (first := WORD.search(part)) else part): part for part in parts}
+        single = len([c for c in self.sheet.rows[row] if c != ""]) == 1 or self.place(row)
+        return {**titles, "": text} if single else titles
 
     def _head(self, pending: Sequence[int], numbers: Sequence[int]) -> list[int]:
         """Rows of a head at the end of rows of text, above a row with figures in these columns."""
@@ -238,20 +286,21 @@ class CutSheet:
                 *range(len(filled))
             ]  # the last of them stands over all that follow
             ahead = head and ((2 * filled[-1] < numbers[-1] and not grouped) or texts[0].endswith(":") or filled == [0])
-            if apart or ahead or any(f is not None and f[1] < 1 for f in self.figures[row]):
+            if apart or ahead or (any(f is not None and f[1] < 1 for f in self.figures[row]) and not self.targets(row)):
                 break
             head.insert(0, row)
         return head
 
     def _paths(self, head: Sequence[int]) -> list[list[str]]:
-        """Texts above each column; a text of an upper row stands over the columns up to the next one."""
-        levels = []
+        """Texts above each column; a text of an upper row stands over the columns up to the next one of it or above it."""
+        levels, begun = [], [False] * self.width
         for depth, row in enumerate(head):
             texts = [self.text(row, k) for k in range(self.width)]
+            begun = [before or bool(text) for before, text in zip(begun, texts, strict=True)]
             if depth < len(head) - 1:
                 below = [any(self.text(lower, k) for lower in head[depth + 1 :]) for k in range(self.width)]
                 for k in range(1, self.width):
-                    texts[k] = texts[k] or (texts[k - 1] if below[k] else "")
+                    texts[k] = texts[k] or (texts[k - 1] if below[k] and not begun[k] else "")
             levels.append(texts)
         return [[level[k] for level in levels] for k in range(self.width)]
 

@@ -33,11 +33,12 @@ from cmm_uq.jobs.importing.roles import (
     labels_of,
     like,
     mean_of,
+    said,
     unit_beside,
 )
 
 _LETTER = re.compile(r"(?<![A-Za-zÀ-ÿ])([xyzXYZ])(?![A-Za-zÀ-ÿ])|^([XYZ])(?=[A-Z]?[a-z])")
-_ENDS = re.compile(r"(.*?)[\s_.:/-]*([XYZxyz])(?:[- ]?(?:axis|achse|axe|wert|value))?", re.IGNORECASE)
+_ENDS = re.compile(r"(.*?)[\s_.:/-]*([XYZ])(?:[- ]?(?:axis|achse|axe|wert|value|[ck]oord\w*\.?))?", re.IGNORECASE)
 
 
 def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> SheetReading | None:
@@ -169,6 +170,8 @@ def _threes(labels: Sequence[Mapping[tuple[str, str], str]]) -> bool:
 def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> SheetReading | None:
     """Deviations at targets along an axis, there and back."""
     columns = columns_in(grid, blocks, rows)
+    if blocks[0].head and (across := grid.targets(blocks[0].head[-1])):
+        return _across(grid, rows, columns, across, blocks[0].head[-1])
     ends = [c for c in columns if c.role in (TARGET, NOMINAL) and np.ptp(c.values[np.isfinite(c.values)]) > 1]
     target = ends[0] if ends else None
     if target is None or not np.isfinite(target.values[0]):
@@ -187,6 +190,28 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
             if np.isfinite(c.values[k]):
                 reading.add(row, k, c, source, (float(values[k]), float(c.values[k])))
     return reading if any(ways_of(label.values) is not None for label in labels_of(reading)) else None
+
+
+def _across(
+    grid: CutSheet, rows: Sequence[int], columns: Sequence[FigureColumn], across: Sequence[int], head: int
+) -> SheetReading | None:
+    """Deviations below the targets that stand above them, a way and a run in each row."""
+    source = [c for c in columns if c.i in across]
+    labels = {row: [grid.text(row, k) for k in range(across[0])] for row in rows}
+    own = [
+        row
+        for row in rows
+        if said(labels[row]) != SUMMARY and any(ways_of([one, "+"]) or ways_of([one, "-"]) for one in labels[row])
+    ]
+    reading = SheetReading("runs")
+    reading.taken = {"target": source, "reading_um": source}
+    reading.collect(grid, own, columns)
+    for k, row in enumerate(own):
+        for c in source:
+            target, figure = grid.figures[head][c.i], grid.figures[row][c.i]
+            if target is not None and figure is not None:
+                reading.add(row, k, c, [c], (target[0], figure[0]))
+    return reading if len(reading.figures) == len(own) * len(across) else None
 
 
 def _same_way(a: FigureColumn, b: FigureColumn) -> bool:

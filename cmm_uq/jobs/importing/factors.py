@@ -23,6 +23,8 @@ _TOKEN = re.compile(r"[^\W_]+")
 _GLUED = re.compile(r"(?<=\d)(?=[^\W\d_])|(?<=[^\W\d_])(?=\d)")
 _CAMEL = re.compile(r"(?<=[a-zäöüéèà])(?=[A-Z])")
 _SAME_PLACE_MM = 0.5
+_RIGID_MM = 0.1
+_PROBED, _ROUND, _LARGEST_BALL_MM, _FORM_MM = 9, 0.1, 75.0, 0.02  # of a ball that was probed
 _SHORT = {"m": LINE, "p": POINT, "b": POINT, "k": POINT, "r": RUN, "w": RUN, "l": LINE}
 
 
@@ -56,9 +58,8 @@ def ways_of(values: Sequence[str]) -> list[int] | None:
 
 
 def _has(text: str, words: frozenset[str]) -> bool:
-    return any(
-        w in words or any(len(one) > 1 and not one.isascii() and one in w for one in words) for w in plain_words(text)
-    )
+    asian = [one for one in words if len(one) > 1 and not one.isascii()]
+    return any(word in words or any(one in word for one in asian) for word in plain_words(text))
 
 
 def counted(label: Label, *, lengths: bool) -> str | None:
@@ -112,9 +113,11 @@ def parts_of(label: Label) -> list[Label]:
         for k, column in enumerate(zip(*tokens, strict=True)):
             values = tuple(token[0] for token in column)
             if len({*values}) > 1:
-                if before:  # with the word ahead of it
+                halves = _halves(Label(before, values, "part"))
+                if before and len(halves) == 1:  # with the word ahead of it
                     values = tuple(name[own[k - 1][1] : own[k][2]] for name, own in zip(names, tokens, strict=True))
-                found += _halves(Label(before, values, "part"))
+                    halves = [Label(before, values, "part")]
+                found += halves
             before = values[0] if len({*values}) == 1 and not values[0].isdigit() else ""
         if len(found) > 1 or (found and names is not label.values and found[0].values != label.values):
             return found
@@ -127,13 +130,13 @@ def parts_of(label: Label) -> list[Label]:
 
 
 def _halves(label: Label) -> list[Label]:
-    """A part such as ``1A`` as its number and its letter."""
-    halves = [re.fullmatch(r"(.*\d)([A-Za-z])", value) for value in label.values]
-    return (
-        [Label(label.words if k == 1 else "", tuple(m[k] for m in halves if m), "part") for k in (1, 2)]
-        if all(halves)
-        else [label]
-    )
+    """A part such as ``1A`` or ``A1`` as its number and its letter."""
+    for form in (r"(.*\d)([A-Za-z])", r"([A-Za-z])(\d+)"):
+        halves = [re.fullmatch(form, value) for value in label.values]
+        own = [tuple(m[k] for m in halves if m) for k in (1, 2)]
+        if all(halves) and len({*own[0]}) > 1 < len({*own[1]}):
+            return [Label(label.words if k == 0 else "", values, "part") for k, values in enumerate(own)]
+    return [label]
 
 
 def codes(values: Sequence[object]) -> Ints:
@@ -305,25 +308,39 @@ def points_of_names(labels: Sequence[Label], xyz: Floats) -> dict[str, list[str]
     order = sorted(rest, key=lambda f: (_LAST.index(f[0].sort), np.count_nonzero(np.diff(f[1]))))
     lines, faces, free = ([f for f in order if f[2] == word] for word in (LINE, POINT, None))
     slow = sorted(free, key=lambda f: (f[0].sort == "block", np.count_nonzero(np.diff(f[1])), f[0].sort == "part"))
-    for measurement in (*lines, *([] if lines else [*slow, None])):
-        for point in (*faces, *slow[::-1]):
-            keys = [f[1] for f in (measurement, point) if f is not None] + ([] if repeat is None else [repeat])
-            if (
-                point is measurement
-                or together(*keys).max() + 1 < count
-                or (measurement and fixes(measurement[1], point[1]))
-            ):
-                continue
-            if measurement is None and point[2] != POINT:
-                continue
-            return _columns(measurement, point, repeat, count)
+    pairs = [(one, other) for one in (*lines, *([] if lines else [*slow, None])) for other in (*faces, *slow[::-1])]
+    more = [] if repeat is None else [repeat]
+    fitting = [pair for pair in pairs if _tells(*pair, more, count)]
+    turned = [(other, one) for one, other in fitting if one is not None and not lines and other[0].sort == "part"]
+    if fitting:
+        rigid = ((one, other) for one, other in (*fitting, *turned) if one and _rigid(one, other, repeat, xyz))
+        return _columns(*next(rigid, fitting[0]), repeat, count)
     if lines or again or not each:
         return None
-    size = alike_in_turn(xyz)
+    size = alike_in_turn(xyz) or (count if _on_a_ball(xyz) else None)
     if size is not None:
         rows = np.arange(count)
         return {"measurement": [f"{k // size + 1}" for k in rows], "point": [f"{k % size + 1}" for k in rows]}
     return next((_columns(None, f, None, count) for f in each if f[2] == POINT), None)
+
+
+def _tells(measurement: _Counted | None, point: _Counted, more: Sequence[Ints], count: int) -> bool:
+    """Whether two labels, and what counts repeats, tell all points apart."""
+    if measurement is None:
+        return point[2] == POINT and bool(together(point[1], *more).max() + 1 == count)
+    apart = point is not measurement and not fixes(measurement[1], point[1])
+    return apart and bool(together(measurement[1], point[1], *more).max() + 1 == count)
+
+
+def _rigid(measurement: _Counted, point: _Counted, repeat: Ints | None, xyz: Floats) -> bool:
+    """Whether the points have the same distances from each other in every measurement, as those of one artefact."""
+    first = np.ones(len(xyz), dtype=bool) if repeat is None else repeat == repeat[0]
+    shape = measurement[1].max() + 1, point[1].max() + 1
+    if first.sum() != shape[0] * shape[1] or min(shape) < 2:
+        return False
+    own = np.full((*shape, 3), np.nan)
+    own[measurement[1][first], point[1][first]] = xyz[first]
+    return bool(np.ptp(np.linalg.norm(own[:, :, None] - own[:, None, :], axis=3), axis=0).max() < _RIGID_MM)
 
 
 def _run_of(found: Sequence[_Counted], place: Ints) -> _Counted | None:
@@ -340,6 +357,9 @@ def _run_of(found: Sequence[_Counted], place: Ints) -> _Counted | None:
             f for f in by_place if f[2] is not None
         ]  # an artefact turned about its middle comes to the same places
     choices = [f for f in by_words if f in apart] or by_words or [f for f in by_place if f[2] is None] or by_place
+    if not choices and together(place, *(f[1] for f in apart)).max() + 1 == len(place):
+        fast = max(apart, key=lambda f: np.count_nonzero(np.diff(f[1])))  # the others are set-ups, read again in each
+        choices = [fast] if fast[2] == LINE and hint(fast[0].words, lengths=True) == RUN else []
     return min(choices, key=lambda f: (f[1].max(), _LAST.index(f[0].sort)), default=None)
 
 
@@ -360,9 +380,21 @@ def alike_in_turn(xyz: Floats) -> int | None:
         distances = np.linalg.norm(own[:, :, None] - own[:, None, :], axis=3)
         along = (own[:, -1] - own[:, 0]) / np.maximum(distances[:, 0, -1:], 1e-9)
         if (
-            np.ptp(distances, axis=0).max() < 0.1
+            np.ptp(distances, axis=0).max() < _RIGID_MM
             and distances[:, 0, -1].min() > 1
             and np.abs(along @ along[0]).min() < 0.99
         ):
             return size
     return None
+
+
+def _on_a_ball(xyz: Floats) -> bool:
+    """Whether places (n, 3) are points probed on one ball: more than enough of them, all round, within a few micrometres."""
+    about = xyz - xyz.mean(axis=0)
+    if len(xyz) < _PROBED or np.linalg.svd(about, compute_uv=False)[2] < _ROUND * np.linalg.norm(about):
+        return False
+    centre = np.linalg.lstsq(np.column_stack([2 * about, np.ones(len(xyz))]), np.sum(about**2, axis=1), rcond=None)[0][
+        :3
+    ]
+    distance = np.linalg.norm(about - centre, axis=1)
+    return bool(distance.max() < _LARGEST_BALL_MM and np.ptp(distance) < _FORM_MM)

@@ -284,8 +284,10 @@ def no_header(sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Seq
     score, place, headings = best
     if not score:
         given = f" ({', '.join(map(repr, texts))})" if keys.columns else ""
-        return NotReadError(f"no line names the columns{given} of a table of points", where=where,
-                          fix="Say which column is which: columns = { x_mm = …, y_mm = …, z_mm = … }")  # fmt: skip
+        lengths = ", or of lengths { nominal_mm = …, length_mm = … }" if "x_mm" in wanted[0] else ""
+        of = "a table of points or lengths" if lengths else "a table of points"
+        return NotReadError(f"no line names the columns{given} of {of}", where=where,
+                          fix=f"Say which column is which: columns = {{ x_mm = …, y_mm = …, z_mm = … }}{lengths}")  # fmt: skip
     named = keys.columns.items()
     lacking = [name for name, given in named if any(_place(one, headings) is None for one in sources_of(given))]
     known = {understood(heading).column for heading in headings} | set(keys.columns)

@@ -101,9 +101,10 @@ class Calypso(TextReport):
         if len(runs := list(dict.fromkeys(place.run for place in places))) > 1:
             plans = {plan: [run for run in runs if run[0] == plan] for plan, _ in runs}
             numbers = {run: ([*plans].index(run[0]) + 1, plans[run[0]].index(run) + 1) for run in runs}
-            head = ["measurement", "repeat", *head]
+            kept = 0 if len(plans) > 1 else 1  # of one plan, names say what its measurements are
+            head = [*("measurement", "repeat")[kept:], *head]
             rows_of = [
-                (sort, [*map(str, numbers[place.run]), *cells], line)
+                (sort, [*(f"{n}" for n in numbers[place.run][kept:]), *cells], line)
                 for place, (sort, cells, line) in zip(places, rows_of, strict=True)
             ]
         return sheets_of(rows_of, head, unit=next(iter(units), None), facts=facts)

@@ -180,11 +180,12 @@ def like(a: Floats, b: Floats, far: float = 0.04) -> bool:
     return bool(both.any()) and bool((np.abs(a - b)[both] <= np.maximum(0.002 * np.abs(a), far)[both]).all())
 
 
+_COARSE = 0.05  # mm: figures printed no finer than this are nominal, and exact
+
+
 def agrees(deviation: FigureColumn, measured: FigureColumn, reference: FigureColumn, factor: float) -> bool:
     """Whether a column is measured minus reference to the last printed digits."""
-    step = deviation.step * factor + sum(
-        one.step for one in (measured, reference) if one.step < 1
-    )  # whole mm are exact
+    step = deviation.step * factor + sum(one.step for one in (measured, reference) if one.step < _COARSE)
     away = np.abs(measured.values - reference.values - deviation.values * factor)
     away = away[np.isfinite(away)]
     return away.size > 0 and bool((away <= 0.525 * step + 1e-9).all())

@@ -16,7 +16,7 @@ import warnings
 import zipfile
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import islice
+from itertools import compress, islice, pairwise
 from typing import Any
 from xml.etree.ElementTree import Element, ParseError
 
@@ -117,6 +117,7 @@ def in_columns(lines: Sequence[str]) -> Iterator[list[str]]:
         2 * n >= len(own) > 0
         and (n > 1 or (len(own) <= 3 and any(_POINT.search(t[2]) for t in own)))
         and not (n > 2 and any(places_in(line, sign) for sign in ".,"))
+        and not _in_words([t[2] for t in own])
         for n, own, line in zip(figured, tokens, lines, strict=True)
     ]
     spans = _spans([t for own, is_row in zip(tokens, counted, strict=True) if is_row for t in own])
@@ -137,6 +138,13 @@ def in_columns(lines: Sequence[str]) -> Iterator[list[str]]:
             else:
                 cells[k] = f"{cells[k]} {text}"
         yield cells
+
+
+def _in_words(texts: Sequence[str]) -> bool:
+    """Whether figures stand among words, as ``Mean 35.4339  Range 0.0006`` or ``9 elements, 36 characteristics``."""
+    numbers = [_NUMBER.fullmatch(text) is not None for text in texts]
+    apart = sum(numbers) > 1 and not any(a and b for a, b in pairwise(numbers))
+    return apart and not (numbers[0] and any(_POINT.search(text) for text in compress(texts, numbers)))
 
 
 def _spans(tokens: Sequence[tuple[int, int, str]]) -> list[tuple[int, int]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -52,6 +52,7 @@ from cmm_uq.jobs.importing.lengths import MeasuredLengths
 from cmm_uq.jobs.importing.numbering import numbered_points
 from cmm_uq.jobs.importing.roles import SheetReading, each, heading, is_void, joined, labels_of, rows_left_out, said_by
 
+_MILLIMETRES = 0.2  # deviations at targets that are all smaller may be in mm
 ROWS_MOST = 20_000  # of a sheet that is understood this way
 
 
@@ -77,7 +78,8 @@ def reading_of(
     kinds = Counter[str]()
     for reading, _ in found:
         kinds[reading.kind] += len(reading.figures)
-    kind = next((kind for kind in ("runs", "points", "lengths") if kind in kinds), "")
+    ends = kinds["points"] >= kinds["lengths"]  # else places of lines, beside lengths that were measured along them
+    kind = next((kind for kind in ("runs", "points", "lengths") if kind in kinds and (kind != "points" or ends)), "")
     chosen = [one for one in found if one[0].kind == kind]
     # deviations of lengths that are there, and small tables beside a large one, are the same again
     chosen = [one for one in chosen if not one[0].deviations] or chosen
@@ -89,14 +91,29 @@ def reading_of(
     ):
         return None
     left_out: list[str] = []
+    elsewhere = (
+        _tabled_places([*map(stacked, sheets)], {grid.sheet.name for _, grid in chosen}) if kind == "lengths" else {}
+    )
     for reading, grid in chosen:
         if (told := rows_left_out(reading, grid)) is None:
             return None
         left_out += told
         for labels, row in zip(reading.labels, reading.rows, strict=True):
+            own_places = {elsewhere[text] for text in labels.values() if text in elsewhere}
+            place = grid.places_of.get(row) or (own_places.pop() if len(own_places) == 1 else "")
             labels["sheet", ""] = grid.sheet.name
-            labels |= {("place", ""): grid.places_of[row]} if row in grid.places_of else {}
+            labels |= {("place", ""): place} if place else {}
     return joined([reading for reading, _ in chosen]), left_out, chosen[0][1]
+
+
+def _tabled_places(sheets: Sequence[Sheet], others: Collection[str]) -> dict[str, str]:
+    """Places of lines by their names, of sheets that have a row for each; of a name with two places neither."""
+    found: dict[str, set[str]] = {}
+    for sheet in sheets:
+        grid = CutSheet(sheet) if sheet.name not in others else None
+        for row, place in (grid.places_of if grid else {}).items():
+            found.setdefault(grid.text(row, 0) if grid else "", set()).add(place)
+    return {name: places.pop() for name, places in found.items() if len(places) == 1}
 
 
 def _called(reading: SheetReading) -> bool:
@@ -119,13 +136,18 @@ def _of_sheet(
             row for row in rows if not is_summary(sheet.rows[row]) and not is_void(sheet.rows[row], "void", "feature")
         ]
         own = _layout(grid, usable) if usable else []
+        readings: list[SheetReading] = []
         for read in (
             () if not own else (runs_in, lengths_in) if keys else (points_in, rows_of_axes, runs_in, lengths_in)
         ):
             if (reading := read(grid, blocks, own)) is not None and (_called(reading) or not turned):
-                reading.lines = [sheet.lines[row] for row in reading.rows]
-                found.append((reading, grid))
-                break
+                readings.append(reading)
+                if 2 * len({*reading.rows, *reading.others}) > len(own):
+                    break  # else they are places of lines, or a few rows that were taken for others
+        if readings:
+            reading = max(readings, key=lambda one: len({*one.rows, *one.others}))
+            reading.lines = [sheet.lines[row] for row in reading.rows]
+            found.append((reading, grid))
     return found
 
 
@@ -250,7 +272,11 @@ class Understanding:
     def runs(self, where: str) -> list[AxisRun]:
         """Runs along axes, each with its targets in turn."""
         figures = np.array(self.reading.figures)
-        small = self.reading.small or unit_elsewhere(self.sheets, small=True) or UNITS["um"]
+        small = self.reading.small or unit_elsewhere(self.sheets, small=True)
+        if small is None and np.abs(figures[:, 1]).max() < _MILLIMETRES:
+            fix = "Write it above them: (µm) or (mm)"
+            raise NotReadError("nothing says the unit of the deviations: µm or mm", where=where, fix=fix)
+        small = small or UNITS["um"]
         unit = self.reading.unit or unit_elsewhere(self.sheets, small=False) or UNITS["mm"]
         target = units.converted(figures[:, 0], unit, "x_mm")
         deviation = units.converted(figures[:, 1], small, "reading_um")

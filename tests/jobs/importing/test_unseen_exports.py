@@ -25,7 +25,10 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError
 
-FOLDERS = [Path(__file__).parent / name for name in ("unseen_exports", "development_exports", "further_exports")]
+FOLDERS = [
+    Path(__file__).parent / name
+    for name in ("unseen_exports", "development_exports", "further_exports", "fresh_exports")
+]
 EXPECTED = {
     path.name.removesuffix(".expected.json"): path for folder in FOLDERS for path in sorted(folder.glob("*.json"))
 }
@@ -33,18 +36,27 @@ ASKED = {"10": "unit", "15": "unit"}
 """By number: what is asked beside where lines lie, of files that name no unit."""
 REFUSED = {
     "S07": "is no measured length",
-    "S22": "which points belong",
-    "S27": "no column is",
     "S29": "no line names",
+    "T21": "no line names",
+    "T22": "no line names",
+    "T23": "no column is",
+    "T24": "no line names",
 }
 """Of exports that are not read, what is said."""
-PLACED = {"02": [60, 350, -250], "S01": [40, 500, -300], "S05": [60, 400, -300]}
+PLACED = {
+    "T01": [90, 450, -300],
+    "T05": [100, 500, -400],
+    "T07": [100, 400, -350],
+    "02": [60, 350, -250],
+    "S01": [40, 500, -300],
+    "S05": [60, 400, -300],
+}
 """Start of the first line, of files that say where their lines lie."""
 GROUPED = {"18": 2}  # points of which the file does not say how many are one measurement, and their distances do
 
 
 def number(name: str) -> str:
-    return name.split("_")[0]
+    return re.split("[_.]", name)[0]
 
 
 def answered(name: str) -> tuple[ImportedTable, list[Any]]:
