@@ -17,10 +17,9 @@ from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import METRE, MICROMETRE, unit
 from cmm_uq.certificate.document import Column, Section, Table
 from cmm_uq.certificate.result import Page, Result
-from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.machine.model.artefact import Artefact, Size
-from cmm_uq.machine.model.kind import LENGTHS, Kind
+from cmm_uq.machine.model.kind import LENGTHS, Beginning, Kind
 from cmm_uq.machine.model.recorded import columns_needed
 
 __all__ = [

@@ -17,7 +17,6 @@ from cmm_uq.app.commands.forms import SCHEMAS, as_text, schema_named
 from cmm_uq.app.commands.jobs.new import known
 from cmm_uq.artefacts import kind_named
 from cmm_uq.base.files.table import unit_of
-from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS, REQUIRED
 from cmm_uq.jobs.part import dmis as drawing_dmis, qif as drawing_qif
 from cmm_uq.jobs.part.dmis import PROGRAM as DMIS
@@ -26,6 +25,7 @@ from cmm_uq.jobs.part.qif import PROGRAM as QIF
 from cmm_uq.jobs.schema import keys_of, without_place, written
 from cmm_uq.laboratory.live.instruments.library import profile_named, ready
 from cmm_uq.laboratory.live.instruments.profile import ProfileFacts, ProfileFile
+from cmm_uq.machine.model.kind import Beginning
 from cmm_uq.machine.physics.catalogue import EVERY
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES
 from cmm_uq.maths.uncertainty.models.input_keys import KINDS as DISTRIBUTIONS

@@ -27,7 +27,7 @@ from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import effects
-from cmm_uq.maths.geometry.circular import CircularTest
+from cmm_uq.maths.geometry.positioning import CircularTest
 
 TRAVEL = np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]])
 MIDDLE, SECOND = TRAVEL.mean(axis=1), np.pi / 180 / 3600

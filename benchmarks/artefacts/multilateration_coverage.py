@@ -17,8 +17,7 @@ from benchmarks.artefacts.axis_runs_coverage import SECOND, TRAVEL, Machine as C
 from benchmarks.artefacts.digitizer_coverage import posterior
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.multilateration.artefact import Multilateration
-from cmm_uq.artefacts.multilateration.free_points import FreePoints, free_points
-from cmm_uq.artefacts.multilateration.page import standpoints
+from cmm_uq.artefacts.multilateration.page import FreePoints, free_points, standpoints
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects

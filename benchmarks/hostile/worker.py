@@ -42,8 +42,7 @@ MEMORY = 4 * 2**30
 def read(kind: str, path: Path) -> None:
     """Read what a command would read first, and no more."""
     from cmm_uq.app.commands.reading import read_job
-    from cmm_uq.base.files.content import content_of
-    from cmm_uq.base.files.limits import JOB_BYTES
+    from cmm_uq.base.files.limits import JOB_BYTES, content_of
     from cmm_uq.base.files.toml_file import checked
     from cmm_uq.jobs.derived_job import Truth
     from cmm_uq.machine.model.predicted_errors import maps_of

@@ -28,8 +28,8 @@ from benchmarks.parts.known_noise import joint_posterior
 from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, as_points, joined, plan
 from cmm_uq.analysis.machine.conditional import further_recording, given_recording, own_noise, white
 from cmm_uq.analysis.machine.recordings import FurtherRecording, FurtherRecordings
+from cmm_uq.analysis.machine.regions import with_readings
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, unmodelled_errors, with_curves
-from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.evaluation import Evaluator, Known
 from cmm_uq.analysis.parts.plan import PartPose

@@ -30,7 +30,7 @@ def _timed(work: Callable[[], list[float]], repeats: int = 3) -> tuple[float, li
 def ours_first_order() -> Result:
     from cmm_uq.maths.uncertainty.distributions import normal
     from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-    from cmm_uq.maths.uncertainty.propagation import first_order
+    from cmm_uq.maths.uncertainty.monte_carlo import first_order
 
     function, (x, u) = model({"sqrt": np.sqrt, "cos": np.cos}), points(POINTS)
     inputs = {name: normal(x[k], u[k]) for k, name in enumerate(NAMES)}

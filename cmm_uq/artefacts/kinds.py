@@ -11,10 +11,9 @@ from cmm_uq.artefacts.axis_runs.kind import APPROACHES, AXIS_RUNS, Interferomete
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import JobTable, Length, Number, Numbers, Position, Triple, Uncertainty, key, required
 from cmm_uq.base.points import AXES
-from cmm_uq.jobs.beginning import AT_20_C, SIX, Beginning, circumstances
 from cmm_uq.jobs.tables import artefact as tables
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertifiedValue, ReferencedFacts
-from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS, Kind
+from cmm_uq.machine.model.kind import AT_20_C, BARS, FORMS, LENGTHS, SIX, Beginning, Kind, circumstances
 
 _HERE = "cmm_uq.artefacts"
 # figures that a laboratory may decide by its own rule
@@ -240,8 +239,8 @@ MULTILATERATION = Kind(
     "multilateration",
     MultilaterationFacts,
     f"{_STATIONS}.artefact:Multilateration",
-    f"{_STATIONS}.plan:SCREENING",
-    f"{_STATIONS}.plan:PLANNING",
+    f"{_STATIONS}.artefact:SCREENING",
+    f"{_STATIONS}.artefact:PLANNING",
     f"{_STATIONS}.page:PAGE",
     Beginning(
         title="Distances from four stations of a tracking interferometer",
@@ -311,7 +310,7 @@ class ShiftFacts(ArtefactFacts):
 
 
 SHIFT = Kind(
-    "shift", ShiftFacts, f"{_HERE}.shift.artefact:ShiftedArtefact", plan=f"{_HERE}.shift.analysis:PLANNING",
+    "shift", ShiftFacts, f"{_HERE}.shift.artefact:ShiftedArtefact", plan=f"{_HERE}.shift.artefact:PLANNING",
     begin=Beginning(
         title="Self-calibration of an axis by shifting an uncalibrated gauge",
         numbering="One measurement is one series, at one shift; its points are those of the gauge.",
@@ -322,8 +321,8 @@ SHIFT = Kind(
         effects=(), plan={"repeats": 3}, recorded=AT_20_C,
         conformity=_own_rule("linearity", 10.0, 3, 3, 21), test=circumstances(),
     ),
-    begin_also={"shift_plate": f"{_HERE}.shift.beginning:PLANE_SHIFTED"},
-    check=f"{_HERE}.shift.analysis:refuse_unfit", own=f"{_HERE}.shift.analysis:OWN",
+    begin_also={"shift_plate": f"{_HERE}.beginnings:PLANE_SHIFTED"},
+    check=f"{_HERE}.shift.artefact:refuse_unfit", own=f"{_HERE}.shift.artefact:OWN",
     refusal="a shift job cannot be {}: its machine error is a free function, no list of effects",
     instead="cmm-uq report JOB estimates it", tested=("linearity", "straightness", "squareness"),
 )  # fmt: skip
@@ -338,7 +337,7 @@ class ErrorMapFacts(ArtefactFacts):
 
 ERROR_MAP = Kind(
     "error_map", ErrorMapFacts,
-    begin=f"{_HERE}.error_maps.beginning:BEGINNING",
+    begin=f"{_HERE}.beginnings:BEGINNING",
     check=f"{_HERE}.error_maps.diagnosis:refuse_unfit", own=f"{_HERE}.error_maps.page:OWN",
     refusal="error maps cannot be {}: they are free functions, no points of an artefact",
     instead="cmm-uq diagnose JOB compares them with each other",

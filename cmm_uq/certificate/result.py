@@ -23,7 +23,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, at_key, say
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Document, Section
-from cmm_uq.certificate.further import NO_FURTHER, FurtherCertificates
+from cmm_uq.certificate.origin import NO_FURTHER, FurtherCertificates
 from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
@@ -36,9 +36,8 @@ from cmm_uq.machine.physics.stated import physics_of
 from cmm_uq.maths.inference.draws import Draws
 from cmm_uq.maths.inference.linear_model import LeastSquares
 from cmm_uq.maths.inference.posterior import Cause, Doubt, NoisyPosterior
-from cmm_uq.maths.uncertainty.correlation import Covariance
 from cmm_uq.maths.uncertainty.quantity import Quantity
-from cmm_uq.maths.uncertainty.type_a import factor_of_noise
+from cmm_uq.maths.uncertainty.type_a import Covariance, factor_of_noise
 
 
 @dataclass(frozen=True, eq=False)

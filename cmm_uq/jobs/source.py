@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import FILE_NAME, Limit
+from cmm_uq.base.files.limits import FILE_NAME, Limit, content_of
 
 # names that commands write, or attach to a certificate, beside the recording of a job
 _WRITTEN = re.compile(

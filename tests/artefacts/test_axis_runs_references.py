@@ -15,7 +15,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
-from cmm_uq.maths.geometry.circular import CircularTest
+from cmm_uq.maths.geometry.positioning import CircularTest
 from tests.artefacts.constructions import estimated, model
 from tests.artefacts.simulated import results
 from tests.artefacts.test_axis_runs import EXACT, TARGETS, X, Y, Z, joined, read, run

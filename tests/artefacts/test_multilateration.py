@@ -15,16 +15,14 @@ from scipy.optimize import least_squares
 
 from benchmarks.artefacts.multilateration_coverage import ARMS, MACHINE, NAMES, SET_UPS, Square, read, recorded, targets
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.multilateration.artefact import READING, Multilateration, first_station, nearest_station
-from cmm_uq.artefacts.multilateration.free_points import FreePoints, free_points
-from cmm_uq.artefacts.multilateration.page import standpoints
-from cmm_uq.artefacts.multilateration.plan import shape_of
+from cmm_uq.artefacts.multilateration.artefact import READING, Multilateration, first_station, nearest_station, shape_of
+from cmm_uq.artefacts.multilateration.page import FreePoints, free_points, standpoints
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.linear_model import LeastSquares
-from cmm_uq.maths.uncertainty.air.refractivity import harris_2004
+from cmm_uq.maths.uncertainty.air import harris_2004
 from tests.artefacts.constructions import free
 
 KNOWN = artefact_facts(kind="multilateration", u_scale_um_per_m=0.0)

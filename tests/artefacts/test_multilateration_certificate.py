@@ -18,7 +18,7 @@ from cmm_uq.app.commands.jobs.simulate import recording as as_csv
 from cmm_uq.app.commands.plan import write_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
-from cmm_uq.artefacts.multilateration.plan import NEAR_MM
+from cmm_uq.artefacts.multilateration.artefact import NEAR_MM
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.document import Paragraph
 from cmm_uq.machine.physics.kinematics import on_leaning_axes

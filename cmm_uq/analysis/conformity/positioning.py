@@ -21,8 +21,7 @@ from cmm_uq.base.units import METRE, MICROMETRE
 from cmm_uq.jobs.tables.conformity import Circumstances
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import POSITIONING
-from cmm_uq.maths.geometry.circular import CircularTest
-from cmm_uq.maths.geometry.positioning import MissingReadingError, PositioningRuns
+from cmm_uq.maths.geometry.positioning import CircularTest, MissingReadingError, PositioningRuns
 
 LINES = ("calibration", "temperature", "alignment", "repeat")
 _DRAWS = 2000

@@ -11,11 +11,13 @@ errors at points that fill it:
 with θ and c the coefficients of named and other errors, B_R (3n, j) what one unit of each of c does at the points of R, and
 P_R the least-squares operator of the named columns at the same points. Over the recorded set-ups P is the estimator of the
 recording itself. Where the recording leaves the difference open, the draws differ, and U says so.
+
+What is stated of a machine's axes: how each is read, in place of what physics allows of its periodic error and play.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
@@ -25,21 +27,54 @@ from scipy.special import ndtri
 
 from cmm_uq.analysis.diagnosis.held_out import with_quantities
 from cmm_uq.analysis.machine.conditional import RecordedField, as_recorded_allows, doubted_draws
-from cmm_uq.analysis.machine.influence import PriorInfluence, influence_of
-from cmm_uq.analysis.machine.performance import MachinePerformance, performance_of, rows_of
+from cmm_uq.analysis.machine.performance import (
+    MachinePerformance,
+    PriorInfluence,
+    influence_of,
+    performance_of,
+    rows_of,
+)
 from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecordings, recorded, shown_by
-from cmm_uq.analysis.machine.state import StatementEvidence, Unmodelled, of_machine, unmodelled_errors
-from cmm_uq.analysis.machine.statements import with_readings
+from cmm_uq.analysis.machine.state import StatementEvidence, Unmodelled, of_machine, stated_as, unmodelled_errors
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
-from cmm_uq.machine.model.field import ALLOWED, curves, family_of
+from cmm_uq.machine.model.field import ALLOWED, as_read, curves, family_of
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.measurement import RecordingModel
+from cmm_uq.machine.model.readings import AxisReading
 from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.effects.drives import Hysteresis, PeriodicScale
 from cmm_uq.machine.physics.superposition import About
 from cmm_uq.maths.inference.families import BRIEF, FieldSizes, sample_sizes
 from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior, gain
 from cmm_uq.maths.uncertainty.quantity import Quantity
+
+
+def readings_of(machine: Machine) -> dict[str, AxisReading]:
+    """By axis, of those of which it is stated how they are read."""
+    q = float(np.sqrt(-2 * np.log(0.05)))
+    return {axis: AxisReading(facts, q * _allowed(axis)) for axis, facts in machine.read_by.items()}
+
+
+def _allowed(axis: str) -> float:
+    return PeriodicScale(axis).coefficients[0].prior_sd
+
+
+def with_readings(others: Iterable[Unmodelled], machine: Machine) -> tuple[Unmodelled, ...]:
+    """Errors that were not modelled, those of axes as these are stated to be read; a bound stands before that."""
+    known, found = readings_of(machine), list[Unmodelled]()
+    for one in others:
+        effect, reading = one.effect, known.get(getattr(one.effect, "axis", ""))
+        if one.unstated is not None:
+            one = replace(one, unstated=with_readings((one.unstated,), machine)[0])
+        elif reading is not None:
+            if isinstance(effect, PeriodicScale):
+                one = stated_as(one, as_read(effect, reading.largest_um, reading.errors))
+            elif isinstance(effect, Hysteresis) and reading.play_um is not None:
+                one = stated_as(one, as_read(effect, reading.play_um))
+        found.append(one)
+    return tuple(found)
+
 
 DRAWS = 2000
 _ABSENT = 1e-4  # size of a family of errors that are not there

@@ -17,7 +17,7 @@ from functools import cache, cached_property, partial
 
 import numpy as np
 
-from cmm_uq.analysis.machine.influence import PriorInfluence, influence_of
+from cmm_uq.analysis.machine.performance import PriorInfluence, influence_of
 from cmm_uq.analysis.machine.state import MachineState
 from cmm_uq.analysis.parts.causes.cause import LARGE, CommonCause, Drawn, PartCause, condensed, normal
 from cmm_uq.analysis.parts.causes.machine import MACHINE, Qualified, modelled, noise, not_modelled, styli

@@ -13,7 +13,7 @@ import typer
 
 from cmm_uq.app.cli.terminal import say
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import value_of
+from cmm_uq.base.files.limits import value_of
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.parts.new import Answers

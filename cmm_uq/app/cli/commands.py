@@ -11,7 +11,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from cmm_uq.app.cli import certificates, desk, evaluations, instruments, jobs, laboratory, records
+from cmm_uq.app.cli import certificates, evaluations, instruments, jobs, laboratory, records
 from cmm_uq.app.cli.options import examples, flag, with_ending
 from cmm_uq.app.cli.terminal import BAD_INPUT, say
 from cmm_uq.base.errors import CmmUqError
@@ -54,7 +54,7 @@ app = typer.Typer(
 )
 
 COMMANDS: dict[str, tuple[Callable[..., None], str, *tuple[str, ...]]] = {
-    "desk": (desk.desk, "Certificates made in a browser, on this machine.", "desk", "desk jobs --no-open"),
+    "desk": (laboratory.desk, "Certificates made in a browser, on this machine.", "desk", "desk jobs --no-open"),
     "new": (jobs.new, "A job folder that runs at once, to be filled with your own figures.", "new", "new step_gauge my-gauge",
         "new ballbar --machine 'CMM 3' --set artefact.length_mm=500"),
     "import": (jobs.import_export, "What is recognised of a laboratory's export.", "import export.xlsx",

@@ -212,7 +212,7 @@ def _alone(context: typer.Context) -> None:
 @opt.command(app, "list", "instruments list", "instruments list --json")
 def list_all(end: Ending = opt.ONLY_JSON) -> None:
     """List the ready profiles and the serial ports of this computer."""
-    from cmm_uq.app.commands.laboratory.instruments import ready_profiles
+    from cmm_uq.app.commands.laboratory.acquire import ready_profiles
     from cmm_uq.laboratory.live.instruments.source import serial_ports
 
     rows, ports = ready_profiles(), serial_ports()
@@ -238,7 +238,7 @@ def try_out(
 
     Exit code 2 when nothing was, with what was seen, what was expected and what to check.
     """
-    from cmm_uq.app.commands.laboratory.instruments import Attempt
+    from cmm_uq.app.commands.laboratory.acquire import Attempt
 
     attempt = Attempt(profile, port, job)
     for event in attempt.events(seconds):
@@ -262,7 +262,7 @@ def try_out(
 @opt.command(app, "watch", "instruments watch line-logger socket://logger:4001")
 def watch(profile: str = PROFILE, port: str = PORT, job: Path | None = JOB, seconds: float | None = SECONDS) -> None:
     """Show each message beside what is understood of it, gaps and returns too, until it is interrupted."""
-    from cmm_uq.app.commands.laboratory.instruments import Attempt
+    from cmm_uq.app.commands.laboratory.acquire import Attempt
     from cmm_uq.base.output.interruption import speaking
 
     attempt = Attempt(profile, port, job)
@@ -295,7 +295,7 @@ def new(
     stop: int = option(1, "Stop bits.", "N", min=1, max=2),
 ) -> None:  # fmt: skip
     """Write a profile from an example line; on a terminal it asks for what no option says."""
-    from cmm_uq.app.commands.laboratory.instruments import write_profile
+    from cmm_uq.app.commands.laboratory.acquire import write_profile
     from cmm_uq.laboratory.live.instruments.library import ProfileDraft, range_of
 
     settings: dict[str, str | int] = {"baud": baud, "data_bits": bits, "parity": parity.value, "stop_bits": stop}
@@ -322,7 +322,7 @@ def simulate(
     seconds: float | None = SECONDS,
 ) -> None:
     """Be an instrument without hardware, at a port that is printed, until it is interrupted."""
-    from cmm_uq.app.commands.laboratory.instruments import simulated_instrument
+    from cmm_uq.app.commands.laboratory.acquire import simulated_instrument
 
     with simulated_instrument(profile, way) as port:
         say_now(port)

@@ -16,7 +16,7 @@ from cmm_uq.app.cli.options import Ending, argument, flag, job_folder, option
 from cmm_uq.app.cli.summary import conclude_derived, put_manifest, screen_layout
 from cmm_uq.app.cli.terminal import BAD_INPUT, can_answer, put, say, show
 from cmm_uq.base.errors import CmmUqError, printable
-from cmm_uq.base.files.content import value_of
+from cmm_uq.base.files.limits import value_of
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.jobs.check import JobCheck

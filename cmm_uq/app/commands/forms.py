@@ -18,7 +18,7 @@ from cmm_uq.analysis.conformity.statement import Clause
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import names, table_of
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.output.new_file import refuse_taken, write_new
+from cmm_uq.base.output.manifest import refuse_taken, write_new
 from cmm_uq.base.plugins import EFFECTS, KINDS, STANDARDS, Plugin, naming_package, offered
 from cmm_uq.jobs.derived_job import Truth
 from cmm_uq.jobs.schema import DRAFT, Schema, chosen_by, job_schema, schema_of

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from cmm_uq.analysis.conformity.standards import names as standard_names, standard_named
 from cmm_uq.artefacts import names, table_of
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.plugins import naming_package

@@ -16,23 +16,25 @@ from typing import Any
 
 from cmm_uq import __version__
 from cmm_uq.app.desk import export_pages, job_pages as jobs
-from cmm_uq.app.desk.drafts import Draft
 from cmm_uq.app.desk.export_pages import ARTEFACT, FIELDS, READ
-from cmm_uq.app.desk.folder import DeskFolder, to
-from cmm_uq.app.desk.guard import POLICY, Guard
+from cmm_uq.app.desk.folder import DeskFolder, to, verify_page
 from cmm_uq.app.desk.job_pages import JobState, state_of
-from cmm_uq.app.desk.part_pages import PLAN
-from cmm_uq.app.desk.place import ChangedError, below, jobs_in, plans_in, sha256, write_over
-from cmm_uq.app.desk.shown import OWN_FILES, own_file, records_page, shown_file
-from cmm_uq.app.desk.verify_page import VERIFY, verify_page
-from cmm_uq.app.desk.workers import ReportRun
-from cmm_uq.app.serve.accounts import Accounts
-from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse, read_form
+from cmm_uq.app.desk.place import ChangedError, Draft, below, jobs_in, plans_in, sha256, write_over
+from cmm_uq.app.desk.workers import OWN_FILES, ReportRun, own_file, records_page, shown_file
+from cmm_uq.app.serve.accounts import POLICY, Accounts, Guard
+from cmm_uq.app.serve.exchange import (
+    DESK,
+    RefusedRequest,
+    WebRequest,
+    WebResponse,
+    fault,
+    read_form,
+    refusal,
+    render_page,
+)
 from cmm_uq.app.serve.page import WebPage
-from cmm_uq.app.serve.rendering import DESK, fault, refusal, render_page
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
+from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES, content_of
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 
 AT_ONCE = 2  # reports under way
@@ -54,7 +56,7 @@ class Desk(DeskFolder):
         """Begin with a link that is opened once, or with ``accounts`` of those who may sign in."""
         self.url = url
         if accounts is not None:
-            self.guard = Accounts(accounts, port, self.tell, (VERIFY,), DESK)
+            self.guard = Accounts(accounts, port, self.tell, (jobs.VERIFY,), DESK)
             return f"{url.rstrip('/')}{DESK}"
         self.guard = Guard(self.tell, port)
         return self.guard.link(url)
@@ -113,7 +115,7 @@ class Desk(DeskFolder):
             jobs.FILE: partial(shown_file, self.root),
             jobs.PART: self.part,
             jobs.FACTS: self.facts,
-            VERIFY: lambda request: verify_page(),
+            jobs.VERIFY: lambda request: verify_page(),
             jobs.EVENTS: self.events,
             jobs.FIELD: self.field,
         }
@@ -128,11 +130,11 @@ class Desk(DeskFolder):
             jobs.CANCEL: self.cancel,
             f"{DESK}/check": self.check,
             jobs.DELETE: self.delete,
-            PLAN: self.plan,
+            jobs.PLAN: self.plan,
             jobs.PART: self.create_part,
             jobs.POINTS: self.points,
             jobs.FACTS: self.state_facts,
-            VERIFY: self.verify,
+            jobs.VERIFY: self.verify,
         }
 
     def home(self, request: WebRequest) -> WebPage:

@@ -13,8 +13,7 @@ from pydantic import ValidationError
 
 from cmm_uq.app.commands.jobs.exchange import lines_asked, placed_by_plan, remember, remembered_keys
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.points import Machine
 from cmm_uq.jobs.importing.answers import matching, path_of
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, Recognition, Sheet, letters, sources_of

@@ -1,25 +1,131 @@
-"""The folder of a desk: its jobs, what they state by fields, parts, and certificates that are verified."""
+"""The folder of a desk: its jobs, what they state by fields, parts, and certificates that are verified.
+
+A certificate that somebody received: who says what in it, what that rests on, and whether it holds.
+
+A part on the desk: its plan and the machine's certificate make a job, and measured points that are dropped on it decide.
+"""
 
 from __future__ import annotations
 
+import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from http import HTTPStatus
 from pathlib import Path
+from typing import Any, Literal
 
 from cmm_uq.app.desk import job_pages as jobs
-from cmm_uq.app.desk.drafts import DraftFolder, received
 from cmm_uq.app.desk.export_pages import check_blocks
-from cmm_uq.app.desk.job_pages import REPORTS, state_of
-from cmm_uq.app.desk.part_pages import part_page, with_points
-from cmm_uq.app.desk.place import ChangedError, below, jobs_in, safe_name, sha256, write_over
-from cmm_uq.app.desk.verify_page import verify_page
+from cmm_uq.app.desk.job_pages import DELETE, PART, PLAN, REPORTS, VERIFY, JobState, state_of
+from cmm_uq.app.desk.place import (
+    ChangedError,
+    Draft,
+    DraftFolder,
+    below,
+    jobs_in,
+    received,
+    safe_name,
+    sha256,
+    write_over,
+)
 from cmm_uq.app.desk.workers import Worker
-from cmm_uq.app.serve.exchange import WebRequest, WebResponse, read_form
-from cmm_uq.app.serve.page import WebPage, address
+from cmm_uq.app.serve import page as p
+from cmm_uq.app.serve.exchange import DESK, WebRequest, WebResponse, read_form
+from cmm_uq.app.serve.page import Block, Cell, FormEntry, PageForm, PageNotice, PageParagraph, WebPage, address
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of, text_of
-from cmm_uq.base.files.limits import JOB_BYTES
+from cmm_uq.base.files.limits import JOB_BYTES, content_of, text_of
+from cmm_uq.base.messages import Text, Verbatim, number, say
+
+_RECORDING = re.compile(r"^\[recording\][^\n]*\n", re.MULTILINE)
+_FILE = re.compile(r"^file = [^\n]*\n", re.MULTILINE)
+
+
+def part_page(draft: Draft | None, machines: Iterable[JobState]) -> WebPage:
+    """A plan to be dropped, then the certificate of the machine to be chosen."""
+    certificates = tuple(
+        (one.file(".pdf"), say("{id}: {machine}", id=Verbatim(one.id), machine=p.shown(one.machine)))
+        for one in machines
+        if one.file(".pdf") and not one.part
+    )
+    blocks: tuple[Block, ...]
+    if draft is None:
+        hint = say("QIF 3.0 with features and tolerances, a DMIS program, or a table of features.")
+        blocks = (p.Drop(PLAN, say("Drop the plan of the part here, or choose it"), hint, say("Read it")),)
+    elif not certificates:
+        blocks = (PageNotice(say("No certificate of a machine lies in this folder yet: make one first"), "open"),)
+    else:
+        no_yes: tuple[tuple[str, Text], ...] = (
+            ("", say("is refused by its name")),
+            ("yes", say("is left out, and named")),
+        )
+        fields = (
+            FormEntry("folder", say("Name of the job, and of its folder"), example="bracket-7"),
+            FormEntry("certificate", say("Certificate of the machine"), "", "select", certificates),
+            FormEntry("date", say("Date of the measurement"), "", "date"),
+            FormEntry("not_measured", say("What of the plan is not understood"), "", "select", no_yes),
+        )
+        given = (("draft", draft.id),)
+        delete = PageForm(DELETE, (), (("delete", say("Delete this plan")),), given)
+        blocks = (PageForm(PART, fields, (("create", say("Make the job")),), given), delete)
+    lead = say("Features and tolerances from its plan, errors from the certificate of the machine.")
+    return WebPage(say("A part"), DESK, lead, blocks, above=(Cell(say("Desk"), DESK),))
+
+
+def with_points(text: str, name: str) -> str:
+    """job.toml with the file of its measured points; nothing else is changed."""
+    line = f'file = "{name}"\n'
+    found = _RECORDING.search(text)
+    if found is None:
+        return f"{text.rstrip()}\n\n[recording]\n{line}"
+    end = text.find("\n[", found.end())
+    block = text[found.end() : end + 1 if end >= 0 else len(text)]
+    changed = _FILE.sub(lambda _: line, block, count=1) if _FILE.search(block) else line + block
+    return text[: found.end()] + changed + text[found.end() + len(block) :]
+
+
+_HINT = say(
+    "PDF, HTML, XML (DCC) or results.json of a certificate, or of the report of a part. It is read once and not kept."
+)
+
+
+def verify_page(name: str = "", found: Mapping[str, Any] | None = None) -> WebPage:
+    """The form, below what was found of the file that was dropped."""
+    form = p.Drop(VERIFY, say("Drop a certificate here, or choose one"), _HINT, say("Verify it"))
+    above = (Cell(say("Desk"), DESK),)
+    lead = say("Who says what, what it rests on, and whether it holds.")
+    if found is None:
+        return WebPage(say("Verify a certificate"), DESK, lead, (form,), above=above)
+    word: Text = say("Something in it is wrong: do not rely on it")
+    if found["word"] == "VERIFIED":
+        word = say("Its files, figures and decisions agree with each other and with its inputs")
+    elif not found["findings"]:
+        word = say("Nothing in it is wrong, but not all of it could be checked from this file")
+    standing: Literal["good", "open", "bad"] = (
+        "bad" if found["findings"] else "good" if found["word"] == "VERIFIED" else "open"
+    )
+    head = PageNotice(Verbatim(found["said"]), standing, (Cell(word), Cell(Verbatim(found["signed"]))))
+    rows = tuple(
+        (
+            Cell(say("wrong") if wrong else say("right"), standing="bad" if wrong else "good"),
+            Cell(Verbatim(what)),
+            Cell(number(count, ",d")),
+        )
+        for wrong, what, count in found["checks"]
+    )
+    headings = p.columns(say("Is"), say("What"), (say("Things"), "number"))
+    table = p.PageTable(say("Comparisons"), headings, rows, heard=True)
+    wrong: tuple[Block, ...] = tuple(PageParagraph(Verbatim(one)) for one in found["findings"])
+    left: tuple[Block, ...] = tuple(PageParagraph(Verbatim(one), "note") for one in found["unchecked"])
+    again = p.SourceText(say("Command"), f"cmm-uq verify {name}")
+    records = p.Links((Cell(say("Is it in the records of this folder?"), "/file"),))
+    sections = [(say("What is wrong"), wrong)] if wrong else []
+    sections += [
+        (say("What was compared"), (table,)),
+        (say("What was not"), (*left, again, records)),
+        (say("Another file"), (form,)),
+    ]
+    return WebPage(say("Verify a certificate"), DESK, Verbatim(name), (head,), tuple(sections), above)
+
 
 VERIFY_S = 180.0  # s that reading and comparing a certificate may take
 

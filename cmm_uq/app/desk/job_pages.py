@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cmm_uq.app.desk.drafts import Draft
 from cmm_uq.app.desk.export_pages import DESK_CELL, READ, check_blocks, facts_form, steps
-from cmm_uq.app.desk.place import sha256
-from cmm_uq.app.desk.verify_page import VERIFY
+from cmm_uq.app.desk.place import Draft, sha256
 from cmm_uq.app.desk.workers import ReportRun
 from cmm_uq.app.serve import page as p
+from cmm_uq.app.serve.exchange import DESK
 from cmm_uq.app.serve.page import (
     DECISIONS,
     Block,
@@ -30,15 +29,14 @@ from cmm_uq.app.serve.page import (
     address,
     section,
 )
-from cmm_uq.app.serve.rendering import DESK
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
+from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES, content_of
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 from cmm_uq.base.output.manifest import plain_name
 
 JOB, RUN, CANCEL, CERTIFICATE, FILE = (f"{DESK}/{name}" for name in ("job", "run", "cancel", "certificate", "file"))
 PART, POINTS, DELETE, EVENTS = (f"{DESK}/{name}" for name in ("part", "points", "delete", "events"))
+PLAN, VERIFY = f"{DESK}/plan", f"{DESK}/verify"
 FIELD, FACTS = f"{DESK}/field.json", f"{DESK}/facts"
 RESULTS, REPORTS = "results.json", "reports"
 MOST_FILES, LISTED = 100, 200

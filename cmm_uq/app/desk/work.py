@@ -2,6 +2,8 @@
 
 Run by the server as ``python -P -m cmm_uq.app.desk.work BYTES`` in the root folder; BYTES of memory are the most it takes, 0
 is no limit. It ends with the server, whose pipe it reads.
+
+The job of a part, as the worker writes it from a plan and the certificate of the machine.
 """
 
 from __future__ import annotations
@@ -24,22 +26,40 @@ import numpy as np
 from cmm_uq.analysis.diagnosis.location import residual_field
 from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.app.commands.files import Written
+from cmm_uq.app.commands.jobs.new import check_empty, job_id, put_new
+from cmm_uq.app.commands.parts.new import PART, Answers, certificate_files, part_of_drawing
 from cmm_uq.app.commands.parts.part import PartOptions, write_part
 from cmm_uq.app.commands.report import write_report
-from cmm_uq.app.desk import exports, facts, parts, questions
+from cmm_uq.app.desk import exports, questions
 from cmm_uq.app.serve import page as p
 from cmm_uq.app.serve.certificate_page import diagnosis_section
 from cmm_uq.app.serve.exchange import WebRequest
 from cmm_uq.app.serve.site import Site
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import JOB_BYTES
+from cmm_uq.base.files.limits import JOB_BYTES, content_of, value_of
+from cmm_uq.base.output import Owner
 from cmm_uq.base.output.interruption import done, watch
 from cmm_uq.certificate.result import Outcome, Result
 from cmm_uq.certificate.verify.given import CHECKS
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import is_part
+from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.laboratory.records.place import is_url, of_folder, place_of
+
+
+def create_part(plan: str, certificate: str, folder: str, date: str, not_measured: bool) -> dict[str, Any]:
+    """Write the job of a part as ``cmm-uq new part --from`` does, with the machine's certificate in it."""
+    target = Path(folder)
+    check_empty(target)
+    given: dict[str, dict[str, Any]] = {"job": {"date": value_of(date)}} if date else {}
+    if not_measured:
+        given[PART] = {"not_measured": ["*"]}
+    machine = certificate_files(Path(certificate))
+    given["machine_state"] = {"certificate": Answers(machine=machine).certificate}
+    name = job_id(target, given)
+    files = part_of_drawing(Path(plan), given, id=name)
+    return {"files": sorted(put_new(target, Owner("new", name, MEASURED), {**files, **machine}, (Path(plan),)))}
+
 
 MOST_VECTORS = 1500
 Tell = Callable[[Mapping[str, Any]], None]
@@ -190,9 +210,9 @@ DOES: Mapping[str, Callable[..., Any]] = {
     "check_answers": questions.check_answers,
     "check": questions.check_text,
     "create": questions.create,
-    "create_part": parts.create_part,
-    "facts": facts.facts,
-    "with_facts": facts.with_facts,
+    "create_part": create_part,
+    "facts": questions.facts,
+    "with_facts": questions.with_facts,
     "report": report,
     "results": results,
     "page": page,

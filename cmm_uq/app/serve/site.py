@@ -2,31 +2,249 @@
 
 Records are opened for each request and closed after it, so that a page shows what is there now, and not a file that was
 moved, restored or migrated meanwhile.
+
+Pages that check: a dropped file against the records, and the records against their chain.
+
+A file is known by its SHA-256 alone, and where that is unknown by what it says it is. No signature is checked, and nothing
+computed anew.
 """
 
 from __future__ import annotations
 
 import contextlib
 import datetime as dt
+import html
+import json
+import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from http import HTTPStatus
 from pathlib import Path
+from typing import Literal
 
 from cmm_uq import __version__
-from cmm_uq.app.serve.certificate_page import certificate_page, recorded_file
-from cmm_uq.app.serve.checks_page import dropped_page, file_page, integrity_page
-from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse
+from cmm_uq.app.serve import page as p
+from cmm_uq.app.serve.certificate_page import certificate_page, files_of, recorded_file
+from cmm_uq.app.serve.exchange import (
+    LARGEST,
+    RefusedRequest,
+    UploadedFile,
+    WebRequest,
+    WebResponse,
+    fault,
+    read_dropped,
+    refusal,
+    render_page,
+    style,
+)
 from cmm_uq.app.serve.lists import artefacts_page, certificates_page, diagnoses_page, machine_page, machines_page
-from cmm_uq.app.serve.page import WebPage
-from cmm_uq.app.serve.rendering import fault, refusal, render_page, style
-from cmm_uq.app.serve.view import ChainComparing, DueDates, MachineStanding, SiteView, by_rule, overview, problem_of
+from cmm_uq.app.serve.page import Block, Cell, PageFacts, PageNotice, PageParagraph, WebPage
+from cmm_uq.app.serve.view import (
+    MOST,
+    ChainComparing,
+    DueDates,
+    MachineStanding,
+    SiteView,
+    by_rule,
+    machine_cell,
+    overview,
+    problem_of,
+)
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Verbatim, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, number, plural, say
+from cmm_uq.certificate.document import Standing
 from cmm_uq.certificate.look import template_folder
 from cmm_uq.laboratory.records import open_records
-from cmm_uq.laboratory.records.place import shown
+from cmm_uq.laboratory.records.facts import RecordedCertificate
+from cmm_uq.laboratory.records.listing import entry_of
+from cmm_uq.laboratory.records.place import shown, shown as shown_place
 from cmm_uq.laboratory.records.store import Records
+
+MOST_CERTIFICATES = 50  # of one number that are compared: it is issued once, and drafted a few times
+
+_OF_PAGE = re.compile(rb'class="number">[^<]{0,40}<bdi>([^<]{1,300})</bdi>')
+_OF_PDF = re.compile(rb"<pdf:Keywords>([^<]{1,300})</pdf:Keywords>")
+
+
+@dataclass(frozen=True)
+class FileMatch:
+    """What the records know of a file.
+
+    ``how``: recorded, the very bytes; altered, other bytes that say they are a certificate of the records; unknown;
+    ``certificate``: that it is of, or says that it is of; ``name``: under which it was recorded; ``says``: the number
+    that an altered or unknown file says it has; empty where it says none that can be read.
+    """
+
+    how: Literal["recorded", "altered", "unknown"]
+    certificate: RecordedCertificate | None = None
+    name: str = ""
+    says: str = ""
+
+
+def look_up(records: Records, dropped: UploadedFile) -> FileMatch:
+    if (results := records.has_results(dropped.sha256)) is not None:
+        return FileMatch("recorded", records.certificate(results), "results.json")
+    says = number_in(dropped.content or b"")
+    candidates = records.named(says)[-MOST_CERTIFICATES:] if says else []
+    for certificate in reversed(candidates):
+        entry = entry_of(records, certificate.entry)
+        folder, signed = Path(certificate.folder), records.signed(certificate.entry)
+        known = (*files_of(entry, folder), *files_of(entry, folder, signed)) if entry is not None else ()
+        for file in known:  # as it was written, and as it was signed since
+            if file.sha256 == dropped.sha256:
+                return FileMatch("recorded", certificate, file.name, says)
+    if candidates:
+        return FileMatch("altered", candidates[-1], says=says)
+    return FileMatch("unknown", says=says)
+
+
+def number_in(content: bytes) -> str:
+    """The number that a certificate (PDF or HTML) or a results.json says it has; empty where none can be read."""
+    if not content.startswith(b"%PDF") and content.lstrip()[:1] == b"{":
+        try:
+            data = json.loads(content)
+            return str(data["job"]["id"]) if str(data["schema"]).startswith("cmm-uq/results/") else ""
+        except (ValueError, KeyError, TypeError, RecursionError):
+            return ""
+    found = (_OF_PDF if content.startswith(b"%PDF") else _OF_PAGE).search(content)
+    return html.unescape(found[1].decode("utf-8", "replace")).strip() if found else ""
+
+
+_SCOPE = say(
+    "What is compared is the SHA-256 of the whole file with those in the records. No signature is checked, nothing is "
+    "computed anew, and the records themselves are taken as they are: whether they agree with their chain, Integrity says."
+)
+
+
+def file_page(view: SiteView, request: WebRequest) -> WebPage:
+    request.only(())
+    lead = say("Is this certificate the one that was issued, and does it still hold?")
+    return WebPage(say("Check a file"), "/file", lead=lead, blocks=_form())
+
+
+def dropped_page(view: SiteView, request: WebRequest) -> WebPage:
+    request.only(())
+    dropped = read_dropped(request)
+    known = look_up(view.records, dropped)
+    rows: list[tuple[Text, Cell]] = []
+    if (one := known.certificate) is not None:
+        name = say("recorded as {name}", name=Verbatim(known.name)) if known.name else NOTHING
+        rows = [
+            (say("Certificate"), Cell(Verbatim(one.number), p.address("/certificate", entry=one.entry), note=name)),
+            (say("Machine"), machine_cell(one.machine)),
+            (say("Measured on"), Cell(day(one.day))),
+        ]
+    size = say("{bytes} bytes", bytes=number(dropped.size, ",d"))
+    rows += [(say("Size"), Cell(size)), (say("SHA-256"), Cell(Verbatim(dropped.sha256)))]
+    return WebPage(
+        say("Check a file"), "/file", lead=Verbatim(dropped.name),
+        blocks=(verdict(known), PageFacts(tuple(rows), wide=True), PageParagraph(_SCOPE, "note")),
+        sections=((say("Another file"), _form()),),
+    )  # fmt: skip
+
+
+def _form() -> tuple[Block, ...]:
+    hint = say(
+        "A certificate as PDF or HTML, or its results.json; at most {most} MB. It is read once and not kept.",
+        most=number(LARGEST // 2**20),
+    )
+    return (p.Drop("/file", say("Drop a file here, or choose one"), hint, say("Check it")),)
+
+
+def verdict(known: FileMatch) -> PageNotice:
+    """What is said first of a file."""
+    lines: list[Text]
+    if (one := known.certificate) is None:
+        lines = [
+            say("Its bytes are not in the records."),
+            say("It says that it is {number}, which is not in them either.", number=Verbatim(known.says)) if known.says else
+            say("It says no number by which it could be found: it may be of another program, a file beside a "
+                "certificate, or damaged."),
+        ]  # fmt: skip
+        return _notice(say("Unknown: no certificate of these records"), "open", lines)
+    if known.how == "altered":
+        lines = [
+            say("It says that it is {number}, which is in the records, but its bytes are none of those that were recorded.",
+                number=Verbatim(known.says)),
+            say("It was changed after it was made, or made again without being recorded here. Do not rely on it."),
+        ]  # fmt: skip
+        return _notice(say("Altered: not the file that was recorded"), "bad", lines)
+    heads: dict[str, tuple[Text, Standing]] = {
+        "released": (say("Known and released"), "good"),
+        "draft": (say("Known, but a draft: nobody has released it"), "open"),
+        "withdrawn": (say("Known, but withdrawn: do not rely on it"), "bad"),
+        "replaced": (say("Known, but replaced by another certificate: do not rely on it"), "bad"),
+    }
+    head, standing = heads.get(one.state, (say("Known; its state is {state}", state=Verbatim(one.state)), "open"))
+    if one.command != "report":
+        head, standing = say("Known: a diagnosis, which is no certificate"), "open"
+    lines = [say("Its bytes are those that were recorded.")]
+    if (warning := p.NOT_MEASURED.get(one.origin)) is not None:
+        lines, standing = [*lines, warning], "bad" if standing == "bad" else "open"
+    return _notice(head, standing, lines)
+
+
+def _notice(head: Text, standing: Standing, lines: list[Text]) -> PageNotice:
+    return PageNotice(head, standing, tuple(map(Cell, lines)))
+
+
+_WHAT = say(
+    "Every entry carries the hash of the one before. A comparison finds entries that were altered, deleted or exchanged, and "
+    "tables and files that are not what was recorded. Whether entries are missing at the end, only a head that was filed "
+    "elsewhere can show."
+)
+
+
+def integrity_page(view: SiteView, request: WebRequest) -> WebPage:
+    """The head of the records, and what the last comparison found."""
+    request.only(())
+    count, head = view.records.head()
+    rows = (
+        (say("Entries"), Cell(number(count, ",d"))),
+        (say("Head"), Cell(Verbatim(head) if count else say("none yet"))),
+        (say("Records"), Cell(Verbatim(shown_place(view.records.place)))),
+    )
+    forms: tuple[Block, ...] = (
+        PageParagraph(_WHAT),
+        p.Press("/integrity/chain", say("Compare entries and tables")),
+        p.Press("/integrity/files", say("Compare entries, tables and all files")),
+    )
+    if (since := view.checking.since) is not None:
+        under_way = say("A comparison is under way since {moment}.", moment=p.moment(since))
+        forms = (PageParagraph(under_way), p.Links((Cell(say("Look again"), "/integrity"),)))
+    return WebPage(
+        say("Integrity"), "/integrity", lead=NOTHING,
+        blocks=(*_comparison(view, (count, head)), PageFacts(rows, wide=True)),
+        sections=((say("Compare the records with their chain"), forms),),
+    )  # fmt: skip
+
+
+def _comparison(view: SiteView, head: tuple[int, str]) -> tuple[Block, ...]:
+    last = view.checking.last
+    if last is None:
+        return (PageNotice(say("Not compared since cmm-uq serve was started"), "open"),)
+    at = say("Compared on {moment}, {what}, up to entry {number}.", moment=p.moment(last.at), number=number(last.head[0]),
+             what=say("with all files") if last.files else say("without files"))  # fmt: skip
+    later = [say("Entries were added since.")] if last.head != head else []
+    if last.failed:
+        return (_notice(say("The records could not be compared"), "bad", [Verbatim(last.failed), at]),)
+    if not last.count:
+        return (_notice(say("The records agree with their chain"), "good", [at, *later]),)
+    found = plural(last.count, one=say("One thing is not as it was recorded"),
+                   many=say("{count} things are not as they were recorded", count=number(last.count, ",d")))  # fmt: skip
+    kinds = {"chain": say("Entry"), "index": say("Table"), "file": say("File"), "missing": say("Missing file")}
+    kinds |= {"clock": say("Clock"), "schema": say("Database")}
+    rows = tuple(
+        (Cell(say("Entry {number}", number=number(one.entry)) if one.entry is not None else say("Records")),
+         Cell(kinds.get(one.kind, Verbatim(one.kind))), Cell(Verbatim(one.problem)))
+        for one in last.findings
+    )  # fmt: skip
+    more = (say("Shown are the first {most}.", most=number(MOST)),) if last.count > len(rows) else ()
+    headings = p.columns(say("Where"), say("What"), say("Finding"))
+    table = p.PageTable(say("What is not as it was recorded"), headings, rows, notes=more)
+    return (_notice(found, "bad", [at, *later]), table)
+
 
 PAGES: Mapping[str, Callable[[SiteView, WebRequest], WebPage | WebResponse]] = {  # what is looked at, by path
     "/": machines_page, "/machine": machine_page, "/certificates": certificates_page, "/certificate": certificate_page,
@@ -41,7 +259,7 @@ WITH_FORM = ("/file", "/integrity")
 class Site:
     """Answers requests; ``where`` as :func:`~cmm_uq.laboratory.records.opening.open_records` takes it.
 
-    ``desk``, ``account``: what surrounds its pages (:func:`~cmm_uq.app.serve.rendering.render_page`).
+    ``desk``, ``account``: what surrounds its pages (:func:`~cmm_uq.app.serve.exchange.render_page`).
     """
 
     def __init__(

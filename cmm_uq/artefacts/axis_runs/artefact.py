@@ -47,8 +47,7 @@ from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, unit
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size
 from cmm_uq.machine.model.recorded import expansion
 from cmm_uq.machine.physics.effects.drives import index_change
-from cmm_uq.maths.geometry.circular import CircularTest
-from cmm_uq.maths.geometry.positioning import PositioningRuns
+from cmm_uq.maths.geometry.positioning import CircularTest, PositioningRuns
 
 _FAR = {False: 2000.0, True: 3600.0}  # µm or ″ beyond which a reading is in another unit
 _UNITS = {ACROSS: unit("µm"), TURNING: unit("″")}

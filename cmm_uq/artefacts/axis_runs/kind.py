@@ -11,9 +11,8 @@ from pydantic import Field
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import JobTable, Length, Position, Triple, Uncertainty, key
 from cmm_uq.base.points import AXES
-from cmm_uq.jobs.beginning import AT_20_C, SIX, Beginning, circumstances
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertifiedValue
-from cmm_uq.machine.model.kind import POSITIONING, Kind
+from cmm_uq.machine.model.kind import AT_20_C, POSITIONING, SIX, Beginning, Kind, circumstances
 
 APPROACHES, READ, TURN = (tuple(f"{name}_{a}" for a in AXES) for name in ("approach", "read", "turn"))
 

@@ -22,9 +22,9 @@ from cmm_uq.certificate.document import Column, Section, Table, figure_columns, 
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import expanded
-from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size
+from cmm_uq.machine.model.kind import Beginning
 from cmm_uq.machine.model.recorded import columns_needed, place
 from cmm_uq.machine.physics.kinematics import euler_313
 from cmm_uq.maths.geometry import fit_plane

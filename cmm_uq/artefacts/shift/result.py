@@ -35,8 +35,8 @@ from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, error_map_csv
 from cmm_uq.maths.inference.draws import Draws, by_ensemble
 from cmm_uq.maths.inference.ensembles import Chains
-from cmm_uq.maths.uncertainty.correlation import Covariance
 from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of, nominal, significant
+from cmm_uq.maths.uncertainty.type_a import Covariance
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,7 @@ from math import isfinite
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, Gathered
-from cmm_uq.base.files.content import text_of
-from cmm_uq.base.files.limits import CELL, CELLS, COLUMN_NAME, COLUMNS, LINE, LINES, ROWS, Limit
+from cmm_uq.base.files.limits import CELL, CELLS, COLUMN_NAME, COLUMNS, LINE, LINES, ROWS, Limit, text_of
 from cmm_uq.base.points import Floats
 
 # sizes of a number in a table, other than 0: squares and sums of 10⁵ of them stay far within a double's range

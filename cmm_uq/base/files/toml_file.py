@@ -16,9 +16,8 @@ from pydantic_core import ErrorDetails
 from tomlkit.exceptions import TOMLKitError
 
 from cmm_uq.base.errors import MOST_GATHERED, CmmUqError, shortened, suggestion
-from cmm_uq.base.files.content import text_of
 from cmm_uq.base.files.csv_table import conversion
-from cmm_uq.base.files.limits import DEPTH, LISTED, NUMERAL, TEXT, TOML_KEY, WORD
+from cmm_uq.base.files.limits import DEPTH, LISTED, NUMERAL, TEXT, TOML_KEY, WORD, text_of
 from cmm_uq.base.files.table import sentences
 
 _STRING = (

@@ -2,21 +2,26 @@
 
 The manifest says which command wrote a folder's files, for which job, and the hash of each. It is the last file of a set to be
 put in place, so that a folder whose files agree with it is one set, whole. Renames can be done again, or undone, after any.
+
+One new file, whole or not at all, and over nothing; what the system refuses to write, in words.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Mapping
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from cmm_uq import __version__
-from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.base.output import interruption
 
 MANIFEST = "manifest.json"
 SCHEMA = "cmm-uq/manifest/1"
@@ -209,3 +214,61 @@ def journal_for(
     kept = {name: free_name(folder, name) for name in in_the_way}
     stale = {name: digest for name, digest in mine.items() if name not in files}
     return Journal(token, dict(files), {name: mine[name] for name in files if name in mine}, kept, stale)
+
+
+@contextlib.contextmanager
+def writing_to(path: Path, fix: str) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        what = error.strerror or error if isinstance(error, OSError) else error
+        raise OutputError(f"cannot be written: {what}", where=str(path), fix=fix) from error
+
+
+_TAKEN, _FOLDER = "Name another file; nothing is overwritten", "Name a folder that exists"
+_MENDED = "Free the disk, mend the permissions, or name another file"
+
+
+def write_new(out: Path, content: bytes) -> None:
+    """Write a file that is not there yet."""
+    with new_file(out) as path:
+        path.write_bytes(content)
+
+
+def refuse_taken(out: Path) -> None:
+    """Make sure, before there is anything to write, that a new file could be there."""
+    if os.path.lexists(out):
+        raise OutputError("is there already", where=str(out), fix=_TAKEN)
+    if not out.parent.is_dir():
+        raise OutputError("cannot be written: no such folder", where=str(out), fix=_FOLDER)
+
+
+@contextlib.contextmanager
+def new_file(out: Path, *, force: bool = False) -> Iterator[Path]:
+    """Where a file is to be written that then takes its place; where that fails, nothing is left, after a signal neither."""
+    unfinished = _Unfinished()
+    with interruption.staged(unfinished):
+        try:
+            with tempfile.NamedTemporaryFile(dir=out.parent, prefix=".unfinished-", delete=False) as file:
+                unfinished.name = file.name
+            yield Path(unfinished.name)
+            if force and os.path.lexists(out):
+                out.rename(out.parent / free_name(out.parent, out.name))
+            os.link(unfinished.name, out)
+        except FileExistsError:
+            raise OutputError("is there already", where=str(out), fix=_TAKEN) from None
+        except OSError as error:
+            fix = _FOLDER if error.errno in (errno.ENOENT, errno.ENOTDIR) else _MENDED
+            raise OutputError(f"cannot be written: {error.strerror}", where=str(out), fix=fix) from error
+        finally:
+            unfinished.discard()
+
+
+class _Unfinished:
+    """The file before it takes its place."""
+
+    name = ""
+
+    def discard(self) -> None:
+        with contextlib.suppress(OSError):
+            os.unlink(self.name)  # noqa: PTH108 - may be empty

@@ -25,8 +25,7 @@ from typing import Protocol
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import interruption, manifest
-from cmm_uq.base.output.manifest import JOURNAL, MANIFEST, NEW, Journal, Manifest, Owner, journal_for, place
-from cmm_uq.base.output.new_file import writing_to
+from cmm_uq.base.output.manifest import JOURNAL, MANIFEST, NEW, Journal, Manifest, Owner, journal_for, place, writing_to
 
 
 def locked(path: Path, *, create: bool) -> int | None:

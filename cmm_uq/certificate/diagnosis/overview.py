@@ -25,8 +25,16 @@ from cmm_uq.base.messages import (
     say,
     semicolons,
 )
-from cmm_uq.certificate.diagnosis.empirical import empirical_words, nearest_words, repeats_words
-from cmm_uq.certificate.diagnosis.mistakes import AGAINST_SIMULATION, TITLE, contained, mistaken, to_mend
+from cmm_uq.certificate.diagnosis.empirical import (
+    AGAINST_SIMULATION,
+    TITLE,
+    contained,
+    empirical_words,
+    mistaken,
+    nearest_words,
+    repeats_words,
+    to_mend,
+)
 from cmm_uq.certificate.diagnosis.sections import by_columns, explanation, next_sentence, place_words, without_power
 from cmm_uq.certificate.document import Overview, Standing
 from cmm_uq.certificate.result import JobDiagnosis

@@ -28,8 +28,7 @@ from cmm_uq.base.messages import (
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate import document as doc, wording
 from cmm_uq.certificate.diagnosis import overview as words
-from cmm_uq.certificate.diagnosis.empirical import empirical_section
-from cmm_uq.certificate.diagnosis.mistakes import contained, mistakes_section
+from cmm_uq.certificate.diagnosis.empirical import contained, empirical_section, mistakes_section
 from cmm_uq.certificate.diagnosis.sections import costs_section, next_section, unseen_section, where_section
 from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.origin import came_about, program

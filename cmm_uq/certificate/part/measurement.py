@@ -14,7 +14,7 @@ import numpy as np
 from cmm_uq import __version__
 from cmm_uq.analysis.conformity.decision import Outcome, rule_name, rule_words
 from cmm_uq.analysis.conformity.limits import LimitDecision
-from cmm_uq.analysis.machine.influence import PriorInfluence
+from cmm_uq.analysis.machine.performance import PriorInfluence
 from cmm_uq.analysis.parts.budget import PointErrors, VarianceShares, Way
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.methods import method as other_methods
@@ -25,8 +25,7 @@ from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
-from cmm_uq.certificate.further import FurtherCertificate, further_data
-from cmm_uq.certificate.origin import NAME
+from cmm_uq.certificate.origin import NAME, FurtherCertificate, further_data
 from cmm_uq.certificate.sections.read_axes import evidence_data, readings_data, shrinking, smaller_by
 from cmm_uq.certificate.sections.regions import families_data, priors_data
 from cmm_uq.jobs.part.feature import CharacteristicFacts

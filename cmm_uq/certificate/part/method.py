@@ -18,8 +18,7 @@ from cmm_uq.base import messages
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, number, plural, say
 from cmm_uq.base.units import REFERENCE_TEMPERATURE, unit
 from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
-from cmm_uq.certificate.further import further_table
-from cmm_uq.certificate.origin import NAME
+from cmm_uq.certificate.origin import NAME, further_table
 from cmm_uq.certificate.part.figures import ANGLES, LENGTHS, figures_of
 from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, Source
 from cmm_uq.certificate.wording import titles

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmm_uq.analysis.parts.budget import PointErrors
-from cmm_uq.analysis.parts.outlines import outline
 from cmm_uq.analysis.parts.plan import PartPose, Plan
+from cmm_uq.analysis.parts.setup import outline
 from cmm_uq.base.messages import NOTHING, Text, after, number, plural, say, sentences, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE

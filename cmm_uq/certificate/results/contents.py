@@ -22,7 +22,7 @@ from cmm_uq.analysis.planning.set_up import NextPlan
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.diagnosis.mistakes import mistakes_data
+from cmm_uq.certificate.diagnosis.empirical import mistakes_data
 from cmm_uq.certificate.diagnosis.overview import sentence
 from cmm_uq.certificate.origin import quantity_data, software
 from cmm_uq.certificate.result import JobDiagnosis, Result, SimulatedTwin
@@ -33,8 +33,8 @@ from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.inference.linear_model import LeastSquares
 from cmm_uq.maths.uncertainty.budget_results import budget_data
-from cmm_uq.maths.uncertainty.correlation import Covariance
 from cmm_uq.maths.uncertainty.quantity import Quantity
+from cmm_uq.maths.uncertainty.type_a import Covariance
 
 SCHEMA = "cmm-uq/results/1"
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from cmm_uq.analysis.machine.regions import readings_of
 from cmm_uq.analysis.machine.state import StatementEvidence
-from cmm_uq.analysis.machine.statements import readings_of
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, listed, number, say, semicolons
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import unit

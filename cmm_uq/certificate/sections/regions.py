@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.machine.influence import ALL, MATTERS, PriorInfluence
+from cmm_uq.analysis.machine.performance import ALL, MATTERS, PriorInfluence
 from cmm_uq.analysis.machine.regions import FactorRegions, Key
 from cmm_uq.analysis.machine.state import FREE
 from cmm_uq.base.messages import DASH, NOTHING, Text, after, listed, number, say, signed
@@ -15,8 +15,7 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
 from cmm_uq.certificate import wording
 from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
-from cmm_uq.certificate.further import further_data, further_table
-from cmm_uq.certificate.origin import quantity_data
+from cmm_uq.certificate.origin import further_data, further_table, quantity_data
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.sections.read_axes import readings_data, readings_table, readings_warnings
 from cmm_uq.certificate.wording import effect_title

@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from cmm_uq.base.errors import CmmUqError, NotInstalledError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import KEY_BYTES
+from cmm_uq.base.files.limits import KEY_BYTES, content_of
 from cmm_uq.base.messages import Text, say
 
 if TYPE_CHECKING:

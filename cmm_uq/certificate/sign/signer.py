@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from urllib.parse import parse_qsl, unquote
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import KEY_BYTES
+from cmm_uq.base.files.limits import KEY_BYTES, content_of
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.sign.found import installed
 

@@ -12,14 +12,13 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.analysis.conformity.decision import rule_name
-from cmm_uq.analysis.parts.plan import Plan
-from cmm_uq.certificate.part.measurement import CertificateStatus, standing_data
 from cmm_uq.certificate.verify.given import JOB, Inquiry
 from cmm_uq.jobs.part.feature import ASKS
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.verdicts import Verdict, Verdicts
 
 if TYPE_CHECKING:
+    from cmm_uq.analysis.parts.plan import Plan
     from cmm_uq.base.points import Floats
 
 
@@ -319,9 +318,9 @@ def check_part_job(
         inquiry.compare("inputs", file, place, problem, at_hand, agreed)
 
 
-def check_standing(inquiry: Inquiry, standing: CertificateStatus, data: Mapping[str, Any], file: str) -> None:
+def check_standing(inquiry: Inquiry, should: Mapping[str, Any], data: Mapping[str, Any], file: str) -> None:
     """Keep what the machine's certificate says otherwise."""
-    should, said, problem = standing_data(standing), data["machine"], "is not what the machine's certificate says"
+    said, problem = data["machine"], "is not what the machine's certificate says"
     for key in _OF_THE_MACHINE:
         inquiry.compare("inputs", file, f"machine.{key}", problem, said[key], should[key])
     more, found = said.get("further", []), should.get("further", [])

@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of, text_of
-from cmm_uq.base.files.limits import GIVEN, JSON_BYTES, JSON_DEPTH, NUMERAL, PDF_BYTES
+from cmm_uq.base.files.limits import GIVEN, JSON_BYTES, JSON_DEPTH, NUMERAL, PDF_BYTES, content_of, text_of
 from cmm_uq.base.languages.translation import ENGLISH, Code
 from cmm_uq.base.output import MANIFEST
 from cmm_uq.base.output.manifest import Manifest, parsed, plain_name

@@ -20,8 +20,7 @@ from types import MappingProxyType
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import text_of
-from cmm_uq.base.files.limits import HTML_BYTES, HTML_DEPTH, PDF_BYTES, PDF_OBJECTS, PDF_PAGES, PDF_UNPACKED
+from cmm_uq.base.files.limits import HTML_BYTES, HTML_DEPTH, PDF_BYTES, PDF_OBJECTS, PDF_PAGES, PDF_UNPACKED, text_of
 
 _FIX = "Ask whoever sent it for the file as cmm-uq wrote it"
 

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import PDF_BYTES
+from cmm_uq.base.files.limits import PDF_BYTES, content_of
 from cmm_uq.certificate.sign.found import AFTER
 from cmm_uq.certificate.verify.given import JOB, RESULTS, Given, Inquiry, given_of, strict_json
 from cmm_uq.certificate.verify.views import AHEAD, Signed

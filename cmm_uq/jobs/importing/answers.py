@@ -12,8 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import JOB_BYTES
+from cmm_uq.base.files.limits import JOB_BYTES, content_of
 from cmm_uq.jobs.importing.encodings import is_number
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, Sheet, format_of
 from cmm_uq.jobs.importing.header import LINES_BEFORE, text_of

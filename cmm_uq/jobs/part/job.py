@@ -10,8 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError, Gathered
-from cmm_uq.base.files.content import text_of
-from cmm_uq.base.files.limits import JOB_BYTES, JSON_BYTES, LISTED, LOGO_BYTES, TABLE_BYTES
+from cmm_uq.base.files.limits import JOB_BYTES, JSON_BYTES, LISTED, LOGO_BYTES, TABLE_BYTES, text_of
 from cmm_uq.base.files.toml_file import checked, toml_of
 from cmm_uq.base.output import finish_interrupted
 from cmm_uq.base.points import Floats

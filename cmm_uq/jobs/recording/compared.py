@@ -23,9 +23,8 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.content import text_of
 from cmm_uq.base.files.csv_table import Cells, cells_of, numbers
-from cmm_uq.base.files.limits import MAPS
+from cmm_uq.base.files.limits import MAPS, text_of
 from cmm_uq.base.files.table import AnyFloat, JobTable, Length, Names, Uncertainty, key
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.files.content import check_file
+from cmm_uq.base.files.limits import check_file
 from cmm_uq.base.output.staging import synced
 from cmm_uq.laboratory.live.instruments.source import Moment
 

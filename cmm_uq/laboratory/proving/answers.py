@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.output.new_file import writing_to
+from cmm_uq.base.output.manifest import writing_to
 from cmm_uq.base.output.staging import locked, replace_file
 from cmm_uq.laboratory.proving.cases import canonical_json
 from cmm_uq.laboratory.schedule.processes import WorkerTask, answers

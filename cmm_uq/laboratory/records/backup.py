@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from sqlalchemy import select, text
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.output.new_file import writing_to
+from cmm_uq.base.output.manifest import writing_to
 from cmm_uq.base.output.staging import synced
 from cmm_uq.laboratory.records import indexing
 from cmm_uq.laboratory.records.facts import Entry

@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.files.content import check_file, content_of, text_of
-from cmm_uq.base.files.limits import JOB_BYTES
+from cmm_uq.base.files.limits import JOB_BYTES, check_file, content_of, text_of
 from cmm_uq.base.files.toml_file import toml_of
 from cmm_uq.base.output import finish_interrupted, sha256_of
 from cmm_uq.base.plugins import told_with_package

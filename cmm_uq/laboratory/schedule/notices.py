@@ -20,7 +20,7 @@ from typing import Any, Literal, Protocol, get_args
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, day, plural, say
-from cmm_uq.base.output.new_file import writing_to
+from cmm_uq.base.output.manifest import writing_to
 from cmm_uq.base.output.staging import replace_file
 from cmm_uq.jobs.verdicts import AGREES, Verdicts
 from cmm_uq.laboratory.schedule.state import AHEAD, PRIVATE, Dispatch, FolderState, turn

@@ -24,8 +24,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError, printable
-from cmm_uq.base.files.content import content_of, text_of
-from cmm_uq.base.files.limits import JOB_BYTES, SECRET_BYTES
+from cmm_uq.base.files.limits import JOB_BYTES, SECRET_BYTES, content_of, text_of
 from cmm_uq.base.files.table import JobTable
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.laboratory.schedule.notices import EVENTS, Channel, Event, OutgoingMessage, UndeliveredError, within

@@ -21,8 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.base.errors import CmmUqError, OutputError, printable
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.output import read_manifest, sha256_of
 from cmm_uq.base.output.staging import locked, replace_file
 from cmm_uq.jobs.source import RESULTS

@@ -30,7 +30,7 @@ from cmm_uq.jobs.tables.machine import ErrorMapFile, SquarenessFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings
 from cmm_uq.machine.model.recorded import display_step
 from cmm_uq.machine.physics.error_map import ErrorMap, parse_map_file
-from cmm_uq.machine.physics.map_covariance import parse_covariance
+from cmm_uq.machine.physics.map_interpolation import parse_covariance
 
 # mm from where a point was recorded, within which it is taken to be predicted: no hand sets up much worse, and errors change
 # by less than their own size over it

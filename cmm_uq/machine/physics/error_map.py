@@ -20,14 +20,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.csv_table import csv_table, number_problem
-from cmm_uq.base.files.limits import LINE, MAP_BYTES, MAP_ROWS
+from cmm_uq.base.files.limits import LINE, MAP_BYTES, MAP_ROWS, content_of
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
 
 if TYPE_CHECKING:
-    from cmm_uq.machine.physics.map_covariance import MapCovariance
+    from cmm_uq.machine.physics.map_interpolation import MapCovariance
 
 COLUMNS = ("dx_um", "dy_um", "dz_um", "rx_arcsec", "ry_arcsec", "rz_arcsec")
 UNITS = np.array([MICROMETRE] * 3 + [ARCSECOND] * 3)  # unit of each column, in mm and rad

@@ -16,9 +16,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.files.content import check_file
 from cmm_uq.base.files.csv_table import column_problem, numbers
-from cmm_uq.base.files.limits import COLUMNS, LINE
+from cmm_uq.base.files.limits import COLUMNS, LINE, check_file
 from cmm_uq.base.points import Floats
 
 CHUNK = 2**20  # bytes read at a time, some 20 000 lines

@@ -22,14 +22,20 @@ from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.uncertainty import monte_carlo
 from cmm_uq.maths.uncertainty.budget import NAMES, Budget, Labels, Method, budget_of, joint_line, line_of
-from cmm_uq.maths.uncertainty.correlation import correlation_of
 from cmm_uq.maths.uncertainty.coverage import NO_VARIANCE
 from cmm_uq.maths.uncertainty.distributions import constant
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.monte_carlo import HIGHEST_COVERAGE, LARGEST, Simulated, numerical_tolerance
-from cmm_uq.maths.uncertainty.propagation import Propagated, first_order, second_order
+from cmm_uq.maths.uncertainty.monte_carlo import (
+    HIGHEST_COVERAGE,
+    LARGEST,
+    Propagated,
+    Simulated,
+    first_order,
+    numerical_tolerance,
+    second_order,
+)
 from cmm_uq.maths.uncertainty.quantity import figure, rounded
-from cmm_uq.maths.uncertainty.type_a import check_coverage, coverage_factor
+from cmm_uq.maths.uncertainty.type_a import check_coverage, correlation_of, coverage_factor
 
 METHODS = (*NAMES, "auto")
 _ORDERS: Mapping[Method, Callable[[MeasurementModel], Propagated]] = {"first": first_order, "second": second_order}

@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.uncertainty.correlation import Correlations, correlation_matrix
 from cmm_uq.maths.uncertainty.distributions import Distribution
+from cmm_uq.maths.uncertainty.type_a import Correlations, correlation_matrix
 
 Operand = Any  # a float or an array, real or complex
 Partial = Callable[..., Operand]

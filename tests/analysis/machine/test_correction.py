@@ -18,8 +18,7 @@ from cmm_uq.machine.model.field import curves
 from cmm_uq.machine.physics.catalogue import effects, every
 from cmm_uq.machine.physics.compensation import NOMINAL, Compensation, PointConditions
 from cmm_uq.machine.physics.error_map import ErrorMap
-from cmm_uq.machine.physics.map_covariance import MapCovariance
-from cmm_uq.machine.physics.map_interpolation import ErrorMaps
+from cmm_uq.machine.physics.map_interpolation import ErrorMaps, MapCovariance
 from cmm_uq.machine.physics.superposition import Superposition
 from cmm_uq.maths.inference.posterior import Doubt
 from tests.artefacts.simulated import SCALE, SQUARE, analysed

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import cmm_uq
-from cmm_uq.analysis.machine.ranking import contributions
+from cmm_uq.analysis.machine.performance import contributions
 from cmm_uq.app.api.outcomes import Report
 from cmm_uq.base.units import MICROMETRE
 from tests.conftest import ROOT

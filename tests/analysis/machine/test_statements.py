@@ -12,8 +12,8 @@ from scipy.stats import multivariate_normal, norm
 from benchmarks.parts import curved, machines
 from benchmarks.parts.studied import MACHINE
 from cmm_uq.analysis.machine.conditional import as_recorded_allows, given_recording, white
+from cmm_uq.analysis.machine.regions import readings_of, with_readings
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, StatementEvidence, Unmodelled, with_bounds
-from cmm_uq.analysis.machine.statements import readings_of, with_readings
 from cmm_uq.base.points import Machine
 from cmm_uq.jobs.tables.machine import AxisFacts
 from cmm_uq.machine.model import RecordingModel

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts.outlines import outline
 from cmm_uq.analysis.parts.plan import Nominal, PartFeature
+from cmm_uq.analysis.parts.setup import outline
 from cmm_uq.base.points import Floats
 from tests.parts_drawn import UP, bore, circle, plane, spot
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.machine.influence import ALL
+from cmm_uq.analysis.machine.performance import ALL
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, Unmodelled
 from cmm_uq.analysis.parts.plan import PartCharacteristic, PartPose, Plan
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual, prior_influence

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.app.desk import drafts
+from cmm_uq.app.desk import place
 from cmm_uq.app.desk.workers import Worker
 from cmm_uq.base.errors import CmmUqError
 from tests.app.desk.conftest import Visitor
@@ -87,7 +87,7 @@ def test_what_does_not_come_whole_leaves_nothing(seated: Visitor) -> None:
 
 def test_more_exports_than_anybody_finishes_are_refused(visitor: Visitor, monkeypatch: pytest.MonkeyPatch) -> None:
     visitor.open()
-    monkeypatch.setattr(drafts, "MOST_DRAFTS", 1)
+    monkeypatch.setattr(place, "MOST_DRAFTS", 1)
     draft_of(visitor, b"X;Y;Z\n1;2;3\n")
     assert "lie here unfinished" in visitor.drop(b"X;Y;Z\n1;2;3\n").text
 

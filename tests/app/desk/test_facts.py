@@ -7,7 +7,7 @@ import tomllib
 
 import pytest
 
-from cmm_uq.app.desk.facts import facts, with_facts
+from cmm_uq.app.desk.questions import facts, with_facts
 from cmm_uq.base.errors import CmmUqError
 from tests.app.desk.conftest import Visitor
 from tests.app.desk.test_desk import made

@@ -8,7 +8,7 @@ import time
 import pytest
 from pypdf import PdfReader
 
-from cmm_uq.app.desk.part_pages import with_points
+from cmm_uq.app.desk.folder import with_points
 from tests.app.desk.conftest import Answer, Visitor
 from tests.app.serve.test_exchange import BOUNDARY, form
 from tests.conftest import ROOT

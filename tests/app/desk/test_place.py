@@ -8,8 +8,17 @@ from pathlib import Path, PureWindowsPath
 import pytest
 from hypothesis import given, strategies as st
 
-from cmm_uq.app.desk.drafts import DraftFolder
-from cmm_uq.app.desk.place import LONGEST, ChangedError, below, jobs_in, parts_of, safe_name, sha256, write_over
+from cmm_uq.app.desk.place import (
+    LONGEST,
+    ChangedError,
+    DraftFolder,
+    below,
+    jobs_in,
+    parts_of,
+    safe_name,
+    sha256,
+    write_over,
+)
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.source import check_name
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.app.desk.pictures import DRAWINGS
+from cmm_uq.app.desk.export_pages import DRAWINGS
 from cmm_uq.app.desk.questions import check_answers, check_text, create, fields, kinds, tables_of
 from cmm_uq.base.errors import CmmUqError
 from tests.conftest import ROOT

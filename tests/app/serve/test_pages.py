@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.app.serve.certificate_page import RecordedFile, content_of, files_of, results_of
-from cmm_uq.app.serve.checks_page import FileMatch, look_up, number_in, verdict
 from cmm_uq.app.serve.exchange import RefusedRequest, UploadedFile, sent_file
+from cmm_uq.app.serve.site import FileMatch, look_up, number_in, verdict
 from cmm_uq.app.serve.view import MachineStanding, groups, in_order
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.render import render_html, render_pdf

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of, text_of
-from cmm_uq.base.files.limits import Limit
+from cmm_uq.base.files.limits import Limit, content_of, text_of
 
 TEN = Limit(10, "bytes", "test", "it is one")
 POSIX = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no such files here")

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import OutputError
-from cmm_uq.base.output.new_file import new_file, write_new
+from cmm_uq.base.output.manifest import new_file, write_new
 
 
 @pytest.mark.parametrize(

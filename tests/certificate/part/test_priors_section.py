@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.machine.influence import ALL, PriorInfluence
+from cmm_uq.analysis.machine.performance import ALL, PriorInfluence
 from cmm_uq.analysis.machine.state import StatementEvidence
 from cmm_uq.certificate.document import Paragraph, Section, Table
 from cmm_uq.certificate.part.budget_section import priors_section, resting_on_priors

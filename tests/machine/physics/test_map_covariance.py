@@ -12,14 +12,14 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.physics.compensation import Compensation, PointConditions
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap
-from cmm_uq.machine.physics.map_covariance import (
+from cmm_uq.machine.physics.map_interpolation import (
+    ErrorMaps,
     MapCovariance,
     SampledPoints,
     covariance_file,
     figure_units,
     parse_covariance,
 )
-from cmm_uq.machine.physics.map_interpolation import ErrorMaps
 
 POSITIONS = (np.array([0.0, 200.0, 500.0, 900.0]), np.array([0.0, 300.0, 600.0]), np.array([-500.0, -100.0, 0.0]))
 READINGS = np.array([[100.0, 50.0, -400.0], [820.0, 590.0, -20.0], [200.0, 300.0, -100.0], [455.0, 10.0, -333.0]])

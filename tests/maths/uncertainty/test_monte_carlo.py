@@ -9,11 +9,17 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.uncertainty import distributions as make
-from cmm_uq.maths.uncertainty.correlation import correlation_matrix, joint_draws, square_root, tied
 from cmm_uq.maths.uncertainty.distributions import Distribution, constant, normal, rectangular, student_t
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.monte_carlo import BLOCK, Simulated, numerical_tolerance, simulate, simulate_adaptively
-from cmm_uq.maths.uncertainty.propagation import first_order
+from cmm_uq.maths.uncertainty.monte_carlo import (
+    BLOCK,
+    Simulated,
+    first_order,
+    numerical_tolerance,
+    simulate,
+    simulate_adaptively,
+)
+from cmm_uq.maths.uncertainty.type_a import correlation_matrix, joint_draws, square_root, tied
 
 TRIALS = 400_000
 

@@ -6,7 +6,7 @@ the calibrated part lay:
 
     U = k √(u_cal² + u_p² + u_b² + u_w²), k = 2, for results that are corrected by b; else |b| is added (ISO/TS 15530-3:2004).
 
-The budget itself is that of :func:`cmm_uq.maths.uncertainty.budgets.machine.use_by_calibrated_workpiece`.
+The budget itself is that of :func:`cmm_uq.maths.uncertainty.budgets.measurements.use_by_calibrated_workpiece`.
 
 By measuring it in several orientations: the method of ISO/DTS 15530-2, "Use of multiple workpiece orientations and calibrated
 simple standards", by its public summary: several orientations and repetitions, evaluated by analysis of variance; standards of
@@ -32,7 +32,7 @@ from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import REFERENCE_TEMPERATURE, unit
 from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, BudgetLine, OneWay, one_way
-from cmm_uq.maths.uncertainty.budgets.machine import FEWEST_READINGS, use_by_calibrated_workpiece
+from cmm_uq.maths.uncertainty.budgets.measurements import FEWEST_READINGS, use_by_calibrated_workpiece
 
 # virtual measurements; a calibrated part measured again and again; the part itself in several orientations
 Method = Literal["virtual", "calibrated_part", "orientations"]

@@ -25,7 +25,7 @@ from cmm_uq.app.commands.estimation import doubt_of, with_noise
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, after, day, number, say
-from cmm_uq.certificate.further import NO_FURTHER, FurtherCertificate, FurtherCertificates
+from cmm_uq.certificate.origin import NO_FURTHER, FurtherCertificate, FurtherCertificates
 from cmm_uq.certificate.verify.given import given_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from cmm_uq.app.commands.files import called, opened
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, number, say, semicolons
 from cmm_uq.base.output.manifest import sha256_of
 from cmm_uq.base.units import UNITS, printed_unit

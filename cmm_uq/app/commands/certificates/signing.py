@@ -15,8 +15,7 @@ from typing import Any
 
 from cmm_uq.app.commands.files import opened
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import SIGNED_BYTES
+from cmm_uq.base.files.limits import SIGNED_BYTES, content_of
 from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.output import Owner, finish_interrupted, read_manifest, staged
 from cmm_uq.certificate import sign

@@ -18,6 +18,7 @@ from cmm_uq.app.commands.parts.machine import CALIBRATION, attached_calibration,
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
 from cmm_uq.app.commands.reading import in_language
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.part.measurement import standing_data
 from cmm_uq.certificate.verify.again import Again, check_results
 from cmm_uq.certificate.verify.decisions import check_part_decisions
 from cmm_uq.certificate.verify.figures import check_part_figures, check_part_job, check_standing, check_verdicts
@@ -120,7 +121,8 @@ def _check_machine(
     except CmmUqError as error:
         inquiry.wrong("dates", where, "", f"does not hold for this part: {error.problem}")
         return
-    check_standing(inquiry, replace(standing, further=tuple(one.certificate for one in more)), data, file)
+    should = standing_data(replace(standing, further=tuple(one.certificate for one in more)))
+    check_standing(inquiry, should, data, file)
 
 
 def part_again(

@@ -21,8 +21,7 @@ from cmm_uq.app.commands.model import recorded_model, refuse_unmeasured
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError, Gathered
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
+from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES, content_of
 from cmm_uq.base.messages import html_table
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine

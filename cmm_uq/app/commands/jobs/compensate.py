@@ -24,7 +24,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import Owner, sha256_of, staged
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.further import FurtherCertificates, further_data
+from cmm_uq.certificate.origin import FurtherCertificates, further_data
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.sections.read_axes import readings_data, readings_warnings
 from cmm_uq.jobs.derived_job import IN_THE_RECORDING, PROGRAM, derived_toml, is_compensated, kept_inputs, recording_name
@@ -38,8 +38,14 @@ from cmm_uq.machine.physics.compensation import Compensation, circumstances, com
 from cmm_uq.machine.physics.digitizer import POSE, DigitizedCloud, Digitizer, columns_for
 from cmm_uq.machine.physics.error_map import ErrorMap, error_map_csv, error_map_text
 from cmm_uq.machine.physics.kinematics import euler_313
-from cmm_uq.machine.physics.map_covariance import MapCovariance, SampledPoints, covariance_file, uncertain_map
-from cmm_uq.machine.physics.map_interpolation import Beyond, ErrorMaps
+from cmm_uq.machine.physics.map_interpolation import (
+    Beyond,
+    ErrorMaps,
+    MapCovariance,
+    SampledPoints,
+    covariance_file,
+    uncertain_map,
+)
 from cmm_uq.machine.physics.point_cloud import cloud_files, cloud_header, transform_cloud
 from cmm_uq.machine.physics.stated import physics_of
 

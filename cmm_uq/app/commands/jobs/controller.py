@@ -19,8 +19,7 @@ from cmm_uq.app.commands.model import recorded_model, refuse_unmeasured
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import JOB_BYTES
+from cmm_uq.base.files.limits import JOB_BYTES, content_of
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.jobs.derived_job import PROGRAM

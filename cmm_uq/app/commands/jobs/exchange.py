@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import DCC_BYTES, TABLE_BYTES
+from cmm_uq.base.files.limits import DCC_BYTES, TABLE_BYTES, content_of
 from cmm_uq.base.files.toml_file import nested
 from cmm_uq.base.output import Owner
-from cmm_uq.base.output.new_file import refuse_taken, write_new
+from cmm_uq.base.output.manifest import refuse_taken, write_new
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
 from cmm_uq.certificate.results.qif_file import qif

@@ -28,13 +28,12 @@ from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.jobs.beginning import MACHINE, Beginning
 from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.derived_job import PROGRAM, Truth
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.schema import commented
 from cmm_uq.jobs.tables.identification import EXAMPLE, MEASURED, SIMULATED, Origin, first_line
-from cmm_uq.machine.model.kind import Kind
+from cmm_uq.machine.model.kind import MACHINE, Beginning, Kind
 from cmm_uq.machine.physics.catalogue import effects
 
 RECORDING, SCHEMA, README = "recording.csv", ".cmm-uq/job.schema.json", "README.md"

@@ -16,8 +16,7 @@ import numpy as np
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import JOB_BYTES
+from cmm_uq.base.files.limits import JOB_BYTES, content_of
 from cmm_uq.base.files.table import LONGEST_MM
 from cmm_uq.base.files.toml_file import as_toml, checked
 from cmm_uq.base.output import Owner, staged

@@ -21,7 +21,7 @@ from cmm_uq.app.commands.files import RESULTS, called
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.app.commands.report import REPORT, report_outcome
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.output.new_file import new_file, refuse_taken
+from cmm_uq.base.output.manifest import new_file, refuse_taken
 from cmm_uq.jobs.verdicts import AGREES, Verdicts
 from cmm_uq.laboratory.records.content import values
 from cmm_uq.laboratory.records.facts import Heads

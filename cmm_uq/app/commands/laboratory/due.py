@@ -15,8 +15,7 @@ import numpy as np
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, in_order, machine_due
 from cmm_uq.laboratory.due.history import MachineHistory, machine_history
 from cmm_uq.laboratory.due.rule import CompletedInterval, Pool, Rule, calibrations, ended_intervals, part_used

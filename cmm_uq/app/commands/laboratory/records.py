@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.app.commands.files import content_of
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of as whole_file
-from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.files.limits import TABLE_BYTES, content_of as whole_file
 from cmm_uq.base.output import MANIFEST, finish_interrupted, read_manifest, sha256_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records import open_records

@@ -21,7 +21,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError, OutputError, suggestion
 from cmm_uq.base.messages import Verbatim, plural, say
 from cmm_uq.base.output.interruption import keeping
-from cmm_uq.base.output.new_file import write_new
+from cmm_uq.base.output.manifest import write_new
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.schema import commented
 from cmm_uq.laboratory.due.history import machine_history

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from cmm_uq import __version__
+from cmm_uq.analysis.machine.regions import with_readings
 from cmm_uq.analysis.machine.state import MachineState, machine_stated, with_bounds
-from cmm_uq.analysis.machine.statements import with_readings
 from cmm_uq.app.commands.certificates.again import of_a_machine
 from cmm_uq.app.commands.certificates.further import (
     further_certificates,

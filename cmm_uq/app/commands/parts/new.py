@@ -19,8 +19,7 @@ from pydantic import ValidationError
 from cmm_uq.app.commands.forms import shipped
 from cmm_uq.app.commands.reading import unwritten
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.files.toml_file import as_toml, nested
 from cmm_uq.jobs.importing.encodings import begins_with, head_text
 from cmm_uq.jobs.importing.format import HEAD

@@ -15,9 +15,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, say
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments import source
-from cmm_uq.laboratory.live.instruments.conversation import PAUSE, Conversation
 from cmm_uq.laboratory.live.instruments.ipp_machine import open_machine
-from cmm_uq.laboratory.live.instruments.library import profile_of_source, unsaid_units
+from cmm_uq.laboratory.live.instruments.library import PAUSE, Conversation, profile_of_source, unsaid_units
 from cmm_uq.laboratory.live.instruments.parsing import FramedMessage, Framer, Parser, Understood
 from cmm_uq.laboratory.live.instruments.profile import Identify, ProfileFile, bytes_of
 from cmm_uq.laboratory.live.instruments.source import SECOND, Identity

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 from urllib.parse import parse_qs
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import check_file
+from cmm_uq.base.files.limits import check_file
 from cmm_uq.base.messages import Text
 from cmm_uq.laboratory.live.instruments.profile import Connection
 

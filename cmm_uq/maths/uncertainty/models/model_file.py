@@ -19,8 +19,7 @@ import numpy as np
 from pydantic import Field
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.content import content_of, text_of
-from cmm_uq.base.files.limits import DRAWS, INPUTS, MODEL_BYTES, TEXT
+from cmm_uq.base.files.limits import DRAWS, INPUTS, MODEL_BYTES, TEXT, content_of, text_of
 from cmm_uq.base.files.table import JobTable, key, required
 from cmm_uq.base.files.toml_file import toml_of
 from cmm_uq.base.messages import Text, say

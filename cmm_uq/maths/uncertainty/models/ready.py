@@ -20,15 +20,15 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.table import JobTable
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.messages import Text, Verbatim, number, say
-from cmm_uq.maths.uncertainty.air.state import Air, Interferometer, interferometer_model
+from cmm_uq.maths.uncertainty.air import Air, Interferometer, interferometer_model
 from cmm_uq.maths.uncertainty.budget import Budget, Labels
 from cmm_uq.maths.uncertainty.budgets.measurements import UNITS, length_at_20, scale_error, triangle_angles
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES, BudgetTable
-from cmm_uq.maths.uncertainty.correlation import Correlations
 from cmm_uq.maths.uncertainty.distributions import Distribution
 from cmm_uq.maths.uncertainty.evaluation import Evaluation, OutputResult, Request, Ways
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.models.expression import Expression
+from cmm_uq.maths.uncertainty.type_a import Correlations
 
 Built = tuple[MeasurementModel, Labels]
 

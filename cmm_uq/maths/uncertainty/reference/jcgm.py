@@ -17,15 +17,20 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.maths.uncertainty import distributions as known
-from cmm_uq.maths.uncertainty.correlation import correlation_of
 from cmm_uq.maths.uncertainty.coverage import elliptical_factor
 from cmm_uq.maths.uncertainty.distributions import Distribution, arcsine, normal, rectangular, student_t
 from cmm_uq.maths.uncertainty.evaluation import Request, compare, evaluate
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.monte_carlo import Simulated, simulate, simulate_adaptively
-from cmm_uq.maths.uncertainty.propagation import Propagated, first_order, second_order
+from cmm_uq.maths.uncertainty.monte_carlo import (
+    Propagated,
+    Simulated,
+    first_order,
+    second_order,
+    simulate,
+    simulate_adaptively,
+)
 from cmm_uq.maths.uncertainty.quantity import rounded
-from cmm_uq.maths.uncertainty.type_a import coverage_factor, simultaneous_readings, straight_line
+from cmm_uq.maths.uncertainty.type_a import correlation_of, coverage_factor, simultaneous_readings, straight_line
 
 SEED = 1  # of every case that makes trials
 

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.maths.uncertainty.air import refractivity as air
+from cmm_uq.maths.uncertainty import air
 from cmm_uq.maths.uncertainty.budgets.measurements import harris_compensated, harris_uncompensated, sphere_covariance
-from cmm_uq.maths.uncertainty.correlation import correlation_of
 from cmm_uq.maths.uncertainty.measurement_model import derivatives
 from cmm_uq.maths.uncertainty.quantity import MINUS
 from cmm_uq.maths.uncertainty.reference import jcgm
 from cmm_uq.maths.uncertainty.reference.jcgm import ReferenceCase, figures
+from cmm_uq.maths.uncertainty.type_a import correlation_of
 
 # °C, %, kPa, nm; 10⁹ (n − 1) by Ciddor and by the modified Edlén equation
 _AIR_TABLE = (

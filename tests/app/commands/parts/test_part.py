@@ -23,8 +23,7 @@ from cmm_uq.app.commands.parts.part import PartOptions, affordable, decide_limit
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
-from cmm_uq.certificate.further import NO_FURTHER
-from cmm_uq.certificate.origin import as_json
+from cmm_uq.certificate.origin import NO_FURTHER, as_json
 from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
 from cmm_uq.certificate.part.method import decided_without
 from cmm_uq.jobs.part.job import TABLES

@@ -15,9 +15,8 @@ import serial
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments import source as ports
-from cmm_uq.laboratory.live.instruments.conversation import Conversation
 from cmm_uq.laboratory.live.instruments.instrument import SECOND, open_source
-from cmm_uq.laboratory.live.instruments.library import profile_named
+from cmm_uq.laboratory.live.instruments.library import Conversation, profile_named
 from cmm_uq.laboratory.live.instruments.profile import Connection, Poll, Send
 from cmm_uq.laboratory.live.instruments.simulated_line import Lines, SimulatedLine
 from cmm_uq.laboratory.live.instruments.source import Gap, Reading, opener, serial_ports

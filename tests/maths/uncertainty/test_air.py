@@ -6,29 +6,26 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.maths.uncertainty.air.refractivity import (
-    birch_downs_1994,
-    ciddor,
-    edlen_1966,
-    harris_2004,
-    relative_humidity,
-    saturation_pressure,
-)
-from cmm_uq.maths.uncertainty.air.state import (
+from cmm_uq.maths.uncertainty.air import (
     EQUATIONS,
     Air,
     Interferometer,
     air_model,
+    birch_downs_1994,
+    ciddor,
+    edlen_1966,
+    harris_2004,
     interferometer_model,
     refractive_index,
+    relative_humidity,
+    saturation_pressure,
     standard_pressure,
 )
 from cmm_uq.maths.uncertainty.budget import budget_of
 from cmm_uq.maths.uncertainty.distributions import constant, normal, rectangular
 from cmm_uq.maths.uncertainty.evaluation import evaluate
 from cmm_uq.maths.uncertainty.measurement_model import complex_step, derivatives
-from cmm_uq.maths.uncertainty.monte_carlo import simulate
-from cmm_uq.maths.uncertainty.propagation import first_order
+from cmm_uq.maths.uncertainty.monte_carlo import first_order, simulate
 
 LABORATORY = (20.0, 101325.0, 50.0, 450.0, 633.0)
 
