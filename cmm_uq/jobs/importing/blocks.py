@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -32,6 +32,7 @@ _BETWEEN = r"[\s;,]+(?:[YZ]\s*[=:]?\s*)?"
 _THREE = {
     sign: re.compile(r"[^\d+−-]{0,20}?" + _BETWEEN.join([rf"([+−-]?\d+(?:[{sign}]\d+)?)"] * 3), re.I) for sign in ".,"
 }
+_FORMULA = re.compile(r"(?<=\S)\s*[=＝].*", re.DOTALL)  # that says how a column was computed
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
 SMALL = ("um", "nm", "microinch")  # units of deviations
 DEEPEST = 4  # rows of a head
@@ -89,7 +90,7 @@ class CutSheet:
         self.figures = [[None if c == "" else figure(c, self.sign) for c in row] for row in sheet.rows]
         self._targets: dict[int, list[int]] = {}
         self.places_of: dict[int, str] = {}  # of each row of figures, as LINE_PLACE has it
-        self.blocks = list(self._blocks())
+        self.blocks = self._titled(list(self._blocks()))
         for block in self.blocks:
             self.places_of |= self._places_beside(block)
 
@@ -236,6 +237,23 @@ class CutSheet:
         if block is not None:
             yield block
 
+    def _titled(self, blocks: list[Block]) -> list[Block]:
+        """Blocks, upper rows of whose heads are titles, for they differ where the rows below them are the same."""
+        alike: dict[tuple[str, ...], list[Block]] = {}
+        for block in blocks:
+            if len(block.head) > 1:
+                alike.setdefault(tuple(map(str, self.sheet.rows[block.head[-1]])), []).append(block)
+        for same in alike.values():
+            deep = min(len(block.head) for block in same)
+            rows = [{tuple(map(str, self.sheet.rows[block.head[-n]])) for block in same} for n in range(1, deep + 1)]
+            kept = next((n for n, own in enumerate(rows) if len(own) == len(same) > 1), deep)
+            for block in same if kept < deep else ():
+                titles = {key: text for row in block.head[:-kept] for key, text in self._titles(row).items()}
+                block.titles = [{**own, **titles} for own in block.titles]
+                block.head = block.head[-kept:]
+                block.paths = self._paths(block.head)
+        return blocks
+
     def _places_beside(self, block: Block) -> dict[int, str]:
         """Places of lines that stand in the columns of a table, once for the rows that follow."""
         columns: dict[str, list[int]] = {}
@@ -259,8 +277,9 @@ class CutSheet:
         """Titles in a row of text, by the word that each begins with; without one where it has nothing else."""
         text = " ".join(self.text(row, k) for k in range(len(self.sheet.rows[row]))).strip()
         text = _before_place(text) if self.place(row) else text
-        pairs = _PAIRS.split(text)
+        pairs, cells = _PAIRS.split(text), [str(cell) for cell in self.sheet.rows[row] if cell != ""]
         parts = pairs if all(":" in pair for pair in pairs) else [text]
+        parts = cells if len(cells) > 1 and all(hint(cell, lengths=True) for cell in cells) else parts
         titles = {(first[0].casefold() if (first := WORD.search(part)) else part): part for part in parts}
         single = len([c for c in self.sheet.rows[row] if c != ""]) == 1 or self.place(row)
         return {**titles, "": text} if single else titles
@@ -277,7 +296,11 @@ class CutSheet:
             gap = any(line not in self._ruled for line in between)
             texts = [self.text(row, k) for k in filled]
             dated = sum(DATED.search(text) is not None for text in texts)
-            odd = (0 < dated < 3 or len(text) > 60 or "=" in text or len(_PRINTED.findall(text)) > 1 for text in texts)
+            few = len(filled) < 4
+            odd = (
+                0 < dated < 3 or len(text) > 60 or (few and "=" in text) or len(_PRINTED.findall(text)) > 1
+                for text in texts
+            )
             if len(head) == DEEPEST or gap or any(odd) or self.place(row):
                 break
             over = [k for k in filled if k in numbers]
@@ -295,7 +318,7 @@ class CutSheet:
         """Texts above each column; a text of an upper row stands over the columns up to the next one of it or above it."""
         levels, begun = [], [False] * self.width
         for depth, row in enumerate(head):
-            texts = [self.text(row, k) for k in range(self.width)]
+            texts = [_FORMULA.sub("", self.text(row, k)) for k in range(self.width)]
             begun = [before or bool(text) for before, text in zip(begun, texts, strict=True)]
             if depth < len(head) - 1:
                 below = [any(self.text(lower, k) for lower in head[depth + 1 :]) for k in range(self.width)]
@@ -332,40 +355,6 @@ def unit_of(path: Sequence[str]) -> WrittenUnit | None:
         if text and (unit := unit_named(text.strip("[]()<>{} ")) or without_unit(text.replace("\n", " "))[1]):
             return unit
     return None
-
-
-def stacked(sheet: Sheet) -> Sheet:
-    """Tables side by side, between which a column is empty and whose heads are alike, below each other."""
-    for row in sheet.rows:
-        own = [
-            k
-            for k in range(3, len(row) // 2 + 1)
-            if row[:k] == row[k + 1 : 2 * k + 1] and row[k] == "" and all(row[:k])
-        ]
-        if not own or any(
-            len(one) > own[0] and one[own[0]] != "" and sum(cell != "" for cell in one) > 2 for one in sheet.rows
-        ):
-            continue
-        starts = range(0, max(map(len, sheet.rows)), own[0] + 1)
-        parts = [(row[k : k + own[0]], line) for k in starts for row, line in zip(sheet.rows, sheet.lines, strict=True)]
-        filled = [(cells, line) for cells, line in parts if any(cell != "" for cell in cells)]
-        return replace(sheet, rows=[cells for cells, _ in filled], lines=[line for _, line in filled])
-    return sheet
-
-
-def transposed(sheet: Sheet) -> Sheet | None:
-    """The widest part of a sheet with its rows as columns."""
-    wide = [i for i, row in enumerate(sheet.rows) if len(row) > 3]
-    if not wide or len(wide) > 300 or max(len(sheet.rows[i]) for i in wide) > 300:
-        return None
-    width = max(len(sheet.rows[i]) for i in wide)
-    rows = [[*sheet.rows[i], *[""] * (width - len(sheet.rows[i]))] for i in wide]
-    return replace(
-        sheet,
-        rows=[list(row) for row in zip(*rows, strict=True)],
-        lines=[sheet.lines[wide[0]]] * width,
-        spreadsheet=False,
-    )
 
 
 def unit_elsewhere(sheets: Sequence[Sheet], *, small: bool) -> WrittenUnit | None:

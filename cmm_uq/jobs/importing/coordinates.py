@@ -180,6 +180,8 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
     small = [c for c in columns if c is not target and c.role in (None, DEVIATION, MEASURED) and c.may_be_length]
     small = [c for c in small if c.step < 1 and not like(c.values + 1000, values + 1000)]
     source = [c for c in small if not mean_of(c, [o for o in small if o is not c and _same_way(o, c)])]
+    directed = [c for c in source if _way(c.heading)]
+    source = directed if len(directed) > 1 else source  # the others are reversals and spreads
     if not source:
         return None
     reading = SheetReading("runs", unit=target.unit, small=next((c.unit for c in source if c.unit), None))
@@ -198,11 +200,7 @@ def _across(
     """Deviations below the targets that stand above them, a way and a run in each row."""
     source = [c for c in columns if c.i in across]
     labels = {row: [grid.text(row, k) for k in range(across[0])] for row in rows}
-    own = [
-        row
-        for row in rows
-        if said(labels[row]) != SUMMARY and any(ways_of([one, "+"]) or ways_of([one, "-"]) for one in labels[row])
-    ]
+    own = [row for row in rows if said(labels[row]) != SUMMARY and any(map(_way, labels[row]))]
     reading = SheetReading("runs")
     reading.taken = {"target": source, "reading_um": source}
     reading.collect(grid, own, columns)
@@ -212,6 +210,11 @@ def _across(
             if target is not None and figure is not None:
                 reading.add(row, k, c, [c], (target[0], figure[0]))
     return reading if len(reading.figures) == len(own) * len(across) else None
+
+
+def _way(text: str) -> bool:
+    """Whether a text names a sense of travel."""
+    return any(ways_of([text, other]) is not None for other in "+-")
 
 
 def _same_way(a: FigureColumn, b: FigureColumn) -> bool:

@@ -25,6 +25,7 @@ _CAMEL = re.compile(r"(?<=[a-zäöüéèà])(?=[A-Z])")
 _SAME_PLACE_MM = 0.5
 _RIGID_MM = 0.1
 _PROBED, _ROUND, _LARGEST_BALL_MM, _FORM_MM = 9, 0.1, 75.0, 0.02  # of a ball that was probed
+_LETTERS = {*"ABCDEFGHabcdefgh"}  # of balls
 _SHORT = {"m": LINE, "p": POINT, "b": POINT, "k": POINT, "r": RUN, "w": RUN, "l": LINE}
 
 
@@ -69,7 +70,7 @@ def counted(label: Label, *, lengths: bool) -> str | None:
     if label.sort == "title" and not label.words:
         every = {hint(value, lengths=lengths) for value in {*label.values}}
         return every.pop() if len(every) == 1 else None
-    if label.sort == "part" and {*label.values} <= {*"ABCDEFGHabcdefgh"}:
+    if label.sort == "part" and {*label.values} <= _LETTERS:
         return POINT
     words = (label.words, label.values[0]) if label.sort in ("title", "part") else label.values[:1]
     found = next((found for text in words if (found := hint(text, lengths=lengths))), None)
@@ -114,7 +115,7 @@ def parts_of(label: Label) -> list[Label]:
             values = tuple(token[0] for token in column)
             if len({*values}) > 1:
                 halves = _halves(Label(before, values, "part"))
-                if before and len(halves) == 1:  # with the word ahead of it
+                if before and len(halves) == 1 and not {*values} <= _LETTERS:  # with the word ahead of it
                     values = tuple(name[own[k - 1][1] : own[k][2]] for name, own in zip(names, tokens, strict=True))
                     halves = [Label(before, values, "part")]
                 found += halves
@@ -241,11 +242,8 @@ def _one_run(labels: Sequence[Label], runs: Sequence[_Counted], place: str) -> _
         raise NotReadError("no line is named", where=unnamed[0], fix="Complete the row")
     run = min(runs, key=lambda f: f[1].max(), default=None)
     heads = next((len({*f[0].values}) for f in runs if f[0].sort == "head"), 0)
-    columns = [
-        one.words
-        for one in labels
-        if one.sort == "column" and _counting(one.values) and hint(one.words, lengths=True) == RUN
-    ]
+    counting = [one for one in labels if one.sort == "column" and _counting(one.values)]
+    columns = [one.words for one in counting if hint(one.words, lengths=True) == RUN]
     if (heads and columns) or (run is not None and any(not fixes(run[1], f[1]) for f in runs)):
         what = f"{(columns or [runs[0][0].words])[0]!r} counts runs, and so do {heads or 'other'} columns"
         raise NotReadError(what, where=place, fix="Name one of them alone: columns")
@@ -291,7 +289,7 @@ def points_of_names(labels: Sequence[Label], xyz: Floats) -> dict[str, list[str]
     found: list[_Counted] = [
         (label, own, counted(label, lengths=False)) for label, own in _varying(with_parts(labels), lengths=False)
     ]
-    if any({*f[0].values} <= {*"ABCDEFGHabcdefgh"} for f in found):  # then P counts positions
+    if any({*f[0].values} <= _LETTERS for f in found):  # then P counts positions
         letters = [re.match(r"([pm])(?![^\W\d_])", f"{f[0].words}{f[0].values[0]}".casefold()) for f in found]
         known = {m[1] for m in letters if m}
         found = [
@@ -311,7 +309,7 @@ def points_of_names(labels: Sequence[Label], xyz: Floats) -> dict[str, list[str]
     pairs = [(one, other) for one in (*lines, *([] if lines else [*slow, None])) for other in (*faces, *slow[::-1])]
     more = [] if repeat is None else [repeat]
     fitting = [pair for pair in pairs if _tells(*pair, more, count)]
-    turned = [(other, one) for one, other in fitting if one is not None and not lines and other[0].sort == "part"]
+    turned = [(other, one) for one, other in fitting if one is not None]
     if fitting:
         rigid = ((one, other) for one, other in (*fitting, *turned) if one and _rigid(one, other, repeat, xyz))
         return _columns(*next(rigid, fitting[0]), repeat, count)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from importlib import import_module
 from typing import Annotated, Any, Literal
@@ -349,3 +349,37 @@ def _built_in(name: str) -> Format:
     module, _, cls = name.partition(".")
     form: Format = getattr(import_module(f"cmm_uq.jobs.importing.{module}"), cls)()
     return form
+
+
+def stacked(sheet: Sheet) -> Sheet:
+    """Tables side by side, between which a column is empty and whose heads are alike, below each other."""
+    for row in sheet.rows:
+        own = [
+            k
+            for k in range(3, len(row) // 2 + 1)
+            if row[:k] == row[k + 1 : 2 * k + 1] and row[k] == "" and all(row[:k])
+        ]
+        if not own or any(
+            len(one) > own[0] and one[own[0]] != "" and sum(cell != "" for cell in one) > 2 for one in sheet.rows
+        ):
+            continue
+        starts = range(0, max(map(len, sheet.rows)), own[0] + 1)
+        parts = [(row[k : k + own[0]], line) for k in starts for row, line in zip(sheet.rows, sheet.lines, strict=True)]
+        filled = [(cells, line) for cells, line in parts if any(cell != "" for cell in cells)]
+        return replace(sheet, rows=[cells for cells, _ in filled], lines=[line for _, line in filled])
+    return sheet
+
+
+def transposed(sheet: Sheet) -> Sheet | None:
+    """The widest part of a sheet with its rows as columns."""
+    wide = [i for i, row in enumerate(sheet.rows) if len(row) > 3]
+    if not wide or len(wide) > 300 or max(len(sheet.rows[i]) for i in wide) > 300:
+        return None
+    width = max(len(sheet.rows[i]) for i in wide)
+    rows = [[*sheet.rows[i], *[""] * (width - len(sheet.rows[i]))] for i in wide]
+    return replace(
+        sheet,
+        rows=[list(row) for row in zip(*rows, strict=True)],
+        lines=[sheet.lines[wide[0]]] * width,
+        spreadsheet=False,
+    )

@@ -270,6 +270,14 @@ def with_units(sheet: Sheet, row: int, headings: Sequence[str], columns: Mapping
     return Header(row, row + 1, headings, columns, units, odd)
 
 
+def names_axes(row: Sequence[Cell]) -> bool:
+    """Whether a row is a head of coordinates, and no row of a table."""
+    texts = [cell for cell in row if isinstance(cell, str) and cell]
+    if len(texts) < 3 or len(texts) < sum(cell != "" for cell in row) or any(map(is_number, texts)):
+        return False
+    return {*COORDINATES} <= {understood(text).column for text in texts}
+
+
 def no_header(sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Sequence[Sequence[str]]) -> CmmUqError:
     """Why no sheet has the columns that are needed."""
     texts = [source for given in keys.columns.values() for source in sources_of(given) if isinstance(source, str)]

@@ -16,10 +16,25 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.csv_table import number_problem
 from cmm_uq.base.messages import Verbatim, say, semicolons
-from cmm_uq.base.points import AXES
-from cmm_uq.jobs.importing.format import Fact, ImportKeys, Row, Sheet, sheets_of
+from cmm_uq.base.points import AXES, Floats, Ints
+from cmm_uq.jobs.importing import format as units
+from cmm_uq.jobs.importing.blocks import unit_elsewhere
+from cmm_uq.jobs.importing.factors import (
+    RUN,
+    Label,
+    codes,
+    counted,
+    in_turn,
+    numbered_runs,
+    parts_of,
+    together,
+    ways_of,
+)
+from cmm_uq.jobs.importing.format import UNITS, Fact, ImportKeys, NotReadError, Row, Sheet, sheets_of
+from cmm_uq.jobs.importing.header import plain_words, words_of
 from cmm_uq.jobs.importing.lengths import place_of
 from cmm_uq.jobs.importing.reports import TextReport
+from cmm_uq.jobs.importing.roles import SheetReading
 
 _SECTION, _KEY = re.compile(r"([A-Z][A-Z -]{0,40})::"), re.compile(r"([A-Za-z][\w -]{0,40}?)\s{0,9}:\s{0,9}(.{0,200})")
 _LINEAR, _TRIPLE = {"linear", ""}, 3
@@ -141,3 +156,71 @@ class Rtl(TextReport):
         runs = [AxisRun(axis, int(way), number, [(found.targets[k], deviation, line) for k, deviation, line in own])
                 for own, (number, way) in zip(found.runs.values(), found.ways(), strict=True)]  # fmt: skip
         return placed_runs(runs, keys, where, (encoding,))
+
+
+_MILLIMETRES = 0.2  # deviations at targets that are all smaller may be in mm
+
+
+def axis_runs(reading: SheetReading, labels: Sequence[Label], sheets: Sequence[Sheet], where: str) -> list[AxisRun]:
+    """Runs along axes, each with its targets in turn."""
+    figures = np.array(reading.figures)
+    if (angle := _angle_in(sheets)) is not None:
+        fix = "Runs of positions are read; state rotations as reading_arcsec (docs/reference/columns.md)"
+        raise NotReadError(f"its deviations may be angles ({angle!r})", where=where, fix=fix)
+    small = reading.small or unit_elsewhere(sheets, small=True)
+    if small is None and np.abs(figures[:, 1]).max() < _MILLIMETRES:
+        fix = "Write it above them: (µm) or (mm)"
+        raise NotReadError("nothing says the unit of the deviations: µm or mm", where=where, fix=fix)
+    small = small or UNITS["um"]
+    unit = reading.unit or unit_elsewhere(sheets, small=False) or UNITS["mm"]
+    target = units.converted(figures[:, 0], unit, "x_mm")
+    deviation = units.converted(figures[:, 1], small, "reading_um")
+    texts = ([f"{label.words} {value}" for value in label.values] for label in labels)
+    named = ([axis_in(text) for text in own] for own in texts)
+    axes = next((own for own in named if all(own)), [_axis_of(sheets)] * len(target))
+    ways = next((found for label in labels if (found := ways_of(label.values)) is not None), None)
+    parts = [part for label in labels for part in (label, *parts_of(label))]
+    run = next((part for part in parts if counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)
+    key = codes([*zip(axes, ways or [0] * len(target), strict=True)])
+    numbers = numbered_runs(run.values) if run is not None else in_turn(together(key, codes(target.tolist())))
+    if ways is None:
+        ways = _by_order(target, numbers)
+    runs: dict[tuple[str, int, int], AxisRun] = {}
+    for k, one in enumerate(zip(axes, ways, numbers.tolist(), strict=True)):
+        runs.setdefault(one, AxisRun(*one, [])).targets.append(
+            (float(target[k]), float(deviation[k]), reading.lines[k])
+        )
+    if any(len({t for t, _, _ in one.targets}) < len(one.targets) for one in runs.values()):
+        raise NotReadError("a run has a target twice", where=where, fix="Number the runs in a column")
+    return list(runs.values())
+
+
+_AXES = "axis|achse|axe|asse|eje|eixo|osa|oś|axel|軸|轴|축"
+_AXIS_NAME = re.compile(rf"(?:{_AXES})\W{{0,3}}([XYZ])\b|\b([XYZ])[- ]?(?:{_AXES})", re.IGNORECASE)
+
+
+def _angle_in(sheets: Sequence[Sheet]) -> str | None:
+    """A text that says that deviations are angles."""
+    known = {f" {word} " for words in words_of("angles").values() for word in words}
+    for text in (cell for sheet in sheets for row in sheet.rows for cell in row if isinstance(cell, str) and cell):
+        plain = f" {' '.join(plain_words(text))} "
+        if any(word in plain or (not word.isascii() and word.strip() in plain) for word in known):
+            return text
+    return None
+
+
+def axis_in(text: str) -> str:
+    found = _AXIS_NAME.search(text)
+    return (found[1] or found[2]).upper() if found else ""
+
+
+def _axis_of(sheets: Sequence[Sheet]) -> str:
+    """The axis that the first texts of a file name."""
+    texts = (text for sheet in sheets for text in (sheet.name, *(" ".join(map(str, row)) for row in sheet.rows[:60])))
+    return next(filter(None, map(axis_in, texts)), "1")
+
+
+def _by_order(target: Floats, numbers: Ints) -> list[int]:
+    """Senses of runs by the order of their targets; 0 where all are listed in one order."""
+    senses = {n: int(np.sign(target[numbers == n][-1] - target[numbers == n][0])) for n in np.unique(numbers).tolist()}
+    return [senses[n] if len({*senses.values()}) > 1 else 0 for n in numbers.tolist()]

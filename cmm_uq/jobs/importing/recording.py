@@ -43,6 +43,7 @@ from cmm_uq.jobs.importing.header import (
     REFERENCES,
     Header,
     header_of,
+    names_axes,
     no_header,
 )
 from cmm_uq.jobs.importing.interferometer import placed_runs
@@ -226,7 +227,9 @@ def _imported(
     try:
         sheets = _sheets_of(form, content, where, keys)
         sheet, header = _chosen(sheets, keys, where, wanted)
-        if sheet.rows[header.row] in sheet.rows[header.row + 1 :]:
+        if sheet.rows[header.row] in sheet.rows[header.row + 1 :] or any(
+            map(names_axes, sheet.rows[header.first + 1 :])
+        ):
             raise NotReadError("its head comes again", where=sheet.at(where, header.row), fix="Export one table")
         head = _raw_head(sheets, sheet, sheet.lines[header.row]) if header.row < header.first else ()
         return _points(sheet, header, keys, where, reach_mm, replace(recognised, head=head), points=wanted is POINTS)

@@ -359,6 +359,9 @@ def _explained(grid: CutSheet, row: int, figures: Sequence[int], reading: SheetR
     alone = len(figures) < 2 or {*grid.of_block(row)}.isdisjoint(reading.rows)
     if (alone and reading.columns.isdisjoint(figures)) or grid.other_quantity(row):
         return True
+    heads = [text for k in figures for text in grid.path(row, k)]
+    if alone and is_void(heads, "feature"):
+        return True
     for k in {*figures} & reading.columns:
         above = [
             f[0]

@@ -16,24 +16,17 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import DASH, Verbatim, commas, names, say
-from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
-from cmm_uq.jobs.importing.blocks import CutSheet, stacked, transposed, unit_elsewhere
+from cmm_uq.jobs.importing.blocks import CutSheet, unit_elsewhere
 from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact
 from cmm_uq.jobs.importing.coordinates import points_in, rows_of_axes, runs_in
 from cmm_uq.jobs.importing.factors import (
-    RUN,
     Label,
     codes,
-    counted,
     hint,
-    in_turn,
     lines_and_runs,
-    numbered_runs,
-    parts_of,
-    together,
-    ways_of,
 )
 from cmm_uq.jobs.importing.format import (
     UNITS,
@@ -44,15 +37,16 @@ from cmm_uq.jobs.importing.format import (
     Sources,
     WrittenUnit,
     length_named,
+    stacked,
+    transposed,
 )
 from cmm_uq.jobs.importing.header import Header, is_summary
-from cmm_uq.jobs.importing.interferometer import AxisRun
+from cmm_uq.jobs.importing.interferometer import AxisRun, axis_in, axis_runs
 from cmm_uq.jobs.importing.length_columns import lengths_in
 from cmm_uq.jobs.importing.lengths import MeasuredLengths
 from cmm_uq.jobs.importing.numbering import numbered_points
 from cmm_uq.jobs.importing.roles import SheetReading, each, heading, is_void, joined, labels_of, rows_left_out, said_by
 
-_MILLIMETRES = 0.2  # deviations at targets that are all smaller may be in mm
 ROWS_MOST = 20_000  # of a sheet that is understood this way
 
 
@@ -75,11 +69,7 @@ def reading_of(
             except NotReadError as error:
                 problem = problem or error
         found += own
-    kinds = Counter[str]()
-    for reading, _ in found:
-        kinds[reading.kind] += len(reading.figures)
-    ends = kinds["points"] >= kinds["lengths"]  # else places of lines, beside lengths that were measured along them
-    kind = next((kind for kind in ("runs", "points", "lengths") if kind in kinds and (kind != "points" or ends)), "")
+    kind = _kind(found)
     chosen = [one for one in found if one[0].kind == kind]
     # deviations of lengths that are there, and small tables beside a large one, are the same again
     chosen = [one for one in chosen if not one[0].deviations] or chosen
@@ -90,6 +80,8 @@ def reading_of(
         kind == "points" and not _counted_sheets([*dict.fromkeys(grid.sheet.name for _, grid in chosen)])
     ):
         return None
+    if kind == "lengths":
+        _refuse_same_lines(chosen, where)
     left_out: list[str] = []
     elsewhere = (
         _tabled_places([*map(stacked, sheets)], {grid.sheet.name for _, grid in chosen}) if kind == "lengths" else {}
@@ -104,6 +96,34 @@ def reading_of(
             labels["sheet", ""] = grid.sheet.name
             labels |= {("place", ""): place} if place else {}
     return joined([reading for reading, _ in chosen]), left_out, chosen[0][1]
+
+
+def _kind(found: Sequence[tuple[SheetReading, CutSheet]]) -> str:
+    """What the sheets hold before all else."""
+    kinds = Counter[str]()
+    for reading, _ in found:
+        kinds[reading.kind] += len(reading.figures)
+    ends = kinds["points"] >= kinds["lengths"]  # else places of lines, beside lengths that were measured along them
+    return next((kind for kind in ("runs", "points", "lengths") if kind in kinds and (kind != "points" or ends)), "")
+
+
+def _refuse_same_lines(chosen: Sequence[tuple[SheetReading, CutSheet]], where: str) -> None:
+    """Sheets with the same lengths beside the same names are two recordings, unless their names count lines or runs."""
+    sheets: dict[str, list[object]] = {}
+    for reading, grid in chosen:
+        labels = [{key: text for key, text in own.items() if key[0] == "column"} for own in reading.labels]
+        sheets.setdefault(grid.sheet.name, []).append(sorted(map(str, labels)))
+    words = any(hint(name, lengths=True) or axis_in(name) or name.strip().upper() in {*"XYZ"} for name in sheets)
+    hinted = words or len({re.sub(r"\d+", "0", name) for name in sheets}) == 1
+    first, *others = sheets
+    if (
+        others
+        and not hinted
+        and any(sheets[first] == sheets[other] for other in others)
+        and any(map(bool, sheets[first]))
+    ):
+        what = f"sheets {', '.join(map(repr, sheets))} hold lengths of the same names, each a recording of its own"
+        raise NotReadError(what, where=where, fix=f'Say which: sheet = "{first}"')
 
 
 def _tabled_places(sheets: Sequence[Sheet], others: Collection[str]) -> dict[str, str]:
@@ -270,34 +290,7 @@ class Understanding:
         )
 
     def runs(self, where: str) -> list[AxisRun]:
-        """Runs along axes, each with its targets in turn."""
-        figures = np.array(self.reading.figures)
-        small = self.reading.small or unit_elsewhere(self.sheets, small=True)
-        if small is None and np.abs(figures[:, 1]).max() < _MILLIMETRES:
-            fix = "Write it above them: (µm) or (mm)"
-            raise NotReadError("nothing says the unit of the deviations: µm or mm", where=where, fix=fix)
-        small = small or UNITS["um"]
-        unit = self.reading.unit or unit_elsewhere(self.sheets, small=False) or UNITS["mm"]
-        target = units.converted(figures[:, 0], unit, "x_mm")
-        deviation = units.converted(figures[:, 1], small, "reading_um")
-        texts = ([f"{label.words} {value}" for value in label.values] for label in self.labels)
-        named = ([_axis_in(text) for text in own] for own in texts)
-        axes = next((own for own in named if all(own)), [_axis_of(self.sheets)] * len(target))
-        ways = next((found for label in self.labels if (found := ways_of(label.values)) is not None), None)
-        parts = [part for label in self.labels for part in (label, *parts_of(label))]
-        run = next((part for part in parts if counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)
-        key = codes([*zip(axes, ways or [0] * len(target), strict=True)])
-        numbers = numbered_runs(run.values) if run is not None else in_turn(together(key, codes(target.tolist())))
-        if ways is None:
-            ways = _by_order(target, numbers)
-        runs: dict[tuple[str, int, int], AxisRun] = {}
-        for k, one in enumerate(zip(axes, ways, numbers.tolist(), strict=True)):
-            runs.setdefault(one, AxisRun(*one, [])).targets.append(
-                (float(target[k]), float(deviation[k]), self.reading.lines[k])
-            )
-        if any(len({t for t, _, _ in one.targets}) < len(one.targets) for one in runs.values()):
-            raise NotReadError("a run has a target twice", where=where, fix="Number the runs in a column")
-        return list(runs.values())
+        return axis_runs(self.reading, self.labels, self.sheets, where)
 
 
 def _places(names: Sequence[str], reading: SheetReading, measured: Floats, unit: WrittenUnit) -> dict[str, str]:
@@ -317,27 +310,6 @@ def _places(names: Sequence[str], reading: SheetReading, measured: Floats, unit:
             if measured[own].max() * 0.98 - 1 <= np.linalg.norm(ends[1] - ends[0]) <= 3 * measured[own].max():
                 places[name] = "from " + " to ".join(",".join(f"{one:.10g}" for one in end) for end in ends)
     return places
-
-
-_AXES = "axis|achse|axe|asse|eje|eixo|osa|oś|axel|軸|轴|축"
-_AXIS_NAME = re.compile(rf"(?:{_AXES})\W{{0,3}}([XYZ])\b|\b([XYZ])[- ]?(?:{_AXES})", re.IGNORECASE)
-
-
-def _axis_in(text: str) -> str:
-    found = _AXIS_NAME.search(text)
-    return (found[1] or found[2]).upper() if found else ""
-
-
-def _axis_of(sheets: Sequence[Sheet]) -> str:
-    """The axis that the first texts of a file name."""
-    texts = (text for sheet in sheets for text in (sheet.name, *(" ".join(map(str, row)) for row in sheet.rows[:60])))
-    return next(filter(None, map(_axis_in, texts)), "1")
-
-
-def _by_order(target: Floats, numbers: Ints) -> list[int]:
-    """Senses of runs by the order of their targets; 0 where all are listed in one order."""
-    senses = {n: int(np.sign(target[numbers == n][-1] - target[numbers == n][0])) for n in np.unique(numbers).tolist()}
-    return [senses[n] if len({*senses.values()}) > 1 else 0 for n in numbers.tolist()]
 
 
 def understand(

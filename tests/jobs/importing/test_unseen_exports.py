@@ -41,6 +41,11 @@ REFUSED = {
     "T22": "no line names",
     "T23": "no column is",
     "T24": "no line names",
+    "U16": "no line names",
+    "U21": "may be angles",
+    "U22": "nothing says the unit",
+    "U23": "each a recording of its own",
+    "U24": "which points belong",
 }
 """Of exports that are not read, what is said."""
 PLACED = {
