@@ -32,7 +32,7 @@ CEILING = {
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1495
 """Imports of the package within functions, and exemptions from the formatter: only falling."""
 LOADED_LATE = {
-    "arviz", "asn1crypto", "contourpy", "cryptography", "ctypes", "defusedxml", "emcee", "fcntl",
+    "arviz", "asn1crypto", "asyncio", "contourpy", "cryptography", "ctypes", "defusedxml", "emcee", "fcntl",
     "hashlib", "importlib", "jinja2", "json", "lxml", "markupsafe", "matplotlib", "msvcrt", "numpy", "openpyxl",
     "pandas", "pint", "pkcs11", "pty", "pydantic", "pyhanko", "pyhanko_certvalidator", "pypdf", "pyvisa", "resource", "rich",
     "scipy", "serial", "signxml", "sqlalchemy", "termios", "tty", "typst", "uncertainties", "webbrowser",

@@ -49,7 +49,8 @@ def main() -> None:
     sys.exit(code)
 
 
-UNUSED = ("emcee.moves.kde", "numpy.f2py.f2py2e", "scipy.linalg._decomp_interpolative", "scipy.optimize._shgo")
+UNUSED: tuple[str, ...] = ("emcee.backends.hdf", "emcee.moves.kde", "mpl_toolkits.mplot3d", "numpy.f2py.f2py2e")
+UNUSED += ("scipy.linalg._decomp_interpolative", "scipy.optimize._shgo")
 """Modules that libraries import and nothing here comes to: with what they import themselves, a tenth of a report's time."""
 
 
@@ -70,6 +71,7 @@ def _called_later(stand_in: ModuleType, name: str) -> Callable[..., object]:
             del sys.modules[stand_in.__name__]
         return getattr(import_module(stand_in.__name__), name)(*arguments, **named)
 
+    called.__dict__["name"] = name  # by which Matplotlib registers a projection
     return called
 
 

@@ -229,12 +229,8 @@ def import_keys(
         data[name] = value
     several: dict[str, list[Any]] = {}
     for name, value in map(_setting, columns or ()):
-        numbers = (
-            [int(part) for part in value.split(",")]
-            if isinstance(value, str) and re.fullmatch(r"\d+(,\s*\d+)+", value)
-            else [value]
-        )
-        several.setdefault(name, []).extend(numbers)
+        numbers = re.fullmatch(r"\d+(,\s*\d+)+", str(value))
+        several.setdefault(name, []).extend(map(int, str(value).split(",")) if numbers else [value])
     if several:
         data["columns"] = {name: own if len(own) > 1 else own[0] for name, own in several.items()}
     if lines:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import datetime as dt
 import hashlib
@@ -20,7 +19,6 @@ from cmm_uq.base.messages import Text, say
 
 if TYPE_CHECKING:
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
-
 
 _T = TypeVar("_T")
 _SILENT = logging.NullHandler()
@@ -40,6 +38,8 @@ def installed() -> Iterator[None]:
 
 def ran(coroutine: Coroutine[Any, Any, _T]) -> _T:
     """What a coroutine of the library returns, also where a loop runs already, as in a notebook."""
+    import asyncio  # most who ask what was found of signatures run nothing
+
     try:
         asyncio.get_running_loop()
     except RuntimeError:
