@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,9 @@ from cmm_uq.analysis.screening.screening import ScreenedRecording
 from cmm_uq.analysis.screening.shape import Screening
 from cmm_uq.artefacts import artefact_facts, kind_named
 from cmm_uq.base.points import Floats, Machine, Points
+from cmm_uq.base.rotary import Turntable
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.machine.physics.effect import Effect
 
 TRAVEL = np.array([[0.0, 900.0], [0.0, 550.0], [-500.0, 0.0]])
 """Of the DEA Iota 1102, mm."""
@@ -40,6 +43,22 @@ def with_columns(points: Points, **columns: Floats) -> Points:
     """The same points with further recorded columns."""
     return Points(points.xyz, points.measurement, points.point, points.repeat, points.machine,
                   {**points.columns, **columns}, points.lines)  # fmt: skip
+
+
+def on_table(points: Points, effect: Effect) -> Points:
+    """The same on the turning table that an effect is of, where it is of one; with that machine, and its columns."""
+    letter = effect.columns[0][0] if effect.mechanism == "rotary axis" else ""
+    if not letter:
+        return points
+    old, random = points.machine, np.random.default_rng(3)
+    machine = Turntable(
+        old.name, old.chain, old.travel_mm, old.origin_mm, letter=letter, axis_mm=np.array([1.0, 2.0, 3.0])
+    )
+    approach = random.choice([-1.0, 1.0], len(points))
+    turned = with_columns(
+        points, **{f"{letter}_deg": random.uniform(0, 360, len(points)), f"approach_{letter}": approach}
+    )
+    return replace(turned, machine=machine)
 
 
 def screened(points: Points, facts: ArtefactFacts, **how: Any) -> ScreenedRecording:

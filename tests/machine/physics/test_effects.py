@@ -15,7 +15,7 @@ from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import UNITS, Unit, printed_unit
 from cmm_uq.machine.physics.catalogue import CATALOGUE, EVERY, effects
 from tests.machine.physics.effect_table import END, PAGE, START, table
-from tests.recordings import TRAVEL, bars, with_columns
+from tests.recordings import TRAVEL, bars, on_table, with_columns
 
 ARCSECOND = np.pi / 648000
 
@@ -186,7 +186,7 @@ def test_amplitude_and_phase_survive_the_way_through_linear_coefficients(
 def test_the_displacement_is_linear_in_the_coefficients(name: str) -> None:
     effect = CATALOGUE[name]
     shape = [s.low * 10 for s in effect.shape]
-    basis = effect.basis(POINTS, shape)
+    basis = effect.basis(on_table(POINTS, effect), shape)
     assert basis.shape == (len(POINTS), 3, len(effect.coefficients))
     assert np.all(np.isfinite(basis))
 

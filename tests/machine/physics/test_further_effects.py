@@ -13,7 +13,7 @@ from cmm_uq.machine.physics.compensation import Compensation
 from cmm_uq.machine.physics.digitizer import Digitizer, euler_313
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap
 from cmm_uq.machine.physics.map_interpolation import ErrorMaps
-from tests.recordings import TRAVEL, bars, with_columns
+from tests.recordings import TRAVEL, bars, on_table, with_columns
 
 ARCSECOND = np.pi / 648000
 
@@ -316,18 +316,19 @@ def test_light_that_meets_a_surface_askew_errs_along_the_beam(incident: float, p
 @pytest.mark.parametrize("name", FURTHER)
 def test_a_further_effect_is_as_complete_as_the_others(name: str) -> None:
     effect = FURTHER[name]
+    points = on_table(POINTS, effect)
     assert effect.tier == "further"
     assert all(coefficient.prior_sd > 0 for coefficient in effect.coefficients)
     for shape in effect.trials():
-        basis = effect.basis(POINTS, shape)
+        basis = effect.basis(points, shape)
         assert basis.shape == (len(POINTS), 3, len(effect.coefficients))
         assert np.isfinite(basis).all()
         assert (
             np.any(basis[:, :, 0]) or name == "yaw_play_y"
         )  # in the chain XYZ carriage y carries nothing beside the ram
     for column in effect.columns:
-        bare = {key: values for key, values in C.items() if key != column}
-        less = Points(POINTS.xyz, POINTS.measurement, POINTS.point, POINTS.repeat, POINTS.machine, bare)
+        bare = {key: values for key, values in points.columns.items() if key != column}
+        less = Points(POINTS.xyz, POINTS.measurement, POINTS.point, POINTS.repeat, points.machine, bare)
         with pytest.raises(CmmUqError, match=column):
             effect.basis(less, next(iter(effect.trials())))
 

@@ -11,7 +11,7 @@ import scipy
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.plugins import BrokenPluginError
-from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.base.points import AXES, Floats, Points, reading_name
 from cmm_uq.jobs.columns import in_words
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
@@ -240,7 +240,7 @@ def _of_readings(model: RecordingModel, points: Points, values: Floats) -> Itera
             members = tuple(Member(model.seen(_along(j, f), values), weight=w, values=f) for f, w in functions)
             along, of = Verbatim(direction.upper()), Verbatim(axis.upper())
             name = say("error along {direction} as a function of {axis}", direction=along, axis=of)
-            term = Nonparametric(f"{axis}_mm", direction)
+            term = Nonparametric(reading_name(axis), direction)
             yield Explanation(name, UNKNOWN, members, readings, term.of, term)
 
 

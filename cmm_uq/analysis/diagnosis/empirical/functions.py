@@ -11,7 +11,7 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN, UNKNOWN_S
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.empirical.forms import BOWL, PRODUCT, SMOOTH, ClosedForm, forms_of
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.base.points import AXES, Floats, Ints
+from cmm_uq.base.points import AXES, Floats, Ints, reading_name
 from cmm_uq.jobs.columns import in_words
 
 _TURNED = 0.3  # how readily a curve of rotation is thought of, beside a displacement
@@ -165,7 +165,7 @@ def _letter(axis: str) -> Text:
 
 def _curve(along: str, axis: str) -> FunctionTerm:
     words = say("error along {direction} as a function of {axis}", direction=_letter(along), axis=_letter(axis))
-    return FunctionTerm(f"{axis}_mm", words, along, variable=axis)
+    return FunctionTerm(reading_name(axis), words, along, variable=_variable(axis))
 
 
 def _turning(along: str, axis: str, lever: str, middle: float, half: float) -> FunctionTerm:
@@ -175,7 +175,13 @@ def _turning(along: str, axis: str, lever: str, middle: float, half: float) -> F
         axis=_letter(axis),
         lever=_letter(lever),
     )
-    return FunctionTerm(f"{axis}_mm", title, along, lever, f"*({lever} - {middle!r})/{half!r}", axis)
+    arm = f"*({_variable(lever)} - {middle!r})/{half!r}"
+    return FunctionTerm(reading_name(axis), title, along, lever, arm, _variable(axis))
+
+
+def _variable(axis: str) -> str:
+    """What it reads, in a formula."""
+    return axis if axis in AXES else reading_name(axis)
 
 
 def _arm(axis: str, readings: Floats) -> str:

@@ -1,0 +1,306 @@
+"""Errors of a rotary table, with the names of ISO 230-7:2015: location and tilt of its axis, and how it moves as it turns.
+
+What stands on the table goes by E + ε × r while the probe stays, r from the point p of the axis that the job states: true =
+indicated − (E + ε × r). C is the angle by which the table has turned, R that turn; coordinates on the table are those of the
+machine at C = 0. What no recording can show is no effect:
+
+- an angle that is the same everywhere is how the artefact was laid on the table;
+- a constant radial error is the location of the axis, a constant tilt its tilt;
+- of the first order of radial and of tilt errors the half that turns with the table is a place, or a tilt, of what stands on
+  it; what is left turns the other way: EXC = A·cos(C + φ), EYC = −A·sin(C + φ).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.base.rotary import ROTARY, Turntable
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
+from cmm_uq.machine.physics.effect import FURTHER, CommonSize, Effect, Family, Harmonic, Nonparametric, Parameter
+from cmm_uq.machine.physics.words import AXIS, OTHER, SENSE, SIDE, SIZE, filled
+
+_MANY, _HIGHER = "n", np.arange(3, 13)  # orders of errors of which only the common size is known beforehand
+
+
+class OfTable(Family):
+    """An effect of a rotary table; ``axis`` is its letter."""
+
+    mechanism = "rotary axis"
+    columns: tuple[str, ...] = ("{a}_deg",)
+
+    def machine(self, points: Points) -> Turntable:
+        if isinstance(points.machine, Turntable) and points.machine.letter == self.axis:
+            return points.machine
+        letter = self.axis.upper()
+        fix = f'Give it behind a bar, as chain = "XYZ|{letter}", or leave the effect out'
+        raise CmmUqError(f"{self.name} is of a rotary table {letter}", where="job.toml [machine] chain", fix=fix)
+
+    def unfit(self, points: Points) -> CmmUqError | None:
+        try:
+            self.machine(points)
+        except CmmUqError as error:
+            return error
+        return None
+
+    def angle(self, points: Points) -> Floats:
+        """(n,) rad by which the table has turned."""
+        points.column(self.columns[0])
+        return np.asarray(self.machine(points).angle(points.columns))
+
+    def about(self, points: Points, rotation: Floats) -> Floats:
+        """(n, 3) what rotations (n, 3) about the stated point of the axis do to what stands on the table, mm."""
+        machine = self.machine(points)
+        return np.cross(rotation, points.machine_xyz - machine.origin_mm - machine.pivot)
+
+
+def along_axis(points: Points, index: int) -> Floats:
+    """(n, 3) unit vectors of an axis of the machine."""
+    return np.tile(np.eye(3)[index], (len(points), 1))
+
+
+class OfItsAxis(OfTable):
+    """A constant vector of the axis: what of it does not turn with the table is seen."""
+
+    def __init__(self, axis: str, other: str) -> None:
+        super().__init__(axis, other)
+        self.index = AXES.index(other)
+        self.imitated_by = tuple(Nonparametric(self.columns[0], a) for a in AXES if a != ROTARY[axis])
+
+    def change(self, points: Points) -> Floats:
+        """(n, 3) of a unit vector along the axis, (1 − R) of it."""
+        self.angle(points)
+        vectors = along_axis(points, self.index)
+        return np.asarray(vectors - points.machine.turned(vectors[:, :, None], points.columns)[:, :, 0])
+
+
+class TableLocation(OfItsAxis):
+    """The axis of the table stands beside where it is taken to stand."""
+
+    family, title = "rotary_location", say("Location of axis {axis} along {direction}", axis=AXIS, direction=OTHER)
+    formula = "e = −(1 − R)·o; c_x: o = EX0C along X"
+    points_to = say(
+        "the axis of table {axis} is not where the controller takes it to be: calibrate its location", axis=AXIS
+    )
+    means = say(
+        "the axis of the table stands {size} further towards {side} {direction} than it is taken to",
+        size=SIZE,
+        side=SIDE,
+        direction=OTHER,
+    )
+    coefficients = (Parameter("um", unit("µm"), 50.0),)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return -MICROMETRE * self.change(points)[:, :, None]
+
+
+class TableTilt(OfItsAxis):
+    """The axis of the table is not parallel to that of the machine."""
+
+    family, title = "rotary_tilt", say("Tilt of axis {axis} about {about}", axis=AXIS, about=OTHER)
+    formula = "e = −((1 − R)·a) × r; c_x: a = EA0C about X"
+    points_to = say("the axis of table {axis} is tilted: level the table, or calibrate its direction", axis=AXIS)
+    means = say(
+        "the axis of the table is turned {sense} about {about} by {size}, seen along plus",
+        sense=SENSE,
+        about=OTHER,
+        size=SIZE,
+    )
+    sense = (say("clockwise"), say("anticlockwise"))
+    coefficients = (Parameter("angle_arcsec", unit("″"), 100.0),)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return -ARCSECOND * self.about(points, self.change(points))[:, :, None]
+
+
+class TableMotion(OfTable):
+    """How the table moves as it turns: along axes, or about them."""
+
+    error: Text  # its name, without direction and order
+    remedy: Text
+    turns: ClassVar[bool] = False
+    across: ClassVar[bool] = False  # of its own axis, whether it moves across that
+    tier = FURTHER
+
+    def __init__(self, axis: str, *others: str) -> None:
+        own, direction = AXES.index(ROTARY[axis]), others[0]
+        each = [(own + 1) % 3, (own + 2) % 3] if self.across else [own]
+        self.parts = tuple(i for i in each if direction not in ROTARY.values() or direction == AXES[i])
+        self.order = others[-1]
+        super().__init__(axis, *others)
+        if not self.turns:
+            self.imitated_by = tuple(Nonparametric(self.columns[0], AXES[i]) for i in self.parts)
+
+    def fill(self, letters: Mapping[Text, str]) -> None:
+        error = filled(self.error, {AXIS: Verbatim(letters[AXIS].upper())})
+        if self.across and len(self.parts) == 1:
+            direction = Verbatim(letters[OTHER].upper())
+            along = say("{error} along {direction}", error=error, direction=direction)
+            error = say("{error} about {direction}", error=error, direction=direction) if self.turns else along
+        order = Verbatim(f"{_HIGHER[0]}–{_HIGHER[-1]}" if self.order == _MANY else self.order)
+        self.title = say("{error}, order {order}", error=error, order=order)
+        self.points_to = say("{error:small}, order {order}: {remedy}", error=error, order=order, remedy=self.remedy)
+
+    def moved(self, points: Points, part: int) -> Floats:
+        """(n, 3) mm by which one of its parts moves what stands on the table, of 1 µm or 1″."""
+        vectors = along_axis(points, part)
+        return ARCSECOND * self.about(points, vectors) if self.turns else MICROMETRE * vectors
+
+    def parameter(self, name: str, size: float) -> Parameter:
+        of, own = ("arcsec", unit("″")) if self.turns else ("um", unit("µm"))
+        return Parameter(f"{name}_{of}", own, size, say("amplitude") if name == "amplitude" else NOTHING)
+
+
+class TableHarmonic(TableMotion, Harmonic):
+    """A motion of one order of the angle; of the first order across the axis in a circle against the turn."""
+
+    def __init__(self, axis: str, *others: str) -> None:
+        super().__init__(axis, *others)
+        self.amplitude = self.parameter("amplitude", 5.0)  # type: ignore[misc]
+        self.coefficients = tuple(self.parameter(name, 5.0) for name in ("cosine", "sine"))
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        angle = int(self.order) * self.angle(points)[:, None]
+        c, s = np.cos(angle), np.sin(angle)
+        one, *others = (self.moved(points, part) for part in self.parts)
+        other = others[0] if others else np.zeros_like(one)
+        return -np.stack([c * one - s * other, -s * one - c * other], axis=2)
+
+
+class TableFunction(TableMotion, CommonSize):
+    """A motion of all higher orders of the angle, each smaller by its order: a function of no particular form."""
+
+    def __init__(self, axis: str, *others: str) -> None:
+        super().__init__(axis, *others)
+        self.size = self.parameter("rms", 3.0)
+        share = self.size.prior_sd / np.sqrt(np.sum(1.0 / _HIGHER**2))
+        self.coefficients = tuple(
+            self.parameter(f"{name}_{AXES[part]}_{order}", float(share / order))
+            for part in self.parts
+            for order in _HIGHER
+            for name in ("cosine", "sine")
+        )
+
+    def errors(self, coefficients: Floats) -> Floats:
+        waves = _waves(np.linspace(0, 2 * np.pi, 4 * _HIGHER[-1], endpoint=False))
+        parts = np.reshape(coefficients, (*coefficients.shape[:-1], len(self.parts), waves.shape[1]))
+        return np.reshape(parts @ waves.T, (*coefficients.shape[:-1], -1))
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        waves = _waves(self.angle(points))[:, None, :]
+        return np.concatenate([-self.moved(points, part)[:, :, None] * waves for part in self.parts], axis=2)
+
+
+def _waves(angle: Floats) -> Floats:
+    """(n, 2k) cosine and sine of each higher order."""
+    each = angle[:, None] * _HIGHER
+    return np.stack([np.cos(each), np.sin(each)], axis=2).reshape(len(angle), -1)
+
+
+class _Radial(TableMotion):
+    error, across = say("Radial error of table {axis}", axis=AXIS), True
+    remedy = say("its bearing runs out: check bearing and preload")
+
+
+class _Axial(TableMotion):
+    error = say("Axial error of table {axis}", axis=AXIS)
+    remedy = say("its axial bearing runs out: check its races and their seat")
+
+
+class _Tilt(TableMotion):
+    error, across, turns = say("Tilt error of table {axis}", axis=AXIS), True, True
+    remedy = say("it wobbles: check the axial bearing, and how evenly the table is loaded")
+
+
+class _Angular(TableMotion):
+    error, turns = say("Angular positioning error of table {axis}", axis=AXIS), True
+    remedy = say("its encoder is beside its axis (order 1) or out of round: centre it, or compensate its positions")
+
+
+class RadialHarmonic(_Radial, TableHarmonic):
+    """The table moves across its axis as it turns: in a circle against its turn (1), or along one axis of the machine."""
+
+    family = "rotary_radial"
+    formula = "e = −E; c_1: EXC = A·cos(C + φ), EYC = −A·sin(C + φ); c_x_2: EXC = A·cos(2C + φ)"
+
+
+class AxialHarmonic(_Axial, TableHarmonic):
+    """The table moves along its axis as it turns."""
+
+    family, formula = "rotary_axial", "e = −E; c_2: EZC = A·cos(2C + φ)"
+
+
+class TiltHarmonic(_Tilt, TableHarmonic):
+    """The table tilts as it turns: in a circle against its turn (1), or about one axis of the machine."""
+
+    family = "rotary_wobble"
+    formula = "e = −ε × r; c_1: EAC = A·cos(C + φ), EBC = −A·sin(C + φ); c_x_2: EAC = A·cos(2C + φ)"
+
+
+class AngularHarmonic(_Angular, TableHarmonic):
+    """The table stands at another angle than it reads; of the first order as of an encoder beside the axis."""
+
+    family, formula = "rotary_positioning", "e = −ε × r; c_1: ECC = A·cos(C + φ)"
+
+
+class RadialFunction(_Radial, TableFunction):
+    """The table moves across its axis as any function of its angle, of the orders 3 to 12."""
+
+    family, formula = "rotary_radial", "e = −E, EXC and EYC = Σ cosine_k·cos(kC) + sine_k·sin(kC)"
+
+
+class AxialFunction(_Axial, TableFunction):
+    """The table moves along its axis as any function of its angle, of the orders 3 to 12."""
+
+    family, formula = "rotary_axial", "e = −E, EZC = Σ cosine_k·cos(kC) + sine_k·sin(kC)"
+
+
+class AngularFunction(_Angular, TableFunction):
+    """The table stands at another angle than it reads, by any function of it, of the orders 3 to 12."""
+
+    family, formula = "rotary_positioning", "e = −ε × r, ECC = Σ cosine_k·cos(kC) + sine_k·sin(kC)"
+
+
+class TablePlay(OfTable):
+    """The table stands at another angle when it comes from the other side."""
+
+    family, title = "rotary_play", say("Play of table {axis}", axis=AXIS)
+    formula = "e = −ε × r, ECC = ½·gap·approach_c"
+    points_to = say(
+        "the drive of table {axis} has play, or its encoder sits on the drive: check worm, belt and brake", axis=AXIS
+    )
+    means = say(
+        "at the same reading the table is turned {size} further towards {side} when it comes from minus than when it comes "
+        "from plus",
+        size=SIZE,
+        side=SIDE,
+    )
+    coefficients = (Parameter("gap_arcsec", unit("″"), 10.0),)
+    columns, tier = ("{a}_deg", "approach_{a}"), FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        self.angle(points)
+        sense = -1.0 if self.machine(points).clockwise else 1.0
+        turn = self.about(points, along_axis(points, AXES.index(ROTARY[self.axis])))
+        return -0.5 * ARCSECOND * sense * (points.column(f"approach_{self.axis}")[:, None] * turn)[:, :, None]
+
+
+def _of(axis: str) -> Iterator[Effect]:
+    """Of the rotary axis with this letter, in the order of ISO 230-7."""
+    across = [a for a in AXES if a != ROTARY[axis]]
+    yield from (TableLocation(axis, a) for a in across)
+    yield from (TableTilt(axis, a) for a in across)
+    yield from (AngularHarmonic(axis, order) for order in "12")
+    yield from (RadialHarmonic(axis, *each) for each in (("1",), *((a, "2") for a in across)))
+    yield from (AxialHarmonic(axis, order) for order in "12")
+    yield from (TiltHarmonic(axis, *each) for each in (("1",), *((a, "2") for a in across)))
+    yield from (each(axis, _MANY) for each in (AngularFunction, RadialFunction, AxialFunction))
+    yield TablePlay(axis)
+
+
+EFFECTS: tuple[Effect, ...] = tuple(effect for axis in "cab" for effect in _of(axis))
