@@ -88,6 +88,7 @@ class CutSheet:
         self.sign = sheet.decimal or sign_of(sheet.rows)
         self.width = max(map(len, sheet.rows), default=0)
         self.figures = [[None if c == "" else figure(c, self.sign) for c in row] for row in sheet.rows]
+        self.matched: set[str] = set()  # of what the job calls columns, what is there
         self._targets: dict[int, list[int]] = {}
         self.places_of: dict[int, str] = {}  # of each row of figures, as LINE_PLACE has it
         self.blocks = self._titled(list(self._blocks()))
@@ -128,7 +129,9 @@ class CutSheet:
         whole = " ".join(" ".join(text.split()) for text in path if text)
         own = {f"{i + 1}", *(text.strip().casefold() for text in (whole, *path) if text)}
         every = ((name, str(one)) for name, sources in self.keys.items() for one in sources_of(sources))
-        return next((name for name, one in every if one.replace("\n", " ").strip().casefold() in own), "")
+        found = [(name, one) for name, one in every if one.replace("\n", " ").strip().casefold() in own]
+        self.matched |= {one for _, one in found}
+        return found[0][0] if found else ""
 
     def path(self, row: int, i: int) -> list[str]:
         """Texts above a cell."""

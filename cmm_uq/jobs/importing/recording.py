@@ -235,7 +235,7 @@ def _imported(
         return _points(sheet, header, keys, where, reach_mm, replace(recognised, head=head), points=wanted is POINTS)
     except NotReadError as error:
         problem = error
-    if wanted is POINTS and {*keys.columns} <= {*COLUMNS, *OPTIONAL}:
+    if wanted is POINTS and {*keys.columns} <= {*COLUMNS, *OPTIONAL, *WHOLE}:
         understood = understand(_alternatives(form, content, where, keys), keys.columns, where, points=not keys.lines)
         if understood is not None:
             return _understood(understood, keys, where, reach_mm, recognised)

@@ -255,7 +255,8 @@ def _beside(grid: CutSheet, rows: Sequence[int], used: set[int]) -> list[dict[tu
     for i in sorted({*range(len(paths))} - used):
         cells = [grid.text(row, i) for row in rows]
         numbers = [grid.figures[row][i] if i < len(grid.figures[row]) else None for row in rows]
-        name = {"repeat": "run", "line": "line"}.get(grid.named(i, paths[i]), heading(paths[i]))
+        said_to_be = grid.named(i, paths[i])
+        name = "run" if said_to_be == "repeat" else said_to_be or heading(paths[i])
         of_line = hint(name, lengths=True) == "line"
         if of_line and not cells[0]:
             out[0]["unnamed", grid.at(rows[0], i)] = name

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import DASH, Verbatim, commas, names, say
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.columns import COORDINATES
+from cmm_uq.jobs.columns import COORDINATES, WHOLE
 from cmm_uq.jobs.importing import format as units
 from cmm_uq.jobs.importing.blocks import CutSheet, unit_elsewhere
 from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact
@@ -37,6 +37,7 @@ from cmm_uq.jobs.importing.format import (
     Sources,
     WrittenUnit,
     length_named,
+    sources_of,
     stacked,
     transposed,
 )
@@ -80,6 +81,7 @@ def reading_of(
         kind == "points" and not _counted_sheets([*dict.fromkeys(grid.sheet.name for _, grid in chosen)])
     ):
         return None
+    _refuse_unmatched([grid for _, grid in chosen], keys, where)
     if kind == "lengths":
         _refuse_same_lines(chosen, where)
     left_out: list[str] = []
@@ -96,6 +98,15 @@ def reading_of(
             labels["sheet", ""] = grid.sheet.name
             labels |= {("place", ""): place} if place else {}
     return joined([reading for reading, _ in chosen]), left_out, chosen[0][1]
+
+
+def _refuse_unmatched(grids: Sequence[CutSheet], keys: Mapping[str, Sources], where: str) -> None:
+    """A column that the job names must be there."""
+    matched = {one for grid in grids for one in grid.matched}
+    for source in (str(one) for sources in keys.values() for one in sources_of(sources)):
+        if source not in matched:
+            headings = [heading(path) for path in grids[0].blocks[-1].paths]
+            raise NotReadError(f"no column is {source!r}", where=where, fix=suggestion(source, headings))
 
 
 def _kind(found: Sequence[tuple[SheetReading, CutSheet]]) -> str:
@@ -157,9 +168,8 @@ def _of_sheet(
         ]
         own = _layout(grid, usable) if usable else []
         readings: list[SheetReading] = []
-        for read in (
-            () if not own else (runs_in, lengths_in) if keys else (points_in, rows_of_axes, runs_in, lengths_in)
-        ):
+        numbered = {*keys} <= {*WHOLE}
+        for read in ((points_in, rows_of_axes) if numbered else ()) + (runs_in, lengths_in) if own else ():
             if (reading := read(grid, blocks, own)) is not None and (_called(reading) or not turned):
                 readings.append(reading)
                 if 2 * len({*reading.rows, *reading.others}) > len(own):

@@ -445,3 +445,35 @@ def test_cells_of_two_figures_are_no_reading() -> None:
     content = head + "1;100;100.0012;100.0008\n1;200;200.0021 200.0018;200.0013\n1;300;300.0002;299.9998\n"
     with pytest.raises(CmmUqError, match=r"column|cell|line"):
         imported(content.encode(), "e0.csv", ImportKeys(lines={"1": "along X from 0,0,0"}))
+
+
+BALLS = b"""Ball bar check;;;;;;;;
+;;Ball A;;;Ball B;;;
+Asento;Toisto;X;Y;Z;X;Y;Z;Distance [mm]
+1;1;100.0012;300.0003;-200.0011;600.0033;300.0001;-200.0010;500.0021
+;2;100.0011;300.0004;-200.0010;600.0031;300.0002;-200.0011;500.0020
+2;1;100.0012;400.0003;-200.0011;100.0033;900.0021;-200.0010;500.0018
+;2;100.0013;400.0003;-200.0012;100.0034;900.0023;-200.0011;500.0020
+"""
+
+
+@pytest.mark.parametrize(
+    "columns", [{}, {"measurement": "Asento"}, {"repeat": "Toisto"}, {"measurement": "Asento", "repeat": 2}]
+)
+def test_a_column_of_numbers_may_be_named_beside_balls_in_a_row(columns: dict[str, str | int]) -> None:
+    found = read(BALLS, columns=columns, unit="mm").columns
+    assert found["measurement"].tolist() == [1, 1, 1, 1, 2, 2, 2, 2]
+    assert found["repeat"].tolist() == [1, 1, 2, 2, 1, 1, 2, 2]
+    assert found["x_mm"].tolist()[:2] == [100.0012, 600.0033]
+
+
+@pytest.mark.parametrize("columns", [{"repeat": "Nonsense"}, {"measurement": 12}])
+def test_a_column_that_is_not_there_is_an_error(columns: dict[str, str | int]) -> None:
+    with pytest.raises(CmmUqError, match="no column is"):
+        read(BALLS, columns=columns, unit="mm")
+
+
+def test_a_column_of_lengths_that_is_not_there_is_an_error() -> None:
+    table = b"Line;Nominal [mm];Run 1 [mm];Run 2 [mm]\nA;100;100.001;100.002\nA;200;200.001;200.002\n"
+    with pytest.raises(CmmUqError, match=r"no column is 'Nominel'\. Did you mean 'Nominal"):
+        read(table, columns={"nominal_mm": "Nominel", "length_mm": "Run 1 [mm]"})
