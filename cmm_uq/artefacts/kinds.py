@@ -358,7 +358,16 @@ _SCANNED = f"{_HERE}.optical.planes"
 SCANNED_PLANES = Kind(
     "scanned_planes", ScannedPlaneFacts, f"{_SCANNED}:ScannedPlanes", page=f"{_SCANNED}:PAGE", begin=f"{_SCANNED}:BEGIN"
 )
+_TRACKED = f"{_HERE}.optical.tracked"
+TRACKED_POINTS = Kind(
+    "tracked_points",
+    ReferencedFacts,
+    f"{_TRACKED}:TrackedPoints",
+    f"{_TRACKED}:SCREENING",
+    page=f"{_TRACKED}:PAGE",
+    begin=f"{_TRACKED}:BEGIN",
+)
 BUILT_IN = {kind.name: kind for kind in (
     BALLBAR, BRYAN, STEP_GAUGE, GAUGE_BLOCKS, PLATE, TRIANGLE, SPHERE, PLANE, SHIFT, ERROR_MAP, DIGITIZER, AXIS_RUNS,
-    MULTILATERATION, SCANNED_PLANES,
+    MULTILATERATION, SCANNED_PLANES, TRACKED_POINTS,
 )}  # fmt: skip

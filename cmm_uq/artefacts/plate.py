@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import hypot
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,8 @@ class Plate(Rigid):
 
     kind = "plate"
     title = say("Plate")
+    size_title: ClassVar[Text] = say("Length of the plate")
+    plural: ClassVar[str] = "the recorded plates"  # what is measured, for messages
 
     def __init__(self, facts: PlateFacts, points: Points, *, where: str | None = None) -> None:
         super().__init__(points)
@@ -74,7 +76,7 @@ class Plate(Rigid):
         self.body = body - self.placings.means(body)
         length = facts.length_mm or longest
         sd = self.certificate.sd(length, from_first, farthest)
-        self.sizes = (Size("length_mm", say("Length of the plate"), unit("mm"), length, sd, say("length")),)
+        self.sizes = (Size("length_mm", self.size_title, unit("mm"), length, sd, say("length")),)
         self._together = self.body / self.sizes[0].nominal
         if not self.certificate.plain and self.sizes[0].certified:
             about = self.reference - self.placings.means(self.reference)
@@ -140,7 +142,7 @@ class Plate(Rigid):
             fix = "Record at least three balls of different reference positions in each measurement, or leave it out"
             raise CmmUqError(problem, where=place(points, points.measurement == number, where), fix=fix)
         length = self.sizes[0].nominal
-        check_length(float(found.sum() / nominal.sum()) * length, length, "the recorded plates", where)
+        check_length(float(found.sum() / nominal.sum()) * length, length, self.plural, where)
         self.refuse_another_shape("Check the numbering of the balls and their reference positions", where)
 
 

@@ -64,7 +64,11 @@ def job_schema(
     own = {"type": "string", "pattern": stated["pattern"]}
     keys["model"]["properties"]["effects"]["items"] = {"anyOf": [known, own]}
     named = {"properties": {"model": {"properties": {"effects": {"items": {"enum": list(effects)}}}}}}
-    found["allOf"] = [{"if": {"not": {"required": ["effect"]}}, "then": named}]
+    joined = {
+        "properties": {"machine": {"required": ["joint"]}},
+        "required": ["machine"],
+    }  # an arm has effects of its own
+    found["allOf"] = [{"if": {"not": {"anyOf": [{"required": ["effect"]}, joined]}}, "then": named}]
     keys["conformity"]["items"]["properties"]["standard"]["enum"] = list(standards)
     without = [name for name, table in tables.items() if not table.with_recording]
     found["required"] = [name for name in found["required"] if name != "recording"]

@@ -38,7 +38,7 @@ EXAMPLE = {
     "step_gauge": "step-gauge-simulated", "gauge_blocks": "gauge-blocks-simulated", "plate": "plate-simulated",
     "triangle": "triangle-simulated", "sphere": "sphere-simulated", "plane": "plane-simulated",
     "digitizer": "digitizer-simulated", "axis_runs": "axis-runs-simulated", "multilateration": "multilateration-simulated",
-    "scanned_planes": "scanned-planes-simulated",
+    "scanned_planes": "scanned-planes-simulated", "tracked_points": "robot-simulated",
 }  # fmt: skip
 OUTSIDE = "tracker_length"
 PLUGINS = {OUTSIDE: {"outside-kinds": "0.1.0"}}
@@ -164,7 +164,7 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(
 
 
 def spoilt(name: str, how: str, to: Path) -> Path:
-    """An example whose coordinates are in inches, or all in one place; a plane without its direction points."""
+    """An example with coordinates in inches, or all in one place, where it has some; a plane without its direction points."""
     shutil.copytree(ROOT / "examples" / EXAMPLE[name], to)
     (file,) = to.glob("*.csv")
     comments = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
@@ -181,7 +181,7 @@ def spoilt(name: str, how: str, to: Path) -> Path:
 
 
 SPOILT = [
-    *((name, "in one place") for name in EXAMPLE if name != "error_map"),
+    *((name, "in one place") for name in EXAMPLE if name not in ("error_map", "tracked_points")),
     *((name, "in inches") for name in ("ballbar", "step_gauge", "gauge_blocks", "plate", "triangle", "sphere", "digitizer")),
     ("plane", "without direction points"),
 ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -139,6 +140,24 @@ def _held_out(model: RecordingModel, groups: NDArray[np.int64]) -> tuple[float, 
 def predictions(linear: LinearModel, sigma: float, groups: NDArray[np.int64]) -> tuple[float, Floats, Floats]:
     """Rms of predictions, µm, log predictive density and squares, mm², of each fold, without what a set-up leaves open."""
     errors, counts, densities = [], [], []
+    for out, error, root, open_ in predicted_folds(linear, sigma, groups):
+        errors.append(float(error @ error) * linear.noise_scale[out].mean() ** 2)
+        counts.append(len(error) - open_)
+        U, s, _ = np.linalg.svd(root, full_matrices=False)
+        seen = U.T @ (error / sigma)
+        rest = error / sigma - U @ seen
+        density = float(-0.5 * (rest @ rest + np.sum(seen**2 / (1 + s**2)) + np.sum(np.log1p(s**2))))
+        densities.append(density - counts[-1] * np.log(sigma * np.sqrt(2 * np.pi)))
+    return float(np.sqrt(sum(errors) / max(sum(counts), 1)) / MICROMETRE), np.array(densities), np.array(errors)
+
+
+def predicted_folds(
+    linear: LinearModel, sigma: float, groups: NDArray[np.int64]
+) -> Iterator[tuple[NDArray[np.bool_], Floats, Floats, int]]:
+    """Of each fold the observations left out (m,), errors (o,) of their prediction, mm, L (o, r), and dimensions lost.
+
+    Errors in units of σ have the covariance 1 + L·Lᵀ, L of what the others told of the set-up and of the estimate.
+    """
     every = np.hstack([linear.observed[:, None], linear.design]) / linear.noise_scale[:, None]
     placing, numbers = linear.freedoms.over(linear.noise_scale), np.unique(groups)
     folds = FOLDS if len(numbers) > 40 else len(numbers)
@@ -146,19 +165,10 @@ def predictions(linear: LinearModel, sigma: float, groups: NDArray[np.int64]) ->
         out = np.isin(groups, numbers[k::folds])
         mean, covariance, _ = Density(replace(linear.at(~out), sigma=sigma)).conditional(float(np.log(sigma)))
         left, known, open_ = predicted(placing, every, out)
-        error = left[:, 0] - left[:, 1:] @ mean
-        errors.append(float(error @ error) * linear.noise_scale[out].mean() ** 2)
-        counts.append(len(error) - open_)
-        # errors in units of σ have the covariance 1 + L·Lᵀ with L of what was told and of the estimate
         scale = np.sqrt(np.diag(covariance))
         values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
         root = np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
-        U, s, _ = np.linalg.svd(np.hstack([known, left[:, 1:] @ (root / sigma)]), full_matrices=False)
-        seen = U.T @ (error / sigma)
-        rest = error / sigma - U @ seen
-        density = float(-0.5 * (rest @ rest + np.sum(seen**2 / (1 + s**2)) + np.sum(np.log1p(s**2))))
-        densities.append(density - counts[-1] * np.log(sigma * np.sqrt(2 * np.pi)))
-    return float(np.sqrt(sum(errors) / max(sum(counts), 1)) / MICROMETRE), np.array(densities), np.array(errors)
+        yield out, left[:, 0] - left[:, 1:] @ mean, np.hstack([known, left[:, 1:] @ (root / sigma)]), open_
 
 
 def predicted(placing: Freedoms, every: Floats, out: NDArray[np.bool_]) -> tuple[Floats, Floats, int]:

@@ -48,6 +48,7 @@ from cmm_uq.maths.inference.posterior import NoisyPosterior
 DIAGNOSE = Form("diagnose", ("diagnosis.html", "diagnosis.pdf"), "diagnosis", (TO_FILL_IN, EMPIRICAL), recorded=True)
 
 
+@with_own_physics
 def diagnose_read(
     job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
 ) -> AnalysisResult:

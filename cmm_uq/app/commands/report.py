@@ -26,9 +26,10 @@ from cmm_uq.app.commands.files import Form, Stage, Told, Written, silent
 from cmm_uq.app.commands.model import OVERFLOW_FIX, recipe_of
 from cmm_uq.app.commands.reading import in_language, read_job
 from cmm_uq.artefacts import kind_of
+from cmm_uq.base.arm import Arm
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code
-from cmm_uq.base.messages import Text, Verbatim
+from cmm_uq.base.messages import NOTHING, Text, Verbatim
 from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.certificate import certified
@@ -115,6 +116,8 @@ def regions_of(
 
     @cache
     def regions() -> FactorRegions | Text:
+        if isinstance(model.artefact.points.machine, Arm):  # rows hold wherever the tool is
+            return NOTHING
         try:
             return factor_regions(model, posterior, doubt, observe, seed, together().taken)
         except CmmUqError as error:

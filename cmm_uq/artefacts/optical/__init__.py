@@ -1,1 +1,1 @@
-"""What a laser digitizer scans: the balls of a bar, and planes."""
+"""What light measures: balls of a bar and planes that a laser digitizer scans, points that a tracker sees."""

@@ -21,6 +21,7 @@ from cmm_uq.base.files.csv_table import GIVE, GIVE_OR_REMOVE, MEASURE, cells_of,
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.messages import Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints, Machine, Points
+from cmm_uq.jobs.arms import coordinates, required_columns
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest
 from cmm_uq.jobs.importing.answers import head_of
 from cmm_uq.jobs.importing.columns import columns_of
@@ -79,8 +80,8 @@ def read_recording(content: bytes, name: str, machine: Machine, without: Collect
         raise CmmUqError("has no rows", where=name, fix="The first line names the columns, then one row a point")
     rows, lines = list(compress(cells.rows, whole)), list(compress(cells.lines, whole))
     with wrong.going_on():
-        _check_header(header, name)
-    if not set(REQUIRED) <= set(header):
+        _check_header(header, name, needed := required_columns(machine, header))
+    if not set(needed) <= set(header):
         wrong.refuse()  # the cells of another table are another's
 
     def column_of(i: int) -> Floats:
@@ -135,11 +136,18 @@ def points_of(
             )  # fmt: skip
         seen[key] = line
     columns = {column: values for column, values in table.items() if column not in (*REQUIRED, "repeat")}
-    xyz = np.column_stack([table[column] for column in COORDINATES])
-    return Points(xyz, measurement, point, repeat, machine, columns, np.array(lines, dtype=np.int64))
+    return Points(
+        coordinates(machine, table, lines, name),
+        measurement,
+        point,
+        repeat,
+        machine,
+        columns,
+        np.array(lines, dtype=np.int64),
+    )
 
 
-def _check_header(header: Sequence[str], name: str) -> None:
+def _check_header(header: Sequence[str], name: str, needed: Sequence[str]) -> None:
     where = f"{name} line 1"
     if len(header) == 1 and ";" in header[0]:
         raise CmmUqError("cells are separated by semicolons", where=where,
@@ -157,9 +165,9 @@ def _check_header(header: Sequence[str], name: str) -> None:
         if known and column not in (*REQUIRED, *OPTIONAL):
             fix = conversion(column, [known]) or f"Convert it and name it {known}, or say unit under [recording]"
             wrong.add(CmmUqError(f"the column {column!r} is not in the unit of {known!r}", where=where, fix=fix))
-    for column in REQUIRED:
+    for column in needed:
         if column not in header:
-            unread = " (of an axis that nobody reads, give one number in all rows)" * column.endswith("_mm")
+            unread = " (of an axis that nobody reads, give one number in all rows)" * (column in COORDINATES)
             wrong.add(CmmUqError(f"no column {column!r}", where=where, fix=f"{suggestion(column, header)}{unread}"))
     wrong.refuse()
 

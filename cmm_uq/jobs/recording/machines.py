@@ -9,13 +9,16 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Machine, Points
 from cmm_uq.base.rotary import Turntable
+from cmm_uq.jobs.arms import arm
 from cmm_uq.jobs.tables.machine import MachineFacts, stated_axes
 
 _ROUNDING = 1e-6  # of a reading, °
 
 
 def machine_of(facts: MachineFacts) -> Machine:
-    """Of three carriages, or with a rotary table too."""
+    """Of three carriages, or with a rotary table too; or an arm of joints."""
+    if facts.joint:
+        return arm(facts.name, facts.joint, facts.arm)
     travel = np.array([getattr(facts.travel_mm, axis) or [np.nan, np.nan] for axis in AXES], dtype=np.float64)
     origin = np.array(facts.origin_mm, dtype=np.float64)
     carriages, _, letter = facts.chain.partition("|")

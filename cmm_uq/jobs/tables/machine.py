@@ -23,6 +23,7 @@ from cmm_uq.base.files.table import (
     key,
     required,
 )
+from cmm_uq.jobs.arms import MOST_JOINTS, ArmFacts, JointFacts
 
 Method = Literal["fixed", "A3", "S2", "staircase", "control chart", "drift"]
 Months = Annotated[int, Field(ge=1, le=600)]
@@ -288,6 +289,9 @@ class MachineFacts(JobTable):
     """Carriages from the table to the ram, with F for the frame where the workpiece moves; behind a bar the rotary table that
     it stands on, such as `XYZ|C`."""
     table: RotaryTableFacts = key(RotaryTableFacts(), "The rotary table of the chain.")
+    joint: Annotated[list[JointFacts], Field(max_length=MOST_JOINTS)] = []
+    """Joints of an arm, or of a robot, from the base to the flange, in place of carriages."""
+    arm: ArmFacts = key(ArmFacts(), "What holds for all joints, and the tool.")
     travel_mm: Travel = key(Travel(), "Lowest and highest scale reading of each axis.")
     origin_mm: Triple = [0.0, 0.0, 0.0]
     """Scale reading of the recording's origin: scale reading = recorded coordinate + origin."""
@@ -309,6 +313,13 @@ class MachineFacts(JobTable):
         check_carriages(self.chain)
         if self.table.model_fields_set and "|" not in self.chain:
             yield f"[machine.table] is of a rotary table, which chain = {self.chain!r} has not: give it behind a bar, as XYZ|C"
+        if self.joint and (wrong := sorted(self.model_fields_set - _OF_ARMS)):
+            yield f"{wrong[0]} is of a machine of carriages, and [[machine.joint]] of an arm: leave one of them out"
+        if self.arm.model_fields_set and not self.joint:
+            yield "[machine.arm] is of an arm: give its rows, [[machine.joint]]"
+
+
+_OF_ARMS = frozenset(("name", "manufacturer", "model", "serial", "owner", "joint", "arm", "further", "calibrate"))
 
 
 class ProbeFacts(JobTable):

@@ -42,6 +42,7 @@ _NO_SQUARENESS = 0.1  # rad: a squareness of which no more is known than this, s
 # condition up to which a design, in typical sizes of the parameters, is not made of the noise of the placings
 _ILL_CONDITIONED = 1e3
 _ROUNDS = 20
+_SETTLED = 1e-4  # typical sizes of a parameter
 _SIZE_SCALE = 0.1  # mm, a typical deviation of an artefact from its nominal size; only scales columns
 
 
@@ -219,16 +220,21 @@ class RecordingModel:
             if not self.leans_beyond(still, found.spread, _NO_SQUARENESS):
                 break
             found = solve(linear, found.rank - 1)
+        known = np.array([unknown.prior_sd for unknown in linear.unknowns])
+        while self._acting.bends and found.rank > 1 and np.any(found.spread > IMPLAUSIBLE * known):
+            found = solve(linear, found.rank - 1)  # of rows of an arm that the poses tell apart by noise alone
         return found
 
     def _likeliest(self, linear: LinearModel, values: Floats, found: LeastSquares) -> Floats:
         """Where the posterior is to be linear: the estimate, unless priors know angles much better than the recording does."""
         sigma, still = max(found.sigma_of_residuals, _SMALLEST_NOISE), np.zeros_like(values)
-        if not self.leans_beyond(values, still, SMALL_LEAN):
+        bends, scale = self._acting.bends, np.array([unknown.scale for unknown in self.unknowns])
+        if not (bends or self.leans_beyond(values, still, SMALL_LEAN)):
             return values
         for _ in range(_ROUNDS):
             nearer = likeliest(linear, sigma)
-            if not self.leans_beyond(nearer - values, still, _MOVED):
+            settled = not bends or np.abs((nearer - values) / scale).max() < _SETTLED
+            if settled and not self.leans_beyond(nearer - values, still, _MOVED):
                 break
             values, linear = nearer, self._anew(linear, nearer)
         return values

@@ -134,7 +134,12 @@ EVERY = MappingProxyType({**CATALOGUE, **FURTHER, **OWN})
 
 
 def every() -> Mapping[str, Effect]:
-    """All effects by name: built in, of other packages in the order of their names, registered, stated by the job at hand."""
+    """All effects by name: built in, of other packages in the order of their names, registered, stated by the job at hand.
+
+    Of an arm of joints only those that its job brings: the others are of carriages.
+    """
+    if _ALONE.get():
+        return _STATED.get()
     found, own = _every(tuple(sys.path)), _own()
     return MappingProxyType({**found, **own}) if own else found
 
@@ -145,6 +150,8 @@ def effects(names: Sequence[str], *, where: str | None = None) -> tuple[Effect, 
     known = {*EVERY, *outside, *own}
     for i, name in enumerate(names):
         with wrong.going_on():
+            if _ALONE.get() and name not in own:
+                raise CmmUqError(f"the arm of this job has no effect {name!r}", where=where, fix=suggestion(name, own))
             if name not in known:
                 raise CmmUqError(f"unknown effect {name!r}", where=where, fix=suggestion(name, known))
             if name in names[:i]:
@@ -189,13 +196,14 @@ def refuse_known(name: str, where: str, further: Container[str] = ()) -> None:
 
 
 @contextmanager
-def beside_the_catalogue(stated: Mapping[str, Effect]) -> Iterator[None]:
-    """What a job states of its own is in the catalogue for a while; nothing of another job."""
-    token = _STATED.set(stated)
+def beside_the_catalogue(stated: Mapping[str, Effect], *, alone: bool = False) -> Iterator[None]:
+    """What a job brings of its own is in the catalogue for a while, or is all of it; nothing of another job."""
+    token, only = _STATED.set(stated), _ALONE.set(alone)
     try:
         yield
     finally:
         _STATED.reset(token)
+        _ALONE.reset(only)
 
 
 def registered() -> tuple[str, ...]:
@@ -210,6 +218,7 @@ def stated_effects() -> Mapping[str, Effect]:
 
 _REGISTERED: dict[str, _Registered] = {}
 _STATED: ContextVar[Mapping[str, Effect]] = ContextVar("effects of the job at hand", default=MappingProxyType({}))
+_ALONE: ContextVar[bool] = ContextVar("whether these are all that its machine has", default=False)
 
 
 def _own() -> dict[str, Effect]:

@@ -14,6 +14,7 @@ from typing import Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
+from cmm_uq.base.arm import Arm
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.table import LONGEST_MM
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, listed, say
@@ -24,6 +25,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.effect import EffectFacts
 from cmm_uq.machine.physics.catalogue import beside_the_catalogue, refuse_known
 from cmm_uq.machine.physics.effect import Effect, Nonparametric, Parameter, Shape
+from cmm_uq.machine.physics.effects.joints import effects_of_arm
 from cmm_uq.maths.uncertainty.models.expression import CONSTANTS, FURTHER, Expression, parse
 
 _EQUATION = re.compile(r"e_([xyz])\s*=(?!=)\s*(.+)", re.DOTALL)
@@ -188,7 +190,8 @@ def physics_of(job: Job | None, *further: str) -> Iterator[None]:
     facts, points = job.facts, job.points
     to_come = {*further, *facts.plan.columns} - points.columns.keys()
     recorded = [*points.columns, *to_come] if len(points) else None
-    stated: dict[str, Effect] = {}
+    joined = isinstance(points.machine, Arm)
+    stated: dict[str, Effect] = effects_of_arm(points) if joined else {}
     for i, one in enumerate(facts.effect, 1):
         where = f"job.toml [[effect]] {i}"
         if one.name in stated:
@@ -197,7 +200,7 @@ def physics_of(job: Job | None, *further: str) -> Iterator[None]:
         if len(points) and not to_come & {*effect.columns}:
             for ends in zip(*((each.low, each.high) for each in effect.shape), strict=True) if effect.shape else ((),):
                 effect.basis(points, ends)
-    with beside_the_catalogue(stated):
+    with beside_the_catalogue(stated, alone=joined):
         yield
 
 

@@ -2,8 +2,9 @@
 
 To first order every effect acts as if the others were not there. Squareness errors of hundreds of seconds are too large for
 that: their squares and products, and theirs with scale errors, are parts per million. So they act together, without
-approximation: each carriage moves along the unit vector of ``axis_directions``, by what its
-scale reads and errs (effects ``along_motion``), and rotations act on what the leaning motions carry. Everything else is added.
+approximation: each carriage moves along the unit vector of ``axis_directions``, by what its scale reads and errs (effects
+``along_motion``), and rotations act on what the leaning motions carry. So do errors of the rows of an arm, whose tool is where
+the chain of all changed rows has it. Everything else is added.
 """
 
 from __future__ import annotations
@@ -13,9 +14,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from cmm_uq.base.arm import Arm
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.machine.physics import kinematics
 from cmm_uq.machine.physics.effect import ARTEFACT, Effect
+from cmm_uq.machine.physics.effects.joints import OfRows, arm_of
 from cmm_uq.machine.physics.kinematics import SQUARENESSES, along_directions, axis_directions, leaning
 
 _SETTLED = 1e-9  # mm
@@ -50,6 +53,11 @@ class Superposition:
 
     def errors(self, points: Points, coefficients: Floats) -> Floats:
         """Errors e (n, 3), mm, of points as indicated, for coefficients (k,)."""
+        arm = self._arm(points, coefficients)
+        if arm is not None:
+            others = self.derivatives(About(points)) @ np.where(self._of_rows, 0.0, coefficients)
+            columns = points.columns
+            return np.asarray(others + arm.posed(columns).tool - arm_of(points).posed(columns).tool, dtype=np.float64)
         squareness = self._squareness(points, coefficients)
         if squareness is None:
             return np.asarray(self.derivatives(About(points)) @ coefficients, dtype=np.float64)
@@ -64,6 +72,9 @@ class Superposition:
         ``true``: points where they truly are; their columns are taken where a machine would indicate them that has these
         squarenesses and no other error. The columns of three scale errors then add up to the place itself.
         """
+        arm = self._arm(true, coefficients)
+        if arm is not None:
+            return About(replace(true, machine=arm))
         squareness = self._squareness(true, coefficients)
         if squareness is None:
             return About(true)
@@ -93,6 +104,26 @@ class Superposition:
             plane = SQUARENESSES.index(str(effect.plane))
             total[plane] = total[plane] + coefficient * effect.lean(points)
         return np.stack(np.broadcast_arrays(*total), axis=-1)
+
+    def _arm(self, points: Points, coefficients: Floats) -> Arm | None:
+        """The arm with its rows as the coefficients (k,) change them; ``None`` where they change none."""
+        change, first = np.zeros(1), 0
+        for effect in self.effects:
+            own = coefficients[first : first + len(effect.coefficients)]
+            first += len(own)
+            if isinstance(effect, OfRows) and own.any():
+                change = change + effect.change(points, self.shapes.get(effect.name, ())) @ own
+        return arm_of(points).changed(change) if change.ndim == 2 else None
+
+    @property
+    def bends(self) -> bool:
+        """Whether e is linear in the coefficients about a place of theirs only: changes of an arm's rows."""
+        return any(isinstance(effect, OfRows) for effect in self.effects)
+
+    @property
+    def _of_rows(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        each = [isinstance(effect, OfRows) for effect in self.effects for _ in effect.coefficients]
+        return np.array(each, dtype=bool)
 
     @property
     def leaning(self) -> list[tuple[int, Effect]]:

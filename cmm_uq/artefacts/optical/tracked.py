@@ -1,0 +1,293 @@
+"""Points whose true places another instrument measured, as a laser tracker those of a robot's tool; placed rigidly and anyhow.
+
+All three coordinates of every point are observations, as those of a plate's balls, and the six freedoms between the frames of
+both instruments are projected out. Nothing is asked of the poses but that they differ: this is a calibration. Pose accuracy
+and repeatability (ISO 9283) need poses that were commanded, and repeated thirty times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+from scipy.special import fdtri, stdtrit
+
+from cmm_uq.analysis.diagnosis.held_out import numbered_by_place, predicted_folds
+from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
+from cmm_uq.artefacts.plate import REFERENCES, Plate, shape_of as shape_of_plate
+from cmm_uq.base.arm import ALPHA, BETA, THETA, A, Arm, D
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
+from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.certificate.document import Block, Section, Table, figure_columns, text_columns
+from cmm_uq.certificate.plots.volume import vector_plot
+from cmm_uq.certificate.result import Page, Result
+from cmm_uq.jobs.tables.artefact import ReferencedFacts
+from cmm_uq.machine.model import RecordingModel
+from cmm_uq.machine.model.artefact import Indications
+from cmm_uq.machine.model.kind import Beginning
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.effects.joints import OfJoint
+from cmm_uq.maths.inference.posterior import Cause
+from cmm_uq.maths.uncertainty.quantity import alike, rounded
+
+# times the extent of all points by which places may be off before a row is held for damaged: rows may be nominal ones
+_ROBOT = 2.0
+
+
+class TrackedPoints(Plate):
+    """3n observations (x, y, z in turn) of n points, with ``reference_x_mm``, … in the frame of the reference instrument."""
+
+    kind = "tracked_points"
+    title = say("Reference instrument")
+    size_title = say("Longest distance by the reference instrument")
+    plural = "the points as the machine has them"
+
+    def own_faults(self) -> Iterable[Effect]:
+        return ()
+
+    def calibration(self) -> Cause | None:
+        """Nothing beside the scale: what each reading has of its own is in the noise."""
+        return None
+
+    def indications(self) -> Indications | None:
+        return None
+
+    def recorded(self, points: Points, xyz: Floats) -> Points:
+        """Of an arm the joints, and what follows from them, stay: the tool is seen where the arm errs instead."""
+        if not isinstance(points.machine, Arm):
+            return super().recorded(points, xyz)
+        moved = np.einsum("nji,nj->ni", self.attitudes(xyz), points.xyz - xyz) / self.expansion[:, None]
+        seen = dict(zip(REFERENCES, (self.reference + moved).T, strict=True))
+        return replace(points, columns={**points.columns, **seen})
+
+
+def shape_of(facts: ReferencedFacts, points: Points) -> ArtefactShape | None:
+    found = shape_of_plate(facts, points)
+    return None if found is None else replace(found, extent=_ROBOT * found.extent)
+
+
+SCREENING = Screening(shape_of)
+
+
+@dataclass(frozen=True, eq=False)
+class PredictedPoses:
+    """Points held out of the fit in turn, as the others predict them."""
+
+    rows: Ints  # (n,) of the recording, those of which all coordinates are used
+    off: Floats  # (n,) distance from where they were seen, mm
+    within: Floats  # (n, 3) coordinates within U of their prediction, as 0 or 1
+    inside: Floats  # (n,) whether within the 95 % ellipsoid of all three
+
+
+def predicted_poses(model: RecordingModel) -> PredictedPoses | None:
+    """By the named model and the residuals that it leaves; ``None`` where a set-up has too few points to leave any out."""
+    if len(np.unique(model.artefact.points.point)) < 2 * len(model.unknowns) / 3 + 4:
+        return None
+    linear, found = model.estimate().linear, model.estimate().least_squares
+    sigma, degrees = found.sigma_of_residuals, found.degrees_of_freedom
+    points, rows = model.artefact.points, model.artefact.rows[model.used, 0]
+    numbers = np.column_stack([points.measurement, points.point])
+    if isinstance(points.machine, Arm):  # all reflectors that were seen at one pose
+        numbers = np.column_stack([points.columns[name] for name in points.machine.columns_of_joints])
+    groups = numbered_by_place(model, numbers[rows])
+    taken, off, within, inside = [], [], [], []
+    for out, error, root, _ in predicted_folds(linear, sigma, groups):
+        _, first, count = np.unique(rows[out], return_index=True, return_counts=True)
+        whole = (first[count == 3, None] + np.arange(3)).ravel()  # of others a coordinate is not used
+        each, of_each = error[whole].reshape(-1, 3) / sigma, root[whole].reshape(-1, 3, root.shape[1])
+        covariance = np.eye(3) + of_each @ of_each.transpose(0, 2, 1)
+        taken.append(rows[out][first[count == 3]])
+        off.append(np.linalg.norm(each, axis=1) * sigma)
+        within.append(np.abs(each) <= stdtrit(degrees, 0.975) * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
+        squares = np.einsum("ni,ni->n", each, np.linalg.solve(covariance, each[:, :, None])[:, :, 0])
+        inside.append(squares <= 3 * fdtri(3, degrees, 0.95))
+    return PredictedPoses(*map(np.concatenate, (taken, off, within, inside)))
+
+
+def _distances(result: Result) -> dict[str, dict[str, float]]:
+    """Mean, root mean square and largest distance of points from where they were seen, µm: before the fit, and after it."""
+    points = cast("TrackedPoints", result.artefact)
+    each = {"before": points.deviations(), "after": result.residuals.reshape(-1, 3)}
+    return {when: _figures(np.linalg.norm(values, axis=1)) for when, values in each.items()}
+
+
+def _figures(off: Floats) -> dict[str, float]:
+    largest, mean, rms = off.max(), off.mean(), np.sqrt(np.mean(off**2))
+    named = zip(("mean_um", "rms_um", "largest_um"), (mean, rms, largest), strict=True)
+    return {name: float(value / MICROMETRE) for name, value in named}
+
+
+def results(result: Result) -> dict[str, Any]:
+    """For results.json: distances, how points held out were predicted, and the rows of an arm as found."""
+    predicted, found = predicted_poses(result.model), dict[str, Any](_distances(result))
+    if predicted is not None:
+        shares = {
+            "coordinates_within_U": float(predicted.within.mean()),
+            "points_within_ellipsoid": float(predicted.inside.mean()),
+        }
+        found["held_out"] = {**_figures(predicted.off), **shares, "points": len(predicted.off)}
+    machine = result.artefact.points.machine
+    rows = {"rows": rows_of(result, machine)} if isinstance(machine, Arm) else {}
+    return {"positions": found, **rows}
+
+
+_KEYS = {A: "a_mm", ALPHA: "alpha_deg", D: "d_mm", THETA: "theta_deg", BETA: "beta_deg"}
+_TO_ROWS: Mapping[int, float] = {i: MICROMETRE if i in (A, D) else 1 / 3600 for i in range(5)}
+
+
+def rows_of(result: Result, arm: Arm) -> list[dict[str, float]]:
+    """Rows of the arm with what was found, where that is determined, as job.toml has them."""
+    scale = np.where(np.isin(np.arange(5), (A, D)), 1.0, np.degrees(1.0))
+    rows = [dict(zip((_KEYS[i] for i in range(5)), row, strict=True)) for row in (arm.rows * scale).tolist()]
+    for effect in result.model.effects:
+        if isinstance(effect, OfJoint) and len(effect.coefficients) == 1 and type(effect).amount is OfJoint.amount:
+            name, found = next(iter(result.parameters[effect.name].items()))
+            if (effect.name, name) not in result.not_given:
+                rows[effect.index][_KEYS[effect.row]] += float(found.value) * _TO_ROWS[effect.row]
+    return rows
+
+
+def sections(result: Result) -> list[Section]:
+    data = results(result)
+    blocks: list[Block] = [_table(data["positions"], result), _arrows(result)]
+    if "rows" in data:
+        blocks.append(_rows(data["rows"], result))
+    return [Section(say("Positions of the tool"), tuple(blocks))]
+
+
+_WHEN: Mapping[str, Text] = {
+    "before": say("as recorded, placed"),
+    "after": say("after the fitted model"),
+    "held_out": say("held out, predicted"),
+}
+
+
+def _table(found: dict[str, Any], result: Result) -> Table:
+    noise = result.noise.coordinate.value
+    rows, notes = [], list[Text]()
+    for when, words in _WHEN.items():
+        if when not in found:
+            continue
+        one = found[when]
+        figures = (rounded(one[name], noise)[0] for name in ("mean_um", "rms_um", "largest_um"))
+        shares = [
+            number(100 * one[name], ".1f") if name in one else NOTHING
+            for name in ("coordinates_within_U", "points_within_ellipsoid")
+        ]
+        rows.append((words, *figures, *shares))
+    if "held_out" in found:
+        notes.append(
+            say(
+                "Held out: {count} points, each predicted from those at other poses; how many coordinates lie "
+                "within U (95 %), and how many points within the 95 % ellipsoid of all three.",
+                count=found["held_out"]["points"],
+            )
+        )
+    notes.append(
+        say(
+            "This is a calibration. Pose accuracy and repeatability (ISO 9283) need poses that were commanded and repeated.",
+        )
+    )
+    distances = figure_columns(say("Mean"), say("rms"), say("Largest"), unit=unit("µm"))
+    within = figure_columns(say("Coordinates within U"), say("Points within the ellipsoid"), unit=unit("%"))
+    title = say("Distance from where the reference instrument saw the point")
+    return Table(title, (*text_columns(say("Points")), *distances, *within), tuple(rows), tuple(notes))
+
+
+def _rows(rows: list[dict[str, float]], result: Result) -> Table:
+    heads = (
+        *figure_columns(Verbatim("a"), unit=unit("mm")),
+        *figure_columns(Verbatim("α"), unit=unit("°")),
+        *figure_columns(Verbatim("d"), unit=unit("mm")),
+        *figure_columns(Verbatim("θ"), Verbatim("β"), unit=unit("°")),
+    )
+    each = tuple(
+        (Verbatim(joint.upper()), *(number(row[_KEYS[i]], ".4f" if i in (A, D) else ".5f") for i in range(5)))
+        for joint, row in zip(cast("Arm", result.artefact.points.machine).joints, rows, strict=True)
+    )
+    note = say("What the recording leaves open stands as the job has it.")
+    return Table(say("Rows of the arm as found"), (*text_columns(say("Joint")), *heads), each, (note,))
+
+
+def _arrows(result: Result) -> Block:
+    points = cast("TrackedPoints", result.artefact)
+    xyz = points.points.xyz
+    axes = np.sort(np.argsort(np.ptp(xyz, axis=0))[1:])
+    turned = np.einsum("nij,nj->ni", points.attitudes(xyz), result.residuals.reshape(-1, 3))
+    arrows = [values[:, axes] / MICROMETRE for values in (points.deviations(), turned)]
+    before, after = alike(*(float(np.linalg.norm(each, axis=1).max()) for each in arrows))
+    first, second = (Verbatim(AXES[axis].upper()) for axis in axes)
+    return vector_plot(
+        xyz[:, axes],
+        tuple(zip((_WHEN["before"], _WHEN["after"]), arrows, strict=True)),
+        axis_labels=(say("{axis} / mm", axis=first), say("{axis} / mm", axis=second)),
+        caption=say("Indicated less seen places, in the plane of {first} and {second}.", first=first, second=second),
+        alternative=say(
+            "Arrows of up to {before} µm as recorded, up to {after} µm after the fitted model.",
+            before=before,
+            after=after,
+        ),
+    )
+
+
+PAGE = Page(sections, results)
+
+_POSES = 60
+
+
+def poses(machine: Machine) -> Points:
+    """Poses within the joints' travels, evenly in each, and where a tracker two metres away sees the tool."""
+    arm = cast("Arm", machine)
+    random, n = np.random.default_rng(1), _POSES
+    low, high = np.array([arm.travel(joint) for joint in arm.joints]).T
+    q = low + (high - low) * (np.argsort(random.random((n, len(low))), axis=0) + 0.5) / n
+    q = np.round(q, 3)
+    columns = dict(zip(arm.columns_of_joints, q.T, strict=True))
+    xyz = arm.posed(columns).tool
+    seen = xyz @ np.array([[0.8, 0.6, 0.0], [-0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]) + [2000.0, -500.0, 300.0]
+    columns |= dict(zip(REFERENCES, seen.T, strict=True))
+    one = np.ones(n, dtype=np.int64)
+    return Points(xyz, one, np.arange(1, n + 1), one, machine, columns)
+
+
+_ROBOT_ROWS = (  # a, α, d, θ, travel of a robot of six joints that reaches 1.6 m
+    (150.0, -90.0, 475.0, 0.0, [-90.0, 90.0]),
+    (600.0, 0.0, 0.0, -90.0, [-40.0, 60.0]),
+    (120.0, -90.0, 0.0, 0.0, [-50.0, 50.0]),
+    (0.0, 90.0, 720.0, 0.0, [-120.0, 120.0]),
+    (0.0, -90.0, 0.0, 0.0, [-90.0, 90.0]),
+    (0.0, 0.0, 85.0, 180.0, [-150.0, 150.0]),
+)
+# without what a place says nothing of: the base, rows of parallel axes, and the last joint beside the tool
+_DETERMINED = (
+    *(f"zero_q{i}" for i in range(2, 6)),
+    *(f"length_q{i}" for i in range(1, 6)),
+    *(f"twist_q{i}" for i in range(1, 6)),
+    *(f"offset_q{i}" for i in range(3, 6)),
+    "parallelism_q2",
+    "tool_offset",
+)
+BEGIN = Beginning(
+    title="Robot measured by a laser tracker",
+    numbering="One measurement is one station of the tracker; its points are the poses.",
+    artefact={"name": "Laser tracker", "u_um": "10 + 5·L/1000"},
+    noise_um=40.0,
+    effects=_DETERMINED,
+    points=poses,
+    machine={
+        "name": "Robot",
+        "arm": {"tool_mm": [30.0, 0.0, 120.0]},
+        "joint": [
+            {"a_mm": a, "alpha_deg": alpha, "d_mm": d, "theta_deg": theta, "travel": travel}
+            for a, alpha, d, theta, travel in _ROBOT_ROWS
+        ],
+    },
+    columns={
+        **{name: f"Place of the reflector along {name[-4]} of the tracker's own frame." for name in REFERENCES},
+        **{f"q{i}_deg": f"Reading of joint {i}." for i in range(1, 7)},
+    },
+    further={f"approach_q{i}": f"Sense in which joint {i} moved last: −1, 0 or +1." for i in range(1, 7)},
+)

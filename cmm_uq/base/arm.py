@@ -1,0 +1,146 @@
+"""Arms: serial chains of joints by Denavit–Hartenberg rows; where the tool is, and what each parameter of a row moves of it.
+
+A row is a, α, d and θ (Denavit, Hartenberg, J. Appl. Mech. 22 (1955) 215), *standard* as Paul 1981 or *modified* as Craig
+1989, and β, the angle of nearly parallel axes that no other parameter tells well (Hayati, Mirmirani, J. Robot. Syst. 2 (1985)
+397).
+From the base to the flange the motions of each joint are
+
+    standard  Rz(θ) Tz(d) Tx(a) Rx(α) Ry(β)        modified  Rx(α) Tx(a) Ry(β) Rz(θ) Tz(d)
+
+A revolute joint adds its reading to θ, a prismatic one to d. Either way a chain is a sequence of turns about, and shifts
+along, axes that the motions before them carry: a turn moves the tool by u × (tool − origin), a shift by u. That is the exact
+derivative with respect to every parameter, whatever the convention.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import AXES, Floats, Machine
+
+A, ALPHA, D, THETA, BETA = range(5)  # parameters of a row
+_TURNS = np.array([False, True, False, True, True])
+# parameters in the order of their motions, from the base outwards, and the axes of the motions
+_STANDARD, _MODIFIED = (THETA, D, A, ALPHA, BETA), (ALPHA, A, BETA, THETA, D)
+_ALONG = {A: 0, ALPHA: 0, BETA: 1, D: 2, THETA: 2}
+
+
+@dataclass(frozen=True, eq=False)
+class ArmPose:
+    """A chain of j joints at n sets of readings, in the frame of its base."""
+
+    tool: Floats  # (n, 3) mm
+    # (n, j, 5, 3) unit vectors along which, or about which, each parameter of each row moves what follows
+    axes: Floats
+    origins: Floats  # (n, j, 5, 3) a point that each goes through, mm
+    flange: Floats  # (n, 3, 3) attitude of the last frame, in which the tool's offset is given
+
+    @cached_property
+    def jacobian(self) -> Floats:
+        """(n, 3, 5 j + 3) how far the tool moves for one mm or rad of each parameter of each row, and of its own offset."""
+        turned = np.cross(self.axes, self.tool[:, None, None] - self.origins)
+        moved = np.where(_TURNS[:, None], turned, self.axes).reshape(len(self.tool), -1, 3)
+        return np.concatenate([moved.transpose(0, 2, 1), self.flange], axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class Arm(Machine):
+    """A machine of joints q1, q2, …, whose coordinates are those of its tool in the frame of its base.
+
+    What the tool measures with, or a reflector on it, is offset from the flange by ``tool_mm``, and by ``tip_x_mm``,
+    ``tip_y_mm`` and ``tip_z_mm`` where these are recorded.
+    """
+
+    rows: Floats = field(default_factory=lambda: np.zeros((0, 5)))  # (j, 5) a, α, d, θ, β at reading 0, mm and rad
+    revolute: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))  # (j,) else prismatic
+    sense: Floats = field(default_factory=lambda: np.zeros(0))  # (j,) +1, or −1 of a reading that counts the other way
+    tool_mm: Floats = field(default_factory=lambda: np.zeros(3))
+    modified: bool = False
+    # (3,) against gravity, in the frame of the base
+    up: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    limits: Floats = field(default_factory=lambda: np.zeros((0, 2)))  # (j, 2) lowest and highest readings, ° or mm
+    # (5 j + 3,) or (n, 5 j + 3) by how much parameters of rows and tool differ from these
+    change: Floats | None = None
+    axes: tuple[str, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axes", (*AXES, *self.joints))
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return tuple(f"q{i}" for i in range(1, len(self.rows) + 1))
+
+    @property
+    def columns_of_joints(self) -> tuple[str, ...]:
+        return tuple(f"{q}_{'deg' if turns else 'mm'}" for q, turns in zip(self.joints, self.revolute, strict=True))
+
+    def readings(self, xyz: Floats, columns: Mapping[str, Floats]) -> Floats:
+        for name in self.columns_of_joints:
+            if name not in columns:
+                raise CmmUqError(f"no column {name!r}", where="the recording", fix="Record what each joint reads")
+        return np.column_stack([self.place(xyz, columns), *(columns[name] for name in self.columns_of_joints)])
+
+    def coordinates(self, readings: Floats) -> Floats:
+        return self.at(readings[:, -len(self.rows) :]).tool - self.origin_mm
+
+    def travel(self, axis: str) -> tuple[float, float]:
+        if axis in AXES:
+            raise CmmUqError(
+                f"an arm has no carriage {axis}", where="job.toml [machine]", fix="Name effects of its joints"
+            )
+        low, high = self.limits[self.joints.index(axis)]
+        if np.isnan(low):
+            raise CmmUqError(
+                f"the travel of joint {axis} is needed",
+                where="job.toml [[machine.joint]] travel",
+                fix="Give travel = [lowest, highest]",
+            )
+        return float(low), float(high)
+
+    def posed(self, columns: Mapping[str, Floats]) -> ArmPose:
+        """Its pose at recorded readings."""
+        q = np.column_stack([columns[name] for name in self.columns_of_joints])
+        tips = np.column_stack([columns.get(f"tip_{axis}_mm", np.zeros(len(q))) for axis in AXES])
+        key = q.tobytes() + tips.tobytes()
+        if key not in self._poses:
+            self._poses.clear()
+            self._poses[key] = self.at(q, tips)
+        return self._poses[key]
+
+    @cached_property
+    def _poses(self) -> dict[bytes, ArmPose]:
+        return {}
+
+    def changed(self, change: Floats) -> Arm:
+        """The same arm with other rows and another tool, by a change as of :attr:`change`."""
+        return replace(self, change=change)
+
+    def at(self, q: Floats, tips: Floats | None = None) -> ArmPose:
+        """Its pose at readings (n, j), ° or mm, with ``tips`` (n, 3) mm beyond the tool's offset."""
+        (n, j), change = q.shape, np.zeros(1) if self.change is None else self.change
+        change = np.broadcast_to(change, (n, 5 * j + 3))
+        values = self.rows + change[:, : 5 * j].reshape(n, j, 5)
+        values[:, np.arange(j), np.where(self.revolute, THETA, D)] += (
+            self.sense * q * np.where(self.revolute, np.pi / 180, 1.0)
+        )
+        frame, origin = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
+        axes, origins = np.empty((2, n, j, 5, 3))
+        for i in range(j):
+            for name in _MODIFIED if self.modified else _STANDARD:
+                along, value = _ALONG[name], values[:, i, name, None]
+                axes[:, i, name], origins[:, i, name] = frame[:, :, along], origin
+                if not _TURNS[name]:
+                    origin = origin + value * frame[:, :, along]
+                    continue
+                one, other = frame[:, :, (along + 1) % 3], frame[:, :, (along + 2) % 3]
+                cosine, sine = np.cos(value), np.sin(value)
+                turned = cosine * one + sine * other, cosine * other - sine * one
+                frame[:, :, (along + 1) % 3], frame[:, :, (along + 2) % 3] = turned
+        offset = self.tool_mm + change[:, 5 * j :] + (0.0 if tips is None else tips)
+        return ArmPose(origin + np.einsum("nij,nj->ni", frame, offset), axes, origins, frame)
