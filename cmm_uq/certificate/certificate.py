@@ -20,16 +20,11 @@ from cmm_uq.certificate.sections.conformity import conformity_section
 from cmm_uq.certificate.sections.method import method, posterior_section, warnings
 from cmm_uq.certificate.sections.performance import machine_alone, own_figures, performance, with_performance
 from cmm_uq.certificate.sections.regions import regions_section, with_regions
+from cmm_uq.certificate.wording import TEMPERATURES
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.tables.identification import MEASURED, SIMULATED, Identification, Laboratory
 from cmm_uq.maths.uncertainty.quantity import nominal
-
-TEMPERATURES: Mapping[str, Text] = {
-    "temp_artefact_c": say("artefact"), "temp_x_c": say("scale of X"), "temp_y_c": say("scale of Y"),
-    "temp_z_c": say("scale of Z"), "temp_air_c": say("air"), "temp_table_top_c": say("table, top"),
-    "temp_table_bottom_c": say("table, bottom"),
-}  # fmt: skip
 
 
 def conditions(job: Job) -> Facts:

@@ -28,6 +28,17 @@ OUTCOME_WORDS: Mapping[str, Text] = {
 }  # fmt: skip
 """What a statement of conformity comes to, in a table."""
 
+SIGN = say("Sign rule: true coordinate = indicated coordinate + error.")
+
+UNCERTAINTY = say(
+    "U is the expanded uncertainty for a coverage probability of 95 %, from the 95 % coverage interval of the posterior "
+    "distribution; k = U/u is its ratio to the standard uncertainty u."
+)
+TEMPERATURES: Mapping[str, Text] = {
+    "temp_artefact_c": say("artefact"), "temp_x_c": say("scale of X"), "temp_y_c": say("scale of Y"),
+    "temp_z_c": say("scale of Z"), "temp_air_c": say("air"), "temp_table_top_c": say("table, top"),
+    "temp_table_bottom_c": say("table, bottom"),
+}  # fmt: skip
 
 NO_FACTOR = say("–")  # in place of a coverage factor that would mean nothing
 _ONE_HILL = 1.6

@@ -9,11 +9,12 @@ import typer
 
 from cmm_uq.app.cli import options as opt, terminal
 from cmm_uq.app.cli.options import Ending, argument, examples, flag, option
+from cmm_uq.app.cli.records import opened_records
 from cmm_uq.app.cli.terminal import put_json, say
 from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.certificates.affected import AffectedCertificate, FigureChange
+    from cmm_uq.app.commands.certificates.again import AffectedCertificate, FigureChange
     from cmm_uq.app.commands.certificates.verification import Verification
     from cmm_uq.jobs.dcc.figures import CertificateView
 
@@ -117,9 +118,8 @@ def release(
     if withdraw and replaced_by is not None:
         raise CmmUqError("a certificate is withdrawn or replaced, not both", where="--withdraw", fix="Leave out one")
     from cmm_uq.app.commands.certificates import release as releases
-    from cmm_uq.laboratory.records import open_records
 
-    with open_records(records) as history:
+    with opened_records(records) as history:
         if withdraw or replaced_by is not None:
             done = releases.withdraw(history, certificate, by=by, reason=reason, replaced_by=replaced_by)
         else:
@@ -157,11 +157,10 @@ def affected(
         raise CmmUqError("nothing is written of what is only listed", where="--list", fix="Leave out --list or --write")
     with end.progress() as stage:
         from cmm_uq import __version__
-        from cmm_uq.app.commands.certificates.affected import affected_certificates
-        from cmm_uq.laboratory.records import open_records
+        from cmm_uq.app.commands.certificates.again import affected_certificates
 
         last = __version__ if to is None else to
-        with open_records(records, read_only=write is None) as history:
+        with opened_records(records, read_only=write is None) as history:
             certificates = list(affected_certificates(
                 history, version, last, recompute=not only_list, out=write, where=str(history.place), stage=stage
             ))  # fmt: skip

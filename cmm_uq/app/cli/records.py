@@ -28,7 +28,7 @@ app = opt.group(
 SHOWN = 50  # findings that are printed
 
 
-def _opened(where: str | None, *, create: bool = False, read_only: bool = False) -> Records:
+def opened_records(where: str | None, *, create: bool = False, read_only: bool = False) -> Records:
     from cmm_uq.laboratory.records import open_records
 
     return open_records(where, create=create, read_only=read_only)
@@ -58,7 +58,7 @@ def verify(
     from cmm_uq.certificate.verify.sources import witnesses_of
 
     stated, without = witnesses_of(witness) if witness else ([], [])
-    with _opened(records, read_only=True) as opened:
+    with opened_records(records, read_only=True) as opened:
         disagreeing = opened.disagreements(stated)
         findings = [*disagreeing, *opened.verify(None if head is None else head.strip().lower(), files=files)]
         number, last = opened.head()
@@ -79,7 +79,7 @@ def verify(
 @opt.command(app, "head", "records head")
 def head(records: str | None = opt.RECORDS, end: Ending = opt.ONLY_JSON) -> None:
     """Print number and hash of the last entry, to be filed elsewhere: on paper, in a mail, on another machine."""
-    with _opened(records, read_only=True) as opened:
+    with opened_records(records, read_only=True) as opened:
         number, last = opened.head()
     end.put({"entries": number, "head": last}, [f"{number} {last}"])
 
@@ -95,7 +95,7 @@ def import_reports(
 
     reports, (place, _) = commands.reports_in(folders), _place(records)
     begun = not isinstance(place, Path) or os.path.exists(place)  # noqa: PTH110 - raises nothing below a closed folder
-    with _opened(records, create=True) if begun else contextlib.nullcontext(Path(place)) as history:
+    with opened_records(records, create=True) if begun else contextlib.nullcontext(Path(place)) as history:
         done = commands.import_reports(history, reports)
     refused = [{"report": str(path), "error": str(error)} for path, error in done.refused]
     data = {"recorded": len(done.added), "recorded_before": len(done.known),
@@ -118,7 +118,7 @@ def backup(
     """Write everything into one new SQLite file, while others go on writing, and verify its chain."""
     from cmm_uq.laboratory.records.backup import back_up
 
-    with _opened(records) as opened:
+    with opened_records(records) as opened:
         number, last = back_up(opened, file)
     data = {"backup": str(file), "entries": number, "head": last}
     end.put(data, [f"{_entries(number)} in {file}; the last has the hash {last}"])
@@ -159,7 +159,7 @@ def retain(
     """
     from cmm_uq.app.commands.laboratory.records import remove_retained, retention
 
-    with _opened(records, read_only=dry_run) as opened:
+    with opened_records(records, read_only=dry_run) as opened:
         found = retention(opened, keep_years, dt.datetime.now(dt.UTC).date())
         if not dry_run:
             remove_retained(opened, found, keep_years)

@@ -15,7 +15,8 @@ from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.residuals import curve_with_band, length_plot
 from cmm_uq.certificate.sections.method import not_converged
-from cmm_uq.certificate.sections.results import SIGN, Left
+from cmm_uq.certificate.sections.results import Left
+from cmm_uq.certificate.wording import SIGN
 from cmm_uq.machine.physics.effects.rigid_body import SCALE
 from cmm_uq.maths.uncertainty.quantity import figure, nominal, rounded, significant
 from cmm_uq.maths.uncertainty.type_a import factor_of_noise

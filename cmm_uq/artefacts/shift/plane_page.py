@@ -16,7 +16,8 @@ from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.residuals import curve_with_band
 from cmm_uq.certificate.plots.volume import vector_plot
 from cmm_uq.certificate.sections.method import not_converged
-from cmm_uq.certificate.sections.results import SIGN, Left
+from cmm_uq.certificate.sections.results import Left
+from cmm_uq.certificate.wording import SIGN
 from cmm_uq.maths.uncertainty.quantity import rounded
 
 

@@ -29,7 +29,8 @@ from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
 from cmm_uq.certificate.origin import file_name, quantity_data
 from cmm_uq.certificate.result import StatedUncertainty
 from cmm_uq.certificate.results.contents import covariance_data, head, statement_data
-from cmm_uq.certificate.sections.results import SIGN, Left, stated_table
+from cmm_uq.certificate.sections.results import Left, stated_table
+from cmm_uq.certificate.wording import SIGN
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, error_map_csv

@@ -14,11 +14,10 @@ from typing import Any
 from cmm_uq.base.languages.translation import ENGLISH, Code, translated
 from cmm_uq.base.messages import Day, Number, Text, Verbatim, day, say
 from cmm_uq.base.units import MICROMETRE, UNITS
-from cmm_uq.certificate.certificate import TEMPERATURES
 from cmm_uq.certificate.clauses import DRAFT, NOT_OURS, STATEMENTS, certifies, claimed, draft, replaced_certificate
 from cmm_uq.certificate.origin import BANNERS, made_after
 from cmm_uq.certificate.results.provenance import Reissue
-from cmm_uq.certificate.sections.results import SIGN, UNCERTAINTY
+from cmm_uq.certificate.wording import SIGN, TEMPERATURES, UNCERTAINTY
 from cmm_uq.jobs.chain import holds_on, right
 from cmm_uq.jobs.dcc import certificate as dcc
 from cmm_uq.jobs.job import Job

@@ -17,7 +17,6 @@ from cmm_uq.certificate.document import Column, Plot, Section, Table, columns, s
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.residuals import budget_bars
 from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.sections.results import UNCERTAINTY
 from cmm_uq.certificate.wording import effect_title
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.uncertainty.quantity import Quantity, rounded, significant
@@ -72,7 +71,7 @@ def performance(result: Result) -> Section:
         "Without noise: the 95 % interval of the same figure of the machine alone, by all of its errors together; nothing is "
         "decided by it."
     )
-    notes: list[Text] = [UNCERTAINTY, measurand]
+    notes: list[Text] = [wording.UNCERTAINTY, measurand]
     if again := returning_figures(result):
         each = [
             say("{figure:small} {U} {unit}", figure=TITLES[name], U=rounded(one.value, one.expanded)[1], unit=one.unit)

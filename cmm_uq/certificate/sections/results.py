@@ -21,13 +21,6 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.verdicts import GRAVEST, NONE, Verdict, Verdicts, gravest, standing_of
 from cmm_uq.maths.uncertainty.quantity import Quantity, limit_in_full, rounded, significant
 
-SIGN = say("Sign rule: true coordinate = indicated coordinate + error.")
-
-UNCERTAINTY = say(
-    "U is the expanded uncertainty for a coverage probability of 95 %, from the 95 % coverage interval of the posterior "
-    "distribution; k = U/u is its ratio to the standard uncertainty u."
-)
-
 
 def stated_table(
     caption: Text, named: Iterable[tuple[Text, Quantity]], notes: tuple[Text, ...] = (), *, what: Text = say("Quantity"),
@@ -56,7 +49,7 @@ def error_factors(result: Result) -> Section:
     figures = (doc.Column(head) for head in (say("Estimate"), say("U"), say("k"), least_squares))
     heads: tuple[Text | doc.Column, ...] = (say("Error factor"), *figures, say("Unit"))
     skewed = wording.skewed_note(one for key, one in reported(result) if key not in result.not_given)
-    factors = doc.table(say("Error factors of the machine"), heads, rows, SIGN, UNCERTAINTY, *skewed)
+    factors = doc.table(say("Error factors of the machine"), heads, rows, wording.SIGN, wording.UNCERTAINTY, *skewed)
     free = (block for combination in result.undetermined for block in _free_combination(result, combination))
     return section(say("Error factors"), factors, *free)
 

@@ -78,9 +78,8 @@ class Kind:
 
     name: str  # in ``[artefact] kind``
     table: type[ArtefactFacts] = ArtefactFacts  # its keys of ``[artefact]``
-    observe: Observe | str | None = (
-        None  # makes an artefact of points; ``None`` where the recording is none of an artefact
-    )
+    # makes an artefact of points; ``None`` where the recording is none of an artefact
+    observe: Observe | str | None = None
     screen: object = None  # a :class:`~cmm_uq.analysis.screening.shape.Screening`
     plan: object = None  # a :class:`~cmm_uq.analysis.planning.setting.Planning`
     page: object = None  # a :class:`~cmm_uq.certificate.result.Page`

@@ -48,9 +48,8 @@ class Compensation:
     """How the readings of one machine become true coordinates."""
 
     maps: ErrorMaps  # its error maps
-    chain: str | KinematicChain = (
-        "XYZ"  # its carriages; see :meth:`cmm_uq.machine.physics.kinematics.KinematicChain.of`
-    )
+    # its carriages; see :meth:`cmm_uq.machine.physics.kinematics.KinematicChain.of`
+    chain: str | KinematicChain = "XYZ"
     origin: Floats | tuple[float, float, float] = (0.0, 0.0, 0.0)  # (3,) scale reading = coordinate + origin, mm
     # True for exact rigid transformations; False to first order in displacements and rotations (Harris 2004 eq. 10–13), on
     # axes that lean exactly.

@@ -21,9 +21,8 @@ from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import Unit, unit
 from cmm_uq.machine.physics.words import AXIS, OTHER, SECOND, SENSE, SIDE, SIZE, Amount, filled
 
-ARTEFACT = (
-    "artefact"  # the mechanism whose displacements are along the axes of the coordinates, which turn with a table
-)
+# the mechanism whose displacements are along the axes of the coordinates, which turn with a table
+ARTEFACT = "artefact"
 # tiers: effects that every job file may count on, rarer ones, and faults of the artefact itself
 CONTRACT, FURTHER, OWN = "contract", "further", "own"
 # how readily an effect of a tier is thought of: a judgement of how many machines show it
@@ -74,24 +73,21 @@ class Effect(ABC):
     name: str  # as in ``[model] effects``
     title: Text  # in words, for certificates
     formula: str  # e with its sign, for documents; a and b are the axes in the name
-    mechanism: str = (
-        ""  # where the cause lies: scale, drive, guideway, frame, temperature, probe, controller, artefact, …
-    )
+    # where the cause lies: scale, drive, guideway, frame, temperature, probe, controller, artefact, …
+    mechanism: str = ""
     points_to: Text  # what a service technician should look at, to follow "What it points to:"; without a full stop
     coefficients: tuple[Parameter, ...]  # what enters e linearly, k of them
     shape: tuple[Shape, ...] = ()  # what shapes the basis, if anything
     columns: tuple[str, ...] = ()  # that the recording must have
     tier: str = CONTRACT  # or ``further``: how readily it is to be thought of
-    everywhere: bool = (
-        False  # whether every machine, or artefact, has it to some degree, so that a diagnosis takes all such
-    )
+    # whether every machine, or artefact, has it to some degree, so that a diagnosis takes all such
+    everywhere: bool = False
     idealised_over: str | None = None  # axis, or column, over which its form is the simplest of many of its mechanism
     imitated_by: tuple[Nonparametric, ...] = ()  # nonparametric terms that could pass for it
     stands_for: tuple[Nonparametric, ...] = ()  # nonparametric terms that are nothing else than it
     along_motion: str | None = None  # carriage along whose motion e goes, however that leans; ``None``: the coordinates
-    plane: str | None = (
-        None  # pair of axes whose squareness it is (``xy``, ``yz``, ``zx``); it then gives its :meth:`lean`
-    )
+    # pair of axes whose squareness it is (``xy``, ``yz``, ``zx``); it then gives its :meth:`lean`
+    plane: str | None = None
     of_artefact: bool = False  # whether it is a fault of the artefact itself, which only that artefact can say in full
     stated: bool = False  # whether its prior sd is of a bound that somebody states, and not what physics allows
     of_family: str | None = None  # family of errors whose size it shares, where that is not the one of its class

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from cmm_uq import __version__
-from cmm_uq.app.commands.certificates import affected as corrected
-from cmm_uq.app.commands.certificates.affected import AffectedCertificate, Correction, JobInputs, stated_version
+from cmm_uq.app.commands.certificates import again as corrected
+from cmm_uq.app.commands.certificates.again import AffectedCertificate, Correction, JobInputs, stated_version
 from cmm_uq.laboratory.records import open_records
 from tests.app.cli.laboratory import kept, older
 from tests.app.cli.process import run

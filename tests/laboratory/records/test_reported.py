@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from cmm_uq import __version__
-from cmm_uq.app.commands.certificates import affected as corrected
-from cmm_uq.app.commands.certificates.affected import Correction, JobInputs, affected_certificates, between, corrections
+from cmm_uq.app.commands.certificates import again as corrected
+from cmm_uq.app.commands.certificates.again import Correction, JobInputs, affected_certificates, between, corrections
 from cmm_uq.app.commands.certificates.release import release, withdraw
 from cmm_uq.app.commands.laboratory.records import import_reports, inputs_of, remove_retained, retention
 from cmm_uq.app.commands.report import write_report

@@ -10,7 +10,8 @@ from typing import Any
 
 from cmm_uq.analysis.parts.reported import measured_of
 from cmm_uq.analysis.parts.setup import plan_of
-from cmm_uq.app.commands.certificates import again, verification
+from cmm_uq.app.commands.certificates import verification
+from cmm_uq.app.commands.certificates.again import as_attached, compute_machine_again, recomputed
 from cmm_uq.app.commands.certificates.further import further_certificates, verify_further
 from cmm_uq.app.commands.files import Stage
 from cmm_uq.app.commands.parts.drift import FILE as HISTORY
@@ -88,7 +89,7 @@ def _check_machine(
     inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], file: str, *, rerun: bool, trust: Iterable[Path] | None
 ) -> None:
     """The certificate that states the machine, verified as it would be by itself, and whether it held on the day."""
-    said, computing = data["machine"], again.of_a_machine() if rerun else None
+    said, computing = data["machine"], compute_machine_again if rerun else None
     held = bool(said["signatures_held_to_trusted"])
     if job.facts.machine_state.job is not None:
         inquiry.looked("inputs")
@@ -143,8 +144,8 @@ def part_again(
         tuple(trust or ()) if held else None, None, history,
     )  # fmt: skip
     found, kept = evaluate_part(job, options, stage), list[str]()
-    files = contents_of(found, stage, finished=partial(again.as_attached, given, kept))
-    return again.recomputed(given, files, kept, tuple(found.files))
+    files = contents_of(found, stage, finished=partial(as_attached, given, kept))
+    return recomputed(given, files, kept, tuple(found.files))
 
 
 def to_rerun(said: Mapping[str, Any]) -> bool:

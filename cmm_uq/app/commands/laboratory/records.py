@@ -18,13 +18,13 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of as whole_file
 from cmm_uq.base.output import MANIFEST, finish_interrupted, read_manifest, sha256_of
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.source import RESULTS
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.facts import RecordedCertificate
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
 
-RESULTS = "results.json"
 COMMANDS = ("report", "diagnose")
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from cmm_uq import __version__
 from cmm_uq.analysis.machine.regions import with_readings
 from cmm_uq.analysis.machine.state import MachineState, machine_stated, with_bounds
-from cmm_uq.app.commands.certificates.again import of_a_machine
+from cmm_uq.app.commands.certificates.again import compute_machine_again
 from cmm_uq.app.commands.certificates.further import (
     further_certificates,
     given_recordings,
@@ -161,7 +161,9 @@ def state_machine(
     since = with_drift(state, serial, job.facts.job.date, records, _where(job), kept=history)
     state = since.state
     stage("The machine's errors, given the recording of its calibration", 0.15)
-    more = further_certificates(job, stated.job, verify_further(job, of_a_machine() if rerun else None, trust=trust))
+    more = further_certificates(
+        job, stated.job, verify_further(job, compute_machine_again if rerun else None, trust=trust)
+    )
     known = None if since.history is None else known_of(since.history)
     refuse_adjusted(more, known.adjusted if known else (), standing.date)
     state, path, given, further = given_recordings(state, stated.job, more, known.change if known else None, seed)
@@ -205,7 +207,7 @@ def verified(job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None 
     if given.of_part:
         raise CmmUqError("is of a part, and states no machine", where=where,
                          fix="Give the certificate of the machine that measured the part")  # fmt: skip
-    return verify_given(given, partial(examine_certificate, computing=of_a_machine()), rerun=rerun, trust=trust)
+    return verify_given(given, partial(examine_certificate, computing=compute_machine_again), rerun=rerun, trust=trust)
 
 
 def _certified(job: PartJob, found: Verification, *, rerun: bool) -> _Stated:

@@ -65,9 +65,8 @@ class ProbeLobing(Harmonic):
         return np.asarray(MICROMETRE * normals[:, :, None] * lobes[:, None, :], dtype=np.float64)
 
 
-_OFF_LINE = (
-    0.05  # of its length, by which points of a bar or a gauge may lie beside the line from its first to its farthest
-)
+# of its length, by which points of a bar or a gauge may lie beside the line from its first to its farthest
+_OFF_LINE = 0.05
 
 
 class ArtefactSag(Effect):
