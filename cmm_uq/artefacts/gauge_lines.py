@@ -292,7 +292,9 @@ class GaugeBlocks(StepGauge):
     title = say("Gauge blocks")
 
     def bidirectional(self, rows: Ints) -> NDArray[np.bool_]:
-        return np.ones(len(rows), dtype=bool)
+        """All, but those that were met from one side by the recording, as of a block that is wrung to a plate."""
+        sense = self.approach()
+        return np.ones(len(rows), dtype=bool) if sense is None else sense[rows[:, 0]] * sense[rows[:, 1]] <= 0
 
 
 def _ends(reference: Floats, lines: Placings) -> Floats:

@@ -10,7 +10,7 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.gauge_lines import GaugeBlocks, StepGauge
 from cmm_uq.artefacts.gauge_lines_page import lines_of, periodic_part
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.points import Points
+from cmm_uq.base.points import Machine, Points
 from cmm_uq.certificate.document import Paragraph, Plot
 from tests.artefacts.constructions import GAUGE_FACES, SEVEN_LINES, estimated, free, indicated, step_gauge
 from tests.artefacts.simulated import SCALE, SQUARE, analysed, blocks, recovered, table
@@ -163,6 +163,17 @@ def test_gauge_blocks_are_a_gauge_of_two_faces() -> None:
     assert found is not None
     assert len(found.errors) == 7
     assert blocks.sizes[0].title == "Length of the gauge blocks"
+
+
+@pytest.mark.parametrize(("second", "both"), [(-1.0, True), (1.0, False), (0.0, True)])
+def test_a_block_that_the_recording_met_from_one_side_is_not_bidirectional(second: float, both: bool) -> None:
+    """Blocks are, without approach columns too; one that is wrung to a plate is met from one side."""
+    xyz, one, zero = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]), np.ones(2, dtype=np.int64), np.zeros(2)
+    columns = {"reference_mm": xyz[:, 0], "approach_x": np.array([1.0, second]), "approach_y": zero, "approach_z": zero}
+    for named, expected in ((columns, both), ({"reference_mm": xyz[:, 0]}, True)):
+        points = Points(xyz, one, np.array([1, 2]), one, Machine(), named)
+        found = GaugeBlocks(artefact_facts(kind="gauge_blocks", u_um=0.2), points)
+        assert found.bidirectional(np.array([[0, 1]])).tolist() == [expected]
 
 
 @pytest.mark.parametrize(

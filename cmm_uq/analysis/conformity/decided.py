@@ -38,8 +38,16 @@ def at_offset(offset_mm: float) -> Chosen:
     return lambda artefact, found: with_offset(artefact.points, found.rows, offset_mm)
 
 
-def on_lines(positions: Collection[Text]) -> Chosen:
-    return lambda artefact, found: np.array([line in positions for line in lines(artefact, found)], dtype=bool)
+def on_lines(these: Collection[Text]) -> Chosen:
+    """Lengths in these positions, or in their directions elsewhere, which no test needs and none may leave out."""
+    positions = set(these)
+
+    def chosen(artefact: Artefact, found: Indications) -> NDArray[np.bool_]:
+        _, along = artefact.lines_of(found.rows)
+        named = zip(lines(artefact, found), map(plans.position_of, along), strict=True)
+        return np.array([not positions.isdisjoint(each) for each in named], dtype=bool)
+
+    return chosen
 
 
 def short(longest_mm: float) -> Chosen:

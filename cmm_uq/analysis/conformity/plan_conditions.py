@@ -28,6 +28,7 @@ def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, 
     places: _Places = defaultdict(list)
     for one in _lines(plan, artefact, copies):
         places[one.position].append(one)
+    often = {line: _as_often(plan, found) for line, found in places.items()}
     absent, wanted = tuple(line for line in plan.positions if line not in places), plan.lengths
     asked, counts = commas(plan.positions), {line: len(found) for line, found in places.items()}
     if set(plan.positions) == {*plans.SPACE_DIAGONALS, *plans.PARALLELS}:
@@ -40,9 +41,9 @@ def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, 
     span = say("{low:.0f} to {high:.0f}", low=min(every), high=max(every)) if every else say("none")
     return (
         Condition(say("{asked}; missing: {absent}", asked=asked, absent=commas(absent)) if absent else asked, absent),
-        _long_enough(plan, artefact.points.machine, places),
+        _long_enough(plan, artefact.points.machine, often),
         Condition(say("{lengths} lengths on each line: {span}", lengths=wanted, span=span), missing),
-        _spread(plan, places), _shortest(plan, places), _repeated(plan, places), *_both_sides(plan, places),
+        _spread(plan, often), _shortest(plan, often), _repeated(plan, places), *_both_sides(plan, often),
         *_offset(plan, artefact),
     )  # fmt: skip
 
@@ -117,6 +118,8 @@ def _lines(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> I
             at = np.flatnonzero(original & (positions == position) & (of == length))
             if not len(at):
                 continue
+            if plan.bidirectional and both is not None and both[at].any():
+                at = at[both[at]]
             travel = [(i, plans.crossed_travel(points.machine, *lines[i])) for i in at]
             shares = [float(found.lengths[i] / t) if t else 0.0 for i, t in travel if t is not None]
             yield _Measured(position, float(found.lengths[at].mean()), max(shares, default=None),
@@ -132,6 +135,12 @@ def nominals(lengths: Floats) -> Ints:
 
 
 _Places = dict[Text, list[_Measured]]
+
+
+def _as_often(plan: LengthPlan, found: list[_Measured]) -> list[_Measured]:
+    """Those that are repeated as often as the plan asks, or as so many of them as it asks for are."""
+    counts = sorted((one.repeats for one in found), reverse=True)[: plan.lengths]
+    return [one for one in found if one.repeats >= min(plan.repeats, counts[-1])]
 
 
 def _long_enough(plan: LengthPlan, machine: Machine, places: _Places) -> Condition:

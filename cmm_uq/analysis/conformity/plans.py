@@ -14,8 +14,8 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Machine
 
 ALIGNED = np.sin(np.radians(10.0))  # a direction cosine below this does not count: as good as square to that axis
-# Part of every axis' travel that a line, produced to the ends of travel, crosses on a space diagonal; this project's figure,
-# which leaves room for the fixture.
+# Part of the travel of each axis that a position is named by, which a line, produced to the ends of travel, crosses; this
+# project's figure, which leaves room for the fixture.
 CORNER_TO_CORNER = 0.75
 _ROUNDING = 1e-6  # mm; a line as near as this to the end of an axis' travel lies in it
 PARALLELS = tuple(say("parallel to {axis}", axis=Verbatim(a.upper())) for a in AXES)
@@ -59,9 +59,12 @@ def _line(machine: Machine, middle: Floats, direction: Floats) -> tuple[Numbers,
 def _position_on(ends: Numbers, place: Numbers, direction: Numbers) -> Text:
     travel, along = np.reshape(ends, (-1, 2)), np.array(direction)
     crossed, u = _crossed(ends, place, direction), along / np.linalg.norm(along)
-    if crossed is not None and np.all(crossed * np.abs(u) >= CORNER_TO_CORNER * np.ptp(travel, axis=1)):
+    if crossed is None:
+        return position_of(u)
+    counts, reached = np.abs(u) > ALIGNED, crossed * np.abs(u) >= CORNER_TO_CORNER * np.ptp(travel, axis=1)
+    if np.all(reached):
         return say("space diagonal {axes}", axes=_signed(u, np.ones(3, dtype=bool)))
-    if crossed is not None and np.all(counts := np.abs(u) > ALIGNED):
+    if np.all(counts) or (crossed and not np.all(reached[counts])):
         return say("oblique {axes}", axes=_signed(u, counts))
     return position_of(u)
 

@@ -107,15 +107,15 @@ _ISO_10360_2 = (
     Clause("positions_offset", say("positions with the offset tip"), "Both face diagonals of Y–Z, or of X–Z, with the "
            "stylus tip 150 mm to the side.", REPORTED, of=("E150",)),
     Clause("space_diagonal", say("what a space diagonal is"), "Produced to the ends of travel it crosses 75 % of the "
-           "travel of every axis; parallel to an axis is within 10°.", CHOSEN, of=("E0", "R0")),
+           "travel of every axis; a face diagonal, or a line within 10° of an axis, of the axes that it is named by.", CHOSEN),
     Clause("longest", say("longest length"), "At least 66 % of the travel along a line through it.", "Harris 2004, of the "
            "edition of 2000, there of the diagonal; that 66 % of the longest body diagonal are asked for: publisher's "
            "words on VDI/VDE 2617-2.3"),
     Clause("shortest", say("shortest length"), "At most 30 mm in every position.", "Harris 2004, of the edition of 2000; "
            "whether the edition of 2009 asks for it is not known"),
     Clause("lengths_and_repeats", say("lengths and repeats"), "Five lengths, more than 1 mm apart, in each position, "
-           "each three times.", "five, three and seven positions: Harris 2004 and summaries of manufacturers; 1 mm: this "
-           "project"),
+           "each three times, the shortest and the longest among them.", "five, three and seven positions: Harris 2004 and "
+           "summaries of manufacturers; 1 mm: this project"),
     Clause("bidirectional", say("bidirectional lengths"), "Ends approached in opposite senses; distances of balls with a "
            "short gauge beside them.", REPORTED),
     Clause("expansion", say("normal expansion"), "8 to 13 × 10⁻⁶ /K.", REPORTED, of=_LENGTHS),
@@ -162,10 +162,11 @@ _B89 = (
     ITS_RULE,
 )  # fmt: skip
 _VDI = (
-    Clause("positions", say("positions"), "U1: the axes; U2: all six face diagonals; U3: all four space diagonals.",
+    Clause("positions", say("positions"), "U1: the axes; U2: all six face diagonals; U3: all four space diagonals; "
+           "each crosses 75 % of the travel of its axes.",
            "Harris 2004, 2.6.2, and the guideline's abstract; that all are asked for: this project"),
-    Clause("lengths_and_repeats", say("lengths and repeats"), "Five lengths, three repeats, the longest 66 % of the "
-           "travel, the shortest at most 30 mm, as of ISO 10360-2.", CHOSEN),
+    Clause("lengths_and_repeats", say("lengths and repeats"), "Five lengths, three repeats of each, the longest 66 % "
+           "of the travel, the shortest at most 30 mm, as of ISO 10360-2.", CHOSEN),
     Clause("share_outside", say("share of values outside"), "None may lie outside, and none is measured again.", CHOSEN),
     _UNCERTAINTY,
     ITS_RULE,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from cmm_uq.analysis.conformity.plan_conditions import lengths_measured, nominals
 from cmm_uq.analysis.conformity.plans import LengthPlan
+from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.points import Machine
@@ -110,6 +112,33 @@ def test_as_many_lengths_as_the_plan_asks_for_are_to_be_repeated_and_no_more() -
     assert missing == []
     _, missing = said(along(*x, (Y, [25.0, 400.0]), (Y, [25.0])))
     assert missing == ["2 repetitions of each length (parallel to Y: 1)", "1 of 8 lengths"]
+
+
+@pytest.mark.parametrize(
+    ("once", "missing"),
+    [
+        (25.0, "length of at most 30 mm (parallel to Y: 100 mm)"),
+        (400.0, "length of at least 66 % of the travel (parallel to Y: 55 %)"),
+    ],
+)
+def test_the_ends_of_the_range_are_among_the_lengths_that_are_repeated(once: float, missing: str) -> None:
+    """Two lengths are repeated, and one end of the range is measured once beside them."""
+    x, often = [(X, [25.0, 720.0])] * 2, [length for length in (25.0, 100.0, 300.0, 400.0) if length != once]
+    _, lacks = said(along(*x, *[(Y, often)] * 2, (Y, [once])))
+    assert lacks == [missing]
+
+
+@pytest.mark.parametrize(("forth", "missing"), [((), []), ((1, 2), []), ((1, 2, 3), ["parallel to X: 1"])])
+def test_only_bidirectional_lengths_count_as_repeats_of_bidirectional_ones(
+    forth: tuple[int, ...], missing: list[str]
+) -> None:
+    """Measurements ``forth`` meet all faces of one line from one side."""
+    both, plan = along(*[(X, [25.0, 720.0])] * 4), replace(PLAN, bidirectional=True)
+    one_sided = np.isin(both.points.measurement, forth)
+    along_x = np.where(one_sided, 1.0, both.points.columns["approach_x"])
+    points = replace(both.points, columns={**both.points.columns, "approach_x": along_x})
+    _, lacks = said(StepGauge(artefact_facts(kind="step_gauge", u_um="L/2000"), points), plan)
+    assert [text for text in lacks if "repetitions" in text] == [f"2 repetitions of each length ({m})" for m in missing]
 
 
 def test_lengths_up_to_a_millimetre_apart_are_one_nominal_length() -> None:

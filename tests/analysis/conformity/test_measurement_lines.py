@@ -17,7 +17,7 @@ LONG = Machine("long", "XYZ", np.array([[0.0, 6000.0], [0.0, 1000.0], [-600.0, 0
     ("direction", "position"),
     [
         ((1, 0, 0), "parallel to X"), ((0, -1, 0.1), "parallel to Y"), ((0, 1, 1), "face diagonal +Y +Z"),
-        ((1, -1, 0), "face diagonal −X +Y"), ((-1, -1, -1), "space diagonal +X +Y +Z"),
+        ((9, -5.5, 0), "face diagonal −X +Y"), ((-1, -1, -1), "space diagonal +X +Y +Z"),
         ((9, -5.5, 5), "space diagonal +X −Y +Z"),
     ],
 )  # fmt: skip
@@ -80,6 +80,24 @@ def test_a_space_diagonal_crosses_three_quarters_of_every_axis(moved: float, pos
     """Moved along X by a part of its travel, the diagonal crosses the rest."""
     middle = TRAVEL.mean(axis=1) + np.array([900 * moved, 0, 0])
     assert position_on(MACHINE, middle, np.array([900.0, 550, 500])) == f"{position} +X +Y +Z"
+
+
+@pytest.mark.parametrize(
+    ("middle", "direction", "position"),
+    [
+        ((450.0, 275, -250), (9.0, 5.5, 0), "face diagonal +X +Y"),
+        ((450.0, 275, -250), (1.0, 0.2, 0), "oblique +X +Y"),  # 11°: all of X, a third of Y
+        ((850.0, 30, -250), (9.0, 5.5, 0), "oblique +X +Y"),  # across a corner
+        ((450.0, 275, -250), (1.0, 0.17, 0), "parallel to X"),
+        ((750.0, 25, -250), (1.0, 0.17, 0), "oblique +X"),  # 9.6°, out of the travel of Y after 294 of 900 mm of X
+    ],
+)
+def test_other_positions_cross_three_quarters_of_the_axes_that_they_are_named_by(
+    middle: tuple[float, ...], direction: tuple[float, ...], position: str
+) -> None:
+    travel = np.array([[0.0, 900.0], [0.0, 550.0], [-500.0, 0.0]])
+    assert position_on(Machine("m", "XYZ", travel), np.array(middle), np.array(direction)) == position
+    assert position_on(Machine(), np.array(middle), np.array(direction)) == position_of(np.array(direction))
 
 
 @pytest.mark.parametrize("unknown", [0, 1, 2])
