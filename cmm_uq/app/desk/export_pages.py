@@ -13,18 +13,6 @@ from typing import Any, Literal
 from cmm_uq.app.desk.place import Draft
 from cmm_uq.app.serve import page as p
 from cmm_uq.app.serve.exchange import DESK
-from cmm_uq.app.serve.page import (
-    Block,
-    Cell,
-    FormEntry,
-    GridColumn,
-    PageForm,
-    PageNotice,
-    PageParagraph,
-    WebPage,
-    address,
-    section,
-)
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 
 _FRAME = (
@@ -64,6 +52,7 @@ DRAWINGS: dict[str, str] = {
     "circular_test": _CIRCLE + _line((60, 52), (86, 46)) + _balls((60, 52), r=4),
     "multilateration": '<path class="beam" d="M18 60 66 30M102 58 66 30M60 74 66 30M24 24 66 30"/>'
     + _balls((66, 30), r=5),
+    "tracked_points": '<path class="beam" d="M18 66 88 26"/>' + _balls((18, 66), (88, 26), (60, 24), r=5),
     "scanned_planes": '<path class="wash" d="M28 60 60 70 60 48 28 38ZM60 70 94 58 94 36 60 48Z"/>'
     '<path class="beam" d="M60 12 46 52M60 12 78 54"/>',
 }
@@ -74,7 +63,7 @@ def drawing(kind: str) -> str:
     return f'<svg viewBox="0 0 120 84" aria-hidden="true">{_FRAME}{DRAWINGS.get(kind, "")}</svg>'
 
 
-DESK_CELL = Cell(say("Desk"), DESK)
+DESK_CELL = p.Cell(say("Desk"), DESK)
 READ, ARTEFACT, FIELDS = f"{DESK}/read", f"{DESK}/artefact", f"{DESK}/fields"
 MEANINGS: Mapping[str, Text] = {
     "": say("not used"),
@@ -127,9 +116,9 @@ _OF_ITEM = (
 def steps(done: int, draft: str = "") -> p.Links:
     """Where on the way to a certificate a page stands, with links to what is done already."""
     names = (say("1 Export"), say("2 Artefact"), say("3 Facts"), say("4 Certificate"))
-    places = (address(READ, draft=draft), address(ARTEFACT, draft=draft), "", "")
+    places = (p.address(READ, draft=draft), p.address(ARTEFACT, draft=draft), "", "")
     links = (place if draft and i < done else "" for i, place in enumerate(places))
-    return p.Links(tuple(map(Cell, names, links)))
+    return p.Links(tuple(map(p.Cell, names, links)))
 
 
 def here(fix: str) -> Text:
@@ -137,37 +126,37 @@ def here(fix: str) -> Text:
     return next((text for pattern, text in _HERE.items() if re.search(pattern, fix)), Verbatim(fix))
 
 
-def read_page(draft: Draft, found: Mapping[str, Any], plans: Sequence[str] = ()) -> WebPage:
+def read_page(draft: Draft, found: Mapping[str, Any], plans: Sequence[str] = ()) -> p.WebPage:
     """The reading of an export, whole, and the form that corrects it; ``plans``: files that may say where lines lie."""
     problem, lines = found["problem"], found["lines"]
-    first = (Cell(say("First: {example}", example=Verbatim(found["example"]))),)
+    first = (p.Cell(say("First: {example}", example=Verbatim(found["example"]))),)
     if problem is None:
-        head = PageNotice(say("Read whole"), "good", first)
+        head = p.PageNotice(say("Read whole"), "good", first)
     elif lines:
         asked = say(
             "Only where the lines lie is open: what a machine does depends on it, and no table of lengths says it"
         )
-        head = PageNotice(asked, "open", first)
+        head = p.PageNotice(asked, "open", first)
     else:
         where, what, fix = problem
-        told = (*p.lines_of({where} - {"", draft.name}), *((Cell(here(fix)),) if fix else ()))
-        head = PageNotice(Verbatim(what), "bad", told)
+        told = (*p.lines_of({where} - {"", draft.name}), *((p.Cell(here(fix)),) if fix else ()))
+        head = p.PageNotice(Verbatim(what), "bad", told)
     planned = (("", say("none")), *((one, Verbatim(one)) for one in plans))
     hint = say("A plan.csv in this folder: line 7 lies as its measurement 7")
-    by_plan = FormEntry("plan", say("Where they were planned"), "", "select", planned, hint=hint)
+    by_plan = p.FormEntry("plan", say("Where they were planned"), "", "select", planned, hint=hint)
     lying = (*((by_plan,) if plans and lines and problem else ()), *_lines(draft, lines))
     fields, buttons = (*lying, *_settings(draft, found)), _buttons(problem, {*draft.keys} - {"lines"})
     grid = _grid(found) if found["columns"] else None
-    form = PageForm(READ, fields, buttons, (("draft", draft.id), ("seen", draft.seen)), grid)
-    facts = tuple((Verbatim(label), Cell(Verbatim(text))) for label, text in found["facts"])
-    delete = PageForm(f"{DESK}/delete", (), (("delete", say("Delete this export")),), (("draft", draft.id),))
+    form = p.PageForm(READ, fields, buttons, (("draft", draft.id), ("seen", draft.seen)), grid)
+    facts = tuple((Verbatim(label), p.Cell(Verbatim(text))) for label, text in found["facts"])
+    delete = p.PageForm(f"{DESK}/delete", (), (("delete", say("Delete this export")),), (("draft", draft.id),))
     sections = (
-        *section(say("What was recognised"), *((p.PageFacts(facts),) if facts else ())),
-        *section(say("The same by a command"), p.SourceText(say("Command"), found["command"])),
-        *section(say("Not wanted"), delete),
+        *p.section(say("What was recognised"), *((p.PageFacts(facts),) if facts else ())),
+        *p.section(say("The same by a command"), p.SourceText(say("Command"), found["command"])),
+        *p.section(say("Not wanted"), delete),
     )
     blocks = (steps(1, draft.id), head, form)
-    return WebPage(say("How it was read"), DESK, Verbatim(draft.name), blocks, sections, (DESK_CELL,))
+    return p.WebPage(say("How it was read"), DESK, Verbatim(draft.name), blocks, sections, (DESK_CELL,))
 
 
 def _buttons(problem: Any, said: set[str]) -> tuple[tuple[str, Text], ...]:
@@ -188,36 +177,36 @@ def _grid(found: Mapping[str, Any]) -> p.CellGrid:
         if meaning == "unknown":
             options[""] = say("not understood")
         label = say("What {heading} is", heading=Verbatim(heading or "—"))
-        field = FormEntry(f"c{i}", label, value, "select", tuple(options.items()))
-        columns.append(GridColumn(Verbatim(heading), COLOURED.get(meaning, "other"), field))
+        field = p.FormEntry(f"c{i}", label, value, "select", tuple(options.items()))
+        columns.append(p.GridColumn(Verbatim(heading), COLOURED.get(meaning, "other"), field))
     more = say("{count} rows more", count=number(found["more"], ",d")) if found["more"] > 0 else say("All rows")
     rows = tuple((line, tuple(cells), head) for line, cells, head in found["rows"])
     return p.CellGrid(more, tuple(columns), rows)
 
 
-def _settings(draft: Draft, found: Mapping[str, Any]) -> tuple[FormEntry, ...]:
+def _settings(draft: Draft, found: Mapping[str, Any]) -> tuple[p.FormEntry, ...]:
     recognised = ("", say("as recognised"))
     units = tuple((one, Verbatim(one)) for one in _UNITS)
     signs = ((".", say("point: 120.0012")), (",", say("comma: 120,0012")))
     said = draft.keys
     fields = [
-        FormEntry("unit", say("Unit of lengths"), str(said.get("unit", "")), "select", (recognised, *units)),
-        FormEntry("decimal", say("Decimal sign"), str(said.get("decimal", "")), "select", (recognised, *signs)),
+        p.FormEntry("unit", say("Unit of lengths"), str(said.get("unit", "")), "select", (recognised, *units)),
+        p.FormEntry("decimal", say("Decimal sign"), str(said.get("decimal", "")), "select", (recognised, *signs)),
     ]
     if len(found["sheets"]) > 1 or said.get("sheet"):
         sheets = tuple((one, Verbatim(one)) for one in found["sheets"])
-        fields.append(FormEntry("sheet", say("Sheet"), str(said.get("sheet", "")), "select", (recognised, *sheets)))
+        fields.append(p.FormEntry("sheet", say("Sheet"), str(said.get("sheet", "")), "select", (recognised, *sheets)))
     rows = str(said.get("points_per_measurement", ""))
     if rows or (found["problem"] and "points_per_measurement" in found["problem"][2]):
         hint = say("A number, or all")
-        fields.append(FormEntry("points_per_measurement", say("Rows of one measurement"), rows, hint=hint))
+        fields.append(p.FormEntry("points_per_measurement", say("Rows of one measurement"), rows, hint=hint))
     return tuple(fields)
 
 
-def _lines(draft: Draft, names: Any) -> tuple[FormEntry, ...]:
+def _lines(draft: Draft, names: Any) -> tuple[p.FormEntry, ...]:
     places, hint = draft.keys.get("lines", {}), say("Direction and start in mm, or: from 0,0,0 to 300,400,0")
     return tuple(
-        FormEntry(
+        p.FormEntry(
             f"line:{name}",
             say("Where line {name} lies", name=Verbatim(name)),
             places.get(name, ""),
@@ -237,18 +226,18 @@ def said_in(form: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
     return chosen, others | {"lines": lines}
 
 
-def artefact_page(draft: Draft, kinds: list[list[str]]) -> WebPage:
+def artefact_page(draft: Draft, kinds: list[list[str]]) -> p.WebPage:
     """What was measured, to be chosen by a picture."""
     choices = tuple(
-        (address(FIELDS, draft=draft.id, kind=name), Verbatim(title), drawing(name)) for name, title in kinds
+        (p.address(FIELDS, draft=draft.id, kind=name), Verbatim(title), drawing(name)) for name, title in kinds
     )
     blocks = (steps(2, draft.id), p.Choices(say("Kinds of measurement"), choices))
     lead = say("Choose the artefact, or the kind of measurement.")
-    return WebPage(say("What was measured"), DESK, lead, blocks, above=_above(draft))
+    return p.WebPage(say("What was measured"), DESK, lead, blocks, above=_above(draft))
 
 
-def _above(draft: Draft) -> tuple[Cell, ...]:
-    return DESK_CELL, Cell(Verbatim(draft.name), address(READ, draft=draft.id))
+def _above(draft: Draft) -> tuple[p.Cell, ...]:
+    return DESK_CELL, p.Cell(Verbatim(draft.name), p.address(READ, draft=draft.id))
 
 
 def facts_form(
@@ -257,65 +246,65 @@ def facts_form(
     filled: Mapping[str, str],
     buttons: tuple[tuple[str, Text], ...],
     hidden: tuple[tuple[str, str], ...],
-    first: tuple[FormEntry, ...] = (),
+    first: tuple[p.FormEntry, ...] = (),
     last: Mapping[str, str] = {},
-) -> PageForm:
+) -> p.PageForm:
     """The dozen fields, and folded away those that only a whole certificate needs; ``last``: offered, and not filled in."""
-    entries, further = list(first), list[FormEntry]()
+    entries, further = list(first), list[p.FormEntry]()
     for one in fields:
         sort: Literal["date", "text"] = "date" if one["sort"] == "date" else "text"
         value, again = filled.get(one["key"], ""), last.get(one["key"], "")
         hint = say("The last time: {value}", value=Verbatim(again)) if again and not value else NOTHING
-        entry = FormEntry(
+        entry = p.FormEntry(
             one["key"], Verbatim(one["label"]), value, sort, hint=hint, example=one["example"], again=again
         )
         (further if one["further"] else entries).append(entry)
     legend = say("What ISO/IEC 17025 asks for besides: without it the certificate is a draft")
-    return PageForm(path, tuple(entries), buttons, hidden, None, f"{DESK}/check", legend, tuple(further))
+    return p.PageForm(path, tuple(entries), buttons, hidden, None, f"{DESK}/check", legend, tuple(further))
 
 
 def fields_page(
     draft: Draft, kind: str, fields: list[dict[str, str]], last: Mapping[str, str], found: Mapping[str, Any] | None
-) -> WebPage:
+) -> p.WebPage:
     """The dozen things that a job states, with what was filled in last; ``found``: what a check of them says."""
     again = {key: value for key, value in last.items() if key.startswith(_OF_ITEM)}
     filled = draft.values if draft.values else {key: value for key, value in last.items() if key not in again}
     folder = draft.values.get("folder", "")
     named, hint = say("Name of the job, and of its folder"), say("Its certificate has this name too")
-    name = FormEntry("folder", named, folder, hint=hint, example="K-2026-115")
+    name = p.FormEntry("folder", named, folder, hint=hint, example="K-2026-115")
     buttons = (("create", say("Make the job")), ("check", say("Check")))
     form = facts_form(
         FIELDS, fields, filled, buttons, (("draft", draft.id), ("kind", kind), ("seen", draft.seen)), (name,), again
     )
-    blocks: list[Block] = [steps(3, draft.id)]
+    blocks: list[p.Block] = [steps(3, draft.id)]
     if last and not draft.values:
         told = say(
             "Filled in as last time: look at each. What is of one machine, artefact or customer is offered, and not filled in."
         )
-        blocks.append(PageParagraph(told, "note"))
+        blocks.append(p.PageParagraph(told, "note"))
     blocks += [*(check_blocks(found) if found else ()), form]
-    above = (*_above(draft), Cell(say("Artefact"), address(ARTEFACT, draft=draft.id)))
+    above = (*_above(draft), p.Cell(say("Artefact"), p.address(ARTEFACT, draft=draft.id)))
     lead = say("What is left empty is not stated. In grey stands an example.")
-    return WebPage(say("What the job states"), DESK, lead, tuple(blocks), above=above)
+    return p.WebPage(say("What the job states"), DESK, lead, tuple(blocks), above=above)
 
 
-def check_blocks(found: Mapping[str, Any]) -> tuple[Block, ...]:
+def check_blocks(found: Mapping[str, Any]) -> tuple[p.Block, ...]:
     """What ``cmm-uq check`` says."""
-    problems, warnings = (tuple(Cell(Verbatim(one)) for one in found[name]) for name in ("problems", "warnings"))
+    problems, warnings = (tuple(p.Cell(Verbatim(one)) for one in found[name]) for name in ("problems", "warnings"))
     if problems:
-        return (PageNotice(say("This would stop a certificate"), "bad", problems),)
+        return (p.PageNotice(say("This would stop a certificate"), "bad", problems),)
     if warnings:
-        return (PageNotice(say("Nothing would stop a certificate; to be known"), "open", warnings),)
-    return (PageNotice(say("Sound: nothing would stop a certificate"), "good"),)
+        return (p.PageNotice(say("Nothing would stop a certificate; to be known"), "open", warnings),)
+    return (p.PageNotice(say("Sound: nothing would stop a certificate"), "good"),)
 
 
-def difference(theirs: bytes, mine: bytes) -> tuple[Block, ...]:
+def difference(theirs: bytes, mine: bytes) -> tuple[p.Block, ...]:
     """What another tab, editor or command changed, against what was to be written."""
     before, after = (content.decode("utf-8", "replace").splitlines() for content in (theirs, mine))
     lines = list(unified_diff(before, after, "as it is now", "as it was to be", lineterm=""))[:400]
-    head = PageNotice(say("Not written: it was changed meanwhile, by another tab, an editor or a command"), "bad")
+    head = p.PageNotice(say("Not written: it was changed meanwhile, by another tab, an editor or a command"), "bad")
     return (
-        (head, p.SourceText(say("Difference"), "\n".join(lines) or "(none)"), PageParagraph(NOTHING))
+        (head, p.SourceText(say("Difference"), "\n".join(lines) or "(none)"), p.PageParagraph(NOTHING))
         if lines
         else (head,)
     )

@@ -31,7 +31,6 @@ from cmm_uq.app.desk.place import (
 from cmm_uq.app.desk.workers import Worker
 from cmm_uq.app.serve import page as p
 from cmm_uq.app.serve.exchange import DESK, WebRequest, WebResponse, read_form
-from cmm_uq.app.serve.page import Block, Cell, FormEntry, PageForm, PageNotice, PageParagraph, WebPage, address
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, content_of, text_of
 from cmm_uq.base.messages import Text, Verbatim, number, say
@@ -40,35 +39,35 @@ _RECORDING = re.compile(r"^\[recording\][^\n]*\n", re.MULTILINE)
 _FILE = re.compile(r"^file = [^\n]*\n", re.MULTILINE)
 
 
-def part_page(draft: Draft | None, machines: Iterable[JobState]) -> WebPage:
+def part_page(draft: Draft | None, machines: Iterable[JobState]) -> p.WebPage:
     """A plan to be dropped, then the certificate of the machine to be chosen."""
     certificates = tuple(
         (one.file(".pdf"), say("{id}: {machine}", id=Verbatim(one.id), machine=p.shown(one.machine)))
         for one in machines
         if one.file(".pdf") and not one.part
     )
-    blocks: tuple[Block, ...]
+    blocks: tuple[p.Block, ...]
     if draft is None:
         hint = say("QIF 3.0 with features and tolerances, a DMIS program, or a table of features.")
         blocks = (p.Drop(PLAN, say("Drop the plan of the part here, or choose it"), hint, say("Read it")),)
     elif not certificates:
-        blocks = (PageNotice(say("No certificate of a machine lies in this folder yet: make one first"), "open"),)
+        blocks = (p.PageNotice(say("No certificate of a machine lies in this folder yet: make one first"), "open"),)
     else:
         no_yes: tuple[tuple[str, Text], ...] = (
             ("", say("is refused by its name")),
             ("yes", say("is left out, and named")),
         )
         fields = (
-            FormEntry("folder", say("Name of the job, and of its folder"), example="bracket-7"),
-            FormEntry("certificate", say("Certificate of the machine"), "", "select", certificates),
-            FormEntry("date", say("Date of the measurement"), "", "date"),
-            FormEntry("not_measured", say("What of the plan is not understood"), "", "select", no_yes),
+            p.FormEntry("folder", say("Name of the job, and of its folder"), example="bracket-7"),
+            p.FormEntry("certificate", say("Certificate of the machine"), "", "select", certificates),
+            p.FormEntry("date", say("Date of the measurement"), "", "date"),
+            p.FormEntry("not_measured", say("What of the plan is not understood"), "", "select", no_yes),
         )
         given = (("draft", draft.id),)
-        delete = PageForm(DELETE, (), (("delete", say("Delete this plan")),), given)
-        blocks = (PageForm(PART, fields, (("create", say("Make the job")),), given), delete)
+        delete = p.PageForm(DELETE, (), (("delete", say("Delete this plan")),), given)
+        blocks = (p.PageForm(PART, fields, (("create", say("Make the job")),), given), delete)
     lead = say("Features and tolerances from its plan, errors from the certificate of the machine.")
-    return WebPage(say("A part"), DESK, lead, blocks, above=(Cell(say("Desk"), DESK),))
+    return p.WebPage(say("A part"), DESK, lead, blocks, above=(p.Cell(say("Desk"), DESK),))
 
 
 def with_points(text: str, name: str) -> str:
@@ -88,13 +87,13 @@ _HINT = say(
 )
 
 
-def verify_page(name: str = "", found: Mapping[str, Any] | None = None) -> WebPage:
+def verify_page(name: str = "", found: Mapping[str, Any] | None = None) -> p.WebPage:
     """The form, below what was found of the file that was dropped."""
     form = p.Drop(VERIFY, say("Drop a certificate here, or choose one"), _HINT, say("Verify it"))
-    above = (Cell(say("Desk"), DESK),)
+    above = (p.Cell(say("Desk"), DESK),)
     lead = say("Who says what, what it rests on, and whether it holds.")
     if found is None:
-        return WebPage(say("Verify a certificate"), DESK, lead, (form,), above=above)
+        return p.WebPage(say("Verify a certificate"), DESK, lead, (form,), above=above)
     word: Text = say("Something in it is wrong: do not rely on it")
     if found["word"] == "VERIFIED":
         word = say("Its files, figures and decisions agree with each other and with its inputs")
@@ -103,28 +102,28 @@ def verify_page(name: str = "", found: Mapping[str, Any] | None = None) -> WebPa
     standing: Literal["good", "open", "bad"] = (
         "bad" if found["findings"] else "good" if found["word"] == "VERIFIED" else "open"
     )
-    head = PageNotice(Verbatim(found["said"]), standing, (Cell(word), Cell(Verbatim(found["signed"]))))
+    head = p.PageNotice(Verbatim(found["said"]), standing, (p.Cell(word), p.Cell(Verbatim(found["signed"]))))
     rows = tuple(
         (
-            Cell(say("wrong") if wrong else say("right"), standing="bad" if wrong else "good"),
-            Cell(Verbatim(what)),
-            Cell(number(count, ",d")),
+            p.Cell(say("wrong") if wrong else say("right"), standing="bad" if wrong else "good"),
+            p.Cell(Verbatim(what)),
+            p.Cell(number(count, ",d")),
         )
         for wrong, what, count in found["checks"]
     )
     headings = p.columns(say("Is"), say("What"), (say("Things"), "number"))
     table = p.PageTable(say("Comparisons"), headings, rows, heard=True)
-    wrong: tuple[Block, ...] = tuple(PageParagraph(Verbatim(one)) for one in found["findings"])
-    left: tuple[Block, ...] = tuple(PageParagraph(Verbatim(one), "note") for one in found["unchecked"])
+    wrong: tuple[p.Block, ...] = tuple(p.PageParagraph(Verbatim(one)) for one in found["findings"])
+    left: tuple[p.Block, ...] = tuple(p.PageParagraph(Verbatim(one), "note") for one in found["unchecked"])
     again = p.SourceText(say("Command"), f"cmm-uq verify {name}")
-    records = p.Links((Cell(say("Is it in the records of this folder?"), "/file"),))
+    records = p.Links((p.Cell(say("Is it in the records of this folder?"), "/file"),))
     sections = [(say("What is wrong"), wrong)] if wrong else []
     sections += [
         (say("What was compared"), (table,)),
         (say("What was not"), (*left, again, records)),
         (say("Another file"), (form,)),
     ]
-    return WebPage(say("Verify a certificate"), DESK, Verbatim(name), (head,), tuple(sections), above)
+    return p.WebPage(say("Verify a certificate"), DESK, Verbatim(name), (head,), tuple(sections), above)
 
 
 VERIFY_S = 180.0  # s that reading and comparing a certificate may take
@@ -132,7 +131,7 @@ VERIFY_S = 180.0  # s that reading and comparing a certificate may take
 
 def to(path: str, **query: str) -> WebResponse:
     """After a form: a page to be got, so that reload sends nothing again."""
-    return WebResponse(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": address(path, **query)})
+    return WebResponse(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": p.address(path, **query)})
 
 
 class DeskFolder:
@@ -148,7 +147,7 @@ class DeskFolder:
         below(self.root, f"{name}/job.toml")
         return folder.relative_to(self.root).as_posix()
 
-    def facts(self, request: WebRequest) -> WebPage:
+    def facts(self, request: WebRequest) -> p.WebPage:
         request.only(("name",))
         name = self.job_of(request.text("name"))
         content = self._job_file(name)
@@ -164,7 +163,7 @@ class DeskFolder:
         values = {key: value for key, value in form.items() if "." in key}
         return self.reader.ask("with_facts", text=text_of(content, "job.toml"), values=values), sha256(content)
 
-    def state_facts(self, request: WebRequest) -> WebPage | WebResponse:
+    def state_facts(self, request: WebRequest) -> p.WebPage | WebResponse:
         form = read_form(request)
         name, seen = self.job_of(form.get("name", "")), form.get("seen", "")
         text, now = self.with_facts(name, form)
@@ -181,7 +180,7 @@ class DeskFolder:
         checked = check_blocks(self.reader.ask("check", job=name, text=text))
         return jobs.facts_page(name, found, form, seen, checked)
 
-    def part(self, request: WebRequest) -> WebPage:
+    def part(self, request: WebRequest) -> p.WebPage:
         request.only(("draft",))
         draft = self.drafts.read(request.text("draft")) if request.text("draft") else None
         return part_page(draft, (state_of(self.root, folder) for folder in jobs_in(self.root)))
@@ -218,7 +217,7 @@ class DeskFolder:
         write_over(path, with_points(content.decode(), points).encode(), sha256(content))
         return to(jobs.JOB, name=name)
 
-    def verify(self, request: WebRequest) -> WebPage:
+    def verify(self, request: WebRequest) -> p.WebPage:
         request.only(())
         with tempfile.TemporaryDirectory(prefix="cmm-uq-") as folder:
             name = received(request, Path(folder), written=True)

@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 
 from cmm_uq.app.serve import page as p
 from cmm_uq.app.serve.exchange import MEDIA, RefusedRequest, WebRequest, WebResponse, sent_file
-from cmm_uq.app.serve.page import Block, Cell, PageNotice, PageParagraph, PageTable, address
 from cmm_uq.app.serve.trends import values_table
 from cmm_uq.app.serve.view import SiteView, machine_cell
 from cmm_uq.base.errors import CmmUqError
@@ -54,7 +53,7 @@ def certificate_page(view: SiteView, request: WebRequest) -> p.WebPage:
         title,
         "/certificates",
         lead=lead,
-        above=(Cell(say("Certificates"), "/certificates"), machine_cell(one.machine)),
+        above=(p.Cell(say("Certificates"), "/certificates"), machine_cell(one.machine)),
         blocks=(*_notices(one), _facts(view, one, entry)),
         sections=(
             (say("Values"), (values_table(say("Values as stated"), values, say("It states no value."), heard=True),)),
@@ -91,24 +90,24 @@ def _named(view: SiteView, request: WebRequest) -> tuple[RecordedCertificate, En
     return one, entry
 
 
-def _notices(one: RecordedCertificate) -> list[PageNotice]:
+def _notices(one: RecordedCertificate) -> list[p.PageNotice]:
     """What it decides and whether it holds, taken together as the worse of both; before that, that nothing was measured."""
     warning = p.NOT_MEASURED.get(one.origin)
-    notices = [PageNotice(warning, "open")] if warning is not None else []
+    notices = [p.PageNotice(warning, "open")] if warning is not None else []
     if one.command != "report":
         return notices
     state, stands = p.STATES.get(one.state, (Verbatim(one.state), "open"))
     decision, conforms = p.DECISIONS.get(one.decision, (Verbatim(one.decision), "open"))
     worse: Standing = max(stands or "good", conforms or "good", key=("good", "open", "bad").index)
     if one.decision == "none":
-        return [*notices, PageNotice(say("{state}; it states no conformity", state=state), worse)]
-    return [*notices, PageNotice(say("{state}; decision: {decision:small}", state=state, decision=decision), worse)]
+        return [*notices, p.PageNotice(say("{state}; it states no conformity", state=state), worse)]
+    return [*notices, p.PageNotice(say("{state}; decision: {decision:small}", state=state, decision=decision), worse)]
 
 
 def _facts(view: SiteView, one: RecordedCertificate, entry: Entry) -> p.PageFacts:
     artefact = any(row.serial == one.artefact for row in view.records.artefacts())
     stated = Verdicts.of_results(entry.data)
-    rows: list[tuple[Text, Cell]] = [(say("Decision"), p.cell_of(p.DECISIONS, one.decision))]
+    rows: list[tuple[Text, p.Cell]] = [(say("Decision"), p.cell_of(p.DECISIONS, one.decision))]
     for each in stated:
         if len(stated) > 1 or not each.by:
             title = f"{each.by}, {each.name}" if each.by else each.title or each.name
@@ -116,16 +115,16 @@ def _facts(view: SiteView, one: RecordedCertificate, entry: Entry) -> p.PageFact
     rows += [
         (say("Diagnosis"), p.cell_of(p.VERDICTS, one.diagnosis)),
         (say("Machine"), machine_cell(one.machine)),
-        (say("Artefact"), Cell(p.shown(one.artefact), "/artefacts" if artefact else "")),
-        (say("Measurement"), Cell(p.shown(one.kind))),
-        (say("Job"), Cell(p.shown(one.job))),
+        (say("Artefact"), p.Cell(p.shown(one.artefact), "/artefacts" if artefact else "")),
+        (say("Measurement"), p.Cell(p.shown(one.kind))),
+        (say("Job"), p.Cell(p.shown(one.job))),
     ]
     if one.adjusted_since is not None:
-        rows.append((say("Adjusted before, on"), Cell(day(one.adjusted_since))))
+        rows.append((say("Adjusted before, on"), p.Cell(day(one.adjusted_since))))
     rows += [
-        (say("Recorded"), Cell(p.moment(one.recorded))),
-        (say("Made by"), Cell(say("cmm-uq {version}", version=Verbatim(one.version)) if one.version else DASH)),
-        (say("Entry of the records"), Cell(number(one.entry), note=Verbatim(entry.hash))),
+        (say("Recorded"), p.Cell(p.moment(one.recorded))),
+        (say("Made by"), p.Cell(say("cmm-uq {version}", version=Verbatim(one.version)) if one.version else DASH)),
+        (say("Entry of the records"), p.Cell(number(one.entry), note=Verbatim(entry.hash))),
     ]
     return p.PageFacts(tuple(rows))
 
@@ -134,53 +133,53 @@ def _signatures(view: SiteView, one: RecordedCertificate) -> tuple[p.Section, ..
     words = {"release": say("Released"), "withdrawal": say("Withdrawn"), "replacement": say("Replaced")}
     headings = p.columns(say("What"), say("By"), say("When"), say("Reason"), say("In its place"))
     rows = tuple(
-        (Cell(words.get(each.what, Verbatim(each.what))), Cell(p.shown(each.by)), Cell(p.moment(each.at)),
-         Cell(Verbatim(each.reason)),
-         Cell(NOTHING) if each.replaced_by is None else
-         Cell(say("entry {number}", number=number(each.replaced_by)), address("/certificate", entry=each.replaced_by)))
+        (p.Cell(words.get(each.what, Verbatim(each.what))), p.Cell(p.shown(each.by)), p.Cell(p.moment(each.at)),
+         p.Cell(Verbatim(each.reason)),
+         p.Cell(NOTHING) if each.replaced_by is None else
+         p.Cell(say("entry {number}", number=number(each.replaced_by)), p.address("/certificate", entry=each.replaced_by)))
         for each in view.records.signatures(one.entry)
     )  # fmt: skip
-    table = PageTable(say("Who released, withdrew or replaced it"), headings, rows, heard=True)
+    table = p.PageTable(say("Who released, withdrew or replaced it"), headings, rows, heard=True)
     return ((say("Release"), (table,)),) if rows else ()
 
 
-def _files(one: RecordedCertificate, files: tuple[RecordedFile, ...]) -> PageTable:
+def _files(one: RecordedCertificate, files: tuple[RecordedFile, ...]) -> p.PageTable:
     headings = p.columns(say("File"), say("Keep"), say("SHA-256 as recorded"))
     rows = tuple(
         (
-            Cell(Verbatim(file.name), address("/recorded", entry=one.entry, name=file.name) if file.shown else ""),
-            Cell(say("Download {name}", name=Verbatim(file.name)),
-                 address("/recorded", entry=one.entry, name=file.name, keep="yes"), download=True),
-            Cell(Verbatim(file.sha256)),
+            p.Cell(Verbatim(file.name), p.address("/recorded", entry=one.entry, name=file.name) if file.shown else ""),
+            p.Cell(say("Download {name}", name=Verbatim(file.name)),
+                 p.address("/recorded", entry=one.entry, name=file.name, keep="yes"), download=True),
+            p.Cell(Verbatim(file.sha256)),
         )
         for file in files
     )  # fmt: skip
     empty = say("The records name no file that is still there.")
     note = say("In {folder}. A file is handed out only while it is, byte for byte, the one that was recorded.",
                folder=p.shown(one.folder))  # fmt: skip
-    return PageTable(say("Files as recorded"), headings, rows, empty, (note,), heard=True)
+    return p.PageTable(say("Files as recorded"), headings, rows, empty, (note,), heard=True)
 
 
 def diagnosis_section(diagnosis: Mapping[str, Any]) -> tuple[p.Section, ...]:
     if not diagnosis.get("verdict"):
         return ()
-    facts: list[tuple[Text, Cell]] = [(say("Verdict"), p.cell_of(p.VERDICTS, str(diagnosis["verdict"])))]
+    facts: list[tuple[Text, p.Cell]] = [(say("Verdict"), p.cell_of(p.VERDICTS, str(diagnosis["verdict"])))]
     if isinstance(p_value := diagnosis.get("p_value"), (int, float)):
-        facts.append((say("Lack-of-fit test, p"), Cell(probability(float(p_value)))))
-    blocks: list[Block] = [p.PageFacts(tuple(facts))]
+        facts.append((say("Lack-of-fit test, p"), p.Cell(probability(float(p_value)))))
+    blocks: list[p.Block] = [p.PageFacts(tuple(facts))]
     if rows := tuple(filter(None, map(_effect, _list(diagnosis.get("effects"))))):
         headings = p.columns(say("Effect"), (say("Probability"), "number"), say("Size"))
-        blocks.append(PageTable(say("What the model leaves out"), headings, rows))
+        blocks.append(p.PageTable(say("What the model leaves out"), headings, rows))
     for group in _list(diagnosis.get("indistinguishable")):
         if isinstance(group, list):
             names = commas(effect_title(str(name)) for name in group)
-            blocks.append(PageParagraph(say("This recording cannot tell apart: {names}.", names=names)))
+            blocks.append(p.PageParagraph(say("This recording cannot tell apart: {names}.", names=names)))
     further = [one.get("what") for one in _list(diagnosis.get("suggested_measurements")) if isinstance(one, Mapping)]
-    blocks += [PageParagraph(say("Measure next: {what}", what=Verbatim(str(what)))) for what in further if what]
+    blocks += [p.PageParagraph(say("Measure next: {what}", what=Verbatim(str(what)))) for what in further if what]
     return ((say("Diagnosis"), tuple(blocks)),)
 
 
-def _effect(one: Any) -> tuple[Cell, ...]:
+def _effect(one: Any) -> tuple[p.Cell, ...]:
     if not isinstance(one, Mapping) or not one.get("effect"):
         return ()
     name, chance, stated = str(one["effect"]), one.get("probability"), one.get("parameters")
@@ -193,7 +192,7 @@ def _effect(one: Any) -> tuple[Cell, ...]:
             continue
     size = size_of(effect_of(name), sizes, factors=False) if sizes else NOTHING
     chance_text = probability(float(chance)) if isinstance(chance, (int, float)) else DASH
-    return Cell(effect_title(name)), Cell(chance_text), Cell(size)
+    return p.Cell(effect_title(name)), p.Cell(chance_text), p.Cell(size)
 
 
 def _list(value: Any) -> list[Any]:

@@ -39,7 +39,6 @@ from cmm_uq.app.serve.exchange import (
     style,
 )
 from cmm_uq.app.serve.lists import artefacts_page, certificates_page, diagnoses_page, machine_page, machines_page
-from cmm_uq.app.serve.page import Block, Cell, PageFacts, PageNotice, PageParagraph, WebPage
 from cmm_uq.app.serve.view import (
     MOST,
     ChainComparing,
@@ -117,34 +116,34 @@ _SCOPE = say(
 )
 
 
-def file_page(view: SiteView, request: WebRequest) -> WebPage:
+def file_page(view: SiteView, request: WebRequest) -> p.WebPage:
     request.only(())
     lead = say("Is this certificate the one that was issued, and does it still hold?")
-    return WebPage(say("Check a file"), "/file", lead=lead, blocks=_form())
+    return p.WebPage(say("Check a file"), "/file", lead=lead, blocks=_form())
 
 
-def dropped_page(view: SiteView, request: WebRequest) -> WebPage:
+def dropped_page(view: SiteView, request: WebRequest) -> p.WebPage:
     request.only(())
     dropped = read_dropped(request)
     known = look_up(view.records, dropped)
-    rows: list[tuple[Text, Cell]] = []
+    rows: list[tuple[Text, p.Cell]] = []
     if (one := known.certificate) is not None:
         name = say("recorded as {name}", name=Verbatim(known.name)) if known.name else NOTHING
         rows = [
-            (say("Certificate"), Cell(Verbatim(one.number), p.address("/certificate", entry=one.entry), note=name)),
+            (say("Certificate"), p.Cell(Verbatim(one.number), p.address("/certificate", entry=one.entry), note=name)),
             (say("Machine"), machine_cell(one.machine)),
-            (say("Measured on"), Cell(day(one.day))),
+            (say("Measured on"), p.Cell(day(one.day))),
         ]
     size = say("{bytes} bytes", bytes=number(dropped.size, ",d"))
-    rows += [(say("Size"), Cell(size)), (say("SHA-256"), Cell(Verbatim(dropped.sha256)))]
-    return WebPage(
+    rows += [(say("Size"), p.Cell(size)), (say("SHA-256"), p.Cell(Verbatim(dropped.sha256)))]
+    return p.WebPage(
         say("Check a file"), "/file", lead=Verbatim(dropped.name),
-        blocks=(verdict(known), PageFacts(tuple(rows), wide=True), PageParagraph(_SCOPE, "note")),
+        blocks=(verdict(known), p.PageFacts(tuple(rows), wide=True), p.PageParagraph(_SCOPE, "note")),
         sections=((say("Another file"), _form()),),
     )  # fmt: skip
 
 
-def _form() -> tuple[Block, ...]:
+def _form() -> tuple[p.Block, ...]:
     hint = say(
         "A certificate as PDF or HTML, or its results.json; at most {most} MB. It is read once and not kept.",
         most=number(LARGEST // 2**20),
@@ -152,7 +151,7 @@ def _form() -> tuple[Block, ...]:
     return (p.Drop("/file", say("Drop a file here, or choose one"), hint, say("Check it")),)
 
 
-def verdict(known: FileMatch) -> PageNotice:
+def verdict(known: FileMatch) -> p.PageNotice:
     """What is said first of a file."""
     lines: list[Text]
     if (one := known.certificate) is None:
@@ -185,8 +184,8 @@ def verdict(known: FileMatch) -> PageNotice:
     return _notice(head, standing, lines)
 
 
-def _notice(head: Text, standing: Standing, lines: list[Text]) -> PageNotice:
-    return PageNotice(head, standing, tuple(map(Cell, lines)))
+def _notice(head: Text, standing: Standing, lines: list[Text]) -> p.PageNotice:
+    return p.PageNotice(head, standing, tuple(map(p.Cell, lines)))
 
 
 _WHAT = say(
@@ -196,34 +195,34 @@ _WHAT = say(
 )
 
 
-def integrity_page(view: SiteView, request: WebRequest) -> WebPage:
+def integrity_page(view: SiteView, request: WebRequest) -> p.WebPage:
     """The head of the records, and what the last comparison found."""
     request.only(())
     count, head = view.records.head()
     rows = (
-        (say("Entries"), Cell(number(count, ",d"))),
-        (say("Head"), Cell(Verbatim(head) if count else say("none yet"))),
-        (say("Records"), Cell(Verbatim(shown_place(view.records.place)))),
+        (say("Entries"), p.Cell(number(count, ",d"))),
+        (say("Head"), p.Cell(Verbatim(head) if count else say("none yet"))),
+        (say("Records"), p.Cell(Verbatim(shown_place(view.records.place)))),
     )
-    forms: tuple[Block, ...] = (
-        PageParagraph(_WHAT),
+    forms: tuple[p.Block, ...] = (
+        p.PageParagraph(_WHAT),
         p.Press("/integrity/chain", say("Compare entries and tables")),
         p.Press("/integrity/files", say("Compare entries, tables and all files")),
     )
     if (since := view.checking.since) is not None:
         under_way = say("A comparison is under way since {moment}.", moment=p.moment(since))
-        forms = (PageParagraph(under_way), p.Links((Cell(say("Look again"), "/integrity"),)))
-    return WebPage(
+        forms = (p.PageParagraph(under_way), p.Links((p.Cell(say("Look again"), "/integrity"),)))
+    return p.WebPage(
         say("Integrity"), "/integrity", lead=NOTHING,
-        blocks=(*_comparison(view, (count, head)), PageFacts(rows, wide=True)),
+        blocks=(*_comparison(view, (count, head)), p.PageFacts(rows, wide=True)),
         sections=((say("Compare the records with their chain"), forms),),
     )  # fmt: skip
 
 
-def _comparison(view: SiteView, head: tuple[int, str]) -> tuple[Block, ...]:
+def _comparison(view: SiteView, head: tuple[int, str]) -> tuple[p.Block, ...]:
     last = view.checking.last
     if last is None:
-        return (PageNotice(say("Not compared since cmm-uq serve was started"), "open"),)
+        return (p.PageNotice(say("Not compared since cmm-uq serve was started"), "open"),)
     at = say("Compared on {moment}, {what}, up to entry {number}.", moment=p.moment(last.at), number=number(last.head[0]),
              what=say("with all files") if last.files else say("without files"))  # fmt: skip
     later = [say("Entries were added since.")] if last.head != head else []
@@ -236,8 +235,8 @@ def _comparison(view: SiteView, head: tuple[int, str]) -> tuple[Block, ...]:
     kinds = {"chain": say("Entry"), "index": say("Table"), "file": say("File"), "missing": say("Missing file")}
     kinds |= {"clock": say("Clock"), "schema": say("Database")}
     rows = tuple(
-        (Cell(say("Entry {number}", number=number(one.entry)) if one.entry is not None else say("Records")),
-         Cell(kinds.get(one.kind, Verbatim(one.kind))), Cell(Verbatim(one.problem)))
+        (p.Cell(say("Entry {number}", number=number(one.entry)) if one.entry is not None else say("Records")),
+         p.Cell(kinds.get(one.kind, Verbatim(one.kind))), p.Cell(Verbatim(one.problem)))
         for one in last.findings
     )  # fmt: skip
     more = (say("Shown are the first {most}.", most=number(MOST)),) if last.count > len(rows) else ()
@@ -246,7 +245,7 @@ def _comparison(view: SiteView, head: tuple[int, str]) -> tuple[Block, ...]:
     return (_notice(found, "bad", [at, *later]), table)
 
 
-PAGES: Mapping[str, Callable[[SiteView, WebRequest], WebPage | WebResponse]] = {  # what is looked at, by path
+PAGES: Mapping[str, Callable[[SiteView, WebRequest], p.WebPage | WebResponse]] = {  # what is looked at, by path
     "/": machines_page, "/machine": machine_page, "/certificates": certificates_page, "/certificate": certificate_page,
     "/diagnoses": diagnoses_page, "/artefacts": artefacts_page, "/recorded": recorded_file, "/file": file_page,
     "/integrity": integrity_page,
@@ -343,7 +342,7 @@ class Site:
         with self.opened() as records:
             return self._standing(records, self._today())
 
-    def _rendered(self, page: WebPage) -> WebResponse:
+    def _rendered(self, page: p.WebPage) -> WebResponse:
         foot = (
             say("Records: {place}. To be looked at only: nothing here can be changed.", place=Verbatim(self.place)),
             say("cmm-uq {version}", version=Verbatim(__version__)),

@@ -15,14 +15,6 @@ from cmm_uq.base.files.table import unit_of
 from cmm_uq.base.messages import Text, Verbatim, number, say, semicolons
 from cmm_uq.base.units import pint_units
 from cmm_uq.laboratory.live.instruments import profile as profiles
-from cmm_uq.laboratory.live.instruments.profile import (
-    MessageFrame,
-    Parse,
-    ProfileFile,
-    ProfileQuantity,
-    bytes_of,
-    shown,
-)
 
 
 @dataclass(frozen=True)
@@ -41,8 +33,8 @@ class Framer:
     A line that is too long is none up to its terminator: what its end looks like is nothing that the instrument said.
     """
 
-    def __init__(self, frame: MessageFrame) -> None:
-        self._terminator, self._start, self._stop = map(bytes_of, (frame.terminator, frame.start, frame.stop))
+    def __init__(self, frame: profiles.MessageFrame) -> None:
+        self._terminator, self._start, self._stop = map(profiles.bytes_of, (frame.terminator, frame.start, frame.stop))
         self._length, self._longest = frame.length, frame.longest
         self._waiting = bytearray()
         self._looked = 0
@@ -130,7 +122,7 @@ def number_of(text: str, decimal: str) -> float:
         raise NoValueError(say("{text} is no number", text=Verbatim(repr(text)))) from None
 
 
-def value_of(name: str, raw: float, quantity: ProfileQuantity, said: str = "") -> float:
+def value_of(name: str, raw: float, quantity: profiles.ProfileQuantity, said: str = "") -> float:
     unit = quantity.units.get(said) if quantity.unit_group else quantity.unit
     if unit is None:
         raise NoValueError(say("{name} comes in {unit}, which the profile does not know", name=Verbatim(name),
@@ -164,8 +156,8 @@ def conversion(given: str, wanted: str) -> Callable[[float], float]:
 
 
 _SHOWN = 60  # bytes of a message that was not understood, as messages show them
-_PLAIN = ProfileQuantity()
-_NOTHING = Parse(pattern="(?!)")  # understands nothing
+_PLAIN = profiles.ProfileQuantity()
+_NOTHING = profiles.Parse(pattern="(?!)")  # understands nothing
 
 
 @dataclass(frozen=True)
@@ -177,7 +169,7 @@ class Understood:
 
 
 class Parser:
-    def __init__(self, profile: ProfileFile) -> None:
+    def __init__(self, profile: profiles.ProfileFile) -> None:
         self._profile, self._parse = profile, profile.parse or _NOTHING
         self._ignored = [re.compile(pattern) for pattern in self._parse.ignore]
         self._ill = [(re.compile(one.pattern), one.says) for one in profile.ill]
@@ -253,7 +245,7 @@ def _not_understood(text: str) -> Text:
 
 
 def _seen(raw: bytes) -> Text:
-    return Verbatim(f"{shown(raw[:_SHOWN])}{'…' if len(raw) > _SHOWN else ''}")
+    return Verbatim(f"{profiles.shown(raw[:_SHOWN])}{'…' if len(raw) > _SHOWN else ''}")
 
 
 def check_unit(name: str, unit: str, where: str) -> None:
@@ -264,7 +256,7 @@ def check_unit(name: str, unit: str, where: str) -> None:
         raise CmmUqError(error.problem, where=where, fix=error.fix) from None
 
 
-def check_profile(profile: ProfileFile, where: str) -> None:
+def check_profile(profile: profiles.ProfileFile, where: str) -> None:
     """Refuse a profile that contradicts itself, or reads its own examples otherwise than they say."""
     if profile.protocol == "ipp":
         return
@@ -286,11 +278,11 @@ def check_profile(profile: ProfileFile, where: str) -> None:
         _check_example(profile, parser, example, f"{where}: [[example]] {place}")
 
 
-def _check_example(profile: ProfileFile, parser: Parser, example: profiles.Example, at: str) -> None:
-    framer, raw = Framer(profile.frame), bytes_of(example.received)
+def _check_example(profile: profiles.ProfileFile, parser: Parser, example: profiles.Example, at: str) -> None:
+    framer, raw = Framer(profile.frame), profiles.bytes_of(example.received)
     messages = framer.feed(raw)
     if len(messages) != 1 or framer.waiting:
-        raise CmmUqError(f"{shown(raw)} is {len(messages)} messages and {'a part' if framer.waiting else 'no rest'}",
+        raise CmmUqError(f"{profiles.shown(raw)} is {len(messages)} messages and {'a part' if framer.waiting else 'no rest'}",
                          where=at, fix="Mend [frame], or write the message with its framing")  # fmt: skip
     found = parser.read(messages[0], example.answers)
     same = found.values.keys() == example.values.keys() and all(
@@ -300,5 +292,5 @@ def _check_example(profile: ProfileFile, parser: Parser, example: profiles.Examp
         seen, wanted = (", ".join(f"{name} = {value!r}" for name, value in each.items())
                         for each in (found.values, example.values))  # fmt: skip
         wanted = wanted or "what is wrong with the instrument"
-        raise CmmUqError(f"{shown(raw)} is read as {seen or found.status or 'nothing'}, not as {wanted}", where=at,
+        raise CmmUqError(f"{profiles.shown(raw)} is read as {seen or found.status or 'nothing'}, not as {wanted}", where=at,
                          fix="Mend [parse] and [quantities], or the example")  # fmt: skip
