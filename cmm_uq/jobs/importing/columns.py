@@ -305,5 +305,5 @@ def _refuse_another_length(sheet: Sheet, header: Header, i: int, needed: Sequenc
                       fix="Export with semicolons or tabs between cells, or mend the row")  # fmt: skip
     if len(row) <= max(needed) and not sheet.spreadsheet:
         last = not any(cell != "" for later in sheet.rows[i + 1 :] for cell in later)
-        raise CmmUqError(f"the row ends after {len(row)} of {width} cells", where=sheet.at(where, i),
+        raise NotReadError(f"the row ends after {len(row)} of {width} cells", where=sheet.at(where, i),
                          fix="The file was cut off: export it again" if last else "Complete the row")  # fmt: skip

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from itertools import permutations
+from dataclasses import replace
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from cmm_uq.jobs.importing.roles import (
     columns_in,
     down,
     factors,
+    heading,
     labels_of,
     like,
     mean_of,
@@ -37,6 +39,7 @@ from cmm_uq.jobs.importing.roles import (
     unit_beside,
 )
 
+_OFF_MM = 1.0  # farther from its target no axis comes to rest
 _LETTER = re.compile(r"(?<![A-Za-zÀ-ÿ])([xyzXYZ])(?![A-Za-zÀ-ÿ])|^([XYZ])(?=[A-Z]?[a-z])")
 _ENDS = re.compile(r"(.*?)[\s_.:/-]*([XYZ])(?:[- ]?(?:axis|achse|axe|wert|value|[ck]oord\w*\.?))?", re.IGNORECASE)
 
@@ -129,6 +132,9 @@ def rows_of_axes(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -
         if len(stems) < 3 or "".join(end[2].upper() for end in ends if end) != "XYZ" * (len(stems) // 3):
             continue
         own = [row for row, end in zip(rows, ends, strict=True) if end]
+        above = heading(blocks[0].paths[i]) if i < len(blocks[0].paths) else ""
+        if not any(stems) and any(map(str.isdigit, above)):
+            stems = [above] * len(stems)  # the head of its own of each feature
         columns = [c for c in columns_in(grid, blocks, own) if c.i != i and c.full]
         fine = [c for c in columns if c.step < 1]
         measured, checked = [c for c in fine if c.role == MEASURED], 0
@@ -173,18 +179,20 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
     if blocks[0].head and (across := grid.targets(blocks[0].head[-1])):
         return _across(grid, rows, columns, across, blocks[0].head[-1])
     ends = [c for c in columns if c.role in (TARGET, NOMINAL) and np.ptp(c.values[np.isfinite(c.values)]) > 1]
-    target = ends[0] if ends else None
+    target = min(ends, key=lambda c: c.counts, default=None)  # and not their numbers
     if target is None or not np.isfinite(target.values[0]):
         return None
     values = down(target.values)
-    small = [c for c in columns if c is not target and c.role in (None, DEVIATION, MEASURED) and c.may_be_length]
-    small = [c for c in small if c.step < 1 and not like(c.values + 1000, values + 1000)]
+    beside = [c for c in columns if c is not target and c.role in (None, DEVIATION, MEASURED) and c.may_be_length]
+    small = [c for c in beside if (c.step < 1 or _way(c.heading)) and not like(c.values + 1000, values + 1000)]
     source = [c for c in small if not mean_of(c, [o for o in small if o is not c and _same_way(o, c)])]
-    directed = [c for c in source if _way(c.heading)]
-    source = directed if len(directed) > 1 else source  # the others are reversals and spreads
-    if not source:
-        return None
+    directed = [c for c in source if _way(c.heading)] or [c for c in source if c.role == DEVIATION]
+    source = directed or source  # the others are reversals, spreads and what was recorded beside them
     reading = SheetReading("runs", unit=target.unit, small=next((c.unit for c in source if c.unit), None))
+    if not any(map(_way, (c.heading for c in source))) and (reached := _reached(columns, target, values, source)):
+        source, reading.positions = reached, True
+    if not source or any(a.heading == b.heading and not _way(a.heading) for a, b in combinations(source, 2)):
+        return None  # or of two instruments
     reading.taken = {"target": [target], "reading_um": source}
     reading.collect(grid, rows, columns)
     for k, row in enumerate(rows):
@@ -192,6 +200,22 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
             if np.isfinite(c.values[k]):
                 reading.add(row, k, c, source, (float(values[k]), float(c.values[k])))
     return reading if any(ways_of(label.values) is not None for label in labels_of(reading)) else None
+
+
+def _reached(
+    columns: Sequence[FigureColumn], target: FigureColumn, values: Floats, deviations: Sequence[FigureColumn]
+) -> list[FigureColumn]:
+    """Positions that were reached, as deviations from their targets, where no deviation stands beside them."""
+    roles = (None, MEASURED, REFERENCE)
+    near = [c for c in columns if c is not target and c.role in roles and c.may_be_length and c.step < 1]
+    near = [c for c in near if like(c.values, values, _OFF_MM) and np.nanmax(np.abs(values)) > 10 * _OFF_MM]
+    found = [
+        replace(c, values=c.values - values)
+        for c in near
+        if not mean_of(c, [o for o in near if o is not c and _same_way(o, c)])
+    ]
+    given = any(agrees(d, c, target, f) for d in deviations for c in near for f in factors(d, c))
+    return [] if given else found
 
 
 def _across(

@@ -16,7 +16,7 @@ import numpy as np
 
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.importing.format import NotReadError
-from cmm_uq.jobs.importing.header import plain_words, words_of
+from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 
 LINE, RUN, POINT = "line", "run", "point"
 _TOKEN = re.compile(r"[^\W_]+")
@@ -59,7 +59,7 @@ def ways_of(values: Sequence[str]) -> list[int] | None:
 
 
 def _has(text: str, words: frozenset[str]) -> bool:
-    asian = [one for one in words if len(one) > 1 and not one.isascii()]
+    asian = [one for one in words if len(one) > 1 and unspaced(one)]
     return any(word in words or any(one in word for one in asian) for word in plain_words(text))
 
 
@@ -95,7 +95,7 @@ def hint(text: str, *, lengths: bool) -> str | None:
         for k, word in enumerate(words)
         for name, those in ((LINE, line), (POINT, point), (RUN, run))
         for one in those
-        if one == word or (len(one) > 1 and not one.isascii() and one in word)
+        if one == word or (len(one) > 1 and unspaced(one) and one in word)
     ]
     exact = [fit for fit in fits if fit[0] == int(fit[0])]
     if fits:

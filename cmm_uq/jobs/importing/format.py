@@ -40,16 +40,16 @@ LENGTH, TEMPERATURE, TIME, PRESSURE, SHARE = "length", "temperature", "time", "p
 _UNITS = (
     (
         WrittenUnit("mm", LENGTH),
-        "mm millimeter millimeters millimetre millimetres millimetri milimetro milimetros milimetr ㎜ 毫米 밀리미터 ミリ",
+        "mm millimeter millimeters millimetre millimetres millimetri milimetro milimetros milimetr мм ㎜ 毫米 밀리미터 ミリ",
     ),
     (
         WrittenUnit("um", LENGTH, 1, 1000),
-        "µm um μm ㎛ 微米 micrometer micrometre micron microns mikrometer mikron micrometri",
+        "µm um μm ㎛ 微米 micrometer micrometre micron microns mikrometer mikron micrometri мкм микрометр",
     ),
     (WrittenUnit("nm", LENGTH, 1, 1_000_000), "nm nanometer nanometre"),
     (WrittenUnit("microinch", LENGTH, 127, 5_000_000), "microinch microinches µin μin uin"),
     (WrittenUnit("cm", LENGTH, 10), "cm centimeter centimetre zentimeter"),
-    (WrittenUnit("m", LENGTH, 1000), "m meter metre metri metros"),
+    (WrittenUnit("m", LENGTH, 1000), "m meter metre metri metros м"),
     (WrittenUnit("inch", LENGTH, 127, 5), "in inch inches zoll pouce pouces pollice pollici pulgada pulgadas \" ″ ''"),
     (WrittenUnit("mil", LENGTH, 127, 5000), "mil mils thou"),
     (WrittenUnit("ft", LENGTH, 1524, 5), "ft foot feet"),

@@ -23,12 +23,18 @@ from cmm_uq.jobs.columns import COORDINATES, OPTIONAL, READINGS, REQUIRED
 from cmm_uq.jobs.importing.encodings import is_number
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, NotReadError, Sheet, WrittenUnit, sources_of, unit_named
 
+_LAST_SPACED = "\u2e7f"  # ahead of Chinese, Japanese and Korean characters
 NAME = "name"  # of the point or feature, by which it may be numbered; no column of a recording
 
 
 def plain_words(text: str) -> list[str]:
     plain = unicodedata.normalize("NFKD", text.casefold().translate(_ORDINAL))
     return _WORDS.findall("".join(c for c in plain if not unicodedata.combining(c)))
+
+
+def unspaced(word: str) -> bool:
+    """Whether a word is of a script that sets none apart, so that others may stand in it."""
+    return word[-1:] > _LAST_SPACED
 
 
 def numbered_words(text: str) -> tuple[tuple[str, ...], list[int]]:

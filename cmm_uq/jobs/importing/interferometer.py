@@ -30,8 +30,8 @@ from cmm_uq.jobs.importing.factors import (
     together,
     ways_of,
 )
-from cmm_uq.jobs.importing.format import UNITS, Fact, ImportKeys, NotReadError, Row, Sheet, sheets_of
-from cmm_uq.jobs.importing.header import plain_words, words_of
+from cmm_uq.jobs.importing.format import UNITS, Fact, ImportKeys, NotReadError, Row, Sheet, length_named, sheets_of
+from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 from cmm_uq.jobs.importing.lengths import place_of
 from cmm_uq.jobs.importing.reports import TextReport
 from cmm_uq.jobs.importing.roles import SheetReading
@@ -167,12 +167,13 @@ def axis_runs(reading: SheetReading, labels: Sequence[Label], sheets: Sequence[S
     if (angle := _angle_in(sheets)) is not None:
         fix = "Runs of positions are read; state rotations as reading_arcsec (docs/reference/columns.md)"
         raise NotReadError(f"its deviations may be angles ({angle!r})", where=where, fix=fix)
-    small = reading.small or unit_elsewhere(sheets, small=True)
+    unit = reading.unit or unit_elsewhere(sheets, small=False) or UNITS["mm"]
+    small = unit if reading.positions else reading.small or unit_elsewhere(sheets, small=True)
+    small = small or length_named(sheets[0].unit or "")
     if small is None and np.abs(figures[:, 1]).max() < _MILLIMETRES:
         fix = "Write it above them: (µm) or (mm)"
         raise NotReadError("nothing says the unit of the deviations: µm or mm", where=where, fix=fix)
     small = small or UNITS["um"]
-    unit = reading.unit or unit_elsewhere(sheets, small=False) or UNITS["mm"]
     target = units.converted(figures[:, 0], unit, "x_mm")
     deviation = units.converted(figures[:, 1], small, "reading_um")
     texts = ([f"{label.words} {value}" for value in label.values] for label in labels)
@@ -204,7 +205,7 @@ def _angle_in(sheets: Sequence[Sheet]) -> str | None:
     known = {f" {word} " for words in words_of("angles").values() for word in words}
     for text in (cell for sheet in sheets for row in sheet.rows for cell in row if isinstance(cell, str) and cell):
         plain = f" {' '.join(plain_words(text))} "
-        if any(word in plain or (not word.isascii() and word.strip() in plain) for word in known):
+        if any(word in plain or (unspaced(word.strip()) and word.strip() in plain) for word in known):
             return text
     return None
 

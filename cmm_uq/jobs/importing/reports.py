@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from abc import abstractmethod
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
@@ -323,3 +324,27 @@ def _probed(tag: str, terms: dict[str, str], line: int, where: str) -> Row:
         problem = f"IJK({terms['IJK']}) is no direction"
         raise CmmUqError(problem, where=f"{where} line {line}", fix="Record the trace again")
     return "", [tag, *(terms[axis].strip() for axis in AXES), *direction], line
+
+
+_PAIR = re.compile(r"([^\W\d]\w*)\s{0,9}=\s{0,9}([^\s=]{1,40})(?=\s|$)")  # as ``target= 50.0``
+_LEAST = 6  # lines of one form
+
+
+def in_pairs(text: str) -> list[list[str]] | None:
+    """Cells of every line of a log that names each of its figures (``run=1 target= 50.0``); ``None`` of another text.
+
+    The names stand in the line ahead of the first, which must be another.
+    """
+    lines = [line.strip() for line in text.splitlines()]
+    pairs = [_PAIR.findall(line) if line.count("=") > 1 else [] for line in lines]
+    forms = Counter(tuple(name for name, _ in own) for own in pairs if own)
+    form, count = max(forms.items(), key=lambda one: one[1], default=((), 0))
+    if count < _LEAST or 2 * count < sum(map(bool, lines)):
+        return None
+    alike = [tuple(name for name, _ in own) == form for own in pairs]
+    if (first := alike.index(True)) == 0:
+        return None
+    rows = [
+        [value for _, value in own] if same else [line] for line, own, same in zip(lines, pairs, alike, strict=True)
+    ]
+    return [*rows[: first - 1], [*form], *rows[first:]]

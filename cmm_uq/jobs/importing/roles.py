@@ -8,7 +8,7 @@ beside a third figure, that one is measured.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from cmm_uq.jobs.importing import header
 from cmm_uq.jobs.importing.blocks import DATED, SMALL, Block, CutSheet, unit_of
 from cmm_uq.jobs.importing.factors import LINE, RUN, Label, hint
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, WrittenUnit, converted, sort_of, unit_named
-from cmm_uq.jobs.importing.header import plain_words, understood, without_unit, words_of
+from cmm_uq.jobs.importing.header import plain_words, understood, unspaced, without_unit, words_of
 
 SUMMARY, DEVIATION, MEASURED, REFERENCE, NOMINAL, TARGET = (
     "summary",
@@ -57,6 +57,7 @@ class SheetReading:
     figures: list[tuple[float, ...]] = field(default_factory=list)  # reference, measured; x, y, z; target, deviation
     taken: dict[str, Sequence[FigureColumn]] = field(default_factory=dict)  # by column of a recording
     unused: list[str] = field(default_factory=list)
+    positions: bool = False  # of runs: whether they are what positions were reached less their targets
     covariates: dict[str, list[float]] = field(default_factory=dict)  # further columns of a recording, in their units
     blank: list[tuple[int, int]] = field(default_factory=list)  # row and column of measured values that are not there
     bare: Sequence[int] = ()  # numbers of columns that no head names
@@ -103,7 +104,7 @@ def further_of(columns: Sequence[FigureColumn]) -> dict[str, Floats]:
 def known(word: str, role: str) -> bool:
     """Whether a word is one for a role, or, in a language without blanks, has one in it."""
     words = words_of("lengths")[role]
-    return word in words or (not word.isascii() and any(len(one) > 1 and one in word for one in words))
+    return word in words or (unspaced(word) and any(len(one) > 1 and one in word for one in words))
 
 
 def said(path: Sequence[str]) -> str | None:
@@ -112,10 +113,11 @@ def said(path: Sequence[str]) -> str | None:
     words = [word for text in texts for word in plain_words(text)]
     short = [own[-1] for text in texts for part in _ABBREVIATED.findall(text) if (own := plain_words(part))]
     of, roles = words_of("lengths"), (SUMMARY, DEVIATION, REFERENCE, MEASURED, TARGET, NOMINAL)
-    for role in roles:
-        if not of[role].isdisjoint(words) or any(one.startswith(part) for part in short for one in of[role]):
-            return role
-    asian = [word for word in words if not word.isascii()]
+    exact = (role for role in roles if not of[role].isdisjoint(words))
+    abbreviated = (role for role in roles if any(one.startswith(part) for part in short for one in of[role]))
+    if (role := next(exact, None) or next(abbreviated, None)) is not None:
+        return role
+    asian = [word for word in words if unspaced(word)]
     fits = [(len(one), role) for role in roles for one in of[role] if any(one in word for word in asian)]
     return max(fits)[1] if fits and max(fits)[0] > 1 else None
 
@@ -317,9 +319,9 @@ def is_void(row: Sequence[Cell], *tables: str) -> bool:
     return any(isinstance(cell, str) and " ".join(plain_words(cell)) in known for cell in row)
 
 
-def rows_left_out(reading: SheetReading, grid: CutSheet) -> list[str] | None:
-    """Rows with figures beside those that are read; ``None`` where one of them may be measured."""
-    taken, heads = {*reading.rows, *reading.others}, {row for block in grid.blocks for row in block.head}
+def rows_left_out(reading: SheetReading, grid: CutSheet, others: Collection[int] = ()) -> list[str] | None:
+    """Rows with figures beside those that are read, here or with ``others``; ``None`` where one of them may be measured."""
+    taken, heads = {*reading.rows, *reading.others, *others}, {row for block in grid.blocks for row in block.head}
     if any(
         isinstance(cell, str) and _SEVERAL.fullmatch(cell.strip()) for row in taken for cell in grid.sheet.rows[row]
     ):

@@ -28,6 +28,7 @@ from cmm_uq.jobs.importing.blocks import places_in
 from cmm_uq.jobs.importing.encodings import HOSTILE_FIX, decoded, head_text, local
 from cmm_uq.jobs.importing.format import DELIMITERS, Cell, Fact, Format, ImportKeys, Sheet
 from cmm_uq.jobs.importing.header import LINES_BEFORE, REFERENCES, header_of, understood
+from cmm_uq.jobs.importing.reports import in_pairs
 from cmm_uq.jobs.importing.roles import said
 
 _BLANK = " "  # cells of a text without separators, by where they stand
@@ -100,6 +101,8 @@ def alternatives(content: bytes, where: str, keys: ImportKeys) -> Iterator[list[
     for candidate in _TITLES if keys.delimiter is None else (DELIMITERS[keys.delimiter],):
         if candidate in text:
             yield [Sheet("", *_rows(text, candidate, where), facts=_facts(encoding, candidate))]
+    if (rows := in_pairs(text)) is not None and keys.delimiter is None:
+        yield [Sheet("", *_filled(enumerate(rows, 1), where), facts=_facts(encoding, _BLANK)[:1])]
 
 
 def _facts(encoding: str, delimiter: str) -> tuple[Fact, ...]:

@@ -89,9 +89,10 @@ def reading_of(
         _tabled_places([*map(stacked, sheets)], {grid.sheet.name for _, grid in chosen}) if kind == "lengths" else {}
     )
     for reading, grid in chosen:
-        if (told := rows_left_out(reading, grid)) is None:
+        others = [row for other, own in chosen if own is grid for row in (*other.rows, *other.others)]
+        if (told := rows_left_out(reading, grid, others)) is None:
             return None
-        left_out += told
+        left_out += [row for row in told if row not in left_out]
         for labels, row in zip(reading.labels, reading.rows, strict=True):
             own_places = {elsewhere[text] for text in labels.values() if text in elsewhere}
             place = grid.places_of.get(row) or (own_places.pop() if len(own_places) == 1 else "")
@@ -122,7 +123,9 @@ def _refuse_same_lines(chosen: Sequence[tuple[SheetReading, CutSheet]], where: s
     """Sheets with the same lengths beside the same names are two recordings, unless their names count lines or runs."""
     sheets: dict[str, list[object]] = {}
     for reading, grid in chosen:
-        labels = [{key: text for key, text in own.items() if key[0] == "column"} for own in reading.labels]
+        columns = [{key: text for key, text in own.items() if key[0] == "column"} for own in reading.labels]
+        lines = [key for key in columns[0] if hint(key[1].partition(" ")[2], lengths=True) == "line"]
+        labels = [[own.get(key) for key in lines or own] for own in columns]
         sheets.setdefault(grid.sheet.name, []).append(sorted(map(str, labels)))
     words = any(hint(name, lengths=True) or axis_in(name) or name.strip().upper() in {*"XYZ"} for name in sheets)
     hinted = words or len({re.sub(r"\d+", "0", name) for name in sheets}) == 1
@@ -168,8 +171,9 @@ def _of_sheet(
         ]
         own = _layout(grid, usable) if usable else []
         readings: list[SheetReading] = []
-        numbered = {*keys} <= {*WHOLE}
-        for read in ((points_in, rows_of_axes) if numbered else ()) + (runs_in, lengths_in) if own else ():
+        places = (points_in, rows_of_axes) if {*keys} <= {*WHOLE} else ()
+        lengths = (runs_in, lengths_in)  # before their places, which may stand beside them
+        for read in (lengths + places if {*own} <= {*grid.places_of} else places + lengths) if own else ():
             if (reading := read(grid, blocks, own)) is not None and (_called(reading) or not turned):
                 readings.append(reading)
                 if 2 * len({*reading.rows, *reading.others}) > len(own):
@@ -308,14 +312,20 @@ def _places(names: Sequence[str], reading: SheetReading, measured: Floats, unit:
     places = {}
     for name in dict.fromkeys(names):
         own = [k for k, one in enumerate(names) if one == name]
-        said_ = {reading.labels[k].get(("place", ""), "") for k in own}
-        if len(said_) == 1 and (text := said_.pop()):
-            start, which, other = text.split()
-            ends = np.array([[float(one) for one in part.split(",")] for part in (start, other)])
-            if which == "direction":
-                ends[1] = (
-                    ends[0] + ends[1] / max(np.linalg.norm(ends[1]), 1e-9) * measured[own].max() * unit.down / unit.up
-                )
+        stated = {reading.labels[k].get(("place", ""), "") for k in own}
+        parted = [text.split() for text in stated if text]
+        each = [np.array([[float(one) for one in part.split(",")] for part in (p[0], p[2])]) for p in parted]
+        ways = [ends[1] - ends[0] if parts[1] == "end" else ends[1] for parts, ends in zip(parted, each, strict=True)]
+        ways = [way / max(np.linalg.norm(way), 1e-9) for way in ways]
+        alike = all(
+            np.allclose([ends[0], way], [each[0][0], ways[0]], atol=1e-4) for ends, way in zip(each, ways, strict=True)
+        )
+        if each and len(each) == len(stated) and alike:
+            ends, which = max(
+                zip(each, parted, strict=True), key=lambda one: float(np.linalg.norm(one[0][1] - one[0][0]))
+            )
+            if which[1] == "direction":
+                ends[1] = ends[0] + ways[0] * measured[own].max() * unit.down / unit.up
             ends = units.converted(ends, unit, "x_mm")
             if measured[own].max() * 0.98 - 1 <= np.linalg.norm(ends[1] - ends[0]) <= 3 * measured[own].max():
                 places[name] = "from " + " to ".join(",".join(f"{one:.10g}" for one in end) for end in ends)

@@ -46,12 +46,18 @@ REFUSED = {
     "U22": "nothing says the unit",
     "U23": "each a recording of its own",
     "U24": "which points belong",
+    "V08": "no column is",
+    "V21": "no line names",
+    "V28": "no line names",
+    "V29": "each a recording of its own",
+    "V30": "nothing says where line '1' lies",
 }
 """Of exports that are not read, what is said."""
 PLACED = {
     "T01": [90, 450, -300],
     "T05": [100, 500, -400],
     "T07": [100, 400, -350],
+    "V16": [40, 450, 120],
     "02": [60, 350, -250],
     "S01": [40, 500, -300],
     "S05": [60, 400, -300],
