@@ -64,6 +64,8 @@ def toleranced(words: list[str], feature: Facts, millimetres: float, datums: Map
     if why := next((_REFUSED[word] for word in plain if word in _REFUSED), None):
         raise NotUnderstoodError(why)
     number = numbers_of([word for word in plain if word not in _PLAIN])
+    if len(number) > (2 if what == "size" else 1):
+        raise NotUnderstoodError("has further numbers, as of a zone for each length or area, which are not read")
     if what == "size":
         if len(number) < 2:
             raise NotUnderstoodError("has a diameter without two limits, which is not read")
@@ -117,7 +119,8 @@ class _Program:
         self.styli: dict[str, Facts] = {}
         self.mount, self.stylus = np.zeros(3), ""
         self.measuring: tuple[str, list[list[float]]] | None = None
-        self.given: list[tuple[int, str, str]] = []
+        # line, features and tolerance of each output, with what the tolerance and the datums were at that line
+        self.given: list[tuple[int, list[str], str, tuple[int, list[str]] | None, dict[str, str]]] = []
         self.scanning, self.scanned = False, set[str]()
         self.read: Mapping[str, Callable[[list[str]], None]] = {
             "SCNMOD": self._scanning, "PAMEAS": self._scanned, "UNITS": self._units, "SNSMNT": self._mounted,
@@ -129,8 +132,8 @@ class _Program:
         for self.line, statement in said:
             if statement:
                 self._one(statement)
-        for line, feature, tolerance in self.given:
-            self._characteristic(line, feature, tolerance)
+        for one in self.given:
+            self._characteristic(*one)
         self._left_over()
         used = dict.fromkeys(one["stylus"] for one in self.drawing.features)
         self.drawing.styli = [self.styli[name] for name in used if name in self.styli]
@@ -289,20 +292,26 @@ class _Program:
         self._unknown(name, "is constructed of other features, which is not read")
 
     def _output(self, words: list[str]) -> None:
-        feature = _named(words, "FA", "F")[:1]
-        self.given += [(self.line, name, tolerance) for tolerance in _named(words, "TA", "T") for name in feature]
+        of = _named(words, "FA", "F")
+        for name in _named(words, "TA", "T") if of else ():
+            self.given.append((self.line, of, name, self.tolerances.get(name), dict(self.datums)))
 
-    def _characteristic(self, line: int, feature: str, tolerance: str) -> None:
+    def _characteristic(
+        self, line: int, of: list[str], tolerance: str, there: tuple[int, list[str]] | None, datums: dict[str, str]
+    ) -> None:
         features = {one["name"]: one for one in self.drawing.features}
-        known = tolerance in self.tolerances and feature in features
-        place = f"{self.where} line {self.tolerances[tolerance][0] if known else line}"
+        defined, feature = there or self.tolerances.get(tolerance), of[0]
+        place = f"{self.where} line {defined[0] if defined and feature in features else line}"
         with self.drawing.understanding(tolerance, place):
-            if tolerance not in self.tolerances:
+            if defined is None:
                 raise NotUnderstoodError("is a tolerance that is not defined")
+            if len(of) > 1:
+                raise NotUnderstoodError(f"is a tolerance of {' and '.join(of)} together, which is not read")
             if feature not in features:
                 raise NotUnderstoodError(f"is a tolerance of {feature!r}, which is not read")
-            datums = {label: name for label, name in self.datums.items() if drawings.all_there([name], features)}
-            found = toleranced(self.tolerances[tolerance][1], features[feature], self.frame.millimetres, datums)
+            known = {**self.datums, **datums}
+            known = {label: name for label, name in known.items() if drawings.all_there([name], features)}
+            found = toleranced(defined[1], features[feature], self.frame.millimetres, known)
             same = [one["name"] for one in self.drawing.characteristics]
             name = tolerance if tolerance not in same else f"{tolerance} {feature}"
             self.drawing.characteristics.append({"name": name, **found})
@@ -313,7 +322,7 @@ class _Program:
         for name in self.nominal:
             if name not in told:
                 self._unknown(name, "is a feature that is not measured", self.where)
-        given = {tolerance for _, _, tolerance in self.given}
+        given = {tolerance for _, _, tolerance, *_ in self.given}
         for name, (line, _) in self.tolerances.items():
             if name not in given:
                 self._unknown(name, "is a tolerance without a feature", f"{self.where} line {line}")

@@ -248,7 +248,9 @@ class _Document:
         shape = "" if zone is None or not len(zone) else local(zone[0])
         if shape and shape not in (("DiametricalZone", "SphericalZone") if what == "position" else (usual,)):
             raise NotUnderstoodError(f"has a tolerance zone of shape {shape}, which is not read")
-        frame = self.by_id.get(child(definition, "DatumReferenceFrameId"))
+        frame = None
+        if child(definition, "DatumReferenceFrameId"):
+            frame = self._referred(definition, "DatumReferenceFrameId")
         datums = self._datums(frame) if ASKS[what].datum_kinds and frame is not None else []
         if len(datums) < ASKS[what].datums:
             raise NotUnderstoodError("names no datum")

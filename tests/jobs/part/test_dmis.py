@@ -209,3 +209,33 @@ def test_a_damaged_program_is_read_or_refused_in_words(at: int, cut: int, put: s
         found.settled(["*"], "plate.dmi")
         assert found.features
         assert found.characteristics
+
+
+def test_a_tolerance_and_a_datum_are_what_they_were_where_they_are_put_out() -> None:
+    """Labels that a program uses again: the bore has ±0.1 about the top, whatever they stand for later."""
+    later = """T(DIA)=TOL/DIAM,-0.5,0.5
+T(SQ)=TOL/PERP,0.5,DAT(A)
+DATDEF/FA(BORE),DAT(A)
+"""
+    found = read(TOP, BORE, later)
+    assert not found.unknown
+    assert found.characteristics == read(TOP, BORE).characteristics
+
+
+@pytest.mark.parametrize(
+    "tolerance",
+    ["DIAM,-0,1,0,2", "DIAM,-0.1,0.2,31", "CYLCTY,0.02,0.005", "PERP,0.05,0.01,25,DAT(A)", "POS,2D,0.1,0.2,DAT(A)"],
+)
+def test_further_numbers_of_a_tolerance_are_not_dropped(tolerance: str) -> None:
+    """Those of a second zone for each length or area are a demand too, and a decimal comma makes two of one."""
+    found = read(TOP, BORE, f"T(MORE)=TOL/{tolerance}\nOUTPUT/FA(BORE),TA(MORE)\n")
+    assert "MORE" not in named(found.characteristics)
+    ((name, why),) = [(one.name, one.why) for one in found.unknown]
+    assert name == "MORE"
+    assert "further numbers" in why
+
+
+def test_a_tolerance_of_two_features_together_is_not_that_of_the_first() -> None:
+    found = read(TOP, BORE.replace("OUTPUT/FA(BORE),TA(DIA)", "OUTPUT/FA(BORE),FA(TOP),TA(DIA)"))
+    assert not found.characteristics
+    assert {one.why for one in found.unknown} == {"is a tolerance of BORE and TOP together, which is not read"}

@@ -212,6 +212,7 @@ SCAN = feature(8, "Circle", "scan", "<Location>4 5 6</Location><Normal>0 0 1</No
      "has 'wide' where a number"),
     ("Asked", characteristic(7, "Position", "8", [2], zone(0.5, 4, "<ZoneShape><NonDiametricalZone/></ZoneShape>")), "8",
      "zone of shape NonDiametricalZone"),
+    ("Asked", characteristic(7, "Position", "8", [2], zone(0.5, 99)), "8", "DatumReferenceFrameId to nothing that is there"),
 ])  # fmt: skip
 def test_what_is_not_understood_is_told_by_name(kind: str, item: tuple[str, str, str], name: str, why: str) -> None:
     found = read(item, kind=kind)
