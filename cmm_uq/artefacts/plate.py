@@ -59,6 +59,7 @@ class Plate(Rigid):
     title = say("Plate")
     size_title: ClassVar[Text] = say("Length of the plate")
     plural: ClassVar[str] = "the recorded plates"  # what is measured, for messages
+    mend: ClassVar[str] = "Check the numbering of the balls and their reference positions"
 
     def __init__(self, facts: PlateFacts, points: Points, *, where: str | None = None) -> None:
         super().__init__(points)
@@ -143,7 +144,7 @@ class Plate(Rigid):
             raise CmmUqError(problem, where=place(points, points.measurement == number, where), fix=fix)
         length = self.sizes[0].nominal
         check_length(float(found.sum() / nominal.sum()) * length, length, self.plural, where)
-        self.refuse_another_shape("Check the numbering of the balls and their reference positions", where)
+        self.refuse_another_shape(self.mend, where)
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import csv
+import datetime as dt
 import io
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from cmm_uq.app.commands.jobs.new import new_job, write_new
+from cmm_uq.app.commands.jobs.new import job_of_export, new_job, write_new
 from cmm_uq.app.commands.jobs.simulate import simulated_job
 from cmm_uq.app.commands.model import recorded_model
+from cmm_uq.app.commands.parts.part import write_part
 from cmm_uq.app.commands.reading import job_of, read_job
-from cmm_uq.app.commands.report import evaluate_job, report_outcome
+from cmm_uq.app.commands.report import evaluate_job, report_outcome, write_report
 from cmm_uq.artefacts.optical.tracked import TrackedPoints, predicted_poses
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.result import Result
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.stated import physics_of
+from tests.conftest import ROOT
 
+EXAMPLES = ROOT / "examples"
 FILES = new_job("tracked_points", {}, id="robot")
 TRUTH = {"seed": 5, "noise": {"coordinate_um": 30.0}, "effects": {
     "zero_q2": {"arcsec": 900.0}, "zero_q4": {"arcsec": -400.0}, "length_q2": {"um": 600.0}, "twist_q1": {"arcsec": 300.0},
@@ -150,3 +155,22 @@ def test_the_certificate_has_the_rows_as_found(tmp_path: Path) -> None:
     assert [row["d_mm"] for row in rows][::5] == [475.0, 85.0]  # what is not named, or open, stands as it was
     value = outcome.results["estimates"]["length_q2"]["um"]["value"]
     assert_allclose(rows[1]["a_mm"], 600.0 + value / 1000, atol=1e-9)
+
+
+def test_a_job_of_an_export_names_effects_that_its_arm_has() -> None:
+    """As a new job does, but for what needs a column that the export has not."""
+    told = robot().facts.machine.model_dump()
+    given = {"job": {"date": dt.date(2026, 1, 1)}, "machine": {"name": "R", "arm": told["arm"], "joint": told["joint"]}}
+    made = job_of_export("tracked_points", given, {"recording.csv": recording({}).partition(b"\n")[2]}, id="r")[
+        "job.toml"
+    ].decode()
+    assert '"zero_q5", "length_q1"' in made
+    assert "slack" not in made
+
+
+def test_no_part_is_evaluated_by_the_certificate_of_an_arm(tmp_path: Path) -> None:
+    write_report(EXAMPLES / "robot-simulated", tmp_path / "machine")
+    shutil.copytree(EXAMPLES / "part-plate-simulated", tmp_path / "part")
+    shutil.copy(tmp_path / "machine" / "certificate-simulated.pdf", tmp_path / "part" / "machine")
+    with pytest.raises(CmmUqError, match="the machine's certificate is of an arm"):
+        write_part(tmp_path / "part", tmp_path / "out")

@@ -44,6 +44,7 @@ class TrackedPoints(Plate):
     title = say("Reference instrument")
     size_title = say("Longest distance by the reference instrument")
     plural = "the points as the machine has them"
+    mend = "Check which row has which reference, and of an arm its rows, convention and reversed"
 
     def own_faults(self) -> Iterable[Effect]:
         return ()

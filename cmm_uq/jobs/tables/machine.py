@@ -319,7 +319,7 @@ class MachineFacts(JobTable):
             yield "[machine.arm] is of an arm: give its rows, [[machine.joint]]"
 
 
-_OF_ARMS = frozenset(("name", "manufacturer", "model", "serial", "owner", "joint", "arm", "further", "calibrate"))
+_OF_ARMS = frozenset(("name", "manufacturer", "model", "serial", "owner", "joint", "arm", "calibrate"))
 
 
 class ProbeFacts(JobTable):

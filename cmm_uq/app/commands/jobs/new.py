@@ -34,7 +34,8 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.schema import commented
 from cmm_uq.jobs.tables.identification import EXAMPLE, MEASURED, SIMULATED, Origin, first_line
 from cmm_uq.machine.model.kind import MACHINE, Beginning, Kind
-from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.machine.physics.stated import physics_of
 
 RECORDING, SCHEMA, README = "recording.csv", ".cmm-uq/job.schema.json", "README.md"
 REST = "docs/reference/job.md, cmm-uq schema job, or what an editor that knows TOML schemas completes"
@@ -209,9 +210,11 @@ def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: s
     bare = replace(begin, artefact={}, conformity=None, test={})
     whole = _tables(found, bare, given, id, origin=MEASURED) | {"machine": nested(given.get("machine", {}))}
     if "effects" not in given.get("model", {}):  # what the export has no column for it cannot tell
-        recorded = read_new(found, whole, files).points.columns
-        known = (one for one in effects(begin.effects) if set(one.columns) <= set(recorded))
-        whole["model"] = {**whole["model"], "effects": [one.name for one in known]}
+        read = read_new(found, whole, files)
+        with physics_of(read):  # an arm has as many effects as joints
+            known = [one for name in begin.effects if (one := every().get(name)) is not None]
+        named = [one.name for one in known if set(one.columns) <= set(read.points.columns)]
+        whole["model"] = {**whole["model"], "effects": named}
     return job_files(found.name, whole, files, begin=begin)
 
 

@@ -336,6 +336,12 @@ def _machine(job: PartJob, calibrated: Job | None) -> Machine:
     """Chain, travel and origin: as the job says, else as the calibration has them."""
     facts, own = job.facts.machine_state, None if calibrated is None else calibrated.facts.machine
     chain, origin = facts.chain, facts.origin_mm
+    if own is not None and own.joint:
+        raise CmmUqError(
+            "the machine's certificate is of an arm, and parts are evaluated of machines of three carriages",
+            where=_where(job),
+            fix="Give the certificate of the machine that measured it",
+        )
     if own is not None and "chain" not in facts.model_fields_set:
         chain = own.chain
     if own is not None and "origin_mm" not in facts.model_fields_set:
