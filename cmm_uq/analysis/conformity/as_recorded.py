@@ -256,7 +256,7 @@ class Supplemented(Around):
 
     def __init__(self, inner: Artefact, gauge: ShortGauge) -> None:
         super().__init__(inner)
-        self.gauge, self._served = gauge, dict[bytes, Ints]()
+        self.gauge, self._served = gauge, dict[bytes, list[Ints]]()
         self._numbers = gauge.points.measurement[gauge.rows[:, 0]]
         self._copied = np.isin(gauge.points.group[gauge.rows[:, 0]], list(gauge.points.copies))
 
@@ -265,32 +265,32 @@ class Supplemented(Around):
         if found is None:
             return None
         served, first = self._measured_by(found.rows), found.rows[:, 0]
-        beside = np.where(served >= 0, self.gauge.u_mm, 0.0)
+        beside = np.where([len(own) > 0 for own in served], self.gauge.u_mm, 0.0)
         measurement, repeat = self.points.measurement[first], self.points.repeat[first]
         repeats_of = {m: np.unique(repeat[measurement == m]) for m in np.unique(measurement)}
         added = np.zeros(len(first))  # mm, error of the short gauge that each length's is taken with
-        for i in np.flatnonzero(served >= 0):
-            repeats = self.gauge.errors_mm[(self._numbers == served[i]) & ~self._copied]
-            turn = int(np.searchsorted(repeats_of[measurement[i]], repeat[i]))
-            outwards = repeats[np.argmax(np.abs(found.errors[i] + repeats))]
-            added[i] = repeats[turn] if turn < len(repeats) else outwards
+        for i in np.flatnonzero(beside):
+            turn, often = np.searchsorted(repeats_of[measurement[i]], repeat[i]), len(repeats_of[measurement[i]])
+            of_each = (self.gauge.errors_mm[(self._numbers == own) & ~self._copied] for own in served[i])
+            errors = np.concatenate([own[turn::often] if turn < len(own) else own for own in of_each])
+            added[i] = errors[np.argmax(np.abs(found.errors[i] + errors))]
         return Indications(found.errors + added, found.lengths, np.hypot(found.u, beside), found.rows, beside)
 
     def bidirectional(self, rows: Ints) -> NDArray[np.bool_] | None:
         own = self.inner.bidirectional(rows)
-        return None if own is None else np.asarray(own | (self._measured_by(rows) >= 0))
+        return None if own is None else own | np.array([len(one) > 0 for one in self._measured_by(rows)], dtype=bool)
 
-    def _measured_by(self, rows: Ints) -> Ints:
-        """Measurement of the short gauge that serves each length, (m,): the nearest of those that fit; −1 for none."""
+    def _measured_by(self, rows: Ints) -> list[Ints]:
+        """Measurements of the short gauge that lie by each length, (m,): all of those that fit, none left for a better one."""
         key = rows.tobytes()
         if key not in self._served:
-            self._served[key] = self._nearest(rows)
+            self._served[key] = self._fitting(rows)
         return self._served[key]
 
-    def _nearest(self, rows: Ints) -> Ints:
+    def _fitting(self, rows: Ints) -> list[Ints]:
         gauge, own = self.gauge, self.inner.bidirectional(rows)
         middles, ways = gauge.lines_mm
-        found = np.full(len(rows), -1, dtype=np.int64)
+        found = [np.empty(0, dtype=np.int64)] * len(rows)
         tips, tips_of_gauge = _tips(self.points)[rows].mean(axis=1), _tips(gauge.points)[gauge.rows].mean(axis=1)
         for i in [] if own is None else np.flatnonzero(~own):
             first, line = self.points.xyz[rows[i, 0]], np.diff(self.points.xyz[rows[i]], axis=0)[0]
@@ -299,9 +299,7 @@ class Supplemented(Around):
             distance = np.linalg.norm(np.cross(middles - first, line / np.linalg.norm(line)), axis=1)
             fits = ~self._copied & (sine <= ALIGNED) & (distance <= NEAR_MM)
             fits &= np.linalg.norm(tips_of_gauge - tips[i], axis=1) <= OFFSET_TOLERANCE_MM
-            if fits.any():
-                at = np.flatnonzero(fits)
-                found[i] = self._numbers[at[np.argmin(distance[at])]]
+            found[i] = np.unique(self._numbers[fits])
         return found
 
 

@@ -126,6 +126,30 @@ def test_a_repeat_that_the_gauge_does_not_have_takes_the_one_farthest_outwards()
     assert fourth.error_um == pytest.approx(-1.7, abs=1e-6)
 
 
+@pytest.mark.parametrize("at", [0, 1, 2, 3])
+def test_each_repeat_of_the_gauge_counts_whatever_its_number(at: int) -> None:
+    """Of four repeats one is 5 µm off: it is added to one of the three of each length, wherever it stands."""
+    errors = np.zeros(4)
+    errors[at] = 5.0
+    found = judged(one_sided(), short(errors))
+    assert found.outcome == "fail"  # more than five lengths have one value outside
+    of_five = sorted(item.error_um for item in found.errors if item.measurement == 5 and (item.length_mm or 0) < 21)
+    assert of_five == pytest.approx([0.0, 0.0, 5.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("aside_mm", [-10.0, 10.0])
+def test_a_further_gauge_nearer_to_the_line_does_not_take_the_place_of_another(aside_mm: float) -> None:
+    off, near = short([5.0] * 3, aside_mm=aside_mm), short()
+    points = Points(
+        np.vstack([off.points.xyz, near.points.xyz]), np.append(off.points.measurement, near.points.measurement + 7),
+        np.tile(off.points.point, 2), np.tile(off.points.repeat, 2), MACHINE,
+    )  # fmt: skip
+    assert judged(one_sided(), near).outcome == "pass"
+    assert (
+        judged(one_sided(), replace(off, points=points, rows=np.arange(len(points)).reshape(-1, 2))).outcome == "fail"
+    )
+
+
 def test_two_errors_that_conform_may_not_conform_together() -> None:
     """1.5 and 1.5 µm, each within 2.5667 µm at 20 mm, are 3.0."""
     errors = {(5, repeat, 20.0): 1.5 for repeat in (1, 2, 3)}
