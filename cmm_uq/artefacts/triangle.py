@@ -203,7 +203,7 @@ class Triangle(Rigid):
 
     kind = "triangle"
     title = say("Triangle standard")
-    key_of_u = "u_blocks_um"
+    key_of_u = "u_blocks_um and u_cylinders_um"
 
     def __init__(self, facts: TriangleFacts, points: Points, *, where: str | None = None) -> None:
         super().__init__(replace(points, machine=replace(points.machine, tip_on_every_carriage=True)))

@@ -201,7 +201,7 @@ def _gaps(points: Points, repeats: int | None) -> Iterator[Message]:
         measurement, repeat = points.run_of(group)
         runs.setdefault(measurement, {})[repeat] = set(points.point[rows].tolist())
     holes = {measurement: _absent(set().union(*own.values())) for measurement, own in runs.items()}
-    consecutive = 2 * sum(not each for each in holes.values()) > len(holes)
+    consecutive = 2 * sum(not each for each in holes.values()) >= len(holes)
     for m, own in runs.items():
         if absent := _absent(own):
             yield say("repeat {which} of measurement {measurement}: numbered, and not recorded", which=_which(absent),

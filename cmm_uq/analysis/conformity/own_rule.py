@@ -33,7 +33,7 @@ from cmm_uq.base.points import Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import CompleteTest
-from cmm_uq.machine.model.artefact import ArtefactFigure, Indications
+from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Indications
 
 NAME = positioning.OWN_RULE
 # lines of a figure whose u is that of its evaluation, with all that is stated of the readings
@@ -195,15 +195,21 @@ def enough(test: Test) -> tuple[Condition, ...]:
     if test.facts.complete is None:
         what = say("what a complete test consists of, by the laboratory's own rule")
         return (Condition(what, (what,), Verbatim("complete = { measurements, repeats, points } in [[conformity]]")),)
-    return whole(test.facts.complete, test.recorded.points)
+    return whole(test.facts.complete, test.recorded)
 
 
-def whole(asked: CompleteTest, points: Points) -> tuple[Condition, ...]:
-    """How many measurements, repeats and points there are, recorded or planned, of those that are asked for."""
-    own = _counting(points)
+def whole(asked: CompleteTest, artefact: Artefact) -> tuple[Condition, ...]:
+    """How many measurements, repeats and points there are, recorded or planned, of those that are asked for.
+
+    Points that observe nothing, as a direction point before contact, are none.
+    """
+    points = artefact.points
+    observed, own = np.isin(np.arange(len(points)), artefact.rows), _counting(points)
     runs: dict[int, list[int]] = {}
     for group in np.unique(points.group[own]).tolist():
-        runs.setdefault(points.run_of(group)[0], []).append(len(np.unique(points.point[points.group == group])))
+        runs.setdefault(points.run_of(group)[0], []).append(
+            len(np.unique(points.point[observed & (points.group == group)]))
+        )
     few = (
         min((len(each) for each in runs.values()), default=0),
         min((n for each in runs.values() for n in each), default=0),

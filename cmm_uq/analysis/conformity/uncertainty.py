@@ -45,7 +45,11 @@ def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Ci
     found = []
     for line in lines:
         if not _met(line, artefact, under):
-            key = "u_um in [artefact]" if line == "calibration" else f"{LINE_KEYS[line]} in [test_uncertainty]"
+            key = (
+                f"{artefact.key_of_u} in [artefact]"
+                if line == "calibration"
+                else f"{LINE_KEYS[line]} in [test_uncertainty]"
+            )
             what = say("uncertainty: {line} is neither stated nor declared negligible", line=_NAMES[line])
             declared = f'{line} = {{ by = "…", reason = "…" }} in [test_uncertainty.negligible]'
             found.append(_lacks(what, f"{key}, or {declared}"))
@@ -80,11 +84,11 @@ def u_of_unstated(lines: Collection[str], artefact: Artefact, under: Circumstanc
 
 
 def _met(line: str, artefact: Artefact, under: Circumstances) -> bool:
-    """Whether a line is stated above zero or declared; of a calibration that of each length, or of the size."""
+    """Whether a line is stated above zero or declared; of a calibration that of each length, or of each size."""
     stated = under.uncertainty
     if line == "calibration":
         found = artefact.indications()
-        u = np.array([artefact.sizes[0].sd]) if found is None else found.u
+        u = np.array([size.sd for size in artefact.sizes]) if found is None else found.u
         return stated.declared(line) is not None or bool(np.all(u > 0))
     if line == "repeat" and _both_lines(under) and _two_readings(1.0, under) > 0:
         return True

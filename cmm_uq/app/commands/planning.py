@@ -50,7 +50,7 @@ def of_standards(job: Job, setting: Setting, name: str, points: Points, recorded
         asked = standard.characteristic(wish.characteristic)
         if asked.observed in tested:
             found += asked.conditions(artefact, recorded=recorded > 0)
-            found += own_rule.whole(wish.complete, artefact.points) if wish.complete else ()
+            found += own_rule.whole(wish.complete, artefact) if wish.complete else ()
     return tuple({condition.what: condition for condition in found}.values())
 
 

@@ -214,6 +214,13 @@ def test_a_row_that_was_taken_out_is_missing(gone: dict[str, int], words: str) -
     assert [words in text for text in condition.missing] == [True]
 
 
+def test_a_row_taken_out_of_one_of_two_measurements_is_missing() -> None:
+    points = recorded.gauge(recorded.SEVEN[:2], repeats=1).points
+    assert not numbered(points)
+    (condition,) = numbered(points.select(~rows(points, measurement=2, point=4)))
+    assert condition.missing == ("point 4 of measurement 2: numbered, and not recorded",)
+
+
 def test_numbers_of_faces_are_no_gaps() -> None:
     """A laboratory that numbers the faces of its gauge has gaps in every line, and none is one."""
     points = recorded.gauge().points

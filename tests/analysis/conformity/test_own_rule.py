@@ -17,10 +17,11 @@ from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.artefacts import BUILT_IN, artefact_facts, kind_named
 from cmm_uq.artefacts.bryan import Bryan
+from cmm_uq.artefacts.plane import PlaneSurface
 from cmm_uq.artefacts.triangle import Triangle
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import translated
-from cmm_uq.base.points import Points
+from cmm_uq.base.points import Machine, Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts, TestUncertainty
 from cmm_uq.jobs.tables.plan import CompleteTest
@@ -95,6 +96,29 @@ def test_the_limit_of_an_error_grows_with_its_length() -> None:
     found = statement(wish, artefact, {}, "[[conformity]] 1", tuple(FIGURES), None, STATED)
     assert {(one.length_mm, one.limit_um) for one in found.errors} == {(20.0, 4.2), (400.0, 8.0)}
     assert (found.named.length_mm, found.finding) == (400.0, "undecided")  # 0.1 µm of room, half its u; of 20 mm ten u
+
+
+def test_a_direction_point_is_no_point_of_a_complete_test() -> None:
+    """Eight points of contact and the one before contact are eight."""
+    x, y = (part.ravel() for part in np.meshgrid([100.0, 200.0, 300.0], [100.0, 200.0, 300.0]))
+    xyz, one = np.column_stack([x, y, np.append(-390.0, np.full(8, -400.0))]), np.ones(9, dtype=np.int64)
+    surface = PlaneSurface(artefact_facts(kind="plane", form_um=0.2), Points(xyz, one, np.arange(9), one, Machine()))
+    under = replace(STATED, uncertainty=TestUncertainty(u_form_um=0.1))
+    for points, outcome in ((8, "pass"), (9, "incomplete")):
+        asked = CompleteTest(measurements=1, repeats=1, points=points)
+        assert decided(surface, "flatness", 5.0, under, asked).outcome == outcome
+
+
+@pytest.mark.parametrize("key", ["u_blocks_um", "u_cylinders_um"])
+@pytest.mark.parametrize("figure", ["error", "mean error", "angle error"])
+def test_blocks_and_cylinders_each_state_how_uncertain_they_are(figure: str, key: str) -> None:
+    artefact, under, value, _, _, complete = OWN["mean error"]("complete")
+    facts = artefact._facts.model_copy(update={key: 0.0})
+    found = decided(Triangle(facts, artefact.points), figure, 10 * abs(value) + 1e3, under, complete)
+    assert (found.finding, found.outcome) == ("pass", "incomplete")
+    (missing,) = found.missing_with_remedies
+    assert "calibration of the artefact" in missing
+    assert key in missing
 
 
 @pytest.mark.parametrize("figure", OWN)
