@@ -105,6 +105,11 @@ def _chain(certificate: Certificate, given: Mapping[str, Any], where: str) -> di
     if "issuer" in given and any(one.traceable is False for one in statements if _TRACEABLE in one.ref_type):
         raise CmmUqError("says itself that its results are not traceable to the SI", where=where,
                          fix="Leave issuer out of [artefact.certificate], or name another certificate")  # fmt: skip
+    months = given.get("interval_months")
+    if due is not None and type(months) is int and 1 <= months <= 600:
+        until = artefacts.Traceability(date=core.issued or core.end, interval_months=months).until
+        if until is not None and until > due:
+            raise _contradicted("[artefact.certificate] interval_months", f"{months} (until {until})", due, where)
     says: dict[str, str | dt.date | None] = {
         "number": core.identifier, "laboratory": str(certificate.administrative.laboratory.contact.name),
         "date": core.issued or core.end, "due": None if "interval_months" in given else due,

@@ -189,6 +189,7 @@ TWO = issued(value("Length A", "404.1", "0.003"), value("Length B", "404.2", "0.
     (BALL_BAR, {"U_um": 2.0, "k": 2.0}, r"\[artefact\] u_um = 1 is smaller"),
     (BALL_BAR, {"certificate": {"number": "4712"}}, r"\[artefact\.certificate\] number = 4712 in job\.toml, and D-K-4711"),
     (BALL_BAR, {"certificate": {"due": dt.date(2027, 1, 1)}}, r"due = 2027-01-01 in job\.toml, and 2028-03-02"),
+    (BALL_BAR, {"certificate": {"interval_months": 60}}, r"interval_months = 60 \(until 2031-.*\) in .*, and 2028-03-02"),
     (BALL_BAR, {"serial": "13"}, r"is of an item with the numbers 12, and \[artefact\] serial = '13'"),
     (TWO, {}, r"has 2 quantities for \[artefact\] length_mm \(1 value\): '.*Length A', '.*Length B'\. Say which"),
     (SPHERE, {}, r"has no one quantity for \[artefact\] length_mm .*'Calibration / Certified values / Diameter'"),
@@ -200,6 +201,13 @@ def test_a_contradiction_or_what_cannot_be_told_is_refused(
 ) -> None:
     with pytest.raises(CmmUqError, match=message):
         job("ballbar", certificate, **given)
+
+
+def test_the_laboratory_s_own_interval_may_end_before_the_day_in_the_certificate_and_not_after() -> None:
+    chain = job("ballbar", BALL_BAR, certificate={"interval_months": 12}).facts.artefact.certificate
+    assert chain is not None
+    assert chain.until is not None
+    assert chain.until < dt.date(2028, 3, 2)
 
 
 def test_the_job_says_which_of_several_quantities_is_meant() -> None:
