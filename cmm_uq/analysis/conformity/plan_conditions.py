@@ -57,10 +57,11 @@ def with_offset(points: Points, rows: Ints, offset_mm: float | None) -> NDArray[
 
 
 def tip_offsets(points: Points) -> Floats | None:
-    """Stylus tip offset across the ram, (n, 3) mm, zero along it; ``None`` where none is recorded."""
-    if not all(f"tip_{a}_mm" in points.columns for a in AXES):
+    """Stylus tip offset across the ram, (n, 3) mm, zero along it and without a column; ``None`` where none is recorded."""
+    recorded = [points.columns.get(f"tip_{a}_mm") for a in AXES]
+    if all(one is None for one in recorded):
         return None
-    tips = np.column_stack([points.columns[f"tip_{a}_mm"] for a in AXES])
+    tips = np.column_stack([np.zeros(len(points)) if one is None else one for one in recorded])
     tips[:, AXES.index(points.machine.chain.replace("F", "")[-1].lower())] = 0.0
     return np.asarray(tips, dtype=np.float64)
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.conformity.plan_conditions import lengths_measured, nominals
+from cmm_uq.analysis.conformity.plan_conditions import lengths_measured, nominals, with_offset
 from cmm_uq.analysis.conformity.plans import LengthPlan
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar import Ballbar
@@ -139,6 +139,17 @@ def test_only_bidirectional_lengths_count_as_repeats_of_bidirectional_ones(
     points = replace(both.points, columns={**both.points.columns, "approach_x": along_x})
     _, lacks = said(StepGauge(artefact_facts(kind="step_gauge", u_um="L/2000"), points), plan)
     assert [text for text in lacks if "repetitions" in text] == [f"2 repetitions of each length ({m})" for m in missing]
+
+
+@pytest.mark.parametrize(("axes", "across"), [("x", True), ("xy", True), ("z", False), ("xyz", True), ("", False)])
+def test_a_tip_of_which_not_every_coordinate_is_recorded_is_where_the_others_say(axes: str, across: bool) -> None:
+    """150 mm along X and along Z, the ram: those without a column are none, as in the physics of the machine."""
+    points, tip = along((X, [25.0, 720.0])).points, {"x": 150.0, "y": 0.0, "z": 150.0}
+    columns = {f"tip_{a}_mm": np.full(len(points), tip[a]) for a in axes}
+    beside = replace(points, columns={**points.columns, **columns})
+    rows = np.array([[0, 1], [0, 2]])
+    assert with_offset(beside, rows, 150.0).tolist() == [across] * 2
+    assert with_offset(beside, rows, 0.0).tolist() == [not across] * 2
 
 
 def test_lengths_up_to_a_millimetre_apart_are_one_nominal_length() -> None:
