@@ -30,7 +30,7 @@ def _timed(work: Callable[[], list[float]], repeats: int = 3) -> tuple[float, li
 def ours_first_order() -> Result:
     from cmm_uq.maths.uncertainty.distributions import normal
     from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-    from cmm_uq.maths.uncertainty.monte_carlo import first_order
+    from cmm_uq.maths.uncertainty.propagation import first_order
 
     function, (x, u) = model({"sqrt": np.sqrt, "cos": np.cos}), points(POINTS)
     inputs = {name: normal(x[k], u[k]) for k, name in enumerate(NAMES)}
@@ -127,7 +127,7 @@ def suncal_first_order() -> Result:
 def ours_monte_carlo() -> Result:
     from cmm_uq.maths.uncertainty.distributions import normal
     from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-    from cmm_uq.maths.uncertainty.monte_carlo import simulate
+    from cmm_uq.maths.uncertainty.propagation import simulate
 
     function = model({"sqrt": np.sqrt, "cos": np.cos})
     length = MeasurementModel(function, {name: normal(mean, u) for name, (mean, u) in INPUTS.items()})
@@ -182,7 +182,7 @@ def suncal_monte_carlo() -> Result:
 
 
 def ours_gauge_block() -> Result:
-    from cmm_uq.maths.uncertainty.monte_carlo import simulate_adaptively
+    from cmm_uq.maths.uncertainty.propagation import simulate_adaptively
     from cmm_uq.maths.uncertainty.reference.jcgm import gauge_block
 
     def work() -> list[float]:

@@ -14,7 +14,7 @@ from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.artefacts.axis_runs.run import roughness
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.maths.uncertainty.air import harris_2004
+from cmm_uq.maths.uncertainty.air.state import harris_2004
 from tests.artefacts.constructions import MACHINE, estimated, model
 from tests.recordings import TRAVEL
 

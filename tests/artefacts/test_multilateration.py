@@ -22,7 +22,7 @@ from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.linear_model import LeastSquares
-from cmm_uq.maths.uncertainty.air import harris_2004
+from cmm_uq.maths.uncertainty.air.state import harris_2004
 from tests.artefacts.constructions import free
 
 KNOWN = artefact_facts(kind="multilateration", u_scale_um_per_m=0.0)

@@ -21,7 +21,7 @@ from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasureme
 from cmm_uq.certificate.wording import effect_title
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.machine.physics.catalogue import effects
-from cmm_uq.maths.uncertainty.monte_carlo import Source, simulate
+from cmm_uq.maths.uncertainty.propagation import Source, simulate
 from tests.jobs.part.parts import plate
 
 ERRORS = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_zx", "squareness_yz")

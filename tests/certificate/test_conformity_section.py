@@ -21,7 +21,7 @@ from cmm_uq.jobs.reports import AsFound
 from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError, Prior
 from cmm_uq.machine.model.kind import BARS, LENGTHS
 from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Budget, BudgetLine
-from cmm_uq.maths.uncertainty.budgets.measurements import length_test_uncertainty
+from cmm_uq.maths.uncertainty.budgets.machine import length_test_uncertainty
 from tests.analysis.conformity.recorded import STATED, gauge
 from tests.artefacts.reading import tables
 from tests.artefacts.simulated import analysed

@@ -289,7 +289,7 @@ def _differences(artefact: Artefact) -> list[tuple[Text, int, float]]:
 
 def form_error(test: Test) -> Statement:
     """Range of the radial distances of each sphere from its least-squares sphere (ISO/TS 23165)."""
-    from cmm_uq.maths.uncertainty.budgets.measurements import probing_test_uncertainty
+    from cmm_uq.maths.uncertainty.budgets.machine import probing_test_uncertainty
 
     probed, u_form_um = _probed(test), test.circumstances.uncertainty.u_form_um
     u = float(np.hypot(probed.certified / MICROMETRE / 2, u_form_um))

@@ -321,7 +321,7 @@ def length_budget(
     length_mm: float, u_mm: float, temperature_c: float, circumstances: Circumstances, u_beside_mm: float = 0.0
 ) -> Budget:
     """Test uncertainty of one length (ISO/TS 23165:2006); ``u_mm`` includes ``u_beside_mm`` of a short gauge beside it."""
-    from cmm_uq.maths.uncertainty.budgets.measurements import length_test_uncertainty
+    from cmm_uq.maths.uncertainty.budgets.machine import length_test_uncertainty
 
     stated = circumstances.uncertainty
     return length_test_uncertainty(

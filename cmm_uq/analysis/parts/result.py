@@ -43,7 +43,7 @@ from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.part.feature import FEWEST as FEWEST_POINTS
 from cmm_uq.maths.geometry.association import associate
 from cmm_uq.maths.inference.slow import root
-from cmm_uq.maths.uncertainty.monte_carlo import Simulated
+from cmm_uq.maths.uncertainty.propagation import Simulated
 
 FEWEST = 500  # draws that are possible, from which on a probability is taken from them alone
 # true widths at which measurements are drawn, closer together near the least one, where fewest draws are possible; squares of

@@ -37,7 +37,7 @@ from cmm_uq.analysis.parts.result import Inverse, alike, inverse, nodes_of, tria
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model.field import family_of
-from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, simulate, simulate_adaptively
+from cmm_uq.maths.uncertainty.propagation import Simulated, Source, simulate, simulate_adaptively
 
 CHECKED = 200  # draws that are looked at exactly, beside first order
 FEWEST = 100_000  # virtual measurements, after which u is known to a quarter of a percent

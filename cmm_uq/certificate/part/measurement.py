@@ -33,7 +33,7 @@ from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.part.values import Reported
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.verdicts import Verdicts, gravest
-from cmm_uq.maths.uncertainty.monte_carlo import Simulated
+from cmm_uq.maths.uncertainty.propagation import Simulated
 
 # what states the machine: a certificate with its inputs inside, the figures and draws alone, or a job that was analysed
 Source = Literal["certificate", "results", "job"]

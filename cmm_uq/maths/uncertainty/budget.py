@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from cmm_uq.maths.uncertainty.distributions import Distribution
     from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-    from cmm_uq.maths.uncertainty.monte_carlo import Propagated
+    from cmm_uq.maths.uncertainty.propagation import Propagated
 
 # where a figure comes from, in the fewest words; a line may say more (``"certificate 4711"``)
 REPEATS, JUDGEMENT, CERTIFICATE = say("repeats"), say("judgement"), say("certificate")

@@ -14,7 +14,7 @@ from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 
 if TYPE_CHECKING:
     from cmm_uq.maths.uncertainty.evaluation import Evaluation, OutputResult as Stated
-    from cmm_uq.maths.uncertainty.monte_carlo import Propagated
+    from cmm_uq.maths.uncertainty.propagation import Propagated
 
 SCHEMA = "cmm-uq/budget/1"
 

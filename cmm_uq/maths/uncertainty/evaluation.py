@@ -20,12 +20,11 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, commas, foreign, names, say, semicolons
 from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.uncertainty import monte_carlo
 from cmm_uq.maths.uncertainty.budget import NAMES, Budget, Labels, Method, budget_of, joint_line, line_of
 from cmm_uq.maths.uncertainty.coverage import NO_VARIANCE
 from cmm_uq.maths.uncertainty.distributions import constant
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.monte_carlo import (
+from cmm_uq.maths.uncertainty.propagation import (
     HIGHEST_COVERAGE,
     LARGEST,
     Propagated,
@@ -33,6 +32,8 @@ from cmm_uq.maths.uncertainty.monte_carlo import (
     first_order,
     numerical_tolerance,
     second_order,
+    simulate,
+    simulate_adaptively,
 )
 from cmm_uq.maths.uncertainty.quantity import figure, rounded
 from cmm_uq.maths.uncertainty.type_a import check_coverage, correlation_of, coverage_factor
@@ -320,7 +321,7 @@ def _ways(model: MeasurementModel, request: Request) -> Ways:
         clear = [np.abs(np.abs(end - figures[:, 4:]) - tolerance) > doubt for end in ends]
         return all(np.all(one | (doubt <= tolerance / _OF_TOLERANCE)) for one in clear)
 
-    simulated = monte_carlo.simulate_adaptively(model, request.coverage, digits, request.seed, request.largest, settled)
+    simulated = simulate_adaptively(model, request.coverage, digits, request.seed, request.largest, settled)
     return replace(ways, simulated=simulated)
 
 
@@ -382,5 +383,5 @@ def one_at_a_time(model: MeasurementModel, seed: int = 0) -> Floats:
         if np.any(np.asarray(given.u) > 0):
             with suppress(CmmUqError):
                 alone = MeasurementModel(model.function, {**held, name: given}, model.outputs)
-                variances[:, k] = monte_carlo.simulate(alone, _TRIALS_FOR_SENSITIVITY, seed=seed).u ** 2
+                variances[:, k] = simulate(alone, _TRIALS_FOR_SENSITIVITY, seed=seed).u ** 2
     return variances

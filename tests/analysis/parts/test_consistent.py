@@ -13,7 +13,7 @@ from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
 from cmm_uq.analysis.parts.result import StatedCharacteristic, conforming, middle, stated
 from cmm_uq.app.commands.parts.part import _together
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.uncertainty.monte_carlo import Source, simulate
+from cmm_uq.maths.uncertainty.propagation import Source, simulate
 from tests.parts_drawn import circle
 
 N = 20_000

@@ -14,7 +14,7 @@ from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.units import ARCSECOND
 from cmm_uq.maths.uncertainty.distributions import normal
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.monte_carlo import first_order
+from cmm_uq.maths.uncertainty.propagation import first_order
 from tests.parts_drawn import POSE, circle, machine, plane, spot
 
 SIGMA, TRIALS = 1e-3, 40_000

@@ -18,7 +18,7 @@ from cmm_uq.analysis.parts.setup import plan_of
 from cmm_uq.app.commands.parts.part import decide_limits
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.part.job import TABLES
-from cmm_uq.maths.uncertainty.monte_carlo import Source, simulate
+from cmm_uq.maths.uncertainty.propagation import Source, simulate
 from tests.jobs.part.parts import plate
 
 HEAD = "characteristic,value_mm,value_deg,feature,x_mm,y_mm,z_mm,i,j,k,diameter_mm\n"

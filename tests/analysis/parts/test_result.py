@@ -15,7 +15,7 @@ from cmm_uq.analysis.conformity.limits import Limits
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, Plan
 from cmm_uq.analysis.parts.result import StatedCharacteristic, conforming, deviations_of, stated, within_bounds
-from cmm_uq.maths.uncertainty.monte_carlo import Source, simulate
+from cmm_uq.maths.uncertainty.propagation import Source, simulate
 from tests.parts_drawn import UP, block, circle, plane, spot
 
 PLAN = Plan(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.maths.uncertainty.air import (
+from cmm_uq.maths.uncertainty.air.state import (
     EQUATIONS,
     Air,
     Interferometer,
@@ -25,7 +25,7 @@ from cmm_uq.maths.uncertainty.budget import budget_of
 from cmm_uq.maths.uncertainty.distributions import constant, normal, rectangular
 from cmm_uq.maths.uncertainty.evaluation import evaluate
 from cmm_uq.maths.uncertainty.measurement_model import complex_step, derivatives
-from cmm_uq.maths.uncertainty.monte_carlo import first_order, simulate
+from cmm_uq.maths.uncertainty.propagation import first_order, simulate
 
 LABORATORY = (20.0, 101325.0, 50.0, 450.0, 633.0)
 

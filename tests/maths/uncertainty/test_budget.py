@@ -25,7 +25,7 @@ from cmm_uq.maths.uncertainty.budget import (
 )
 from cmm_uq.maths.uncertainty.distributions import normal
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.monte_carlo import first_order, second_order
+from cmm_uq.maths.uncertainty.propagation import first_order, second_order
 
 
 def end_gauge() -> Budget:

@@ -26,7 +26,7 @@ from cmm_uq.maths.uncertainty.coverage import (
 from cmm_uq.maths.uncertainty.distributions import normal, rectangular, student_t
 from cmm_uq.maths.uncertainty.evaluation import Request, evaluate, stability
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.monte_carlo import draw_outputs, simulate_adaptively
+from cmm_uq.maths.uncertainty.propagation import draw_outputs, simulate_adaptively
 
 
 def by_definition(draws: np.ndarray, p: float) -> list[float]:
@@ -248,7 +248,7 @@ def test_impossible_regions_are_refused() -> None:
 
 
 def test_draws_are_those_of_the_simulation() -> None:
-    from cmm_uq.maths.uncertainty.monte_carlo import simulate
+    from cmm_uq.maths.uncertainty.propagation import simulate
 
     model = MeasurementModel(lambda a: a**2, {"a": normal(1.0, 2.0)})
     assert draw_outputs(model, 25_000, seed=9).mean() == pytest.approx(

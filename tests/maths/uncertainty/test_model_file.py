@@ -246,7 +246,7 @@ def test_a_joint_sample_is_drawn_row_by_row(read: Read) -> None:
     )
     model = read(text).model
     assert model.correlation_matrix[0, 1] == pytest.approx(1.0)
-    from cmm_uq.maths.uncertainty.monte_carlo import simulate
+    from cmm_uq.maths.uncertainty.propagation import simulate
 
     assert simulate(model, 1000).u[0] == 0
 

@@ -11,7 +11,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.uncertainty import distributions as make
 from cmm_uq.maths.uncertainty.distributions import Distribution, constant, normal, rectangular, student_t
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.monte_carlo import (
+from cmm_uq.maths.uncertainty.propagation import (
     BLOCK,
     Simulated,
     first_order,

@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.uncertainty.distributions import constant, normal, student_t
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.monte_carlo import first_order, second_order
+from cmm_uq.maths.uncertainty.propagation import first_order, second_order
 from cmm_uq.maths.uncertainty.type_a import coverage_factor, multivariate_normal, simultaneous_readings
 
 

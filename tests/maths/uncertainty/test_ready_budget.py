@@ -12,7 +12,7 @@ import cmm_uq
 from cmm_uq.app.commands.budget import write_budget
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.geometry import cap_directions, fit_sphere
-from cmm_uq.maths.uncertainty.budgets.measurements import use_by_calibrated_workpiece
+from cmm_uq.maths.uncertainty.budgets.machine import use_by_calibrated_workpiece
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES
 from cmm_uq.maths.uncertainty.models.ready import READY
 from tests.app.cli.process import run
@@ -282,7 +282,7 @@ def test_angles_of_a_triangle_have_their_correlation(tmp_path: Path) -> None:
 
 def test_a_laser_s_length_is_shortened_by_the_air(tmp_path: Path) -> None:
     """Against the refractive index by itself: 400.1 mm over n."""
-    from cmm_uq.maths.uncertainty.air import Air, refractive_index
+    from cmm_uq.maths.uncertainty.air.state import Air, refractive_index
     from cmm_uq.maths.uncertainty.distributions import normal
 
     n, _ = refractive_index(Air(**{k: normal(*v) for k, v in LASER.items() if k != "vacuum_mm"}))

@@ -9,7 +9,7 @@ from scipy import stats
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import unit
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.monte_carlo import first_order
+from cmm_uq.maths.uncertainty.propagation import first_order
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from cmm_uq.maths.uncertainty.type_a import (
     check_coverage,

@@ -32,7 +32,7 @@ from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import REFERENCE_TEMPERATURE, unit
 from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, BudgetLine, OneWay, one_way
-from cmm_uq.maths.uncertainty.budgets.measurements import FEWEST_READINGS, use_by_calibrated_workpiece
+from cmm_uq.maths.uncertainty.budgets.machine import FEWEST_READINGS, use_by_calibrated_workpiece
 
 # virtual measurements; a calibrated part measured again and again; the part itself in several orientations
 Method = Literal["virtual", "calibrated_part", "orientations"]

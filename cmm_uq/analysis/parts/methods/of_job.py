@@ -24,7 +24,7 @@ from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.part.readings import Repeats, StandardReadings
 from cmm_uq.jobs.part.tables import CalibratedFacts, CalibratedPartFacts, OrientationsFacts
-from cmm_uq.maths.uncertainty.budgets.measurements import FEWEST_READINGS
+from cmm_uq.maths.uncertainty.budgets.machine import FEWEST_READINGS
 from cmm_uq.maths.uncertainty.quantity import significant
 
 _STEP_MM = 1e-3  # by which the farthest point moves, or a tip grows, to see what follows

@@ -50,7 +50,7 @@ from cmm_uq.certificate.wording import effect_title
 from cmm_uq.jobs.part.feature import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob, read_part
 from cmm_uq.jobs.tables.identification import SIMULATED
-from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, simulate, simulate_adaptively
+from cmm_uq.maths.uncertainty.propagation import Simulated, Source, simulate, simulate_adaptively
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.document import Document

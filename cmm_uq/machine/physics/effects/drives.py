@@ -27,7 +27,7 @@ from cmm_uq.machine.physics.effect import (
 )
 from cmm_uq.machine.physics.effects.rigid_body import bow, turned
 from cmm_uq.machine.physics.words import AXIS, OTHER, SECOND, SIDE, SIZE, Amount, filled
-from cmm_uq.maths.uncertainty.air import harris_2004
+from cmm_uq.maths.uncertainty.air.state import harris_2004
 
 _MILLISECOND = 1e-3  # 1 ms in s
 _PASCAL_PER_HPA = 100.0

@@ -22,7 +22,7 @@ from cmm_uq.base.units import ARCSECOND, MICROMETRE, REFERENCE_TEMPERATURE, unit
 from cmm_uq.maths.geometry import cap_directions
 from cmm_uq.maths.geometry.feature import BallForm
 from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Budget, BudgetLine
-from cmm_uq.maths.uncertainty.budgets import measurements
+from cmm_uq.maths.uncertainty.budgets import machine, measurements
 
 Coefficient = Annotated[float, Field(ge=0, le=1e-3)]  # of expansion, or its standard uncertainty, 1/K
 Kelvin = Annotated[float, Field(ge=0, le=100)]  # a standard uncertainty of a temperature
@@ -70,7 +70,7 @@ class CalibratedWorkpiece(BudgetTable):
 
     def budgets(self) -> Mapping[str, Budget]:
         return {
-            "systematic_error": measurements.use_by_calibrated_workpiece(
+            "systematic_error": machine.use_by_calibrated_workpiece(
                 self.readings_mm, self.calibrated_mm, self.u_calibration_um * MICROMETRE, temperature_c=self.temperature_c,
                 u_cte_calibrated_per_k=self.u_cte_calibrated_per_k, u_cte_workpieces_per_k=self.u_cte_workpieces_per_k,
                 u_form_mm=self.u_form_um * MICROMETRE,
@@ -79,7 +79,7 @@ class CalibratedWorkpiece(BudgetTable):
 
     def remarks(self) -> Mapping[str, float]:
         """U + |b|, of results that are not corrected."""
-        return {"U_without_correction_mm": measurements.expanded_without_correction(self.budgets()["systematic_error"])}
+        return {"U_without_correction_mm": machine.expanded_without_correction(self.budgets()["systematic_error"])}
 
 
 class NotSimulated(JobTable):
@@ -106,11 +106,11 @@ class SimulatedTask(BudgetTable):
             BudgetLine(Verbatim(one.name), one.u_um * MICROMETRE, foreign(one.source), unit=unit("mm"))
             for one in self.not_simulated
         ]
-        return {"error": measurements.use_by_simulation(np.array(self.simulated_errors_um) * MICROMETRE, lines)}
+        return {"error": machine.use_by_simulation(np.array(self.simulated_errors_um) * MICROMETRE, lines)}
 
     def remarks(self) -> Mapping[str, float]:
         """U + |b|, of results that are not corrected."""
-        return {"U_without_correction_mm": measurements.expanded_without_correction(self.budgets()["error"])}
+        return {"U_without_correction_mm": machine.expanded_without_correction(self.budgets()["error"])}
 
 
 class LengthTest(BudgetTable):
@@ -130,7 +130,7 @@ class LengthTest(BudgetTable):
     u_fixturing_um: Uncertainty = key(0.0, "Standard uncertainty of the length by the clamping.")
 
     def budgets(self) -> Mapping[str, Budget]:
-        budget = measurements.length_test_uncertainty(
+        budget = machine.length_test_uncertainty(
             self.length_mm, self.u_calibration_um * MICROMETRE, temperature_c=self.temperature_c, cte_per_k=self.cte_per_k,
             u_cte_per_k=self.u_cte_per_k, u_temperature_k=self.u_temperature_k,
             u_alignment_mm=self.u_alignment_um * MICROMETRE, u_fixturing_mm=self.u_fixturing_um * MICROMETRE,
@@ -149,7 +149,7 @@ class ProbingTest(BudgetTable):
     u_form_um: Uncertainty = required("Standard uncertainty of that form deviation.")
 
     def budgets(self) -> Mapping[str, Budget]:
-        budget = measurements.probing_test_uncertainty(self.form_um * MICROMETRE, self.u_form_um * MICROMETRE)
+        budget = machine.probing_test_uncertainty(self.form_um * MICROMETRE, self.u_form_um * MICROMETRE)
         return {"P": budget.of(self.error_um * MICROMETRE)}
 
 

@@ -20,7 +20,7 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.table import JobTable
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.messages import Text, Verbatim, number, say
-from cmm_uq.maths.uncertainty.air import Air, Interferometer, interferometer_model
+from cmm_uq.maths.uncertainty.air.state import Air, Interferometer, interferometer_model
 from cmm_uq.maths.uncertainty.budget import Budget, Labels
 from cmm_uq.maths.uncertainty.budgets.measurements import UNITS, length_at_20, scale_error, triangle_angles
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES, BudgetTable

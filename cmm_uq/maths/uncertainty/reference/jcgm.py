@@ -21,7 +21,7 @@ from cmm_uq.maths.uncertainty.coverage import elliptical_factor
 from cmm_uq.maths.uncertainty.distributions import Distribution, arcsine, normal, rectangular, student_t
 from cmm_uq.maths.uncertainty.evaluation import Request, compare, evaluate
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.monte_carlo import (
+from cmm_uq.maths.uncertainty.propagation import (
     Propagated,
     Simulated,
     first_order,

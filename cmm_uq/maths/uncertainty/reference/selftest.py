@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.maths.uncertainty import air
+from cmm_uq.maths.uncertainty.air import state as air
 from cmm_uq.maths.uncertainty.budgets.measurements import harris_compensated, harris_uncompensated, sphere_covariance
 from cmm_uq.maths.uncertainty.measurement_model import derivatives
 from cmm_uq.maths.uncertainty.quantity import MINUS

@@ -8,26 +8,28 @@ import pytest
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import ARCSECOND
 from cmm_uq.maths.uncertainty.budget import JUDGEMENT, BudgetLine
+from cmm_uq.maths.uncertainty.budgets.machine import (
+    expanded_without_correction,
+    length_test_uncertainty,
+    probing_test_uncertainty,
+    use_by_calibrated_workpiece,
+    use_by_simulation,
+)
 from cmm_uq.maths.uncertainty.budgets.measurements import (
     UNITS,
     BallbarPosition,
     ballbar_length,
-    expanded_without_correction,
     harris_compensated,
     harris_uncompensated,
     length_at_20,
-    length_test_uncertainty,
-    probing_test_uncertainty,
     scale_error,
     sphere_budgets,
     sphere_covariance,
     triangle_angles,
-    use_by_calibrated_workpiece,
-    use_by_simulation,
 )
 from cmm_uq.maths.uncertainty.distributions import constant, normal, rectangular
 from cmm_uq.maths.uncertainty.evaluation import evaluate
-from cmm_uq.maths.uncertainty.monte_carlo import first_order, simulate
+from cmm_uq.maths.uncertainty.propagation import first_order, simulate
 
 
 def hemisphere(n: int) -> np.ndarray:

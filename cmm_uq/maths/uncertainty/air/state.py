@@ -36,7 +36,7 @@ from cmm_uq.base.units import REFERENCE_TEMPERATURE
 from cmm_uq.maths.uncertainty.budget import Labels
 from cmm_uq.maths.uncertainty.distributions import Distribution, Number, constant, normal, rectangular
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.monte_carlo import first_order
+from cmm_uq.maths.uncertainty.propagation import first_order
 
 KELVIN = 273.15  # 0 °C in K
 _TRIPLE_POINT_K, _TRIPLE_POINT_PA = 273.16, 611.657

@@ -1,0 +1,1 @@
+"""The refractive index of air, and what a laser interferometer makes of it."""
