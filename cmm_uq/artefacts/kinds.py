@@ -366,6 +366,7 @@ TRACKED_POINTS = Kind(
     f"{_TRACKED}:SCREENING",
     page=f"{_TRACKED}:PAGE",
     begin=f"{_TRACKED}:BEGIN",
+    instead="Choose poses in which every joint moves far; cmm-uq report says by name what they leave open",
 )
 BUILT_IN = {kind.name: kind for kind in (
     BALLBAR, BRYAN, STEP_GAUGE, GAUGE_BLOCKS, PLATE, TRIANGLE, SPHERE, PLANE, SHIFT, ERROR_MAP, DIGITIZER, AXIS_RUNS,
