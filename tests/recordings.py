@@ -56,7 +56,7 @@ def on_table(points: Points, effect: Effect) -> Points:
     )
     approach = random.choice([-1.0, 1.0], len(points))
     turned = with_columns(
-        points, **{f"{letter}_deg": random.uniform(0, 360, len(points)), f"approach_{letter}": approach}
+        points, **{f"{letter}_deg": random.uniform(0, 360, len(points)), f"{letter}_approach": approach}
     )
     return replace(turned, machine=machine)
 

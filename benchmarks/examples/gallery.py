@@ -42,6 +42,7 @@ EXAMPLES = {
     "axis_runs": "axis-runs-simulated",
     "multilateration": "multilateration-simulated",
     "tracked_points": "robot-simulated",
+    "table_spheres": "table-spheres-simulated",
     "shift": "shift-simulated",
     "shift_plate": "shift-plate-simulated",
     "error_map": "iota-1102-maps",

@@ -19,6 +19,7 @@ from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.artefacts.digitizer import THREE, scan
 from cmm_uq.artefacts.triangle import TriangleStandard, placed_triangle
 from cmm_uq.base.points import Floats, Ints, Machine, Points
+from cmm_uq.base.rotary import Turntable
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.artefact import Size
 from cmm_uq.machine.physics.catalogue import effects
@@ -66,6 +67,7 @@ class Simulated:
     recording: str = ""
     before: Mapping[str, float | Sequence[float]] | None = None
     columns: Sequence[str] = ()
+    machine: str = ""
 
 
 LENGTH = {"expansion": "at 20 °C", "temperature": "at 20 °C", "alignment": "in line", "fixturing": "undistorted"}
@@ -398,9 +400,36 @@ def digitizer() -> Simulated:
     )  # fmt: skip
 
 
+def table_spheres() -> Simulated:
+    """Spheres A and B on a table that turns out over 720° and back, with an encoder beside its axis and play."""
+    out = np.linspace(0, 720, 8)
+    angle, n = np.concatenate([out, out[-2::-1]]), 15
+    sphere = np.array([[180.0, 60.0, 40.0], [-180.0, -60.0, 240.0]])
+    axis = np.array([450.0, 600.0, -400.0])
+    points = replace(
+        recording(np.tile(sphere, (n, 1)), np.ones(2 * n, dtype=np.int64), np.tile([1, 2], n), np.repeat(np.arange(n) + 1, 2),
+                  c_deg=np.repeat(angle, 2), c_approach=np.repeat([0.0, 1.0, -1.0], [2, 14, 14])),
+        machine=Turntable(MACHINE.name, "XYZ", MACHINE.travel_mm, axis),
+    )  # fmt: skip
+    truth: dict[str, float | Sequence[float]] = {
+        "rotary_location_c_x": 1.5, "rotary_location_c_y": -0.8, "rotary_tilt_c_x": 1.2, "rotary_tilt_c_y": 0.5,
+        "rotary_positioning_c_1": (1.6, 0.9), "rotary_play_c": 1.0,
+    }  # fmt: skip
+    stated = "".join(
+        f'\n[[conformity]]\nstandard = "ISO 10360-3:2000"\ncharacteristic = "{figure}"\nlimit_um = {limit}\n'
+        for figure, limit in (("FR", 8.0), ("FT", 12.0), ("FA", 5.0))
+    )
+    return Simulated(
+        "table-spheres-simulated", "ISO 10360-3, two spheres on a turning table",
+        {"kind": "table_spheres", "name": "Spheres A and B, 25 mm"}, points, truth, list(truth), 0.3,
+        extra=_negligible("spheres", {"repeat": "at one place on the table"}) + stated, columns=("c_deg", "c_approach"),
+        machine=f"origin_mm = {axis.tolist()}\ntable = {{ travel_deg = [-10.0, 730.0] }}\n",
+    )  # fmt: skip
+
+
 EXAMPLES = (
     step_gauge, gauge_blocks, sphere, plate, plate_two_dates, bryan, axis_runs, circles, multilateration, triangle, plane,
-    digitizer,
+    digitizer, table_spheres,
 )  # fmt: skip
 
 
@@ -469,9 +498,9 @@ noise of a coordinate {example.noise_um:g} µm.\"\"\"
 
 [machine]
 name = "{MACHINE.name}"
-chain = "{example.points.machine.chain}"
+chain = "{example.points.machine.chain}{"|C" if isinstance(example.points.machine, Turntable) else ""}"
 travel_mm = {{ x = [0, 900], y = [0, 1200], z = [-600, 0] }}
-
+{example.machine}
 [artefact]
 {artefact}
 

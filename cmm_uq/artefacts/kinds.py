@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from cmm_uq.artefacts.axis_runs.kind import APPROACHES, AXIS_RUNS, InterferometerFacts
+from cmm_uq.artefacts.spheres.kind import TABLE_SPHERES
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import JobTable, Length, Number, Numbers, Position, Triple, Uncertainty, key, required
 from cmm_uq.base.points import AXES
@@ -151,7 +152,7 @@ class SphereFacts(ArtefactFacts):
     form_um: Uncertainty | None = key(None, "Form deviation of the sphere by its certificate.")
 
 
-SPHERE = _kind("sphere", SphereFacts, "sphere:SphereArtefact", Beginning(
+SPHERE = _kind("sphere", SphereFacts, "spheres.sphere:SphereArtefact", Beginning(
     title="Test sphere, twenty-five points (ISO 10360-5)",
     numbering="One measurement is one place of the sphere; its points are the points probed.",
     artefact={"name": "Test sphere", "length_mm": 25.0, "u_um": 0.1, "form_um": 0.1},
@@ -370,5 +371,5 @@ TRACKED_POINTS = Kind(
 )
 BUILT_IN = {kind.name: kind for kind in (
     BALLBAR, BRYAN, STEP_GAUGE, GAUGE_BLOCKS, PLATE, TRIANGLE, SPHERE, PLANE, SHIFT, ERROR_MAP, DIGITIZER, AXIS_RUNS,
-    MULTILATERATION, SCANNED_PLANES, TRACKED_POINTS,
+    MULTILATERATION, SCANNED_PLANES, TRACKED_POINTS, TABLE_SPHERES,
 )}  # fmt: skip

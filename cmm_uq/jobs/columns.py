@@ -55,12 +55,12 @@ COLUMNS: Mapping[str, str] = MappingProxyType({
     "turned_deg": "By how much a sphere was turned about Z against its first set-up: what turns with it is its own form.",
     **{f"tip_{a}_mm": f"Offset of the stylus tip from the end of the ram, along {a}." for a in AXES},
     **{f"{a}_deg": f"Reading of the rotary table {a.upper()}, where the machine's chain has one." for a in ROTARY},
-    **{f"approach_{a}": f"How the rotary table {a.upper()} turned into the point: −1, 0 or +1." for a in ROTARY},
+    **{f"{a}_approach": f"How the rotary table {a.upper()} turned into the point: −1, 0 or +1." for a in ROTARY},
     "radius_mm": "Radius of the fit that gave the point.",
     "fit_rms_um": "Root mean square of the residuals of the fit that gave the point.",
     "n_points": "Number of points of the fit that gave the point.",
 })  # fmt: skip
-_OF_SOME_MACHINES = re.compile(r"temp_(bridge|ram)_.*|depth_mm|turned_deg|[abc]_deg|approach_[abc]")
+_OF_SOME_MACHINES = re.compile(r"temp_(bridge|ram)_.*|depth_mm|turned_deg|[abc]_deg|[abc]_approach")
 # columns that a recording may have, and that are refused in another unit than that of their name
 OPTIONAL = tuple(name for name in COLUMNS if name not in REQUIRED and not _OF_SOME_MACHINES.fullmatch(name))
 # what instruments read, which the kinds that go by it describe
@@ -102,7 +102,7 @@ WORDS: Mapping[str, Text] = MappingProxyType({
     "speed_mm_s": say("speed"), "gamma_deg": say("turn of the digitizer"), "turned_deg": say("turn of the sphere"),
     "depth_mm": say("scan depth"),
     **{f"{a}_deg": say("angle of the table {axis}", axis=Verbatim(a.upper())) for a in ROTARY},
-    **{f"approach_{a}": say("sense of turning of the table {axis}", axis=Verbatim(a.upper())) for a in ROTARY},
+    **{f"{a}_approach": say("sense of turning of the table {axis}", axis=Verbatim(a.upper())) for a in ROTARY},
     "radius_mm": say("fitted radius"), "fit_rms_um": say("residuals of the fit"), "n_points": say("number of points fitted"),
 })  # fmt: skip
 _UNITS: Mapping[str, Text] = MappingProxyType({

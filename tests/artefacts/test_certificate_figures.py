@@ -233,6 +233,8 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     **{f"Measurement {i}: {name}": targets(i) for i, name in ((4, "xty"), (5, "ytx"))},
     **{f"All values decided by ISO 230-2:2014, {one}": decided_as(one) for one in "AB"},
     **{f"All values decided by ISO 230-4:1996, {one}": decided_as(one) for one in "GH"},
+    **{f"All values decided by ISO 10360-3:2000, {one}": decided_as(one) for one in ("FR", "FT", "FA")},
+    "Ranges": lambda results: [list(one.values()) for one in results["spheres"]],
     **{f"All values decided by {name}": decided for name in STATED},
     **{f"Contributions to the uncertainty of the test value named, {name}": of_test_value for name in STATED},
 }  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.sphere import SphereArtefact
+from cmm_uq.artefacts.spheres.sphere import SphereArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.maths.geometry import fit_sphere

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.analysis.conformity import decided, own_rule, plans, positioning
+from cmm_uq.analysis.conformity import decided, four_axis, own_rule, plans, positioning
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings, repeats_of_gauge, supplemented
 from cmm_uq.analysis.conformity.plan_conditions import best_of, conditions
 from cmm_uq.analysis.conformity.plans import Condition
@@ -206,6 +206,7 @@ def _sphere(scope: str) -> tuple[Clause, ...]:
 # Of each standard that is decided here, and of the documents that decisions and budgets go by
 CLAUSES: Mapping[str, tuple[Clause, ...]] = MappingProxyType({
     **positioning.CLAUSES,
+    four_axis.NAME: four_axis.CLAUSES,
     "ISO 10360-2:2009": _ISO_10360_2,
     "ASME B89.4.10360.2-2008": (
         Clause("additions", say("what it adds to ISO 10360-2"), "Not tested.", "its abstract: it incorporates the entire ISO "
@@ -294,6 +295,7 @@ _STANDARDS = (
     Standard("ISO 230-4:2005", positioning.ISO_230_4_2005),
     Standard("ISO 230-6:2002", positioning.ISO_230_6),
     Standard("ISO 10360-2:2009", (_E0, _R0, _E150), sensing="contacting"),
+    Standard(four_axis.NAME, four_axis.CHARACTERISTICS),
     Standard("ISO 10360-5:2010", _of_sphere(("P_FTU",), ("P_STU",), plans.ISO_10360_5, _DIAMETER),
              _superseded("ISO 10360-5:2020"), "contacting"),
     Standard("ISO 10360-5:2020", _of_sphere(

@@ -37,6 +37,7 @@ from cmm_uq.analysis.machine.performance import (
 from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecordings, recorded, shown_by
 from cmm_uq.analysis.machine.state import StatementEvidence, Unmodelled, of_machine, stated_as, unmodelled_errors
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.machine.model.field import ALLOWED, as_read, curves, family_of
 from cmm_uq.machine.model.kind import Observed
@@ -232,7 +233,7 @@ def factor_regions(
     recording does not allow it.
     """
     if model.artefact.points.machine.axes != tuple(AXES):
-        raise CmmUqError("the machine has other axes than three straight ones", where="the machine")
+        raise CmmUqError(say("the machine has other axes than three straight ones"), where="the machine")
     drawn = DrawnErrors.of(model, doubt, observe, seed, beside=beside)
     field, sizes, own, further = drawn.field, drawn.sizes, drawn.own, drawn.further
 

@@ -121,7 +121,7 @@ def regions_of(
         try:
             return factor_regions(model, posterior, doubt, observe, seed, together().taken)
         except CmmUqError as error:
-            return Verbatim(error.problem)
+            return error.problem if isinstance(error.problem, Text) else Verbatim(error.problem)
 
     return regions
 

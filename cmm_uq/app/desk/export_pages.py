@@ -53,6 +53,10 @@ DRAWINGS: dict[str, str] = {
     "multilateration": '<path class="beam" d="M18 60 66 30M102 58 66 30M60 74 66 30M24 24 66 30"/>'
     + _balls((66, 30), r=5),
     "tracked_points": '<path class="beam" d="M18 66 88 26"/>' + _balls((18, 66), (88, 26), (60, 24), r=5),
+    "table_spheres": '<ellipse class="wash" cx="60" cy="60" rx="36" ry="12"/>'
+    + _line((34, 60), (34, 50))
+    + _line((86, 60), (86, 28))
+    + _balls((34, 46), (86, 24), r=5),
     "scanned_planes": '<path class="wash" d="M28 60 60 70 60 48 28 38ZM60 70 94 58 94 36 60 48Z"/>'
     '<path class="beam" d="M60 12 46 52M60 12 78 54"/>',
 }

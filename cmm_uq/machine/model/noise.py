@@ -124,9 +124,14 @@ def machine_axes(rows: Ints, sensitivity: Floats) -> tuple[scipy.sparse.csr_arra
 
 
 def repeated_quantity(model: RecordingModel, chosen: np.ndarray) -> Ints:
-    """Numbers (m,) that observations share when they repeat one quantity: the same points of one placing, seen alike."""
+    """Numbers (m,) that observations share when they repeat one quantity: the same points of one placing, seen alike.
+
+    At another angle of a rotary table they are seen otherwise.
+    """
     artefact, points = model.artefact, np.sort(model.artefact.points.point[model.artefact.rows], axis=1)
-    whole = np.column_stack([artefact.measurement, points, number_in_reading(model)])
+    read = artefact.points.readings
+    angles = [np.round(read[axis][artefact.rows[:, 0]], 6) for axis in read if axis not in "xyz"]
+    whole = np.column_stack([artefact.measurement, points, number_in_reading(model), *angles])
     return np.asarray(np.unique(whole[chosen], axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
 
 

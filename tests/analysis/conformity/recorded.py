@@ -10,7 +10,7 @@ import numpy as np
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
-from cmm_uq.artefacts.sphere import SphereArtefact
+from cmm_uq.artefacts.spheres.sphere import SphereArtefact
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.tables.conformity import Circumstances, Declared, NegligibleLines, RatedConditions, TestUncertainty
 from tests.recordings import TRAVEL, bar_facts

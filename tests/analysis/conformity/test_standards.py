@@ -13,7 +13,7 @@ from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.artefacts import artefact_facts, kind_named
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
-from cmm_uq.artefacts.sphere import SphereArtefact
+from cmm_uq.artefacts.spheres.sphere import SphereArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.jobs.tables.conformity import (

@@ -14,7 +14,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, kind_of
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.artefacts.ballbar import Ballbar
-from cmm_uq.artefacts.sphere import SphereArtefact
+from cmm_uq.artefacts.spheres.sphere import SphereArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.machine.model import Noise, RecordingModel

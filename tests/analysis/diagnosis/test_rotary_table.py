@@ -9,7 +9,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import cmm_uq
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.points import Floats
+from cmm_uq.machine.model import RecordingModel
+from cmm_uq.machine.model.noise import repeated_quantity
+from cmm_uq.machine.physics.catalogue import effects
 
 AXIS = np.array([450.0, 600.0, -350.0])
 BALLS = np.array([[x, y, z] for x, y, z in (
@@ -24,7 +29,7 @@ TRUE = {
 LOCATION = ["rotary_location_c_x", "rotary_location_c_y", "rotary_tilt_c_x", "rotary_tilt_c_y"]
 
 
-def job(folder: Path, effects: list[str], *, seed: int, eccentric: float = 8.0, noise_um: float = 0.3) -> Path:
+def job(folder: Path, named: list[str], *, seed: int, eccentric: float = 8.0, noise_um: float = 0.3) -> Path:
     """Six balls on a table that turns about another axis than stated, with an encoder beside that axis; exact motions."""
     random, lines = np.random.default_rng(seed), []
     offset, tilt = np.array([0.030, -0.020, 0.0]), Rotation.from_rotvec(ARCSECOND * np.array([15.0, -6.0, 0.0]))
@@ -58,7 +63,7 @@ u_um = 0.1
 [recording]
 file = "recording.csv"
 [model]
-effects = {effects}
+effects = {named}
 """.replace("'", '"'),
         encoding="utf-8",
     )
@@ -83,3 +88,11 @@ def test_a_concealed_eccentric_encoder_is_found_and_no_other_fault(
         assert "rotary_positioning_c_1" in {each["effect"] for each in found.diagnosis["effects"]}
         row = found.effects.loc["rotary_positioning_c_1.amplitude_arcsec"]
         assert abs(row["value"] - eccentric) < 3 * row["u"]
+
+
+def test_readings_at_another_angle_are_no_repeats_in_one_place(tmp_path: Path) -> None:
+    """An offset that repeats share would be the location of the axis: of twelve angles each has its own."""
+    read = read_job(job(tmp_path, LOCATION, seed=5))
+    model = RecordingModel(artefact_of(read.facts.artefact, read.points), effects(LOCATION))
+    shared = repeated_quantity(model, model.used)
+    assert len(np.unique(shared)) == len(shared) == 12 * 6 * 3

@@ -24,7 +24,7 @@ START, END = "<!-- table of effects: begin -->", "<!-- table of effects: end -->
 EXAMPLES = {
     "ballbar": "iota-1102-20C", "Bryan gauge": "bryan-simulated", "step gauge": "step-gauge-simulated",
     "gauge blocks": "gauge-blocks-simulated", "plate": "plate-simulated", "triangle": "triangle-simulated",
-    "sphere": "sphere-simulated", "plane": "plane-simulated",
+    "sphere": "sphere-simulated", "plane": "plane-simulated", "spheres on a table": "table-spheres-simulated",
 }  # fmt: skip
 SURFACES = ("step gauge", "gauge blocks", "sphere", "plane")
 """Artefacts that are touched; of the others the centres of balls or cylinders are recorded, which have no normal."""

@@ -122,7 +122,7 @@ def test_motions_are_those_of_a_rigid_table(letter: str, clockwise: bool) -> Non
 @pytest.mark.parametrize("clockwise", [False, True])
 def test_play_is_half_of_the_gap_to_either_side_of_the_reading(clockwise: bool) -> None:
     approach = np.where(np.arange(40) % 2, 1.0, -1.0)
-    there = points("c", clockwise=clockwise, approach_c=approach)
+    there = points("c", clockwise=clockwise, c_approach=approach)
     read = iter(approach * (-1 if clockwise else 1))
     turn = np.radians(-ANGLES if clockwise else ANGLES)
     exact = by_rigid_motions("c", turn, rotated=lambda c: 0.5 * 8 * ARCSECOND * next(read) * np.array([0, 0, 1.0]))
@@ -158,7 +158,7 @@ def test_higher_orders_are_a_sum_of_waves_whose_size_is_their_rms(name: str, par
 
 def test_no_effect_is_what_a_place_or_an_attitude_on_the_table_could_be() -> None:
     """Of the whole space of rigid placings of the artefact on the table none is an effect, nor a sum of them."""
-    there = points("c", approach_c=np.where(np.arange(40) % 3, 1.0, -1.0))
+    there = points("c", c_approach=np.where(np.arange(40) % 3, 1.0, -1.0))
     names = [name for name in ROTARY if name.split("_")[2] == "c"]
     columns = []
     for name in names:
@@ -193,7 +193,7 @@ def test_what_an_amount_means_is_what_the_rigid_table_did() -> None:
 @pytest.mark.parametrize("name", ROTARY)
 def test_an_effect_of_a_table_asks_for_that_table(name: str) -> None:
     letter = name.split("_")[2]
-    there = points(letter, **{f"approach_{letter}": np.ones(40)})
+    there = points(letter, **{f"{letter}_approach": np.ones(40)})
     assert EVERY[name].unfit(there) is None
     assert f"{letter}_deg" in EVERY[name].columns
     for machine in (Machine("m"), Turntable("m", letter="cab"["abc".index(letter)])):

@@ -270,7 +270,7 @@ class TablePlay(OfTable):
     """The table stands at another angle when it comes from the other side."""
 
     family, title = "rotary_play", say("Play of table {axis}", axis=AXIS)
-    formula = "e = −ε × r, ECC = ½·gap·approach_c"
+    formula = "e = −ε × r, ECC = ½·gap·c_approach"
     points_to = say(
         "the drive of table {axis} has play, or its encoder sits on the drive: check worm, belt and brake", axis=AXIS
     )
@@ -281,13 +281,13 @@ class TablePlay(OfTable):
         side=SIDE,
     )
     coefficients = (Parameter("gap_arcsec", unit("″"), 10.0),)
-    columns, tier = ("{a}_deg", "approach_{a}"), FURTHER
+    columns, tier = ("{a}_deg", "{a}_approach"), FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         self.angle(points)
         sense = -1.0 if self.machine(points).clockwise else 1.0
         turn = self.about(points, along_axis(points, AXES.index(ROTARY[self.axis])))
-        return -0.5 * ARCSECOND * sense * (points.column(f"approach_{self.axis}")[:, None] * turn)[:, :, None]
+        return -0.5 * ARCSECOND * sense * (points.column(f"{self.axis}_approach")[:, None] * turn)[:, :, None]
 
 
 def _of(axis: str) -> Iterator[Effect]:

@@ -1,0 +1,1 @@
+"""One sphere probed all around, and spheres on a turning table."""
