@@ -145,8 +145,16 @@ def by_standard(statement: Statement) -> Verdict:
                    statement.facts.standard, statement.quantity, statement.missing)  # fmt: skip
 
 
-def by_tolerance(name: str, title: Text, quantity: Quantity, tolerance: float, *, determined: bool = True) -> Verdict:
-    """A parameter, named as ``scale_x.ppm`` and in words, against its tolerance by its whole 95 % interval (ISO 14253-1)."""
+def by_tolerance(
+    name: str, title: Text, quantity: Quantity, tolerance: float, *, determined: bool = True, aside: bool = False
+) -> Verdict:
+    """A parameter, named as ``scale_x.ppm`` and in words, against its tolerance by its whole 95 % interval (ISO 14253-1).
+
+    ``aside``: whether the laboratory set measurements aside, which are not in the estimate: it is then no pass.
+    """
+    if aside and determined and by_tolerance(name, title, quantity, tolerance).outcome == "pass":
+        missing = (say("it is estimated without the measurements that the laboratory set aside"),)
+        return Verdict(name, "undecided", None, None, tolerance, quantity.unit, title=title, missing=missing)
     if not determined:
         missing = (say("the recording does not determine it"),)
         return Verdict(name, "undecided", None, None, tolerance, quantity.unit, title=title, missing=missing)

@@ -133,10 +133,16 @@ def tolerance_sections(result: Result) -> list[Section]:
     """Every parameter with a tolerance; none when the job sets none."""
     toleranced, title = tolerances_of(result), _TOLERANCES
     left_out = sorted(one.name.partition(".")[0] for one in toleranced if one.value is None)
-    unknown = say("Not determined by this recording, so not judged: {left_out}.", left_out=listed(names(left_out)))
+    free, aside = ([name for name in left_out if (name in result.free) == known] for known in (True, False))
+    unknown = say("Not determined by this recording, so not judged: {left_out}.", left_out=listed(names(free)))
+    without = say(
+        "Not judged, since the laboratory set measurements aside, which are not in the estimate: {left_out}.",
+        left_out=listed(names(aside)),
+    )
+    not_judged = tuple(text for text, of in ((unknown, free), (without, aside)) if of)
     judged = [one for one in toleranced if one.value is not None]
     if not judged:
-        return [section(title, doc.Paragraph(unknown))] if left_out else []
+        return [section(title, *map(doc.Paragraph, not_judged))] if left_out else []
     rows, ratios = [], []
     for one in judged:
         effect, _, parameter = one.name.partition(".")
@@ -146,7 +152,7 @@ def tolerance_sections(result: Result) -> list[Section]:
         part = quantity.times(1 / tolerance, unit("1"))
         ratios.append((part.value, *part.interval95))
     figures = (doc.Column(head) for head in (say("Estimate"), say("U"), say("Tolerance")))
-    notes = (say("In or out: the whole 95 % interval is; otherwise open."), *((unknown,) if left_out else ()))
+    notes = (say("In or out: the whole 95 % interval is; otherwise open."), *not_judged)
     out = [one.title for one in judged if one.outcome == "fail"]
     plot = tolerance_plot(
         [one.title for one in judged], *map(list, zip(*ratios, strict=True)),
