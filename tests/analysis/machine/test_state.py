@@ -7,7 +7,7 @@ from datetime import date
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.machine.state import StatedNoise, aged, at_points
+from cmm_uq.analysis.machine.state import StatedNoise, aged, at_points, unmodelled_errors
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
@@ -122,3 +122,8 @@ def test_what_goes_by_a_column_that_the_part_has_not_is_not_drawn_but_named() ->
     at = AtPose(PAIR, MeasurementConditions(left), POSE)
     assert at.lacking == {"drift_x": "time_s"}
     assert errors(PAIR, MeasurementConditions(left)).std() == pytest.approx(300 * 3e-6, rel=0.05)
+
+
+def test_a_machine_of_three_straight_axes_has_no_errors_of_a_table() -> None:
+    """Its part reports said of sixteen of them that they cannot be drawn without a column ``c_deg``."""
+    assert not [one.effect.name for one in unmodelled_errors([], {}) if "_deg" in "".join(one.effect.columns)]
