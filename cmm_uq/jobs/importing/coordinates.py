@@ -16,7 +16,7 @@ import numpy as np
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.blocks import SMALL, Block, CutSheet
 from cmm_uq.jobs.importing.factors import hint, places, ways_of
-from cmm_uq.jobs.importing.format import WrittenUnit
+from cmm_uq.jobs.importing.format import NotReadError, WrittenUnit
 from cmm_uq.jobs.importing.header import plain_words, without_unit, words_of
 from cmm_uq.jobs.importing.roles import (
     DEVIATION,
@@ -39,6 +39,7 @@ from cmm_uq.jobs.importing.roles import (
     unit_beside,
 )
 
+_MOST, _COMPLETE = 0.8, "Complete the row, or take it out"
 _OFF_MM = 1.0  # farther from its target no axis comes to rest
 _LETTER = re.compile(r"(?<![A-Za-zÀ-ÿ])([xyzXYZ])(?![A-Za-zÀ-ÿ])|^([XYZ])(?=[A-Z]?[a-z])")
 _ENDS = re.compile(r"(.*?)[\s_.:/-]*([XYZ])(?:[- ]?(?:axis|achse|axe|wert|value|[ck]oord\w*\.?))?", re.IGNORECASE)
@@ -72,6 +73,7 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
             if all(np.isfinite(xyz)):
                 reading.add(row, k, three[0], triples[0], xyz)
             elif any(np.isfinite(xyz)):
+                _refuse_gaps(grid, rows, every)
                 return None
     for labels in reading.labels:
         labels |= {key: _LETTER.sub(" ", text).strip() or text for key, text in labels.items() if key[0] == "head"}
@@ -135,7 +137,9 @@ def rows_of_axes(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -
         above = heading(blocks[0].paths[i]) if i < len(blocks[0].paths) else ""
         if not any(stems) and any(map(str.isdigit, above)):
             stems = [above] * len(stems)  # the head of its own of each feature
-        columns = [c for c in columns_in(grid, blocks, own) if c.i != i and c.full]
+        columns = [c for c in columns_in(grid, blocks, own) if c.i != i]
+        _refuse_gaps(grid, own, [c for c in columns if c.role == MEASURED])
+        columns = [c for c in columns if c.full]
         fine = [c for c in columns if c.step < 1]
         measured, checked = [c for c in fine if c.role == MEASURED], 0
         nominal = _nominal_of(fine)
@@ -158,6 +162,14 @@ def rows_of_axes(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -
                 reading.labels[-1] |= {("column", f"{i} "): stems[k]} if any(stems) else {}
         return reading if _apart(np.array(reading.figures), reading.unit) else None
     return None
+
+
+def _refuse_gaps(grid: CutSheet, rows: Sequence[int], columns: Sequence[FigureColumn]) -> None:
+    """An error where few of the measured figures are missing: another column is not taken for them."""
+    for c in columns:
+        there = np.isfinite(c.values)
+        if c.step < 1 and _MOST < there.mean() < 1:
+            raise NotReadError("no value", where=grid.at(rows[int(np.argmin(there))], c.i), fix=_COMPLETE)
 
 
 def _threes(labels: Sequence[Mapping[tuple[str, str], str]]) -> bool:
@@ -199,6 +211,8 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
         for c in source:
             if np.isfinite(c.values[k]):
                 reading.add(row, k, c, source, (float(values[k]), float(c.values[k])))
+            else:
+                reading.blank.append((row, c.i))
     return reading if any(ways_of(label.values) is not None for label in labels_of(reading)) else None
 
 

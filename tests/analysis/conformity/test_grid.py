@@ -62,7 +62,7 @@ def judged(hand: Hand, standard: str, characteristic: str, rule: str, room: floa
         hand.artefact,
         hand.accuracy,
         "[[conformity]] 1",
-        (BARS, FORMS, LENGTHS, POSITIONING, *own_rule.FIGURES),
+        (BARS, FORMS, LENGTHS, POSITIONING, "FR", "FT", "FA", *own_rule.FIGURES),
         None,
         hand.circumstances,
     )
@@ -103,9 +103,8 @@ def test_without_an_uncertainty_only_simple_acceptance_decides(standard: str, ch
         pytest.skip("its u is that of the evaluation, which always has one")
     hand = by_hand(standard, characteristic, "no u")
     if rule != "simple":
-        states_none = (
-            r"needs the uncertainty.*states no (u_um|u_blocks_um|u_repeat_um|form_um|u_scale_um_per_m|u_bar_um) above 0"
-        )
+        keys = "u_um|u_blocks_um( and u_cylinders_um)?|u_repeat_um|form_um|u_scale_um_per_m|u_bar_um"
+        states_none = rf"needs the uncertainty.*states no ({keys}) above 0"
         with pytest.raises(CmmUqError, match=states_none):
             judged(hand, standard, characteristic, rule, 10.0)
         return

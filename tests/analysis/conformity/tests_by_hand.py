@@ -13,8 +13,11 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
+from cmm_uq.artefacts.spheres.kind import TableSpheresFacts
 from cmm_uq.artefacts.spheres.sphere import SphereArtefact
+from cmm_uq.artefacts.spheres.table_spheres import TableSpheres
 from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.rotary import Turntable
 from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
 from cmm_uq.jobs.tables.machine import ProbeFacts
 from cmm_uq.jobs.tables.plan import CompleteTest
@@ -359,6 +362,30 @@ def without_scatter(x: Floats, variance: float) -> Floats:
     return found
 
 
+def four_axis(figure: str) -> Callable[[str], Hand]:
+    """Two spheres at 0 and at seven positions out and back over 720°; of A, one coordinate goes through the whole range."""
+
+    def made(how: str) -> Hand:
+        angles = np.concatenate([np.linspace(0, 720, 8), [] if how == "incomplete" else np.linspace(720, 0, 8)[1:]])
+        radial = np.array([0.6, 0.8, 0.0])
+        way = {"FR": radial, "FT": np.cross(Z, radial), "FA": Z}[figure]
+        course = 1e-3 * ERROR * np.linspace(0, 1, len(angles))
+        course[2] = course[1] if how == "copied" else course[2]
+        a = 150.0 * radial + 40.0 * Z + course[:, None] * way
+        b = -150.0 * radial + 240.0 * Z + 0.5 * course[:, None] * way
+        once = np.ones(2 * len(angles), dtype=np.int64)
+        visits = np.tile(np.arange(1, len(angles) + 1), 2)
+        machine = Turntable("m", travel_mm=MACHINE.travel_mm, origin_mm=MACHINE.travel_mm.mean(axis=1))
+        point = np.repeat([1, 2], len(angles))
+        points = Points(np.concatenate([a, b]), once, point, visits, machine, {"c_deg": np.tile(angles, 2)})
+        u = 0.0 if how == "no u" else 0.2
+        return Hand(
+            TableSpheres(TableSpheresFacts(kind="table_spheres"), points), changing(u), {}, ERROR, u or 0.1, False
+        )
+
+    return made
+
+
 E0 = lengths(SEVEN)
 TESTS: Mapping[tuple[str, str], Callable[[str], Hand]] = {
     ("ASME B89.4.1-1997", "volumetric performance"): volumetric,
@@ -372,6 +399,7 @@ TESTS: Mapping[tuple[str, str], Callable[[str], Hand]] = {
     ("ISO 10360-2:2009", "E0"): E0,
     ("ISO 10360-2:2009", "R0"): ranges,
     ("ISO 10360-2:2009", "E150"): lengths(FACES[4:], offset=np.array([0.0, -150.0, -200.0])),
+    **{("ISO 10360-3:2000", figure): four_axis(figure) for figure in ("FR", "FT", "FA")},
     ("ISO 10360-5:2010", "P_FTU"): probed(size=False),
     ("ISO 10360-5:2010", "P_STU"): probed(size=True),
     ("ISO 10360-5:2020", "P_Form.Sph.1x25:SS:Tact"): probed(size=False, sensing="contacting"),

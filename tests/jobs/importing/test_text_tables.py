@@ -477,3 +477,21 @@ def test_a_column_of_lengths_that_is_not_there_is_an_error() -> None:
     table = b"Line;Nominal [mm];Run 1 [mm];Run 2 [mm]\nA;100;100.001;100.002\nA;200;200.001;200.002\n"
     with pytest.raises(CmmUqError, match=r"no column is 'Nominel'\. Did you mean 'Nominal"):
         read(table, columns={"nominal_mm": "Nominel", "length_mm": "Run 1 [mm]"})
+
+
+def test_a_figure_that_is_missing_makes_no_other_column_the_measured_one() -> None:
+    rows = [
+        (f"Ball{n}_{axis}", f"{100 * n + k}.0012", f"{100 * n + k}.0000", "0.0050")
+        for n in range(1, 5)
+        for k, axis in enumerate("XYZ")
+    ]
+    head = "Name;Measured [mm];Nominal [mm];Tolerance [mm]"
+    whole = "\n".join([head, *map(";".join, rows)])
+    assert len(read(whole).lines) == 4
+    with pytest.raises(CmmUqError, match="no value"):
+        read(whole.replace("302.0012", ""))
+
+
+def test_a_coordinate_that_is_missing_makes_no_lengths_of_balls_in_a_row() -> None:
+    with pytest.raises(CmmUqError, match="no value"):
+        read(BALLS.replace(b"-200.0010;500.0018", b";500.0018") + BALLS.partition(b"mm]\n")[2], unit="mm")
