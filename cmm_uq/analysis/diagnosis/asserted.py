@@ -1,22 +1,39 @@
-"""What is asserted of a recording: each effect with its size, its probability, and what could stand in its place."""
+"""What is asserted of a recording: each effect with its size, its probability, and what could stand in its place.
+
+A name is for a technician who acts on it: four in five is asked of an effect, or of it with what the readings cannot tell from
+it. Its form is held against every function that an error could be (:mod:`~cmm_uq.analysis.diagnosis.empirical`): one that is
+more probable in its place, or that has odds of 20 : 1 beside it and is of the same covariate, says that it has another form.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from cmm_uq.analysis.diagnosis import joint as jointly
 from cmm_uq.analysis.diagnosis.comparison.equivalence import equivalent_sets
 from cmm_uq.analysis.diagnosis.comparison.explanations import effect_of
-from cmm_uq.analysis.diagnosis.comparison.search import ASSERTED, SearchResult
-from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, period_modes
-from cmm_uq.base.messages import Text
+from cmm_uq.analysis.diagnosis.comparison.search import ASSERTED, SearchResult, withhold
+from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
+from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily, FunctionTerm, families_of
+from cmm_uq.analysis.diagnosis.empirical.model import ODDS
+from cmm_uq.analysis.diagnosis.joint import (
+    JointPosterior,
+    Mode,
+    WithheldEffect,
+    period_modes,
+    withheld_effect,
+)
+from cmm_uq.base.messages import Text, say
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.linear_model import LinearModel, solve
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
+NAMED = 0.8  # probability from which an effect is named, alone or as one of a group
+IMPROBABLE = say("it is too improbable to be named, alone or together with what the readings do not tell from it")
 _TOLD_APART = 0.95
 # Odds of another in the place of an effect from which both are named together: a set-up is suggested that gives 20 : 1
 _ODDS = 0.05
@@ -139,3 +156,61 @@ def indistinguishable(result: SearchResult) -> tuple[tuple[str, ...], ...]:
         if rivals and result.combinations.of(i) < _TOLD_APART:
             groups.append((names[i], *(names[r] for r in rivals)))
     return tuple(groups)
+
+
+def doubted(result: SearchResult) -> tuple[dict[int, WithheldEffect], bool]:
+    """Effects that are not to be named; where there are none, whether a function is shown beside those that are."""
+    gone = _improbable(result)
+    data = _fit(result) if result.chosen and not gone else None
+    if data is None:
+        return gone, False
+    beside = _likeliest(data) if data.total - data.nothing > np.log(ODDS) else None
+    for i in sorted(result.chosen):
+        effect = effect_of(result.first.explanations[i])
+        if effect.everywhere or not _known(result, i):  # a straight line has no other form
+            continue
+        of = {*effect.columns, *(one.of for one in effect.imitated_by)}
+        without = replace(data, free=withhold(result, frozenset({i})).last.baseline)
+        if without.total > _own(result, i, without):
+            other: FunctionTerm | None = _likeliest(without)
+        else:  # an idealised effect has other forms, which make it one in part
+            other = beside if beside and effect.idealised_over is None and of & set(beside.of.split(",")) else None
+        if other is not None:
+            why = say("the readings show another form: {function}", function=other.title)
+            gone[i] = withheld_effect(result, i, why)
+    return gone, beside is not None
+
+
+def _improbable(result: SearchResult) -> dict[int, WithheldEffect]:
+    if result.combinations is None:
+        return {}
+    each = {i: _probability(result, i, known=_known(result, i))[1] for i in result.chosen}
+    return {i: withheld_effect(result, i, IMPROBABLE) for i, together in each.items() if together < NAMED}
+
+
+def _known(result: SearchResult, index: int) -> bool:
+    """Whether an effect has no period, or one that is settled; of others functions of the same reading are named with it."""
+    modes = period_modes(result, index)
+    return not modes or jointly.period_settled(result, index, modes)
+
+
+def _fit(result: SearchResult) -> FunctionFit | None:
+    data = FunctionFit.of(result, families_of(result))
+    return data if data.families and data.degrees else None
+
+
+def _likeliest(data: FunctionFit) -> FunctionTerm:
+    return data.families[data.versions(1)[0].family].term
+
+
+def _own(result: SearchResult, index: int, data: FunctionFit) -> float:
+    """Log evidence of an effect, in the forms that it may have, as if it were a function of :class:`FunctionFit`."""
+    members, scale = result.first.explanations[index].members, result.first.comparison.noise_scale[:, None, None]
+    whole, logs = sum(one.weight for one in members), []
+    for width in {one.columns.shape[1] for one in members}:
+        some = [one for one in members if one.columns.shape[1] == width]
+        columns = np.stack([one.columns for one in some], axis=1) / scale
+        family = FunctionFamily(data.families[0].term, "", columns, 0.0, np.zeros(0), np.zeros((0, *columns.shape[1:])))
+        weight = np.log([one.weight / whole for one in some])
+        logs.append(scipy.special.logsumexp(data.of_family(family)[0] + weight[:, None]))
+    return float(scipy.special.logsumexp(logs))

@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from cmm_uq.analysis.diagnosis import joint as jointly
-from cmm_uq.analysis.diagnosis.asserted import OmittedEffect, indistinguishable, left_out
+from cmm_uq.analysis.diagnosis.asserted import OmittedEffect, doubted, indistinguishable, left_out
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key
 from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, with_effects, withhold
@@ -242,7 +242,9 @@ def diagnose(
     least = of_last_digit(model.artefact.points.xyz, model.estimate().least_squares.sigma_of_residuals)
     model = replace(model, least_noise=least) if least > model.least_noise else model
     some = model if observe is None else thin_out(model, observe, seed)
-    found, joint, withheld = _asserted(search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known)
+    found, joint, withheld, beside = _asserted(
+        search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known
+    )
     gain = improvement(model, found.model)
     if found.effects and (gain.elpd_gain <= gain.elpd_gain_se or gain.worse):
         withheld = (*withheld, *jointly.withhold_unpredicted(found, gain.unseen))
@@ -253,7 +255,7 @@ def diagnose(
     most = np.argsort(-first.probability)[:12]
     rivals = tuple((first.explanations[i].name, float(first.probability[i])) for i in most)
     repeats, wrong = against_repeats(found.model), first.p_value < alpha
-    doubtful = bool(found.rough) or found.unexplained > _UNKNOWN or exceeds(repeats, alpha)
+    doubtful = bool(found.rough) or found.unexplained > _UNKNOWN or exceeds(repeats, alpha) or beside
     empirical = empirical_model(found) if wrong and (doubtful or not found.effects) else None
     modelled = empirical is not None and empirical.predicts
     verdict = "undetermined" if exceeds(repeats, alpha) else "consistent"
@@ -269,16 +271,23 @@ def diagnose(
 
 def _asserted(
     result: SearchResult, model: RecordingModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
-) -> tuple[SearchResult, JointPosterior, tuple[WithheldEffect, ...]]:
-    """What of a search may be asserted; where an effect's size is open its next probable is tried, else the least goes."""
+) -> tuple[SearchResult, JointPosterior, tuple[WithheldEffect, ...], bool]:
+    """What of a search may be asserted, and whether a function is shown beside it.
+
+    Where an effect's size is open its next probable is tried, else the least goes.
+    """
     result, gone = jointly.withhold_unresolved(result)
     places: dict[int, WithheldEffect] = {}  # of each effect that was tried in the place of others, the first of these
     tried: frozenset[int] = frozenset()
     while True:
+        doubtful, beside = doubted(result)
+        while doubtful:
+            result, gone = withhold(result, frozenset(doubtful)), (*gone, *doubtful.values())
+            doubtful, beside = doubted(result)
         result = _of_all(result, model)
         joint = joint_posterior(result, seed, progress, known)
         if not (more := jointly.effects_without_size(result, joint)):
-            return result, joint, gone
+            return result, joint, gone, beside
         tried |= frozenset(more)
         alone = []
         for i, withheld in more.items():

@@ -190,7 +190,7 @@ def withhold_unresolved(result: SearchResult) -> tuple[SearchResult, tuple[Withh
     for i in sorted(result.chosen):
         modes = period_modes(result, i)
         if modes and (why := _too_little(result, i, modes)) is not None:
-            gone[i] = replace(_withheld(result, i, why), modes=modes)
+            gone[i] = replace(withheld_effect(result, i, why), modes=modes)
     return (withhold(result, frozenset(gone)), tuple(gone.values())) if gone else (result, ())
 
 
@@ -212,7 +212,7 @@ def _too_little(result: SearchResult, index: int, modes: tuple[Mode, ...]) -> Te
 def withhold_unpredicted(result: SearchResult, unseen: Text) -> tuple[WithheldEffect, ...]:
     """All that was found, withheld because held-out set-ups, or points, do not speak for it."""
     why = say("it does not predict {unseen} that the fit had not seen better than noise would", unseen=unseen)
-    return tuple(replace(_withheld(result, i, why), modes=period_modes(result, i)) for i in sorted(result.chosen))
+    return tuple(replace(withheld_effect(result, i, why), modes=period_modes(result, i)) for i in sorted(result.chosen))
 
 
 def effects_without_size(result: SearchResult, joint: JointPosterior) -> dict[int, WithheldEffect]:
@@ -232,7 +232,7 @@ def effects_without_size(result: SearchResult, joint: JointPosterior) -> dict[in
         elif shares[effect.name] * tried > _BY_NOISE:
             why = WITHIN_NOISE
         if why is not None:
-            gone[i] = replace(_withheld(result, i, why), modes=modes)
+            gone[i] = replace(withheld_effect(result, i, why), modes=modes)
     return gone
 
 
@@ -242,7 +242,7 @@ def group_of(combinations: Combinations, chosen: Key, index: int) -> Key:
     return group if combinations.of_any(group | {index}) >= ASSERTED else group | combinations.imitating(index)
 
 
-def _withheld(result: SearchResult, index: int, why: Text) -> WithheldEffect:
+def withheld_effect(result: SearchResult, index: int, why: Text) -> WithheldEffect:
     effect = effect_of(result.first.explanations[index])
     probability = result.combinations.of(index) if result.combinations is not None else 0.0
     return WithheldEffect(effect.name, effect.title, probability, why)

@@ -66,7 +66,7 @@ WORD = Limit(
     500, "characters", "word of a text in a job", "a page breaks lines between words; web addresses are shorter"
 )
 FILE_NAME = Limit(200, "characters", "file name in a job", "file systems take 255 bytes")
-EFFECTS = Limit(100, "entries", "effects, rivals or tolerances of a model", "the catalogue has fewer")
+EFFECTS = Limit(100, "entries", "effects, rivals or tolerances of a model", "no recording tells as many apart")
 STATED = Limit(20, "entries", "[[effect]]", "each is one more explanation that every diagnosis tries")
 MAPS = Limit(20, "entries", "error maps of a machine", "one a degree")
 CONFORMITY = Limit(50, "entries", "[[conformity]]", "each is a section of the certificate")

@@ -25,7 +25,16 @@ from cmm_uq.base.messages import Text, foreign
 from cmm_uq.base.plugins import EFFECTS, BrokenPluginError, Plugin, offered
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.physics.effect import CONTRACT, FURTHER as RARER, OWN as OF_ARTEFACTS, Effect, Parameter, Shape
-from cmm_uq.machine.physics.effects import drives, own_errors, own_states, probing, rigid_body, rotary, thermal
+from cmm_uq.machine.physics.effects import (
+    drives,
+    own_errors,
+    own_states,
+    probing,
+    rigid_body,
+    rotary,
+    structure,
+    thermal,
+)
 from cmm_uq.machine.physics.words import Amount
 
 
@@ -121,7 +130,7 @@ def outside_effects(own: Container[str]) -> dict[str, EffectPlugin]:
     return found
 
 
-_ROOMS = (rigid_body, drives, thermal, probing, rotary, own_errors, own_states)
+_ROOMS = (rigid_body, drives, thermal, probing, structure, rotary, own_errors, own_states)
 
 
 def _of_tier(tier: str) -> Mapping[str, Effect]:

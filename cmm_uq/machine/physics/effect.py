@@ -45,7 +45,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Shape:
-    """A nonlinear parameter: it shapes the basis, and lies between two bounds (uniform in its logarithm)."""
+    """A nonlinear parameter: it shapes the basis, between two bounds, uniform in its logarithm or ``even``."""
 
     name: str
     unit: Unit
@@ -53,6 +53,7 @@ class Shape:
     high: float
     period_along: str | None = None  # the axis (x, y, z) of whose reading it is a period, if it is one
     what: Text = NOTHING
+    even: bool = False  # whether it is uniform itself
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", unit(self.unit))

@@ -133,10 +133,11 @@ def test_where_no_size_of_a_group_is_known_the_most_probable_is_withheld(monkeyp
         "_of_all": lambda found, _model: found,
         "effects_without_size": open_size,
         "joint_posterior": lambda *_: None,
+        "doubted": lambda _found: ({}, False),
         "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
     }.items():
         monkeypatch.setattr(diagnosis if hasattr(diagnosis, name) else joint, name, stub)
-    found, _, withheld = diagnosis._asserted(start, cast("Any", None), 0, None, None)
+    found, _, withheld, _ = diagnosis._asserted(start, cast("Any", None), 0, None, None)
     assert seen == [{0}, {1}, set()]
     assert (found.chosen, [each.effect for each in withheld]) == (frozenset(), ["0"])
 
@@ -157,20 +158,21 @@ def test_of_effects_whose_sizes_are_open_together_the_least_probable_goes_first(
         "_of_all": lambda found, _model: found,
         "effects_without_size": open_size,
         "joint_posterior": lambda *_: None,
+        "doubted": lambda _found: ({}, False),
         "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
         "substitute": lambda *_: None,
     }.items():
         monkeypatch.setattr(diagnosis if hasattr(diagnosis, name) else joint, name, stub)
-    found, _, withheld = diagnosis._asserted(start, cast("Any", None), 0, None, None)
+    found, _, withheld, _ = diagnosis._asserted(start, cast("Any", None), 0, None, None)
     assert (found.chosen, [each.effect for each in withheld]) == (frozenset({0, 1}), ["2"])
 
 
 @pytest.mark.long
 def test_what_held_out_placings_do_not_bear_out_is_said_to_be_withheld(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By a comparison that finds no gain; what remains is unexplained."""
+    """By a comparison that finds no gain; what remains is a function of the sense of motion."""
     monkeypatch.setattr(diagnosis, "improvement", lambda *_: Improvement(4.0, 1.0, 4.0, 4.0, 0.5, 1.0))
     found = diagnosed(recording())
-    assert (found.verdict, found.effects) == ("unexplained", ())
+    assert (found.verdict, found.effects) == ("empirical", ())
     (withheld,) = found.withheld
     assert withheld.effect == "hysteresis_x"
     assert "does not predict set-ups that the fit had not seen" in withheld.why

@@ -51,6 +51,8 @@ def recorded(kind: str) -> Artefact:
         "time_s": 300.0 * np.arange(n), "pressure_hpa": 1000 + np.cumsum(random.normal(0, 2, n)),
         "humidity_pct": 50 + np.cumsum(random.normal(0, 1, n)), "speed_mm_s": random.uniform(2, 80, n),
         "gamma_deg": random.choice([0.0, -60.0, 90.0], n), "depth_mm": random.uniform(-30, 30, n),
+        "load_kg": random.uniform(0, 5, n), **{f"acceleration_{a}_m_s2": random.uniform(-2, 2, n) for a in "xyz"},
+        **{f"since_reversal_{a}_mm": random.uniform(0, 30, n) for a in "xyz"},
     }  # fmt: skip
     if normals is not None:
         columns |= {f"n{a}": normals[:, i] for i, a in enumerate("xyz")}

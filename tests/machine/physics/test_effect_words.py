@@ -21,7 +21,7 @@ from tests.recordings import TRAVEL
 PACKAGE = ROOT / "cmm_uq"
 DEFINE = {f"machine/physics/effects/{name}.py" for name in (
     "rigid_body", "drives", "thermal", "probing", "reversal", "scales", "warming", "stylus", "scanning",
-    "own_errors", "own_states", "rotary",
+    "own_errors", "own_states", "rotary", "structure",
 )}  # fmt: skip
 """Modules of the effects' own classes."""
 BEGIN = re.compile(
@@ -108,11 +108,11 @@ def test_what_an_artefact_has_like_a_machine_may_have_the_same_other_forms() -> 
 
 
 @pytest.mark.parametrize(("term", "names"), [
-    (Nonparametric("x_mm", "x"), {"scale_x", "periodic_scale_x"}),
-    (Nonparametric("x_mm", "y"), {"straightness_x_y"}),
-    (Nonparametric("y_mm", "x"), {"straightness_y_x", "squareness_xy"}),
-    (Nonparametric("z_mm", "y"), {"straightness_z_y", "squareness_yz"}),
-    (Nonparametric("z_mm", "x"), {"straightness_z_x", "squareness_zx"}),
+    (Nonparametric("x_mm", "x"), {"scale_x", "periodic_scale_x", "scale_joint_x"}),
+    (Nonparametric("x_mm", "y"), {"straightness_x_y", "wear_x_y"}),
+    (Nonparametric("y_mm", "x"), {"straightness_y_x", "squareness_xy", "wear_y_x"}),
+    (Nonparametric("z_mm", "y"), {"straightness_z_y", "squareness_yz", "wear_z_y"}),
+    (Nonparametric("z_mm", "x"), {"straightness_z_x", "squareness_zx", "wear_z_x"}),
     (Nonparametric("time_s", "z", scale=True), {"scale_z"}),
     (Nonparametric("approach_y"), {"hysteresis_y"}),
     (Nonparametric("time_s", "z"), set()),
@@ -129,7 +129,7 @@ def test_an_effect_moves_points_along_the_axis_and_by_the_reading_of_what_imitat
     effect = EVERY[name]
     (term,) = (term for term in effect.imitated_by if term.of.endswith("_mm"))
     axis = "xyz".index(term.of[0])
-    readings = np.array([[10.0, 20.0, -30.0], [700.0, 400.0, -450.0]])
+    readings = np.array([[710.0, 420.0, -30.0], [70.0, 40.0, -450.0]])
     readings[1, axis] = readings[0, axis]
     e = displaced(effect, readings)
     np.testing.assert_array_equal(e[0], e[1])

@@ -165,12 +165,14 @@ def with_shorter_periods(model: RecordingModel, values: Floats, explanation: Exp
 
 
 def even_scale(effect: Effect, shape: Floats) -> Floats:
-    """An effect's nonlinear parameter on the scale on which it is tried evenly: frequency for a period, else its logarithm."""
-    return 1 / shape if effect.shape[0].period_along else np.log(shape)
+    """An effect's nonlinear parameter as it is tried evenly: frequency for a period, a place itself, else its logarithm."""
+    (one, *_) = effect.shape
+    return shape if one.even else 1 / shape if one.period_along else np.log(shape)
 
 
 def from_even_scale(effect: Effect, value: Floats) -> Floats:
-    return 1 / value if effect.shape[0].period_along else np.exp(value)
+    (one, *_) = effect.shape
+    return value if one.even else 1 / value if one.period_along else np.exp(value)
 
 
 def effects_together(singles: Sequence[Explanation]) -> list[Explanation]:
@@ -204,7 +206,7 @@ LENGTH_SCALES = (0.6, 0.25, 0.1)  # of smooth functions, in parts of the covaria
 _SPACE_LENGTHS = (0.5, 0.25)
 # In parts of the diameter of a sphere of directions; the shortest lets neighbouring directions differ at will
 _DIRECTION_LENGTHS = (0.5, 0.25, 0.08)
-_LOBES = (2, 4, 5, 6, 7, 8, 9, 10)  # undulations in a turn; three are an effect of the catalogue
+_LOBES = (5, 7, 8, 9, 10)  # undulations in a turn; the others are effects of the catalogue
 _SPACE_PLACES, _SPACE_RANK = 120, 40
 # Jumps that are tried. A reading on the wrong side of one is off by all of it: few between many readings find none
 _MOST_STEPS = 200

@@ -117,9 +117,9 @@ class FunctionFit:
     @cached_property
     def evidence(self) -> list[tuple[Floats, Floats]]:
         """Of each family the log of evidence and prior of its functions at every size, and these sizes, each (K, a)."""
-        return [self._of(family) for family in self.families]
+        return [self.of_family(family) for family in self.families]
 
-    def _of(self, family: FunctionFamily) -> tuple[Floats, Floats]:
+    def of_family(self, family: FunctionFamily) -> tuple[Floats, Floats]:
         z = self.rest(family.columns)
         products = np.einsum("mkr,mks->krs", z, z) if z.shape[2] < 3 else z.transpose(1, 2, 0) @ z.transpose(1, 0, 2)
         strengths, turn = eigen(products) if z.shape[2] > 1 else (products[:, 0], np.ones_like(products))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 
@@ -71,7 +72,7 @@ class FunctionFamily:
 
 def families_of(result: SearchResult) -> list[FunctionFamily]:
     """All functions of a recording, each term as probable as another."""
-    found = list(_of_points(result)) + list(_of_observations(result))
+    found = [*_of_points(result), *_of_approach(result), *_of_observations(result)]
     terms = len({family.term for family in found})
     seen = (family for family in found if np.linalg.norm(family.columns, axis=(0, 2)).max() > _SEEN)
     return [replace(family, log_prior=family.log_prior - float(np.log(terms))) for family in seen]
@@ -122,16 +123,7 @@ def _of_points(result: SearchResult) -> Iterator[FunctionFamily]:
         for axis, other in (pair for pair in ("xy", "yz", "zx") if readings.keys() >= set(pair)):
             u, v = arms[axis], arms[other]
             for name, f in ((PRODUCT, (u * v)[:, None]), (BOWL, np.column_stack([u**2, v**2]))):
-                of = FunctionTerm(
-                    f"{axis}_mm,{other}_mm",
-                    say(
-                        "error along {direction} as a function of {axis} and {other}",
-                        direction=_letter(along),
-                        axis=_letter(axis),
-                        other=_letter(other),
-                    ),
-                    along,
-                )
+                of = FunctionTerm(f"{axis}_mm,{other}_mm", _of_both(along, _letter(axis), other), along)
                 columns, (p, q) = moving(along)(UNKNOWN_SD * f)[:, None], (_arm(a, readings[a]) for a in (axis, other))
                 formula = f"{p}*{q}" if name == PRODUCT else f"{p}**2;{q}**2"
                 nowhere = np.zeros((0, 1, f.shape[1]))
@@ -142,6 +134,21 @@ def _of_points(result: SearchResult) -> Iterator[FunctionFamily]:
             since = f"(time_s + {points.start!r})" if points.start else "time_s"
             term = FunctionTerm("time_s", title, along, along, f"*{along}/{half!r}", since)
             yield from _families(term, moving(along, readings[along] / half), np.asarray(time))
+
+
+def _of_approach(result: SearchResult) -> Iterator[FunctionFamily]:
+    """Of a direction of travel, by as much everywhere and in proportion to a reading."""
+    model, values, scale = result.first.model, result.first.values, result.first.comparison.noise_scale
+    points = model.artefact.points.at(model.where(values))
+    for along, key in product(range(3), (f"approach_{a}" for a in AXES if f"approach_{a}" in points.columns)):
+        for axis, read in ((axis, read) for axis, read in points.readings.items() if np.ptp(read) > 1.0):
+            arm = (read - 0.5 * (read.min() + read.max())) / (0.5 * np.ptp(read))
+            e = np.zeros((len(read), 3, 2))
+            e[:, along] = UNKNOWN_SD * points.columns[key][:, None] * np.column_stack([np.ones(len(arm)), arm])
+            of = FunctionTerm(f"{key},{axis}_mm", _of_both(AXES[along], in_words(key), axis), AXES[along])
+            columns = (model.seen(e, values) / scale[:, None])[:, None]
+            formula = f"{key};{key}*{_arm(axis, read)}"
+            yield FunctionFamily(of, PRODUCT, columns, 0.0, np.zeros(0), np.zeros((0, 1, 2)), formula=formula)
 
 
 def _of_observations(result: SearchResult) -> Iterator[FunctionFamily]:
@@ -161,6 +168,15 @@ def _of_observations(result: SearchResult) -> Iterator[FunctionFamily]:
 
 def _letter(axis: str) -> Text:
     return Verbatim(axis.upper())
+
+
+def _of_both(along: str, one: Text, other: str) -> Text:
+    return say(
+        "error along {direction} as a function of {axis} and {other}",
+        direction=_letter(along),
+        axis=one,
+        other=_letter(other),
+    )
 
 
 def _curve(along: str, axis: str) -> FunctionTerm:

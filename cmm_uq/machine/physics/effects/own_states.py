@@ -16,7 +16,8 @@ from cmm_uq.maths.geometry.feature import frame_about, upward
 
 KELVIN = Parameter("k", unit("K"), 1.0)
 TURNED = "turned_deg"  # column: by how much a sphere was turned about Z against its first set-up
-_DEGREES = (2, 3, 4, 5)  # of the harmonics of a sphere's form: the size and the place of the ball are those of 0 and 1
+# degrees and orders of the harmonics of a sphere's form: the size and the place of the ball are those of 0 and 1
+HARMONICS = tuple((degree, order) for degree in (2, 3, 4, 5) for order in range(-degree, degree + 1))
 
 
 class ArtefactTemperature(OwnFault):
@@ -161,11 +162,7 @@ class OwnForm(OwnFault, CommonSize):
         return self.owner is not None
 
     def sized(self, owner: FaultyArtefact) -> tuple[Parameter, ...]:
-        return tuple(
-            Parameter(f"c{degree}_{order}_um", unit("µm"), owner.size)
-            for degree in _DEGREES
-            for order in range(-degree, degree + 1)
-        )
+        return tuple(Parameter(f"c{degree}_{order}_um", unit("µm"), owner.size) for degree, order in HARMONICS)
 
     def errors(self, coefficients: Floats) -> Floats:
         return np.asarray(coefficients * np.sqrt(coefficients.shape[-1]), dtype=np.float64)
@@ -173,12 +170,14 @@ class OwnForm(OwnFault, CommonSize):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         self.whose()
         normals = _normals(points)
-        azimuth = np.arctan2(normals[:, 1], normals[:, 0]) - _turned(points)
-        polar = np.arccos(np.clip(normals[:, 2], -1.0, 1.0))
-        heights = np.column_stack(
-            [_harmonic(l, m, polar, azimuth) for l in _DEGREES for m in range(-l, l + 1)]  # noqa: E741
-        )
-        return -MICROMETRE * normals[:, :, None] * heights[:, None, :]
+        return -MICROMETRE * normals[:, :, None] * harmonics(normals, _turned(points))[:, None, :]
+
+
+def harmonics(normals: Floats, turned: Floats | float) -> Floats:
+    """Of directions (n, 3), turned back about Z by angles, rad: all of :data:`HARMONICS`, (n, k)."""
+    azimuth = np.arctan2(normals[:, 1], normals[:, 0]) - turned
+    polar = np.arccos(np.clip(normals[:, 2], -1.0, 1.0))
+    return np.column_stack([_harmonic(degree, order, polar, azimuth) for degree, order in HARMONICS])
 
 
 def _harmonic(degree: int, order: int, polar: Floats, azimuth: Floats) -> Floats:

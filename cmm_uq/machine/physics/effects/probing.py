@@ -12,11 +12,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
-from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.machine.physics.effect import FURTHER, Effect, Harmonic, Parameter
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
+from cmm_uq.machine.physics.effect import FURTHER, CommonSize, Effect, Harmonic, Parameter
 from cmm_uq.machine.physics.effects.drives import travel
+from cmm_uq.machine.physics.effects.own_states import HARMONICS, harmonics
 from cmm_uq.machine.physics.effects.rigid_body import tip_offsets
 from cmm_uq.machine.physics.kinematics import euler_313
 from cmm_uq.machine.physics.words import SENSE, SIZE
@@ -48,21 +49,75 @@ class ProbeRadius(Effect):
 
 
 class ProbeLobing(Harmonic):
-    """Three-lobed pre-travel."""
+    """Three-lobed pre-travel.
+
+    A probe on three seats has three lobes; stylus, adapters and strain gauges have others (ISO 230-10, Schwenke 2008).
+    """
 
     name, title = "probe_lobing", say("Lobing of the probe")
     formula, mechanism = "true surface point = indicated + A·cos(3θ + φ)·n, θ = atan2(ny, nx)", "probe"
     points_to = say("the probe's pre-travel has three lobes: qualify it in more directions")
-    means = say("the probing error swings to either side by {size}, three times in a turn about Z", size=SIZE)
+    means: Text = say("the probing error swings to either side by {size}, three times in a turn about Z", size=SIZE)
     amplitude = Parameter("amplitude_um", unit("µm"), 5.0, say("amplitude"))
     coefficients = (Parameter("cosine_um", unit("µm"), 5.0), Parameter("sine_um", unit("µm"), 5.0))
     columns = NORMAL
 
+    def __init__(self, count: int = 3) -> None:
+        self.count = count
+        if count != 3:
+            self.name, self.tier, self.means = f"{self.name}_{count}", FURTHER, NOTHING
+            self.formula = self.formula.replace("3", str(count))
+            self.title = say("Probe with {count} lobes", count=count)
+            self.points_to = say(
+                "the probe's pre-travel has {count} lobes: check how its stylus and its seats are held, and qualify it in "
+                "more directions",
+                count=count,
+            )
+
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         normals = normals_of(points)
-        angle = 3 * np.arctan2(normals[:, 1], normals[:, 0])
+        angle = self.count * np.arctan2(normals[:, 1], normals[:, 0])
         lobes = np.column_stack([np.cos(angle), -np.sin(angle)])
         return np.asarray(MICROMETRE * normals[:, :, None] * lobes[:, None, :], dtype=np.float64)
+
+
+class ProbeMap(CommonSize):
+    """A probing error of its own in every direction: spherical harmonics of the degrees 2 to 5 (VDI/VDE 2617-2)."""
+
+    name, title = "probe_map", say("Probing error by direction")
+    formula, mechanism = "e = Σ c_lm·Y_lm(n)·n, l = 2 … 5", "probe"
+    points_to = say(
+        "the probe errs otherwise in every direction: qualify it with more points, or correct it by a map of directions"
+    )
+    size = Parameter("rms_um", unit("µm"), 2.0)
+    coefficients = tuple(Parameter(f"c{degree}_{order}_um", unit("µm"), 2.0) for degree, order in HARMONICS)
+    columns, tier = NORMAL, FURTHER
+
+    def errors(self, coefficients: Floats) -> Floats:
+        return np.asarray(coefficients * np.sqrt(coefficients.shape[-1]), dtype=np.float64)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        normals = normals_of(points)
+        return np.asarray(MICROMETRE * normals[:, :, None] * harmonics(normals, 0.0)[:, None, :], dtype=np.float64)
+
+
+class HeadAlignment(Effect):
+    """A probe head that stands turned against where its styli were qualified, and moves each as it is long (ISO 10360-5)."""
+
+    name, title = "head_alignment", say("Alignment of the probe head")
+    formula, mechanism = "e = ω × stylus", "probe"
+    points_to = say(
+        "the probe head, or its stylus changer, stands turned against how the styli were qualified: clean its seats, and "
+        "qualify every stylus again"
+    )
+    coefficients = tuple(
+        Parameter(f"about_{a}_arcsec", unit("″"), 20.0, say("about {axis}", axis=Verbatim(a.upper()))) for a in AXES
+    )
+    columns, tier = TIP, FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        turns = np.cross(np.eye(3)[None], np.column_stack([points.column(name) for name in TIP])[:, None])
+        return np.asarray(ARCSECOND * turns.swapaxes(1, 2), dtype=np.float64)
 
 
 # of its length, by which points of a bar or a gauge may lie beside the line from its first to its farthest
@@ -280,5 +335,6 @@ def attitudes(points: Points) -> Floats:
 
 EFFECTS: tuple[Effect, ...] = (
     ProbeRadius(), ProbeLobing(), ArtefactSag(), PreTravel(), ProbeAxial(), StylusBending(), TriggerDelay(),
-    DigitizerOffset(), DigitizerDepth(), DigitizerIncidence(),
+    DigitizerOffset(), DigitizerDepth(), DigitizerIncidence(), *(ProbeLobing(count) for count in (2, 4, 6)), ProbeMap(),
+    HeadAlignment(),
 )  # fmt: skip

@@ -16,7 +16,7 @@ import numpy as np
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, REFERENCE_TEMPERATURE, unit
-from cmm_uq.machine.physics.effect import CONTRACT, FURTHER, Effect, OfAxis, Parameter, Shape
+from cmm_uq.machine.physics.effect import CONTRACT, FURTHER, Effect, Harmonic, OfAxis, Parameter, Shape
 from cmm_uq.machine.physics.effects.rigid_body import LEANING, Lean, turned
 from cmm_uq.machine.physics.words import AXIS, OTHER, SECOND, SENSE, SIDE, SIZE
 
@@ -26,6 +26,7 @@ EXPANSION = Parameter("cte_per_k", unit("1/K"), 12e-6, say("expansion"))
 SETTLING = Shape("settling_h", unit("h"), 0.2, 20.0, what=say("time to settle"))
 # time constant of an artefact behind its thermometer: a thin bar minutes, a solid one an hour or more
 LAG = Shape("lag_h", unit("h"), 0.05, 5.0, what=say("lag"))
+_HALF_A_DAY = 12.0  # h
 
 
 class ThermalScale(OfAxis):
@@ -104,6 +105,70 @@ def lagging(hours: Floats, temperature: Floats, lag: float) -> Floats:
         behind = lag * (driving[k + 1] - driving[k]) / step
         body[k + 1] = driving[k + 1] - behind + (body[k] - driving[k] + behind) * np.exp(-step / lag)
     return np.asarray(body[index], dtype=np.float64)
+
+
+class ThermalLag(OfAxis):
+    """A scale behind its thermometer.
+
+    It stands beside the scale's expansion, compensated or ``thermal_scale``, which follows the thermometer (ISO/TR 16907).
+    """
+
+    family, title = "thermal_lag", say("Scale of {axis} lagging behind its thermometer", axis=AXIS)
+    formula = "e_a = α·(T′ − temp_a)·a, τ·dT′/dt = temp_a − T′"
+    mechanism = "temperature"
+    points_to = say(
+        "the scale of {axis} takes on the temperature later than its thermometer: fix the thermometer to the body of the "
+        "scale, and measure when the room has been steady for longer",
+        axis=AXIS,
+    )
+    coefficients, shape, columns = (EXPANSION,), (LAG,), ("temp_{a}_c", "time_s")
+    tier = FURTHER
+
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        (lag,) = shape
+        temperature = points.column(f"temp_{self.axis}_c")
+        return (lagging(points.hours, temperature, lag) - temperature) * points.readings[self.axis]
+
+
+class Daily(OfAxis, Harmonic):
+    """The zero of an axis that goes with the day: sun, heating at night, shifts (ISO/TR 16015, ISO 230-3).
+
+    Of less than half a day no cycle is to be told from a drift.
+    """
+
+    family, title = "daily", say("Daily cycle of {axis}", axis=AXIS)
+    formula, mechanism = "e_a = A·sin(2π·time/24 h + φ)", "temperature"
+    points_to = say(
+        "{axis} moves with the time of day: look for sun, a heating that is lowered at night, doors and shifts",
+        axis=AXIS,
+    )
+    amplitude = Parameter("amplitude_um", unit("µm"), 10.0, say("amplitude"))
+    coefficients = (Parameter("cosine_um", unit("µm"), 10.0), Parameter("sine_um", unit("µm"), 10.0))
+    columns, tier = ("time_s",), FURTHER
+
+    def shown_in(self, points: Points) -> bool:
+        return "time_s" in points.columns and float(np.ptp(points.hours)) >= _HALF_A_DAY
+
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        angle = np.pi * points.hours / _HALF_A_DAY
+        return MICROMETRE * np.column_stack([np.sin(angle), np.cos(angle)])
+
+
+class DailyScale(Daily):
+    """A scale that goes with the day."""
+
+    family, title = "daily_scale", say("Daily cycle of the scale of {axis}", axis=AXIS)
+    formula = "e_a = s·sin(2π·time/24 h + φ)·a"
+    points_to = say(
+        "lengths along {axis} go with the time of day: check the temperature compensation of this scale, and look for sun "
+        "and a heating that is lowered at night",
+        axis=AXIS,
+    )
+    amplitude = Parameter("amplitude_ppm", unit("ppm"), 10.0, say("amplitude"))
+    coefficients = (Parameter("cosine_ppm", unit("ppm"), 10.0), Parameter("sine_ppm", unit("ppm"), 10.0))
+
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        return PPM / MICROMETRE * points.readings[self.axis][:, None] * super().component(points, shape)
 
 
 class CarriageGradient(Effect):
@@ -227,7 +292,7 @@ class ScaleSettling(OfAxis):
 SCALE_EXPANSION = MappingProxyType({a: ThermalScale(a) for a in AXES})  # by axis
 EFFECTS: tuple[Effect, ...] = (
     *SCALE_EXPANSION.values(), ThermalArtefact(), ThermalGradient(),
-    *(family(a) for family in (ScaleDrift, Settling, ScaleSettling) for a in AXES),
+    *(family(a) for family in (ScaleDrift, Settling, ScaleSettling, ThermalLag, Daily, DailyScale) for a in AXES),
     *(ThermalSquareness(plane) for plane in LEANING),
     CarriageGradient("bridge", say("bridge"), "yx", ("top", "bottom"), say(
         "the bridge bends: its upper and lower side differ in temperature, look for warm air, lamps or a draught above it"

@@ -39,8 +39,8 @@ def of_sphere() -> tuple[dict[str, Explanation], Floats]:
     return {e.name: e for e in found}, directions(model)
 
 
-@pytest.mark.parametrize("count", [2, 5, 7])
-def test_lobes_of_a_probe_are_among_them_whatever_their_number_and_phase(
+@pytest.mark.parametrize("count", [5, 7, 10])
+def test_lobes_of_a_probe_are_among_them_that_no_effect_has(
     of_sphere: tuple[dict[str, Explanation], Floats], count: int
 ) -> None:
     found, normals = of_sphere
@@ -67,7 +67,7 @@ def test_a_scale_may_depend_on_a_column_about_the_middle_of_the_volume() -> None
     middle = 0.5 * (points.carriages.min(axis=0) + points.carriages.max(axis=0))
     u = (load - load.mean()) / np.ptp(load)
     what = model.seen(((1 + u - u**2)[:, None] * (points.carriages - middle))[:, :, None], values)[:, 0]
-    assert reached(found["scale of all axes as a function of load_kg"], what) > 0.999
+    assert reached(found["scale of all axes as a function of load at the ram"], what) > 0.999
 
 
 def test_no_jump_parts_readings_of_one_place() -> None:
