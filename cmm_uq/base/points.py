@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import combinations
+from math import comb
 from types import MappingProxyType
 from typing import Any
 
@@ -167,6 +169,7 @@ class Points:
         """Groups (see :attr:`group`) that repeat another to the last digit, with that other: the first by measurement, repeat.
 
         The order of their points is no matter. Columns named ``reading_…`` are what an instrument found there, and count.
+        Where lengths alone were recorded, no more of them that are equal than rounding makes equal are no copies.
         """
         same: dict[bytes, list[int]] = {}
         read = [values for name, values in sorted(self.columns.items()) if name.startswith("reading_")]
@@ -182,7 +185,8 @@ class Points:
         for groups in same.values():
             original, *later = sorted(groups, key=self.run_of)
             found |= dict.fromkeys(later, original)
-        return found
+        by_chance = set() if read or not found else _rounded_alike(self)
+        return {later: original for later, original in found.items() if later not in by_chance}
 
     def run_of(self, group: int) -> tuple[int, int]:
         """Measurement and repeat of a group."""
@@ -235,3 +239,52 @@ class Points:
         np.add.at(sums, self.group, values)
         counts = np.bincount(self.group).reshape((-1,) + (1,) * (values.ndim - 1))
         return np.asarray((sums / counts)[self.group], dtype=np.float64)
+
+
+_CHANCE = 1e-3  # probability of as many equal lengths, or more, below which they are copies
+_PARALLEL = 1e9  # directions of one line agree to its inverse
+_MEDIAN = 0.6745  # of the absolute value of a normal distribution, standard deviations
+_INCH = 25.4  # mm
+
+
+def _rounded_alike(points: Points) -> set[int]:
+    """Groups of a length alone, of which no more equal those of another repeat than rounding explains.
+
+    Of lengths alone every repeat has the same first point and the same direction: they were laid along a line, and one figure
+    of each was measured. Two repeats are compared line by line, and in all.
+    """
+    lines, lengths = dict[int, bytes](), dict[int, dict[int, tuple[float, int]]]()
+    for group, rows in enumerate(points.rows_of_groups):
+        measurement, repeat = points.run_of(group)
+        first, last = points.xyz[rows[np.argsort(points.point[rows], kind="stable")]][[0, -1]]
+        length = float(np.linalg.norm(last - first))
+        line = np.concatenate([first, np.round(_PARALLEL * (last - first) / (length or 1.0))]) + 0.0
+        bare = len(rows) == 2 and lines.setdefault(measurement, line.tobytes()) == line.tobytes()
+        lines[measurement] = lines[measurement] if bare else b""
+        lengths.setdefault(measurement, {})[repeat] = length, group
+    alone = {measurement: of for measurement, of in lengths.items() if lines[measurement]}
+    step = _step(np.array([length for of in alone.values() for length, _ in of.values()]))
+    apart = np.array([abs(a - b) for of in alone.values() for (a, _), (b, _) in combinations(of.values(), 2)])
+    if not np.any(apart > 0.5 * step):
+        return set()
+    chance = min(1.0, step * _MEDIAN / np.sqrt(2 * np.pi) / float(np.median(apart[apart > 0.5 * step])))
+    alike, copies = set[int](), set[int]()
+    for together in (*({line} for line in set(lines.values())), set(lines.values())):
+        compared = [of for measurement, of in alone.items() if lines[measurement] in together]
+        for one, other in combinations(sorted({repeat for of in compared for repeat in of}), 2):
+            both = [(of[one], of[other]) for of in compared if one in of and other in of]
+            equal = {group for (a, _), (b, group) in both if abs(a - b) < 0.5 * step}
+            n, k = len(both), len(equal)
+            more = sum(comb(n, i) * chance**i * (1 - chance) ** (n - i) for i in range(k, n + 1))
+            (alike if more >= _CHANCE else copies).update(equal)
+    return alike - copies
+
+
+def _step(lengths: Floats) -> float:
+    """The last digit that lengths (n,), mm, were printed with, mm; of inches as well."""
+    for digits in range(9):
+        for unit in (1.0, _INCH):
+            printed = lengths / unit * 10.0**digits
+            if np.all(np.abs(printed - np.round(printed)) < 1e-9 * 10.0**digits + 1e-7):
+                return unit * 10.0**-digits
+    return 0.0

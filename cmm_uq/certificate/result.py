@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cmm_uq.analysis.conformity.accuracy import Consequences, Costs
 from cmm_uq.analysis.conformity.statement import Statement, by_standard, by_tolerance
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
-from cmm_uq.analysis.diagnosis.simulation import SimulationMistakes
+from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin, SimulationMistakes
 from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
 from cmm_uq.analysis.machine.regions import FactorRegions
 from cmm_uq.analysis.machine.state import of_machine
@@ -38,31 +38,6 @@ from cmm_uq.maths.inference.linear_model import LeastSquares
 from cmm_uq.maths.inference.posterior import Cause, Doubt, NoisyPosterior
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from cmm_uq.maths.uncertainty.type_a import Covariance, factor_of_noise
-
-
-@dataclass(frozen=True, eq=False)
-class SimulatedTwin:
-    files: Mapping[str, str]  # SHA-256 by name
-    program: str
-    maps: bool
-    u_um: float  # of a predicted coordinate, root mean square
-    u_common_um: float  # of the artefact's size
-    u_turned_um: float  # besides, because the artefact was taken to lie in another direction
-    contains: tuple[str, ...]  # its effects
-    refitted: tuple[str, ...]  # those that were estimated anew
-    shift_mm: tuple[float, ...]  # of its frame against the recording's
-    turn_deg: float
-    farthest_mm: float  # from a recorded point to the predicted one
-    rms_predicted_um: float  # in the observations
-
-    def data(self, corrections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-        return {
-            "files_sha256": dict(self.files), "program": self.program, "kind": "map" if self.maps else "prediction",
-            "u_um": self.u_um, "u_common_um": self.u_common_um, "u_turned_um": self.u_turned_um,
-            "effects": list(self.contains), "refitted": dict(corrections), "farthest_mm": self.farthest_mm,
-            "frame": {"shift_mm": list(self.shift_mm), "turn_deg": self.turn_deg}, "rms_predicted_um": self.rms_predicted_um,
-        }  # fmt: skip
-
 
 AtLeast = Callable[..., tuple[float, float]]  # U and k as a certificate states them; see StatedUncertainty.raised_to
 
@@ -119,6 +94,7 @@ class StatedUncertainty:
         return {"cmc": {"length_mm": self.length_mm, "raised": self.raised}} if self.raised else {}
 
 
+_LEFT_TO_PRIOR = 0.9  # share of the prior in a parameter's variance from which on the recording does not determine it
 LACK_OF_FIT = 0.01  # probability below which the residuals are held to contradict the stated noise
 
 
@@ -266,9 +242,16 @@ class Result:
 
     @cached_property
     def not_given(self) -> frozenset[tuple[str, str]]:
-        """Keys of parameters without a value: the recording leaves them free, or contradicts them."""
+        """Keys of parameters without a value: the recording leaves them free, to their prior, or contradicts them."""
         free = (key for combination in self.undetermined for key in combination)
-        return frozenset((*free, *(one.key for one in self.contradictions), *self.denied))
+        return frozenset((*free, *self.left_to_prior, *(one.key for one in self.contradictions), *self.denied))
+
+    @cached_property
+    def left_to_prior(self) -> tuple[tuple[str, str], ...]:
+        """Keys of parameters of which the recording says next to nothing beside what physics allows."""
+        physical = {effect.name for effect in self.model.effects if not effect.stated}
+        keys = (unknown.key for unknown in self.posterior.unknowns if unknown.key[0] in physical)
+        return tuple(key for key in keys if self.prior_share(key) > _LEFT_TO_PRIOR)
 
     @cached_property
     def denied(self) -> tuple[tuple[str, str], ...]:

@@ -7,8 +7,9 @@ the diagnosis compared with the prediction as it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy
@@ -308,3 +309,27 @@ def _rounded(found: PredictedErrors, sigma: float, rms_um: float, heldout_um: fl
         0.0,
         unit("µm"),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedTwin:
+    files: Mapping[str, str]  # SHA-256 by name
+    program: str
+    maps: bool
+    u_um: float  # of a predicted coordinate, root mean square
+    u_common_um: float  # of the artefact's size
+    u_turned_um: float  # besides, because the artefact was taken to lie in another direction
+    contains: tuple[str, ...]  # its effects
+    refitted: tuple[str, ...]  # those that were estimated anew
+    shift_mm: tuple[float, ...]  # of its frame against the recording's
+    turn_deg: float
+    farthest_mm: float  # from a recorded point to the predicted one
+    rms_predicted_um: float  # in the observations
+
+    def data(self, corrections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+        return {
+            "files_sha256": dict(self.files), "program": self.program, "kind": "map" if self.maps else "prediction",
+            "u_um": self.u_um, "u_common_um": self.u_common_um, "u_turned_um": self.u_turned_um,
+            "effects": list(self.contains), "refitted": dict(corrections), "farthest_mm": self.farthest_mm,
+            "frame": {"shift_mm": list(self.shift_mm), "turn_deg": self.turn_deg}, "rms_predicted_um": self.rms_predicted_um,
+        }  # fmt: skip

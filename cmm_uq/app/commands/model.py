@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin
 from cmm_uq.analysis.screening.columns import Finding, finding
 from cmm_uq.analysis.screening.screening import counted_with, screen_recording
 from cmm_uq.analysis.screening.shape import Screening
@@ -16,7 +17,7 @@ from cmm_uq.base.files.limits import FREEDOMS, OBSERVATIONS
 from cmm_uq.base.messages import Text, Verbatim, in_a_row, plural, say, signed
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.result import OwnAnalysis, Recipe, SimulatedTwin
+from cmm_uq.certificate.result import OwnAnalysis, Recipe
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.compared import KEY, SimulationFacts
 from cmm_uq.jobs.source import sha256

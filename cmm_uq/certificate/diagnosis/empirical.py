@@ -14,14 +14,13 @@ from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.empirical.model import ODDS, EmpiricalFunction
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import region_of
-from cmm_uq.analysis.diagnosis.simulation import SimulationMistake, SimulationMistakes
+from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin, SimulationMistake, SimulationMistakes
 from cmm_uq.analysis.diagnosis.verdict import exceeds
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, lines, number, say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.diagnosis.sections import region_words
 from cmm_uq.certificate.document import Column, Facts, Paragraph, Plot, Section, Table, section, table
 from cmm_uq.certificate.plots.volume import profile_plot
-from cmm_uq.certificate.result import SimulatedTwin
 from cmm_uq.certificate.wording import probability
 from cmm_uq.jobs.columns import labelled
 from cmm_uq.maths.uncertainty.quantity import Quantity, alike, rounded, significant

@@ -11,6 +11,7 @@ from cmm_uq.analysis.conformity.accuracy import TITLES, UNITS
 from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.held_out import Improvement
+from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin
 from cmm_uq.analysis.planning.set_up import odds_words
 from cmm_uq.base.messages import (
     NOTHING,
@@ -34,7 +35,7 @@ from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.origin import came_about, program
 from cmm_uq.certificate.plots.residuals import length_plot
 from cmm_uq.certificate.plots.style import lettered_in
-from cmm_uq.certificate.result import JobDiagnosis, Outcome, SimulatedTwin
+from cmm_uq.certificate.result import JobDiagnosis, Outcome
 from cmm_uq.certificate.results.contents import corrections, diagnosis_data, head
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import ARTEFACT

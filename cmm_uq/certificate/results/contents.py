@@ -16,6 +16,7 @@ from cmm_uq.analysis.diagnosis.empirical.model import EmpiricalFunction
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode
 from cmm_uq.analysis.diagnosis.power import ALLOWED
+from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin
 from cmm_uq.analysis.diagnosis.smallest import PLACES, SmallestEffect
 from cmm_uq.analysis.diagnosis.verdict import exceeds
 from cmm_uq.analysis.planning.set_up import NextPlan
@@ -25,7 +26,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.diagnosis.empirical import mistakes_data
 from cmm_uq.certificate.diagnosis.overview import sentence
 from cmm_uq.certificate.origin import quantity_data, software
-from cmm_uq.certificate.result import JobDiagnosis, Result, SimulatedTwin
+from cmm_uq.certificate.result import JobDiagnosis, Result
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.verdicts import Verdicts
@@ -340,7 +341,7 @@ def _identifiability(result: Result) -> dict[str, Any]:
     ls = result.least_squares
     names = [".".join(u.key) for u in ls.unknowns]
     free = [{name: float(part) for name, part in zip(names, column, strict=True) if part} for column in ls.null_space.T]
-    denied = (*(one.key for one in result.contradictions), *result.denied)
+    denied = (*result.left_to_prior, *(one.key for one in result.contradictions), *result.denied)
     return {
         "parameters": int(ls.rank + ls.null_space.shape[1]), "rank": ls.rank,
         "condition_number": ls.condition if np.isfinite(ls.condition) else None,

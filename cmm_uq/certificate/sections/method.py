@@ -261,12 +261,16 @@ def _undetermined(result: Result) -> list[Text]:
         for combination in result.undetermined
     ]  # fmt: skip
     for unknown in result.posterior.unknowns:
-        share = result.prior_share(unknown.key)
-        if share > ASSUMED and unknown.key not in result.not_given and not unknown.known:
+        share, left = result.prior_share(unknown.key), unknown.key in result.left_to_prior
+        if left or (share > ASSUMED and unknown.key not in result.not_given and not unknown.known):
+            of = (
+                say("{parameter} is not determined by this recording", parameter=title_of(unknown.key, result))
+                if left
+                else say("{parameter} is hardly determined by this recording", parameter=title_of(unknown.key, result))
+            )
             texts.append(say(
-                "{parameter} is hardly determined by this recording: {share:.0f} % of its variance is the "
-                "assumption that it lies within about ±{prior_sd:g} {unit}.",
-                parameter=title_of(unknown.key, result), share=100 * share, prior_sd=2 * unknown.prior_sd, unit=unknown.unit,
+                "{of}: {share:.0f} % of its variance is the assumption that it lies within about ±{prior_sd:g} {unit}.",
+                of=of, share=100 * share, prior_sd=2 * unknown.prior_sd, unit=unknown.unit,
             ))  # fmt: skip
     return texts
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from itertools import product
 
 import numpy as np
+import pytest
 
 from cmm_uq.analysis.conformity.uncertainty import copies_in_words
 from cmm_uq.base.points import Points
@@ -50,3 +52,53 @@ def test_copies_of_several_are_named_in_the_order_of_their_originals() -> None:
         "Copies to the last digit, which do not count: measurement 2, repeat 1 of measurement 1, repeat 1; "
         "measurement 4, repeat 1 of measurement 3, repeat 1."
     )
+
+
+def lengths_alone(step_mm: float, copied: Collection[int] = (), *, across_mm: float = 0.0) -> Points:
+    """Five lengths on each of seven lines, three times, 0.3 µm of scatter, rounded to ``step_mm``.
+
+    The third repeat of the measurements ``copied`` is their first. ``across_mm``: how far ends lie beside their lines.
+    """
+    noise, rows = np.random.default_rng(12), list[tuple[float, ...]]()
+    for line, nominal in product(range(7), (60, 180, 300, 420, 540)):
+        number = len(rows) // 6 + 1
+        read = np.round((nominal + noise.normal(0.0, 3e-4, 3)) / step_mm) * step_mm
+        read[2] = read[0] if number in copied else read[2]
+        for repeat, length in enumerate(read, 1):
+            start, beside = np.array([10.0 * line, 5.0, 6.0]), across_mm * noise.standard_normal()
+            rows += [(number, 1, repeat, *start), (number, 2, repeat, *(start + np.array([length, 0.0, beside])))]
+    number, point, repeat, *xyz = np.array(rows).T
+    return Points(np.column_stack(xyz), number.astype(int), point.astype(int), repeat.astype(int))
+
+
+@pytest.mark.parametrize("step_mm", [1e-4, 1e-5, 25.4e-5])
+def test_lengths_alone_that_are_equal_by_rounding_are_no_copies(step_mm: float) -> None:
+    points = lengths_alone(step_mm)
+    length = np.linalg.norm(points.xyz[1::2] - points.xyz[::2], axis=1).reshape(-1, 3)
+    assert np.any(np.abs(np.diff(length[:, [0, 1, 2, 0]])) < 1e-9), "some are equal"
+    assert points.copies == {}
+
+
+@pytest.mark.parametrize("step_mm", [1e-4, 1e-5, 1e-7])
+def test_a_line_whose_lengths_are_all_those_of_another_repeat_is_copied(step_mm: float) -> None:
+    copied = range(11, 16)
+    assert by_run(lengths_alone(step_mm, copied)) == {(n, 3): (n, 1) for n in copied}
+
+
+def test_a_repeat_that_is_another_on_every_line_is_copied() -> None:
+    assert {(n, 3) for n in range(1, 36)} <= set(by_run(lengths_alone(1e-4, range(1, 36))))
+
+
+def test_points_that_were_probed_are_copies_each_by_itself() -> None:
+    """Ends scatter across the line as well, so that two repeats are not the same by rounding."""
+    assert by_run(_with_copied_ends(lengths_alone(1e-4, across_mm=1e-3), 7)) == {(7, 3): (7, 1)}
+
+
+def _with_copied_ends(points: Points, measurement: int) -> Points:
+    xyz, own = points.xyz.copy(), points.measurement == measurement
+    xyz[own & (points.repeat == 3)] = xyz[own & (points.repeat == 1)]
+    return points.at(xyz)
+
+
+def test_lengths_that_repeat_exactly_every_time_are_copies() -> None:
+    assert len(lengths_alone(0.1).copies) == 70

@@ -348,3 +348,27 @@ def test_the_plan_is_a_recording_to_fill_in() -> None:
     assert len(job.points) == 2 * plan["repeats"] * len(plan["set_ups"])
     assert set(job.points.measurement.tolist()) == {one["measurement"] for one in plan["set_ups"]}
     assert "fit_rms_um" not in job.points.columns
+
+
+def test_what_is_left_to_the_prior_has_no_value_and_no_decision(tmp_path: Path) -> None:
+    """One level plate sees the vertical only by how it happens to tilt: what physics allows is no measurement."""
+    level = Path(shutil.copytree(EXAMPLES / "plate-simulated", tmp_path / "level"))
+    recording = pd.read_csv(level / "recording.csv")
+    recording[recording["measurement"] == 1].to_csv(level / "recording.csv", index=False)
+    state(
+        level,
+        r"^effects = .*",
+        'effects = ["scale_x", "scale_z", "squareness_zx"]\ntolerances = { squareness_zx = 1500.0 }',
+    )
+    outcome = outcome_of(analyse(level))
+    found, key = outcome.found, ("squareness_zx", "angle_arcsec")
+    assert isinstance(found, Result)
+    assert found.prior_share(key) > 0.9
+    assert key in found.not_given
+    low, high = found.parameters[key[0]][key[1]].interval95
+    assert -1500.0 < low < high < 1500.0, "by the prior alone it would pass"
+    (verdict,) = (one for one in found.verdicts if one.name == "squareness_zx.angle_arcsec")
+    assert verdict.outcome == "undecided"
+    assert {"squareness_zx.angle_arcsec": 1.0} in outcome.results["identifiability"]["undetermined"]
+    assert any(text.startswith("Squareness Z–X is not determined by this recording") for text in outcome.warnings)
+    assert ("scale_x", "ppm") not in found.not_given
