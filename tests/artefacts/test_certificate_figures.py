@@ -235,6 +235,11 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     **{f"All values decided by ISO 230-4:1996, {one}": decided_as(one) for one in "GH"},
     **{f"All values decided by ISO 10360-3:2000, {one}": decided_as(one) for one in ("FR", "FT", "FA")},
     "Ranges": lambda results: [list(one.values()) for one in results["spheres"]],
+    "Distance from where the reference instrument saw the point": lambda results: [
+        [*one.values(), *(100 * one[name] for name in ("coordinates_within_U", "points_within_ellipsoid") if name in one)]
+        for one in results["positions"].values()
+    ],
+    "Rows of the arm as found": lambda results: [list(row.values()) for row in results["rows"]],
     **{f"All values decided by {name}": decided for name in STATED},
     **{f"Contributions to the uncertainty of the test value named, {name}": of_test_value for name in STATED},
 }  # fmt: skip

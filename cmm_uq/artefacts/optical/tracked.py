@@ -18,7 +18,7 @@ from cmm_uq.analysis.diagnosis.held_out import numbered_by_place, predicted_fold
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
 from cmm_uq.artefacts.plate import REFERENCES, Plate, shape_of as shape_of_plate
 from cmm_uq.base.arm import ALPHA, BETA, THETA, A, Arm, D
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, signed
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Section, Table, figure_columns, text_columns
@@ -206,7 +206,7 @@ def _rows(rows: list[dict[str, float]], result: Result) -> Table:
         *figure_columns(Verbatim("θ"), Verbatim("β"), unit=unit("°")),
     )
     each = tuple(
-        (Verbatim(joint.upper()), *(number(row[_KEYS[i]], ".4f" if i in (A, D) else ".5f") for i in range(5)))
+        (Verbatim(joint.upper()), *(signed(row[_KEYS[i]], ".4f" if i in (A, D) else ".5f") for i in range(5)))
         for joint, row in zip(cast("Arm", result.artefact.points.machine).joints, rows, strict=True)
     )
     note = say("What the recording leaves open stands as the job has it.")
