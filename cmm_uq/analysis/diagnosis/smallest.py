@@ -39,6 +39,7 @@ _PART = 0.1  # share from which on a fitted effect counts as part of what takes 
 _ALIKE = 0.96  # mean square cosine from which on two periods look alike
 _NEIGHBOURS = 2
 _RIDGE = 1e-13
+_ROUNDING = 1e-12  # of a share that is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,6 +312,7 @@ class _Signal:
     def smallest(self, view: Visibility, thresholds: Thresholds | None) -> SmallestEffect:
         effect, parameter, whole = self.effect, self.effect.coefficients[0], float(np.linalg.norm(self.raw))
         share = float(np.linalg.norm(self.column)) / whole if whole else 0.0
+        share = share if share > _ROUNDING else 0.0
         length, detected, named = float(np.inf), None, None
         if thresholds is not None:
             length = thresholds.length_detected(POWER)
