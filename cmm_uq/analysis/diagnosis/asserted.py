@@ -16,7 +16,7 @@ import scipy
 from cmm_uq.analysis.diagnosis import joint as jointly
 from cmm_uq.analysis.diagnosis.comparison.equivalence import equivalent_sets
 from cmm_uq.analysis.diagnosis.comparison.explanations import effect_of
-from cmm_uq.analysis.diagnosis.comparison.search import ASSERTED, SearchResult, withhold
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, withhold
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
 from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily, FunctionTerm, families_of
 from cmm_uq.analysis.diagnosis.empirical.model import ODDS
@@ -62,7 +62,7 @@ class OmittedEffect:
     explained: float  # part of the misfit's sum of squares that it takes away
     together: float  # probability of it or one that these data cannot tell from it
     points_to: Text  # what a technician should look at
-    # what these data cannot tell from it; with a probability below one half it is asserted as one of these
+    # what these data cannot tell from it; with a probability below 0.8 it is named as one of these
     group: tuple[Text, ...] = ()
     # other periods that fit, where it has one; all that fit, where none of them is settled
     modes: tuple[Mode, ...] = ()
@@ -85,7 +85,7 @@ def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel
         # that it is one effect and not two is no evidence: by the readings alone
         fewer = [1 / one.odds for one in stand_ins if len(one.effects) != len(one.instead_of)]
         by_readings = min(probability, together / (1 + sum(fewer))) if fewer else probability
-        group = group if probability < ASSERTED or by_readings == probability else ()
+        group = group if probability < NAMED or by_readings == probability else ()
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
         shapes = joint.shapes.get(effect.name, np.zeros((len(draws), 0)))
         if modes and known:  # what is reported of a period is reported of one

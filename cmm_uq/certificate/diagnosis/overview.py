@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
-from cmm_uq.analysis.diagnosis.comparison.search import ASSERTED
+from cmm_uq.analysis.diagnosis.asserted import NAMED, OmittedEffect
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
@@ -151,7 +150,7 @@ def besides(d: Diagnosis, item: OmittedEffect) -> list[str]:
 
 def instead(d: Diagnosis, item: OmittedEffect) -> list[str]:
     """What this recording cannot tell from an effect; of an improbable one the whole group, as one of which it is asserted."""
-    group = item.group if item.probability < ASSERTED else ()
+    group = item.group if item.probability < NAMED else ()
     twins = (name for twins in d.indistinguishable if twins[0] == item.effect for name in twins[1:])
     return [name for name in dict.fromkeys((*group, *twins)) if name != item.effect]
 
@@ -186,7 +185,7 @@ def _otherwise(d: Diagnosis) -> Text:
 
 
 def _probable(item: OmittedEffect) -> Text:
-    if item.probability < ASSERTED:
+    if item.probability < NAMED:
         return say(
             "{title} {probability}, it or one that it could as well be {together}",
             title=item.title, probability=probability(item.probability), together=probability(item.together),
@@ -306,7 +305,7 @@ def sentence(item: OmittedEffect, gain: Improvement, effects: Iterable[Effect] =
 
 def sure(item: OmittedEffect) -> Text:
     share, group = probability(item.probability), (*map(effect_title, item.group), *sets_instead(item))
-    if item.probability < ASSERTED:
+    if item.probability < NAMED:
         share = say(
             "{share}, {together} that it is this or one that this recording cannot tell from it: {group}",
             share=share, together=probability(item.together),

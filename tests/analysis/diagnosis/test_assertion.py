@@ -178,13 +178,20 @@ def test_what_held_out_placings_do_not_bear_out_is_said_to_be_withheld(monkeypat
     assert "does not predict set-ups that the fit had not seen" in withheld.why
 
 
-def test_below_one_half_the_sentence_names_the_group() -> None:
+@pytest.mark.parametrize(("probability", "named"), [(0.37, True), (0.72, True), (0.83, False)])
+def test_an_effect_that_is_named_by_its_group_is_named_with_it(probability: float, named: bool) -> None:
+    """From 0.8 on it is named by itself."""
     size = Quantity(12.0, 1.7, (8.6, 15.4), unit("µm"))
     gain = Improvement(4.0, 1.0, 4.0, 1.0, 9.0, 1.0)
     item = OmittedEffect(
-        "straightness_x_z", say("Straightness"), 0.37, {"bow_um": size}, 0.8, 0.96, say("a way"), (say("scale_x"),)
+        "straightness_x_z",
+        say("Straightness"),
+        probability,
+        {"bow_um": size},
+        0.8,
+        0.96,
+        say("a way"),
+        (say("scale_x"),),
     )
-    assert (
-        "Probability 37 %, 96 % that it is this or one that this recording cannot tell from it: Scale error of X;"
-        in sentence(item, gain).replace("\u00a0", " ")
-    )
+    text = f"Probability {100 * probability:.0f} %, 96 % that it is this or one that this recording cannot tell from it: Scale error of X;"
+    assert (text in sentence(item, gain).replace("\u00a0", " ")) == named
