@@ -89,19 +89,12 @@ class Arm(Machine):
     def coordinates(self, readings: Floats) -> Floats:
         return self.at(readings[:, -len(self.rows) :]).tool - self.origin_mm
 
-    def travel(self, axis: str) -> tuple[float, float]:
+    def limits_of(self, axis: str) -> tuple[Floats, str, str]:
         if axis in AXES:
             raise CmmUqError(
                 f"an arm has no carriage {axis}", where="job.toml [machine]", fix="Name effects of its joints"
             )
-        low, high = self.limits[self.joints.index(axis)]
-        if np.isnan(low):
-            raise CmmUqError(
-                f"the travel of joint {axis} is needed",
-                where="job.toml [[machine.joint]] travel",
-                fix="Give travel = [lowest, highest]",
-            )
-        return float(low), float(high)
+        return self.limits[self.joints.index(axis)], "[[machine.joint]] travel", "travel = [lowest, highest]"
 
     def posed(self, columns: Mapping[str, Floats]) -> ArmPose:
         """Its pose at recorded readings."""

@@ -80,11 +80,15 @@ class Machine:
 
     def travel(self, axis: str) -> tuple[float, float]:
         """Lowest and highest scale reading of an axis, mm; a ``CmmUqError`` where the job does not give them."""
-        low, high = self.travel_mm[self.axes.index(axis)]
+        (low, high), key, given = self.limits_of(axis)
         if np.isnan(low) or np.isnan(high):
-            fix = f"Give travel_mm = {{ {axis} = [lowest, highest] }} in mm"
-            raise CmmUqError(f"the travel of axis {axis} is needed", where="job.toml [machine] travel_mm", fix=fix)
+            raise CmmUqError(f"the travel of axis {axis} is needed", where=f"job.toml {key}", fix=f"Give {given}")
         return float(low), float(high)
+
+    def limits_of(self, axis: str) -> tuple[Floats, str, str]:
+        """Lowest and highest reading of an axis (2,), ``nan`` where nobody says; the key that says it, and how."""
+        given = f"travel_mm = {{ {axis} = [lowest, highest] }} in mm"
+        return self.travel_mm[self.axes.index(axis)], "[machine] travel_mm", given
 
 
 def reading_name(axis: str) -> str:

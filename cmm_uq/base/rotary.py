@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Machine
 
 ROTARY = dict(zip("abc", AXES, strict=True))  # by the letter of a rotary axis the axis that it is parallel to (ISO 841)
@@ -78,17 +77,10 @@ class Turntable(Machine):
     def as_recorded(self, xyz: Floats, columns: Mapping[str, Floats]) -> Floats:
         return self._turned(xyz, columns) if self.recorded_in_machine else xyz
 
-    def travel(self, axis: str) -> tuple[float, float]:
+    def limits_of(self, axis: str) -> tuple[Floats, str, str]:
         if axis != self.letter:
-            return super().travel(axis)
-        low, high = self.travel_deg
-        if np.isnan(low):
-            raise CmmUqError(
-                f"the travel of axis {axis} is needed",
-                where="job.toml [machine.table] travel_deg",
-                fix="Give travel_deg = [lowest, highest] in degrees",
-            )
-        return float(low), float(high)
+            return super().limits_of(axis)
+        return self.travel_deg, "[machine.table] travel_deg", "travel_deg = [lowest, highest] in degrees"
 
     def _turned(self, xyz: Floats, columns: Mapping[str, Floats], *, back: bool = False) -> Floats:
         turn = self.turned_back if back else self.turned
