@@ -191,13 +191,16 @@ class CutSheet:
             columns = [k for k, f in enumerate(own) if f is not None]
             steps = np.diff([f[0] for f in own if f is not None])
             in_turn = len(columns) > 2 and columns[0] > 0 and columns[-1] - columns[0] == len(columns) - 1
-            below = []
+            below, most = list[int](), 0.2 * np.abs(steps).min(initial=np.inf)
             for j in range(i + 1, len(self.figures)) if in_turn and (np.all(steps > 0) or np.all(steps < 0)) else ():
-                if [k for k, f in enumerate(self.figures[j]) if f is not None and k >= columns[0]] != columns:
+                figures = {k: f[0] for k, f in enumerate(self.figures[j]) if f is not None and k >= columns[0]}
+                if [*figures] != columns:
                     break
                 below.append(j)
-            values = np.array([[(self.figures[j][k] or (0.0, 0.0))[0] for k in columns] for j in below])
-            small = len(below) > 1 and np.abs(values).max() < 0.2 * np.abs(steps).min()
+                if max(map(abs, figures.values())) >= most:
+                    below.clear()
+                    break
+            small = len(below) > 1
             ways = (ways_of([self.text(j, k) for j in below[:2]]) for k in range(columns[0] if small else 0))
             self._targets[i] = columns if any(way is not None for way in ways) else []
         return self._targets[i]

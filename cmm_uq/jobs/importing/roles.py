@@ -319,28 +319,30 @@ def is_void(row: Sequence[Cell], *tables: str) -> bool:
     return any(isinstance(cell, str) and " ".join(plain_words(cell)) in known for cell in row)
 
 
-def rows_left_out(reading: SheetReading, grid: CutSheet, others: Collection[int] = ()) -> list[str] | None:
-    """Rows with figures beside those that are read, here or with ``others``; ``None`` where one of them may be measured."""
-    taken, heads = {*reading.rows, *reading.others, *others}, {row for block in grid.blocks for row in block.head}
+def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str] | None:
+    """Rows with figures beside those that are read of a sheet; ``None`` where one of them may be measured."""
+    rows, columns = {r for one in readings for r in one.rows}, {i for one in readings for i in one.columns}
+    taken = rows | {r for one in readings for r in one.others}
+    heads, last = {row for block in grid.blocks for row in block.head}, max(taken)
     if any(
         isinstance(cell, str) and _SEVERAL.fullmatch(cell.strip()) for row in taken for cell in grid.sheet.rows[row]
     ):
         return None  # cells that were not cut apart
     told = []
     for row in range(min(taken), len(grid.sheet.rows)):
-        figures = [k for k, f in enumerate(grid.figures[row]) if f is not None and (f[1] < 1 or k in reading.columns)]
-        if grid.kinds[row] == "text" and row < max(taken) and row not in heads and not _counts(grid, row):
+        if grid.kinds[row] == "text" and row < last and row not in heads and not _counts(grid, row):
             told.append(header.shown(grid.sheet, row, header.REMARK))
-        if row in taken or not figures or grid.kinds[row] != "figures":
+        if row in taken or grid.kinds[row] != "figures":
             continue
-        last = max(taken)
+        figures = [k for k, f in enumerate(grid.figures[row]) if f is not None and (f[1] < 1 or k in columns)]
         within = row < last or grid.sheet.lines[row] - grid.sheet.lines[last] == row - last  # without a gap
-        if within and not _explained(grid, row, figures, reading):
+        if figures and within and not _explained(grid, row, figures, rows, columns):
             return None
-        told.append(header.shown(grid.sheet, row, header.SUMMARY))
-    if any(map(str.isdigit, "".join(grid.text(row, i) for row, i in reading.blank))):
+        told += [header.shown(grid.sheet, row, header.SUMMARY)] if figures else []
+    blank = [cell for one in readings for cell in one.blank]
+    if any(map(str.isdigit, "".join(grid.text(row, i) for row, i in blank))):
         return None
-    places = (grid.sheet.at("", row, i, heading(grid.path(row, i))) for row, i in reading.blank)
+    places = (grid.sheet.at("", row, i, heading(grid.path(row, i))) for row, i in blank)
     return told + [f"{place.removeprefix(': ').strip()}: nothing in the cell" for place in places]
 
 
@@ -350,7 +352,9 @@ def _counts(grid: CutSheet, row: int) -> bool:
     return any(hint(text, lengths=True) in (LINE, RUN) for text in texts[:1])
 
 
-def _explained(grid: CutSheet, row: int, figures: Sequence[int], reading: SheetReading) -> bool:
+def _explained(
+    grid: CutSheet, row: int, figures: Sequence[int], rows: Collection[int], columns: Collection[int]
+) -> bool:
     """Whether a row is void or a summary by its words or by arithmetic, or has none of the columns that are read."""
     cells = grid.sheet.rows[row]
     if (
@@ -359,17 +363,15 @@ def _explained(grid: CutSheet, row: int, figures: Sequence[int], reading: SheetR
         or said([grid.text(row, k) for k in range(len(cells)) if k not in figures]) == "summary"
     ):
         return True
-    alone = len(figures) < 2 or {*grid.of_block(row)}.isdisjoint(reading.rows)
-    if (alone and reading.columns.isdisjoint(figures)) or grid.other_quantity(row):
+    alone = len(figures) < 2 or {*grid.of_block(row)}.isdisjoint(rows)
+    if (alone and {*columns}.isdisjoint(figures)) or grid.other_quantity(row):
         return True
     heads = [text for k in figures for text in grid.path(row, k)]
     if alone and is_void(heads, "feature"):
         return True
-    for k in {*figures} & reading.columns:
+    for k in {*figures} & {*columns}:
         above = [
-            f[0]
-            for r in grid.of_block(row)
-            if r in {*reading.rows} and k < len(grid.figures[r]) and (f := grid.figures[r][k])
+            f[0] for r in grid.of_block(row) if r in rows and k < len(grid.figures[r]) and (f := grid.figures[r][k])
         ]
         value, step = grid.figures[row][k] or (0.0, 1.0)
         sums = (np.mean(above), max(above), min(above), np.ptp(above), np.std(above, ddof=1)) if len(above) > 1 else ()

@@ -88,17 +88,22 @@ def reading_of(
     elsewhere = (
         _tabled_places([*map(stacked, sheets)], {grid.sheet.name for _, grid in chosen}) if kind == "lengths" else {}
     )
-    for reading, grid in chosen:
-        others = [row for other, own in chosen if own is grid for row in (*other.rows, *other.others)]
-        if (told := rows_left_out(reading, grid, others)) is None:
+    for grid in {id(own): own for _, own in chosen}.values():
+        if (told := rows_left_out([reading for reading, own in chosen if own is grid], grid)) is None:
             return None
-        left_out += [row for row in told if row not in left_out]
+        left_out += told
+    _label(chosen, elsewhere)
+    return joined([reading for reading, _ in chosen]), left_out, chosen[0][1]
+
+
+def _label(chosen: Sequence[tuple[SheetReading, CutSheet]], elsewhere: Mapping[str, str]) -> None:
+    """Sheet of every observation, and where its line lies by its own sheet, else by its name in another."""
+    for reading, grid in chosen:
         for labels, row in zip(reading.labels, reading.rows, strict=True):
-            own_places = {elsewhere[text] for text in labels.values() if text in elsewhere}
-            place = grid.places_of.get(row) or (own_places.pop() if len(own_places) == 1 else "")
+            named = {elsewhere[text] for text in labels.values() if text in elsewhere}
+            place = grid.places_of.get(row) or (named.pop() if len(named) == 1 else "")
             labels["sheet", ""] = grid.sheet.name
             labels |= {("place", ""): place} if place else {}
-    return joined([reading for reading, _ in chosen]), left_out, chosen[0][1]
 
 
 def _refuse_unmatched(grids: Sequence[CutSheet], keys: Mapping[str, Sources], where: str) -> None:
