@@ -17,6 +17,7 @@ from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_pa
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from tests.app.cli.test_due import recorded, scale
+from tests.conftest import ROOT
 from tests.part_machines import PDF as MACHINE_PDF, by_certificate, plate_of
 from tests.part_reports import put, sampled_once, unchanged
 
@@ -99,3 +100,11 @@ def test_a_machine_held_to_trusted_signers_is_held_to_them_again(tmp_path: Path)
     assert {left.what for left in alone.inquiry.unchecked} >= {"whose signature the machine's certificate has"}
     held = verify([tmp_path / PDF], rerun=True, trust=trusted)
     assert held.inquiry.word == "VERIFIED", (held.inquiry.findings, held.inquiry.unchecked)
+
+
+@pytest.mark.parametrize(
+    "pdf", ["part-iota/machine/certificate.pdf", "part-plate-simulated/machine/certificate-simulated.pdf"]
+)
+def test_the_certificates_of_machines_in_examples_are_what_this_version_computes(pdf: str) -> None:
+    found = verify([ROOT / "examples" / pdf], rerun=True)
+    assert found.inquiry.word == "VERIFIED", "\n".join(map(str, found.inquiry.findings[:5]))
