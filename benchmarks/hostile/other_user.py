@@ -7,9 +7,11 @@ with each of the folders that it reads or writes in each state of :data:`STATES`
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -21,7 +23,9 @@ from pathlib import Path
 
 from benchmarks.hostile.invariants import Outcome, problems, snapshot
 from benchmarks.hostile.processes import PROGRAM, environment, memory, run
+from benchmarks.hostile.programs import STARTED
 from benchmarks.hostile.seeds import BUDGETS, seeds, small_truth
+from benchmarks.hostile.warm import Warm
 
 NOBODY = 65534
 PERSON = {"user": NOBODY, "group": NOBODY, "extra_groups": ()}
@@ -205,12 +209,23 @@ def attempt(line: Line, place: str, state: str, folder: Path, run_as: Runner = a
     laid_out(folder)
     if place:
         _give(folder / place, STATES[state])
-    before, rights = snapshot(folder), _rights(folder)
+    before, rights, recorded = snapshot(folder), _rights(folder), _dumped(folder / _RECORDS)
     kill = (signal.SIGTERM, SECONDS_OF_SERVER) if line.command in ("serve", "desk") else None
     words = [word.replace("_", " ") if word.startswith(("ISO", "T=")) else word for word in line.words.split()]
     more = {"CMM_UQ_SIGN_PASSPHRASE": "open", "HOME": str(folder.parent / "home")}
     outcome = run_as(words, folder, kill, more)
-    return outcome, _problems(line, place, outcome, before, snapshot(folder)) + _changed(rights, _rights(folder))
+    after = snapshot(folder)
+    if recorded == _dumped(folder / _RECORDS):  # whatever was announced in them was taken back
+        after[_RECORDS] = before[_RECORDS]
+    return outcome, _problems(line, place, outcome, before, after) + _changed(rights, _rights(folder))
+
+
+def _dumped(records: Path) -> list[str]:
+    """All that a database holds, as SQL."""
+    if not records.is_file():
+        return []
+    with contextlib.closing(sqlite3.connect(records)) as connection:
+        return list(connection.iterdump())
 
 
 def _rights(folder: Path) -> dict[str, tuple[int, int]]:
@@ -245,6 +260,15 @@ def _problems(
     return found + [f"left over: {name}" for name in after if "/.unfinished-" in name or "/.placing" in name]
 
 
+def forked(warm: Warm) -> Runner:
+    """The same by a process that is forked from one that has imported everything."""
+
+    def run_as(words: Sequence[str], folder: Path, kill: tuple[int, float] | None, more: Mapping[str, str]) -> Outcome:
+        return warm.run(words, folder, kill=kill, environment=more)
+
+    return run_as
+
+
 def cases() -> Iterator[tuple[Line, str, str]]:
     """Each line in folders of its own, and with each of its folders in each state."""
     for line in LINES:
@@ -263,12 +287,14 @@ def main() -> int:
         return 2
     ended: Counter[tuple[str, int | None]] = Counter()
     wrong = 0
-    with tempfile.TemporaryDirectory(prefix="hostile-", dir=memory()) as work:
+    with tempfile.TemporaryDirectory(prefix="hostile-", dir=memory()) as work, Warm(NOBODY) as warm:
         Path(work).chmod(0o755)
-        for line, place, state in cases():
+        for number, (line, place, state) in enumerate(cases()):
             if options.only and line.command not in options.only:
                 continue
-            outcome, found = attempt(line, place, state, Path(work) / "laboratory")
+            outcome, found = attempt(
+                line, place, state, Path(work) / "laboratory", forked(warm) if number % STARTED else as_other
+            )
             ended[line.command, outcome.code] += 1
             wrong += bool(found)
             if found or options.verbose:

@@ -25,33 +25,31 @@ from pathlib import Path
 from benchmarks.hostile.invariants import Outcome
 
 ROOT = Path(__file__).parents[2]
-NOBODY = 65534
-"""A user to whom nothing belongs."""
 
 
 class Warm(contextlib.AbstractContextManager["Warm"]):
-    """A process that forks commands, one at a time."""
+    """A process that forks commands, one at a time; ``user``: to whom they belong, else to this one."""
 
-    def __init__(self) -> None:
+    def __init__(self, user: int | None = None) -> None:
         environment = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_")}
         self._server = subprocess.Popen(
             [sys.executable, "-m", "benchmarks.hostile.warm"], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             env={**environment, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1", "OPENBLAS_NUM_THREADS": "1"},
+            user=user, group=user, extra_groups=None if user is None else (),
         )  # fmt: skip
         self.pid = 0
 
     def start(self, arguments: Sequence[str], cwd: Path, *, streams: Sequence[Path | str] = ("/dev/null",) * 3,
-              uid: int = 0, environment: Mapping[str, str] | None = None) -> int:  # fmt: skip
+              environment: Mapping[str, str] | None = None) -> int:  # fmt: skip
         """Begin a command; its process.
 
         Parameters
         ----------
         streams : files of standard input, output and error, opened by the command's process.
-        uid : user that it belongs to, 0 for this one.
         environment : variables beside those that there are.
         """
         assert self._server.stdin is not None
-        asked = {"arguments": arguments, "cwd": str(cwd), "streams": list(map(str, streams)), "uid": uid,
+        asked = {"arguments": arguments, "cwd": str(cwd), "streams": list(map(str, streams)),
                  "environment": dict(environment or {})}  # fmt: skip
         self._server.stdin.write(json.dumps(asked).encode() + b"\n")
         self._server.stdin.flush()
@@ -67,14 +65,12 @@ class Warm(contextlib.AbstractContextManager["Warm"]):
         return int(reply["code"]), reply["seconds"]
 
     def run(self, arguments: Sequence[str], cwd: Path, *, kill: tuple[int, float] | None = None, limit: float = 120.0,
-            uid: int = 0, environment: Mapping[str, str] | None = None) -> Outcome:  # fmt: skip
+            environment: Mapping[str, str] | None = None) -> Outcome:  # fmt: skip
         """As :func:`benchmarks.hostile.processes.run`."""
         with tempfile.NamedTemporaryFile() as stdout, tempfile.NamedTemporaryFile() as stderr:
             for file in (stdout, stderr):
                 Path(file.name).chmod(0o666)
-            self.start(
-                arguments, cwd, streams=("/dev/null", stdout.name, stderr.name), uid=uid, environment=environment
-            )
+            self.start(arguments, cwd, streams=("/dev/null", stdout.name, stderr.name), environment=environment)
             sent = 0.0
             ended = self.ended(kill[1] if kill else limit)
             if ended is None and kill:
@@ -107,10 +103,6 @@ def _become(asked: dict, reply: int) -> None:
     os.close(reply)
     os.setsid()
     os.environ.update(asked["environment"])
-    if asked["uid"]:
-        os.setgroups([])
-        os.setgid(asked["uid"])
-        os.setuid(asked["uid"])
     with contextlib.suppress(OSError):  # a folder that this user may not enter
         os.chdir(asked["cwd"])
     flags = (os.O_RDONLY, os.O_WRONLY | os.O_CREAT, os.O_WRONLY | os.O_CREAT)

@@ -27,6 +27,10 @@ CASES = (
      "manifest.json: cannot be read: Permission denied"),
     ("budget truth/budget.toml --out out", "truth", "one's own, 0400", 2, "Permission denied"),
     ("budget truth/budget.toml --out out", "out", READ_ONLY, 3, "out: cannot be written: Permission denied"),
+    ("report job --out reports/mount", "reports/mount", "one's own, with another's files, 0600", 2,
+     "certificate.html: cannot be read: Permission denied"),
+    ("report job --out reports/mount", "reports/mount", "another user's, 1777, with another's files", 3,
+     "reports/mount: cannot be written: Operation not permitted"),
     ("records import reports/mount --records out/new.db", "reports/mount", "one's own, 0400", 2,
      "reports/mount: may not be entered: Permission denied"),
 )  # fmt: skip

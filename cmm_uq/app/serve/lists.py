@@ -125,7 +125,7 @@ ARTEFACT_COLUMNS = p.columns(
 def artefacts_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     request.only(("text", "page"))
     folded = request.text("text").casefold()
-    known = sorted(view.records.artefacts(), key=lambda one: (one.due or dt.date.max, one.serial))
+    known = sorted(view.records.artefacts(view.today), key=lambda one: (one.due or dt.date.max, one.serial))
     found = [
         one for one in known if any(folded in name.casefold() for name in (one.serial, one.certificate, one.laboratory))
     ]
@@ -201,7 +201,7 @@ def _has(one: v.MachineStanding, text: str, state: str, place: str) -> bool:
 
 
 def _overdue_artefacts(view: v.SiteView) -> tuple[p.PageNotice, ...]:
-    known = view.records.artefacts()
+    known = view.records.artefacts(view.today)
     overdue = [(one.serial, one.due) for one in known if one.due is not None and one.due < view.today]
     if not overdue:
         return ()

@@ -210,7 +210,9 @@ def journal_for(
                              fix="Choose another folder with --out")  # fmt: skip
     if in_the_way and not force:
         why = "was changed after it was written" if in_the_way[0] in before else f"was not written by {owner}"
-        raise CmmUqError(why, where=str(folder / in_the_way[0]), fix=WAY_OUT)
+        if (first := folder / in_the_way[0]).is_file() and not os.access(first, os.R_OK):
+            why = "cannot be read: Permission denied"  # so that nobody can tell who wrote it
+        raise CmmUqError(why, where=str(first), fix=WAY_OUT)
     kept = {name: free_name(folder, name) for name in in_the_way}
     stale = {name: digest for name, digest in mine.items() if name not in files}
     return Journal(token, dict(files), {name: mine[name] for name in files if name in mine}, kept, stale)

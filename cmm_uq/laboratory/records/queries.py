@@ -12,12 +12,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sqlalchemy import ColumnElement, Connection, Engine, Select, func, select
+from sqlalchemy import ColumnElement, Connection, Engine, Select, Table, func, select
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.laboratory.records import facts, tables
 from cmm_uq.laboratory.records.place import told
-from cmm_uq.laboratory.records.tables import artefacts, certificates, figures, machines, quantities
+from cmm_uq.laboratory.records.tables import artefacts, certificates, entries, figures, machines, quantities
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,29 +52,36 @@ class RecordQueries:
         with told(self.place, rows=True), self.engine.connect() as connection:
             yield connection
 
-    def machines(self) -> list[facts.RecordedMachine]:
-        """All machines, by serial."""
+    def machines(self, on: dt.date | None = None) -> list[facts.RecordedMachine]:
+        """All machines, by serial, with the rules that are stated up to a day."""
         with self.reading() as connection:
-            rows = connection.execute(select(machines).order_by(machines.c.called)).mappings().all()
+            rows = _known_on(connection, machines, _RULE, on)
             days = _adjusted(connection, [row["id"] for row in rows])
             return [_machine(row, days[row["id"]]) for row in rows]
 
-    def machine(self, serial: str) -> facts.RecordedMachine:
+    def machine(self, serial: str, on: dt.date | None = None) -> facts.RecordedMachine:
         """One machine, by serial however it is spelled, or by name."""
         with self.reading() as connection:
             number = _machine_id(connection, serial)
-            row = connection.execute(select(machines).where(machines.c.id == number)).mappings().one()
+            (row,) = _known_on(connection, machines, _RULE, on, machines.c.id == number)
             return _machine(row, _adjusted(connection, [number])[number])
 
-    def artefacts(self) -> list[facts.ArtefactRow]:
-        """All artefacts, by serial."""
+    def artefacts(self, on: dt.date | None = None) -> list[facts.ArtefactRow]:
+        """All artefacts, by serial, with the newest certificate that is stated up to a day."""
         with self.reading() as connection:
-            return [
-                facts.ArtefactRow(
-                    row.called, row.kind, row.certificate, row.laboratory, _day(row.calibrated), _day(row.due)
-                )
-                for row in connection.execute(select(artefacts).order_by(artefacts.c.called))
-            ]
+            rows = _known_on(connection, artefacts, ("certificate", "laboratory", "calibrated", "due"), on)
+        of = facts.ArtefactRow
+        return [
+            of(
+                r["called"],
+                r["kind"],
+                r["certificate"] or "",
+                r["laboratory"] or "",
+                _day(r["calibrated"]),
+                _day(r["due"]),
+            )
+            for r in rows
+        ]
 
     def certificates(
         self, machine: str | None = None, *, origin: str | None = "measured", states: Collection[str] | None = None,
@@ -248,6 +255,26 @@ def adjusted_before(stated: str | None, day: str, adjusted: Sequence[str]) -> dt
 def blocks(numbers: Sequence[int]) -> Iterable[Sequence[int]]:
     """So many at a time as a query takes."""
     return (numbers[i : i + _TOGETHER] for i in range(0, len(numbers), _TOGETHER))
+
+
+_RULE = ("calibrate",)
+
+
+def _known_on(
+    connection: Connection, table: Table, names: Sequence[str], on: dt.date | None, *where: ColumnElement[bool]
+) -> list[dict[str, Any]]:
+    """Rows of machines or artefacts, by name; what a recording of after a day changed as the one before that has it."""
+    part, until = table.name.removesuffix("s"), (on or dt.date.max).isoformat()
+    newest = select(entries.c.content).join(certificates, _C.entry == entries.c.number).where(_C.day <= until)
+    newest = newest.order_by(_C.day.desc(), _C.entry.desc()).limit(1)
+    rows = [dict(row) for row in connection.execute(select(table).where(*where).order_by(table.c.called)).mappings()]
+    for row in rows:
+        if row["day"] > until:
+            content = connection.execute(newest.where(_C[part] == row["id"])).scalar()
+            said = json.loads(content)[part] if content else {}
+            row |= {name: said.get(name) for name in names}
+            row |= {name: json.dumps(row[name]) for name in _RULE if row.get(name)}
+    return rows
 
 
 def _machine(row: Mapping[Any, Any], adjusted: Iterable[str]) -> facts.RecordedMachine:

@@ -102,6 +102,26 @@ def test_a_certificate_of_tomorrow_does_not_hide_that_a_machine_is_overdue(tmp_p
     assert any("2096-03-02 is dated after" in text for text in item["remarks"])
 
 
+def test_a_certificate_of_tomorrow_changes_no_artefact_and_no_rule(tmp_path: Path) -> None:
+    mine = certificate("1102", dt.date(2026, 3, 2))
+    bar = mine["artefact"] | {"due": "2026-10-01"}
+    later = mine["machine"] | {"calibrate": {"every_months": 60}}
+    place = recorded(
+        tmp_path, certificate("1102", dt.date(2026, 3, 2), artefact=bar),
+        certificate("1102", dt.date(2096, 3, 2), artefact=bar | {"due": "2098-10-01", "certificate": "PTB 9"}, machine=later),
+        certificate("1102", dt.date(2096, 3, 2), artefact=bar | {"serial": "BB-8"}),
+    )  # fmt: skip
+    for asked in ((), ("1102",)):
+        items = json.loads(run("due", *asked, "--records", place, "--on", ON, "--json").stdout)["items"]
+        found = {one["serial"]: (one["due"], one["why"]) for one in items}
+        assert found["BB-7"] == ("2026-10-01", "as its certificate PTB 1 says")
+        assert found["1102"] == ("2027-03-02", "12 months, as its job does not say otherwise")
+        assert found.get("BB-8", (None,))[0] is None
+    with open_records(place, read_only=True) as records:
+        assert {one.serial: str(one.due) for one in records.artefacts()}["BB-7"] == "2098-10-01"
+        assert records.machine("1102").calibrate == {"every_months": 60}
+
+
 def test_an_interim_check_out_of_control_is_found_among_all_machines(three: Path) -> None:
     far = (("scale_x.ppm", "Scale error of x", "ppm", 6.0, 0.5, 5.0, 7.0, 0.2, 8.0),)
     with open_records(three) as records:

@@ -114,8 +114,9 @@ def _today() -> dt.date:
 def due_in(
     records: Records, machines: Collection[str], on: dt.date, fleets: Mapping[str, FleetPrior] = MappingProxyType({})
 ) -> list[DueItem]:
-    artefacts = {one.serial: one for one in records.artefacts()}
-    asked = {one.serial: one for one in map(records.machine, machines)}.values() if machines else records.machines()
+    artefacts = {one.serial: one for one in records.artefacts(on)}
+    chosen = {one.serial: one for one in (records.machine(serial, on) for serial in machines)}
+    asked = chosen.values() if machines else records.machines(on)
     if not asked and not artefacts:
         raise CmmUqError("no machine is recorded yet", where="records", fix="Record one: cmm-uq report JOB")
     reading = _Reading(records, on, fleets, whole=bool(machines))
