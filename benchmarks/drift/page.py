@@ -33,8 +33,7 @@ COVERAGE = """
 """
 AFTER_COVERAGE = """
     Rates are estimated to {rate:.2f} a year (root mean square), alone to {rate_alone:.2f}; the limit is 10. True days
-    in every twentieth of the predicted distributions: {histogram}. Sampling: R-hat at most {rhat:.3f}, at least
-    {ess:.0f} effective samples, {steps} steps.
+    in every twentieth of the predicted distributions: {histogram}. Sampling: {sampling}.
 """
 COST = """
     Stated before the run: a calibration costs 1, a day in use beyond the limit 0.05. {machines} machines (models,
@@ -123,11 +122,10 @@ def _coverage(result: dict[str, Any]) -> str:
 
 
 def _after_coverage(result: dict[str, Any]) -> str:
-    chains, (first, *others) = result["chains"], result["histogram"]
+    first, *others = result["histogram"]
     return told(
         AFTER_COVERAGE, rate=result["rate_error"]["fleet"], rate_alone=result["rate_error"]["alone"],
-        histogram=f"{first}, then {min(others)} to {max(others)}", rhat=chains["rhat_max"], ess=chains["ess_min"],
-        steps=chains["steps"],
+        histogram=f"{first}, then {min(others)} to {max(others)}", sampling=result["sampling"],
     )  # fmt: skip
 
 

@@ -261,7 +261,7 @@ def fleet_document(found: FleetResult) -> Document:
 
 
 def _blocks(of: FleetValue) -> tuple[doc.Block, ...]:
-    shown, chains = groups_shown(of), of.fleet.chains
+    shown, fleet = groups_shown(of), of.fleet
     plot = fleet_plot(
         shown, [words.group_words(each) for each in shown],
         axis=say("Rate in {unit}, with 95 % interval", unit=words.per_year(of)),
@@ -269,8 +269,7 @@ def _blocks(of: FleetValue) -> tuple[doc.Block, ...]:
         alternative=say("Average machine: {rate}.", rate=words.usual_rate(of)),
     )  # fmt: skip
     sampled = say(
-        "Hyper-parameters sampled by {sampler} from {machines}: R-hat at most {rhat}, at least {ess} effective samples, "
-        "{steps} steps.", sampler=Verbatim(chains.sampler), machines=words.counted(of.fleet.learnt_from),
-        rhat=number(chains.rhat_max, ".3f"), ess=number(chains.ess_min, ".0f"), steps=chains.steps,
+        "Hyper-parameters by importance sampling from {machines}: {draws} draws, worth {worth} independent ones.",
+        machines=words.counted(fleet.learnt_from), draws=fleet.draws, worth=number(fleet.worth, ".0f"),
     )  # fmt: skip
     return usual_table(of), plot, outsiders(of), soonest(of), spreads_table(of), Paragraph(sampled, tone="note")

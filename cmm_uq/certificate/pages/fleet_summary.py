@@ -190,9 +190,9 @@ def fleet_warnings(found: FleetResult) -> tuple[Text, ...]:
 
 
 def _warnings(of: FleetValue) -> list[Text]:
-    value, chains, again = called(of), of.fleet.chains, sum(seen_again(member) for member in of.members)
-    rough = say("{value}: the sampling did not converge (R-hat {rhat}); take its figures as rough", value=value,
-                rhat=number(chains.rhat_max, ".3f"))  # fmt: skip
+    value, fleet, again = called(of), of.fleet, sum(seen_again(member) for member in of.members)
+    rough = say("{value}: the draws are worth only {worth} independent ones; take its figures as rough", value=value,
+                worth=number(fleet.worth, ".0f"))  # fmt: skip
     left_out = plural(
         of.left_out, one=say("{value}: one certificate states no uncertainty and cannot be weighed", value=value),
         many=say("{value}: {count} certificates state no uncertainty and cannot be weighed", value=value, count=of.left_out),
@@ -202,7 +202,7 @@ def _warnings(of: FleetValue) -> list[Text]:
     single = say("{value}: only one machine has certificates of two days; no other shows a drift to compare it with",
                  value=value)  # fmt: skip
     warnings = (
-        (not chains.converged, rough), (of.left_out, left_out), (len(of.members) == 1, alone), (not again, assumed),
+        (not fleet.converged, rough), (of.left_out, left_out), (len(of.members) == 1, alone), (not again, assumed),
         (again == 1 < len(of.members), single),
     )  # fmt: skip
     return [text for holds, text in warnings if holds]
@@ -220,14 +220,13 @@ def fleet_data(found: FleetResult) -> dict[str, Any]:
 
 
 def _value(of: FleetValue) -> dict[str, Any]:
-    fleet, chains = of.fleet, of.fleet.chains
+    fleet = of.fleet
     return {
         "name": of.name, "quantity": of.quantity, "unit": of.unit, "machines": _machines(of),
         "certificates_left_out": of.left_out, "compared": of.compared,
         "usual": list(map(asdict, fleet.usual)), "spreads": list(map(asdict, fleet.spreads)),
         "convergence": {
-            "converged": chains.converged, "rhat_max": chains.rhat_max, "ess_min": chains.ess_min, "steps": chains.steps,
-            "sampler": chains.sampler, "machines": fleet.learnt_from,
+            "converged": fleet.converged, "worth": fleet.worth, "draws": fleet.draws, "machines": fleet.learnt_from,
         },
         "prior": fleet.data(),
     }  # fmt: skip

@@ -1,12 +1,12 @@
 """A fleet of machines and one of their errors: what drift is usual, who does not belong, and each machine's own drift.
 
-Hyper-parameters are sampled by emcee, all else is exact given them (:mod:`cmm_uq.laboratory.due.fleet_model`). Each
-machine is judged and estimated with what all the *others* say as its prior, so that its certificates count once.
+Hyper-parameters are drawn by importance sampling, all else is exact given them (:mod:`cmm_uq.laboratory.due.fleet_model`).
+Each machine is judged and estimated with what all the *others* say as its prior, so that its certificates count once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,8 +20,7 @@ from cmm_uq.jobs.verdicts import BEYOND
 from cmm_uq.laboratory.due import drift, fleet_model
 from cmm_uq.laboratory.due.crossing import Crossings, crossings
 from cmm_uq.laboratory.due.drift_filter import DriftStart, DriftState, filtered, log_sum
-from cmm_uq.maths.inference.ensembles import LEAST_EFFECTIVE_SAMPLES, Chains, run_ensembles
-from cmm_uq.maths.inference.proposals import tempered
+from cmm_uq.maths.inference.proposals import evenly_by, laplace, weighed, weights
 
 LEARNT_FROM = 200
 """Machines at most that the hyper-parameters are sampled from: they know a spread between machines to 5 %."""
@@ -30,14 +29,14 @@ DRAWS, LEAST_DRAWS, MANY = 64, 6, 20_000
 """Draws of the hyper-parameters that machines are estimated at: fewer where there are many machines."""
 
 FALSE_DISCOVERIES = 0.05  # part of the machines said not to belong that may well belong (Benjamini and Hochberg 1995)
-_WALKERS, _STEPS = 16, 50  # of each of the four ensembles, and between two looks at how well they have mixed
-_AT_ONCE = 8000
+LEAST_WORTH, _EACH, _MOST = 1000.0, 400, 20_000
+"""Independent draws that those of the hyper-parameters are worth at least; drawn at once, and at most."""
+
+_AT_ONCE = 1000  # machines times hyper-parameters: what a processor has at hand
 _FILTERED_AT_ONCE = 6000
 PATHS = 512  # of each machine until it crosses its limit
 _LEAST_SHIFT = 0.02
 """Of the variance of a rate: a machine that tells less of its own rate cannot show that it does not belong."""
-
-Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +94,16 @@ class Fleet(fleet_model.FleetPrior):
     spreads: tuple[HyperParameter, ...]
     machines: tuple[str, ...]  # names, in the order of the estimates
     estimates: Estimates
-    learnt_from: int  # machines that the hyper-parameters were sampled from
-    chains: Chains
+    learnt_from: int  # machines that the hyper-parameters were drawn from
+    draws: int  # of the hyper-parameters, and how many independent ones they are worth
+    worth: float
+
+    @property
+    def converged(self) -> bool:
+        return self.worth >= LEAST_WORTH
 
 
-def fit_fleet(members: Sequence[FleetMember], seed: int = 1, progress: Progress | None = None) -> Fleet:
+def fit_fleet(members: Sequence[FleetMember], seed: int = 1) -> Fleet:
     """Learn from a fleet: hyper-parameters from machines drawn by lot where there are more than :data:`LEARNT_FROM`."""
     if not members:
         fix = "Record certificates, or choose another --name"
@@ -108,9 +112,8 @@ def fit_fleet(members: Sequence[FleetMember], seed: int = 1, progress: Progress 
     limits = [each.limit for each in members if each.limit]
     unit = drift.limit_for(float(np.median(limits)) if limits else None, np.concatenate([m.history.u for m in members]))
     shared = fleet_model.shared_by(machines, [each.model for each in members], [each.place for each in members])
-    chains, count = _sampled(machines, shared, unit, seed, progress)
-    count_of_draws = int(np.clip(MANY // len(members), LEAST_DRAWS, DRAWS))
-    theta = chains.draws[np.linspace(0, len(chains.draws) - 1, count_of_draws).astype(np.intp)]
+    draws, weight, learnt_from = _drawn(machines, shared, unit, seed)
+    theta = draws[evenly_by(weight, int(np.clip(MANY // len(members), LEAST_DRAWS, DRAWS)))]
     said = fleet_model.messages(machines, shared, theta, unit)
     all_together = fleet_model.together(said, shared, theta, unit)
     covariance = np.asarray(np.linalg.inv(all_together.precision), dtype=np.float64)
@@ -118,16 +121,18 @@ def fit_fleet(members: Sequence[FleetMember], seed: int = 1, progress: Progress 
     start = fleet_model.others(said, all_together, shared, theta, unit)
     estimates = _estimated(machines, start, theta, unit, [each.limit for each in members])
     effects = 1 + len(shared.models) + len(shared.places)
+    spreads = _spreads(draws[evenly_by(weight, len(draws))], unit)
     return Fleet(
         unit, theta, shared.models, shared.places, mean[:, :effects], covariance[:, :effects, :effects],
-        _usual(members, shared, mean, covariance), _spreads(chains.draws, unit), tuple(each.machine for each in members),
-        estimates, count, chains,
+        _usual(members, shared, mean, covariance), spreads, tuple(each.machine for each in members),
+        estimates, learnt_from, len(draws), float(1 / np.sum(weight**2)),
     )  # fmt: skip
 
 
-def _sampled(
-    machines: drift.Histories, shared: fleet_model.SharedEffects, unit: float, seed: int, progress: Progress | None
-) -> tuple[Chains, int]:
+def _drawn(
+    machines: drift.Histories, shared: fleet_model.SharedEffects, unit: float, seed: int
+) -> tuple[Floats, Floats, int]:
+    """Draws (N, 8) of the hyper-parameters, their weights (N,), and of how many machines."""
     which = np.arange(len(machines))
     if len(which) > LEARNT_FROM:
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(3,)))
@@ -139,10 +144,10 @@ def _sampled(
         parts = [theta[i : i + at_once] for i in range(0, len(theta), at_once)]
         return np.concatenate([fleet_model.log_posterior(some, common, part, unit) for part in parts])
 
-    proposal = tempered(density, np.log(drift.MEDIANS), np.diag(drift.SPREADS), seed)
-    chains = run_ensembles(density, proposal, seed, progress, effective_samples=LEAST_EFFECTIVE_SAMPLES,
-                           steps_at_once=_STEPS, walkers=_WALKERS)  # fmt: skip
-    return chains, len(which)
+    numbers = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(5,))))
+    draws, log, _ = weighed(density, *laplace(density, np.log(drift.MEDIANS)), numbers, _EACH, LEAST_WORTH, _MOST)
+    order = np.argsort(draws[:, 0])  # so that few draws, taken evenly, have the spread of rates that all have
+    return draws[order], weights(log)[order], len(which)
 
 
 def _usual(
@@ -303,7 +308,7 @@ class FleetResult:
 
     @property
     def converged(self) -> bool:
-        return all(value.fleet.chains.converged for value in self.values)
+        return all(value.fleet.converged for value in self.values)
 
 
 def comparable(members: Iterable[FleetMember]) -> bool:

@@ -26,7 +26,7 @@ from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel, reach
 from cmm_uq.maths.inference.marginal import SIGMA_BOUNDS, Marginal, cholesky
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import start
-from cmm_uq.maths.inference.proposals import Fall, LogDensity, by_steps, laplace, weighed, weights
+from cmm_uq.maths.inference.proposals import Fall, LogDensity, by_steps, evenly_by, laplace, weighed, weights
 
 Drawn = Callable[[np.random.Generator, int], Floats]
 
@@ -332,9 +332,8 @@ def sample_sizes(
     latent, log, proposal = weighed(density, centre, _WIDER * factor, random, effort.each, effort.worth, effort.most)
     weight = weights(log)
     worth, chains = float(1 / np.sum(weight**2)), None
-    if worth >= _LEAST_WORTH:  # as many of each as its weight says, evenly spread
-        place = np.searchsorted(np.cumsum(weight), (np.arange(effort.held) + 0.5) / effort.held * (1 - 1e-12))
-        latent = latent[np.minimum(place, len(latent) - 1)]
+    if worth >= _LEAST_WORTH:
+        latent = latent[evenly_by(weight, effort.held)]
     elif not effort.sampler:
         raise CmmUqError("how large its errors are cannot be drawn in a short time", where="the recording")
     else:

@@ -265,6 +265,12 @@ def weights(log: Floats) -> Floats:
     return np.asarray(weight / weight.sum())
 
 
+def evenly_by(weight: Floats, count: int) -> NDArray[np.int64]:
+    """Places (count,) of draws, each as often as its weight (w,) says, evenly spread."""
+    place = np.searchsorted(np.cumsum(weight), (np.arange(count) + 0.5) / count * (1 - 1e-12))
+    return np.minimum(place, len(weight) - 1)
+
+
 def worth(log: Floats) -> float:
     """How many draws those are worth whose density over that proposed has the logarithm (w,)."""
     return float(1 / np.sum(weights(log) ** 2))

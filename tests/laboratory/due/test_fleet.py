@@ -9,9 +9,13 @@ import pytest
 from scipy.stats import false_discovery_control
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.due.drift import side_by_side
+from cmm_uq.base.points import Floats
+from cmm_uq.laboratory.due.drift import MEDIANS, NAMES, SPREADS, side_by_side
 from cmm_uq.laboratory.due.drift_filter import usual_start
 from cmm_uq.laboratory.due.fleet import Fleet, FleetMember, belonging, comparable, fit_fleet, judged
+from cmm_uq.laboratory.due.fleet_model import log_posterior, messages, others, shared_by, together
+from cmm_uq.maths.inference.ensembles import run_ensembles
+from cmm_uq.maths.inference.proposals import tempered
 from tests.certificate.fleets import alone, two
 from tests.laboratory.due.histories import machine
 
@@ -36,10 +40,25 @@ def learnt() -> Fleet:
     return fit_fleet(members(), seed=1)
 
 
-@pytest.mark.long
-def test_the_sampling_converged(learnt: Fleet) -> None:
-    assert learnt.chains.converged
+def test_the_draws_are_worth_enough_and_those_of_a_markov_chain(learnt: Fleet) -> None:
+    """Medians within four of their standard errors, and all 95 % intervals nearly as wide; emcee knows nothing of weights."""
+    assert learnt.worth >= 1000
     assert learnt.learnt_from == 11
+    few = members()[:4]
+    arrays = side_by_side([each.history for each in few])
+    shared = shared_by(arrays, [each.model for each in few], [each.place for each in few])
+
+    def density(theta: Floats) -> Floats:
+        return log_posterior(arrays, shared, theta, 10.0)
+
+    chains = run_ensembles(density, tempered(density, np.log(MEDIANS), np.diag(SPREADS), 1), 1, walkers=16)
+    size = np.array([1.0 if name == "steps_per_year" else 10.0 for name in NAMES])[:, None]
+    ours = np.array([[one.lower, one.median, one.upper] for one in fit_fleet(few, seed=1).spreads])
+    low, middle, high = np.quantile(chains.draws, [0.025, 0.5, 0.975], axis=0)
+    error = 1.25 * (high - low) / 3.92 * np.sqrt(1 / chains.ess_min + 1 / 1000)
+    lower, median, upper = np.log(ours / size).T
+    assert np.all(np.abs(median - middle) < 4 * error)
+    np.testing.assert_allclose(upper - lower, high - low, rtol=0.15)
 
 
 def test_only_the_machine_that_drifts_otherwise_does_not_belong(learnt: Fleet) -> None:
@@ -64,7 +83,6 @@ def test_a_machine_seen_once_is_expected_to_drift_as_its_model(learnt: Fleet) ->
 
 def test_a_machine_s_own_certificates_do_not_count_among_what_the_others_say(learnt: Fleet) -> None:
     """What is expected of a machine stays as it is whatever its certificates say, at the same hyper-parameters."""
-    from cmm_uq.laboratory.due.fleet_model import messages, others, shared_by, together
 
     def expected(all_members: list[FleetMember]) -> float:
         arrays = side_by_side([each.history for each in all_members])

@@ -248,14 +248,11 @@ def fleet(
         usable = rows[np.isfinite(rows["value"]) & np.isfinite(rows["u"]) & (rows["u"] > 0)]
         members = tuple(_members(usable, adjusted, stated))
         quantity, unit = called.get(name, (name, ""))
-
-        def told(part: float, i: int = i, quantity: str = quantity) -> None:
-            stage(f"Sampling: {quantity}", (i + part) / len(wanted))
-
+        stage(f"Sampling: {quantity}", i / len(wanted))
         if not members:
             fix = "Choose another --name"
             raise CmmUqError("no certificate states this value with an uncertainty", where=name, fix=fix)
-        learnt.append((name, quantity, unit, members, fit_fleet(members, seed, told), len(rows) - len(usable)))
+        learnt.append((name, quantity, unit, members, fit_fleet(members, seed), len(rows) - len(usable)))
     stage("Done", 1.0)
     return judged(learnt, seed)
 
