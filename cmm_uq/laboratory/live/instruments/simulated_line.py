@@ -355,6 +355,9 @@ class Answering(Speaker):
 
 
 _FEW: Mapping[str, tuple[Any, ...]] = MappingProxyType({
+    # each input by its name, dashes where its probe is open
+    "asl-f250": ((20.013, 20.104), {f"M{key}": (f"{name} {{{n}:.3f}} C\r\n", f"{name} ------\r\n")
+                                    for n, (key, name) in enumerate(("IA", "JB"))}),
     # SCPI, a bare number for each channel
     "fluke-1529": ((20.0132, 20.1044, 19.9871, 21.0), {
         **{rf"(?i)(FETCH?|READ|MEAS)\? ?{n + 1}": (f"{{{n}:.4f}}\r\n", "9.9E37\r\n") for n in range(4)},
