@@ -23,6 +23,7 @@ from cmm_uq.jobs.part.dmis import PROGRAM as DMIS
 from cmm_uq.jobs.part.feature import ASKS, FEWEST, LIMITS, PATTERNS, Asks
 from cmm_uq.jobs.part.qif import PROGRAM as QIF
 from cmm_uq.jobs.schema import keys_of, without_place, written
+from cmm_uq.laboratory.live.instruments import pt104
 from cmm_uq.laboratory.live.instruments.library import profile_named, ready
 from cmm_uq.laboratory.live.instruments.profile import ProfileFacts, ProfileFile
 from cmm_uq.machine.model.kind import Beginning
@@ -257,6 +258,8 @@ def ready_profiles() -> str:
 
 
 def _spoken(one: ProfileFile) -> str:
+    if pt104.SCHEME in one.title:
+        return "UDP"
     line = one.connection
     return (
         f"{line.baud} {line.data_bits}{line.parity[0].upper()}{line.stop_bits}"

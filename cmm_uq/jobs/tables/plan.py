@@ -124,7 +124,7 @@ class DeclaredSource(JobTable):
     """How the instrument speaks: a ready profile (`cmm-uq instruments list`), or a TOML file of one's own beside job.toml."""
     port: Annotated[str, Field(max_length=300)] = ""
     """Where it is: `/dev/ttyUSB0`, `COM3`, `socket://host:port`, `rfc2217://host:port`, `tcp://host:port`,
-    `visa://RESOURCE`, or `file:NAME` to replay bytes. """
+    `visa://RESOURCE`, `pt104://host:port`, or `file:NAME` to replay bytes. """
     serial: str = key("", "Serial number of the instrument; one that it gives itself must be the same.")
     certificate: str = key("", "Number of its calibration certificate.")
     values: Annotated[dict[str, Column], Field(max_length=100)] = {}

@@ -14,7 +14,7 @@ from typing import Any
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, say
 from cmm_uq.jobs.tables.plan import DeclaredSource
-from cmm_uq.laboratory.live.instruments import source
+from cmm_uq.laboratory.live.instruments import pt104, source
 from cmm_uq.laboratory.live.instruments.ipp_machine import open_machine
 from cmm_uq.laboratory.live.instruments.library import PAUSE, Conversation, profile_of_source, unsaid_units
 from cmm_uq.laboratory.live.instruments.parsing import FramedMessage, Framer, Parser, Understood
@@ -296,8 +296,9 @@ def instrument(
 ) -> LiveInstrument:
     if port.startswith(source.FILE):
         return LiveInstrument(identity, profile, partial(source.ReplayedFile, port, folder, clock), clock)
-    far = port.startswith((*source.NETWORK, source.RFC2217))
-    return LiveInstrument(identity, profile, source.opener(port, profile.connection), clock, reopen_when_silent=far)
+    far = port.startswith((*source.NETWORK, source.RFC2217, pt104.SCHEME))
+    opened = pt104.opener(port) if port.startswith(pt104.SCHEME) else source.opener(port, profile.connection)
+    return LiveInstrument(identity, profile, opened, clock, reopen_when_silent=far)
 
 
 MOST_LINES = 200  # in which an instrument is to say which one it is: each is looked at with all before it

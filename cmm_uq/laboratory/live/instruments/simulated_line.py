@@ -320,6 +320,16 @@ class TotalStation(Speaker):
         return b"%R1P,0,0:1285\r\n" if self.ill else f"%R1P,0,0:0,{hz:.16f},{v:.16f},{rest}\r\n".encode()
 
 
+class Pt104(Speaker):
+    """The lines of a PT-104's port, of its first channel."""
+
+    every_s = 0.1
+    usual = (107.7935, 20.0)
+
+    def says(self) -> bytes:
+        return b"1 open\r\n" if self.ill else f"1 {self.readings[0]:.5f} {self.readings[1]:.5f}\r\n".encode()
+
+
 class Thermocouples(Speaker):
     """Eleven channels, a line a scan."""
 
@@ -357,7 +367,7 @@ class Answering(Speaker):
 _FEW: Mapping[str, tuple[Any, ...]] = MappingProxyType({
     # each input by its name, dashes where its probe is open
     "asl-f250": ((20.013, 20.104), {f"M{key}": (f"{name} {{{n}:.3f}} C\r\n", f"{name} ------\r\n")
-                                    for n, (key, name) in enumerate(("IA", "JB"))}),
+                                    for n, (key, name) in enumerate((("I", "A"), ("J", "B")))}),
     # SCPI, a bare number for each channel
     "fluke-1529": ((20.0132, 20.1044, 19.9871, 21.0), {
         **{rf"(?i)(FETCH?|READ|MEAS)\? ?{n + 1}": (f"{{{n}:.4f}}\r\n", "9.9E37\r\n") for n in range(4)},
@@ -382,7 +392,7 @@ _FEW: Mapping[str, tuple[Any, ...]] = MappingProxyType({
 SPEAKERS: Mapping[str, Callable[[], Speaker]] = MappingProxyType({
     "vaisala-ptu300": Vaisala, "vaisala-ptb330": Barometer, "heidenhain-nd287": PositionDisplay,
     "fluke-1502a": Readout1502, "isotech-millik": MilliK, "mitutoyo-digimatic": Digimatic, "leica-geocom": TotalStation,
-    "thermocouple-logger-11": Thermocouples, "line-logger": Lines,
+    "pico-pt104": Pt104, "thermocouple-logger-11": Thermocouples, "line-logger": Lines,
     **{name: partial(Answering, *said) for name, said in _FEW.items()},
 })  # fmt: skip
 """By the name of the profile."""

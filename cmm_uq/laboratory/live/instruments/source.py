@@ -195,7 +195,7 @@ KEPT_ALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 3}
 """So that a connection whose other side was switched off is lost after 8 s, where nothing is sent that would show it."""
 
 _CHUNK, _REPLAYED = 65536, 4096
-_ADDRESS = re.compile(r"(?P<scheme>\w+)://(?P<host>\[[0-9A-Fa-f:.]+\]|[^\s:/]+):(?P<port>\d{1,5})/?")
+ADDRESS = re.compile(r"(?P<scheme>\w+)://(?P<host>\[[0-9A-Fa-f:.]+\]|[^\s:/]+):(?P<port>\d{1,5})/?")
 
 
 PortOpener = Callable[[], Port]  # opens a port, again and again
@@ -210,14 +210,14 @@ def opener(port: str, connection: Connection, *, tcp_port: int | None = None) ->
         return lambda: SerialPort(port, connection)
     if tcp_port is not None and re.fullmatch(r"\w+://[^\s:/]+/?", port):
         port = f"{port.rstrip('/')}:{tcp_port}"
-    address = _ADDRESS.fullmatch(port)
+    address = ADDRESS.fullmatch(port)
     if address is None or not 0 < int(address["port"]) < 65536:
         raise CmmUqError("is no address", where=port, fix="Write it as socket://host:port")
     if port.startswith(NETWORK):
         return lambda: TcpPort(address["host"].strip("[]"), int(address["port"]), port)
     if port.startswith(RFC2217):
         return lambda: SerialPort(port, connection)
-    fix = "Known: a serial port, socket://, tcp://, rfc2217://, visa://, file:"
+    fix = "Known: a serial port, socket://, tcp://, rfc2217://, visa://, pt104://, file:"
     raise CmmUqError(f"{address['scheme']}:// is no way to an instrument", where=port, fix=fix)
 
 

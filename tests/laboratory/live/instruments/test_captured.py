@@ -17,8 +17,9 @@ from cmm_uq.laboratory.live.instruments.source import Reading
 from tests.laboratory.live.instruments.listening import listening
 
 CAPTURED = tomllib.loads(Path(__file__).with_name("captured.toml").read_text(encoding="utf-8"))
-WITHOUT = {"ipp", "ipp-position", "line-logger", "thermocouple-logger-11", "fluke-1529", "asl-f250"}
-"""CMMs have tests of their own; the loggers' lines are this program's; of the 1529 and the F250 no page prints a line."""
+WITHOUT = {"ipp", "ipp-position", "line-logger", "thermocouple-logger-11", "fluke-1529", "asl-f250", "pico-pt104"}
+"""CMMs and the PT-104 have tests of their own; the loggers' lines are this program's; of the 1529 and the F250 no page prints
+a line."""
 
 
 def test_there_are_lines_for_every_profile_of_an_instrument_whose_manual_prints_some() -> None:
