@@ -118,7 +118,7 @@ LINES = (
     Line("selftest --json", ()),
     Line("instruments new out/gauge.toml --line T=20.13_C<CR><LF> --quantity temp_c=1", ("out",)),
     Line("schedule print cron job --schedule truth/schedule.toml", ("truth",)),
-    Line("report --scheduled job --schedule truth/schedule.toml --quiet", ("job", "truth", "out")),
+    Line("report --scheduled job --schedule truth/schedule.toml --quiet", ("job", "truth", "out"), 0, ("out/.scheduled",)),
     Line("keys new keys/new.p12 --name X", ("keys",)),
     Line(f"records verify {_OF}", ("reports",)),
     Line(f"records head {_OF}", ("reports",)),
@@ -250,11 +250,12 @@ def _problems(
         found.append(f"ends with {code} in folders of its own")
     elif place and code in (2, 3) and not allowed and not any(word in said + outcome.stdout for word in ABOUT):
         found.append(f"refused without a word of permissions: {said.strip()[-160:]}")
-    elif place and code in (2, 3) and place.split("/")[0] not in said + outcome.stdout:
+    elif place and code in (2, 3) and not allowed and place.split("/")[0] not in said + outcome.stdout:
         found.append(f"another place is named: {said.strip()[-160:]}")
     gone = [name for name, seal in before.items() if after.get(name) != seal]
     found += [f"lost: {name}" for name in gone if not (line.own and name.startswith(line.own) and code not in (2, 3))]
-    new = [name for name in after if name not in before and not name.endswith(("-wal", "-shm", ".lock"))]
+    new = [name for name in after if name not in before and not name.endswith(("-wal", "-shm", ".lock"))
+           and not (line.own and name.startswith(line.own))]  # fmt: skip
     if code in (2, 3) and not allowed and new:
         found.append(f"something is written though refused: {new[0]}")
     return found + [f"left over: {name}" for name in after if "/.unfinished-" in name or "/.placing" in name]

@@ -33,6 +33,10 @@ CASES = (
      "reports/mount: cannot be written: Operation not permitted"),
     ("records import reports/mount --records out/new.db", "reports/mount", "one's own, 0400", 2,
      "reports/mount: may not be entered: Permission denied"),
+    ("records import reports/mount --records out/new.db", "reports/mount", "one's own, with another's files, 0600", 2,
+     "reports/mount/manifest.json: cannot be read: Permission denied"),
+    ("desk job --no-open", "job", "one's own, 0400", 2, "job: may not be entered: Permission denied"),
+    ("verify reports/mount --no-rerun", "reports/mount", "one's own, 0500", 3, ""),
 )  # fmt: skip
 
 

@@ -19,6 +19,7 @@ from cmm_uq.app.cli.options import Ending, argument, flag, option
 from cmm_uq.app.cli.summary import COLOURS, HEADING, folder_of, screen_layout, show_summary
 from cmm_uq.app.cli.terminal import BAD_INPUT, NOT_CONFORMING, Line, can_answer, put_data, say, say_now, show
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import check_permitted
 from cmm_uq.base.output.interruption import keeping
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ def desk(
         return
     if not folder.is_dir():
         raise CmmUqError("is no folder", where=str(folder), fix="Name a folder that is there")
+    check_permitted(folder, "Mend its permissions, or name another folder")
     context = own.tls_of(tls, tls_key, accounts)
     if accounts is None and bind != "localhost" and not _loopback(bind):
         fix = "Give --tls and --accounts; or cmm-uq serve --bind, which shows the records, to be read"

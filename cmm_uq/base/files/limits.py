@@ -141,6 +141,14 @@ def check_file(path: Path, fix: str) -> None:
     _refuse_other_than_a_file(mode, str(path), fix)
 
 
+def check_permitted(path: Path, fix: str) -> None:
+    """Refuse a folder that this user may not enter, or a file that may not be read."""
+    folder = path.is_dir()
+    if (folder or path.is_file()) and not os.access(path, os.R_OK | (os.X_OK if folder else 0)):
+        problem = "may not be entered" if folder else "cannot be read"
+        raise CmmUqError(f"{problem}: Permission denied", where=str(path), fix=fix)
+
+
 def text_of(content: bytes, where: str, fix: str = "Save it as UTF-8") -> str:
     """Text of a file's bytes, UTF-8 with or without a byte-order mark."""
     try:

@@ -44,8 +44,8 @@ def judged(signature: FileSignature, certificate: x509.Certificate, evidence: Ev
     """A signature with whom its certificate names, and what holds of them when it was made; its own problems stand first."""
     subject, at, found = certificate.subject, signature.time, list(signature.problems)
     signature = replace(
-        signature, subject=subject.human_friendly, issuer=certificate.issuer.human_friendly,
-        name=str(subject.native.get("common_name", subject.human_friendly)),
+        signature, subject=subject.human_friendly, issuer=certificate.issuer.human_friendly, name=_named(subject),
+        beside=dict(_beside(evidence)),
     )  # fmt: skip
     try:
         signer = certificates.load_der_x509_certificate(certificate.dump())
@@ -73,6 +73,24 @@ def judged(signature: FileSignature, certificate: x509.Certificate, evidence: Ev
         found.append(REVOKED)
     return replace(signature, trusted=trusted and revocation != "revoked", revocation=revocation, test_key=test,
                    problems=tuple(found))  # fmt: skip
+
+
+def _named(subject: x509.Name) -> str:
+    return str(subject.native.get("common_name", subject.human_friendly))
+
+
+def _beside(evidence: Evidence) -> Iterator[tuple[str, dt.datetime | None]]:
+    """What a file may bring along beside its signatures, in words."""
+    for one in evidence.others:
+        if (inner := one["encap_content_info"])["content_type"].native == "tst_info":
+            by, at = extract_certificate_info(one).signer_cert.subject, inner["content"].parsed["gen_time"].native
+            yield f"a time stamp by {_named(by)} of {at:%Y-%m-%d %H:%M} UTC", at
+    counts = {"certificate": evidence.certificates, "list of what was revoked": evidence.revocations,
+              "answer on what was revoked": evidence.answers}  # fmt: skip
+    for what, several in counts.items():
+        if several:
+            first, _, rest = what.partition(" ")
+            yield f"{len(several)} {first}{'s' if len(several) > 1 else ''} {rest}".rstrip(), None
 
 
 def _issued(certificate: certificates.Certificate, issuer: certificates.Certificate) -> bool:

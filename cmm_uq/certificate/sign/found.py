@@ -7,7 +7,7 @@ import datetime as dt
 import hashlib
 import io
 import logging
-from collections.abc import Coroutine, Iterator, Sequence
+from collections.abc import Coroutine, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -106,6 +106,9 @@ class FileSignature:
     revocation: Revocation = "not known"  # of the certificate
     test_key: bool = False  # for trying: TEST_NOTE is to be said
     reason: str = ""  # that the signature states, of a PDF
+    beside: Mapping[str, dt.datetime | None] = field(
+        default_factory=dict
+    )  # what it does not cover, and the time that states
     content: bytes = field(default=b"", repr=False)  # verified: the signed revision of a PDF, or the XML without it
 
     @property

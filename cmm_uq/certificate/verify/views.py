@@ -250,13 +250,13 @@ def _earliest(given: Given, issued: dt.date | None) -> list[Moment]:
 
 def _check_time(inquiry: Inquiry, name: str, signature: FileSignature, place: str, earliest: Sequence[Moment]) -> None:
     """Keep a signature that is older than what it signs; one of the future leaves open when it was made."""
-    if (time := signature.time) is None:
-        return
-    if time > (now := dt.datetime.now(dt.UTC)) + AHEAD:
-        why = f"it says {time:%Y-%m-%d %H:%M} UTC, and the clock of this computer {now:%Y-%m-%d %H:%M} UTC"
-        inquiry.left(f"when {name} was signed", why)
+    now = dt.datetime.now(dt.UTC)
+    for said in filter(None, (signature.time, *signature.beside.values())):
+        if said > now + AHEAD:
+            why = f"it says {said:%Y-%m-%d %H:%M} UTC, and the clock of this computer {now:%Y-%m-%d %H:%M} UTC"
+            inquiry.left(f"when {name} was signed", why)
     for moment, why in earliest:
-        if time < moment:
+        if (time := signature.time) is not None and time < moment:
             problem = f"says {time:%Y-%m-%d %H:%M} UTC, before there was anything to sign: {why}"
             inquiry.wrong("signatures", name, place, problem)
 
@@ -275,7 +275,8 @@ def _check_signed(
     for number, one in enumerate(signed, 1):
         at = "at no time that it says" if one.time is None else f"on {one.time:%Y-%m-%d %H:%M} UTC"
         who, by = f"{name}: {one.level} by {one.name or 'nobody'}", "" if one.time_proven else " by the signer himself"
-        inquiry.notes.append(f"{who}, {at}{by}; revocation: {one.revocation}.")
+        beside = f"; beside it {', '.join(one.beside)}" if one.beside else ""
+        inquiry.notes.append(f"{who}, {at}{by}; revocation: {one.revocation}{beside}.")
         _check_time(inquiry, name, one, f"signature {number}", earliest)
         holds = one.problems or (one.intact and one.covers_whole_file and (one.trusted or trust is None))
         for problem in one.problems if holds else ("does not hold",):

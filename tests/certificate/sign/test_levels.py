@@ -61,6 +61,8 @@ def test_a_level_is_reached_and_found(level: Level, pdf: bytes, world: World) ->
     assert found.level == f"PAdES {level}"
     assert (found.time, found.time_proven) == (STAMPED, True)
     assert found.revocation == ("not known" if level == "B-T" else "good")
+    proofs = {} if level == "B-T" else {"1 list of what was revoked": None}
+    assert {"a time stamp by Time of 2026-03-02 09:30 UTC": STAMPED, **proofs}.items() <= found.beside.items()
 
 
 @pytest.mark.parametrize("level", ["B-LT", "B-LTA"])

@@ -15,6 +15,7 @@ from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate import sign as signing
 from cmm_uq.certificate.sign import sign_pdf, sign_xml, signer_of_file
+from cmm_uq.certificate.verify import views
 from cmm_uq.certificate.verify.again import Again
 from cmm_uq.certificate.verify.given import Inquiry
 from tests.certificate.sign.authority import SIGNED, Held, curve_key, issued, root
@@ -81,6 +82,16 @@ def test_a_signature_of_the_future_is_neither_verified_nor_altered(
         one.what for one in found.unchecked if one.why.startswith(f"it says {at:%Y-%m-%d %H:%M} UTC, and the clock")
     ]
     assert early == [f"when {path.name} was signed" for path in (pdf, xml) if word != "VERIFIED"]
+
+
+def test_a_time_stamp_of_the_future_beside_a_signature_is_said_to_be_one() -> None:
+    at, found = dt.datetime.now(dt.UTC) + dt.timedelta(days=60), Inquiry()
+    beside = {"a time stamp by Time": at, "2 certificates": None}
+    one = signing.FileSignature("PAdES B-LTA", (), name="A. Huber", time=SIGNED, intact=True, covers_whole_file=True,
+                                trusted=True, beside=beside)  # fmt: skip
+    views._check_signed(found, "certificate.pdf", [one], signing.Trust(), [])
+    assert [one.what for one in found.unchecked] == ["when certificate.pdf was signed"]
+    assert found.notes[0].endswith("revocation: not known; beside it a time stamp by Time, 2 certificates.")
 
 
 @pytest.mark.long

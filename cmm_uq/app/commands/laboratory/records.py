@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import datetime as dt
 import json
-import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.app.commands.files import content_of
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.limits import TABLE_BYTES, content_of as whole_file
+from cmm_uq.base.files.limits import TABLE_BYTES, check_permitted, content_of as whole_file
 from cmm_uq.base.output import MANIFEST, finish_interrupted, read_manifest, sha256_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import RESULTS
@@ -87,13 +86,13 @@ def report_folders(folder: Path) -> Iterator[Path]:
     if not folder.is_dir():
         raise CmmUqError("no such folder", where=str(folder), fix="Name folders that hold reports")
     for place in (folder, *folder.glob("*/**")):
-        if not place.name.startswith(".") and place.is_dir() and not os.access(place, os.R_OK | os.X_OK):
-            fix = "Mend its permissions, or name the folders beside it"
-            raise CmmUqError("may not be entered: Permission denied", where=str(place), fix=fix)
+        if not place.name.startswith(".") and place.is_dir():
+            check_permitted(place, "Mend its permissions, or name the folders beside it")
     for manifest in sorted((folder / MANIFEST, *folder.glob(f"*/**/{MANIFEST}"))):
         if manifest.parent.name.startswith("."):
             continue
         finish_interrupted(manifest.parent)
+        check_permitted(manifest, "Mend its permissions")
         written = read_manifest(manifest.parent)
         if written is not None and written.owner.command in COMMANDS and RESULTS in written.files:
             yield manifest.parent
