@@ -286,13 +286,15 @@ class Result:
     @cached_property
     def verdicts(self) -> Verdicts:
         """All statements of conformity, and the gravest: those of standards, then (first) parameters with a tolerance."""
-        tolerances, aside = self.job.facts.model.tolerances, bool(self.job.facts.recording.measurements_aside)
+        tolerances, against = self.job.facts.model.tolerances, [what for what, _ in self.job.facts.circumstances.lapsed]
+        if self.job.facts.recording.measurements_aside:
+            against.insert(0, say("it is estimated without the measurements that the laboratory set aside"))
         found = [by_standard(statement) for statement in self.statements]
         for effect in self.model.effects:
             if effect.name in tolerances:
                 name, quantity = next(iter(self.parameters[effect.name].items()))
                 found.append(by_tolerance(f"{effect.name}.{name}", effect.title, quantity, tolerances[effect.name],
-                                          determined=effect.name not in self.free, aside=aside))  # fmt: skip
+                                          determined=effect.name not in self.free, against=against))  # fmt: skip
         return Verdicts(found)
 
     @cached_property

@@ -91,26 +91,12 @@ class Link:
             (accredited and not chain.accreditation.strip(), "accreditation",
              say("the number of the issuer's accreditation is not stated")),
             (accredited and not chain.accredited_by.strip(), "accredited_by", say("who accredited the issuer is not stated")),
-            *self._dates(chain),
+            (chain.date is None, "date", say("the date of the certificate is not stated")),
+            (chain.until is None, "due", say("until when the calibration holds is not stated")),
+            *((True, key, what) for what, key in chain.denials(self.day)),
             (bool(self.another), "serial", say("the temperatures were read from {serial}", serial=Verbatim(self.another))),
         )  # fmt: skip
         yield from ((what, f"{self.table} {key}") for lacks, key, what in found if lacks)
-
-    def _dates(self, chain: Traceability) -> Iterator[tuple[bool, str, Text]]:
-        """The first and the last day belong to the time for which a calibration holds."""
-        date, until, measured = chain.date, chain.until, day(self.day)
-        if date is None:
-            yield True, "date", say("the date of the certificate is not stated")
-        elif date > self.day:
-            what = say("the certificate is dated {date}, after the measurement of {day}", date=day(date), day=measured)
-            yield True, "date", what
-        if until is None:
-            yield True, "due", say("until when the calibration holds is not stated")
-        elif until < self.day:
-            yield True, "due", say("the calibration was due on {due}, before the measurement of {day}", due=day(until),
-                                   day=measured)  # fmt: skip
-        elif date is not None and until < date:
-            yield True, "due", say("the calibration was due before the certificate was issued")
 
     @property
     def sentence(self) -> Text:

@@ -7,10 +7,11 @@ the user knows keeps its name.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from types import MappingProxyType
 
-from cmm_uq.base.files.csv_table import LARGEST
+from cmm_uq.base.files.csv_table import LARGEST, conversion
 from cmm_uq.base.files.table import LONGEST_MM
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.base.points import AXES
@@ -83,6 +84,27 @@ def largest(column: str) -> float:
     if column in WHOLE:
         return LARGEST_NUMBER
     return next((most for ending, most in LARGEST_OF.items() if column.endswith(ending)), LARGEST)
+
+
+_QUANTITIES = {re.sub(r"_(mm|um|c|s|hpa|pct|deg|mm_s)$", "", name): name for name in (*REQUIRED, *OPTIONAL)}
+_NEARLY = 0.93  # a letter of some fourteen: `temp_artifact_c`, but no other axis: `temp_w_c`, `approach_w`
+_OTHER_UNITS = re.compile(
+    r"_(m|cm|um|µm|mm|nm|in|inch|mil|k|f|c|min|ms|h|s|pa|kpa|hpa|mbar|mmhg|rad|deg|arcsec|pct|percent)$"
+)
+
+
+def misnamed(column: str, header: Sequence[str]) -> tuple[str, str] | None:
+    """What is wrong with a name that is one of a recording but for its unit, a letter, case or a word written out; the fix."""
+    if column in (*COLUMNS, *READINGS):
+        return None
+    if known := _QUANTITIES.get(_OTHER_UNITS.sub("", column)):
+        fix = conversion(column, [known]) or f"Convert it and name it {known}, or say unit under [recording]"
+        return f"the column {column!r} is not in the unit of {known!r}", fix
+    written = re.sub("^temperature_", "temp_", column.casefold())
+    for meant in get_close_matches(written, [name for name in COLUMNS if name not in header], 1, _NEARLY):
+        problem = f"the column {column!r} is nearly {meant!r} and would not be used"
+        return problem, f"Name it {meant}, or otherwise where it is something else"
+    return None
 
 
 _AXES = {a: Verbatim(a.upper()) for a in AXES}

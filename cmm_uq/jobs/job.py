@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, create_model, field
 from cmm_uq.base.errors import suggestion
 from cmm_uq.base.files.limits import CONFORMITY, EFFECTS, LISTED, STATED
 from cmm_uq.base.files.table import JobTable, Limit, Names, Number, at_least, key, required
-from cmm_uq.base.messages import html_table
+from cmm_uq.base.messages import Text, html_table, say
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.acquired import Provenance
@@ -185,8 +185,16 @@ class JobFile(JobTable):
         return Circumstances(
             self.test_uncertainty, self.rated_conditions, probe, self.artefact.cte_per_k if stated else None,
             cmc=self.laboratory.cmc,
-            set_aside={entry.measurement: entry.reason for entry in self.recording.set_aside},
+            set_aside={entry.measurement: entry.reason for entry in self.recording.set_aside}, lapsed=tuple(self._lapsed()),
         )  # fmt: skip
+
+    def _lapsed(self) -> Iterator[tuple[Text, str]]:
+        """Certificates of lengths that did not hold on the day of the measurement: why, and the key that says so."""
+        certified = ((self.artefact if self.artefact.traced else None, say("artefact"), "artefact"),
+                     (self.short_gauge, say("short gauge"), "short_gauge"))  # fmt: skip
+        for of, what, table in certified:
+            for lack, key_of in () if of is None or of.certificate is None else of.certificate.denials(self.job.date):
+                yield say("traceability ({what}: {lack})", what=what, lack=lack), f"[{table}.certificate] {key_of}"
 
     @model_validator(mode="before")
     @classmethod

@@ -253,6 +253,7 @@ class Test:
             *uncertainty.rated_conditions(under, points),
             *numbered(points if left_out is None else left_out.recording, repeats),
             *self._gaps_of_short_gauge(),
+            *(Condition(what, (what,), Verbatim(at)) for what, at in under.lapsed),
         )
         missing = {text: condition.remedy for condition in asked for text in condition.missing}
         aside = [item for item in items if item.set_aside]

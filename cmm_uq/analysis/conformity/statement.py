@@ -146,17 +146,20 @@ def by_standard(statement: Statement) -> Verdict:
 
 
 def by_tolerance(
-    name: str, title: Text, quantity: Quantity, tolerance: float, *, determined: bool = True, aside: bool = False
+    name: str,
+    title: Text,
+    quantity: Quantity,
+    tolerance: float,
+    *,
+    determined: bool = True,
+    against: Sequence[Text] = (),
 ) -> Verdict:
     """A parameter, named as ``scale_x.ppm`` and in words, against its tolerance by its whole 95 % interval (ISO 14253-1).
 
-    ``aside``: whether the laboratory set measurements aside, which are not in the estimate: it is then no pass.
+    ``against``: what speaks against a pass, whatever the interval; ``determined``: whether the recording determines it.
     """
-    if aside and determined and by_tolerance(name, title, quantity, tolerance).outcome == "pass":
-        missing = (say("it is estimated without the measurements that the laboratory set aside"),)
-        return Verdict(name, "undecided", None, None, tolerance, quantity.unit, title=title, missing=missing)
-    if not determined:
-        missing = (say("the recording does not determine it"),)
+    missing = tuple(against) if determined else (say("the recording does not determine it"),)
+    if not determined or (missing and by_tolerance(name, title, quantity, tolerance).outcome == "pass"):
         return Verdict(name, "undecided", None, None, tolerance, quantity.unit, title=title, missing=missing)
     low, high = quantity.interval95
     within, beyond = -tolerance <= low and high <= tolerance, low > tolerance or high < -tolerance

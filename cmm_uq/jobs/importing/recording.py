@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.base.files.csv_table import GIVE, GIVE_OR_REMOVE, MEASURE, cells_of, column_problem, conversion, numbers
+from cmm_uq.base.files.csv_table import GIVE, GIVE_OR_REMOVE, MEASURE, cells_of, column_problem, numbers
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.messages import Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.arms import coordinates, required_columns
-from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest
+from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest, misnamed
 from cmm_uq.jobs.importing.answers import head_of
 from cmm_uq.jobs.importing.columns import columns_of
 from cmm_uq.jobs.importing.encodings import is_number
@@ -54,10 +54,6 @@ from cmm_uq.jobs.importing.understanding import Understanding, understand
 
 # lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled
 SHORTEST_NORMAL, LONGEST_NORMAL = 1e-3, 1e3
-_QUANTITIES = {re.sub(r"_(mm|um|c|s|hpa|pct|deg|mm_s)$", "", name): name for name in (*REQUIRED, *OPTIONAL)}
-_OTHER_UNITS = re.compile(
-    r"_(m|cm|um|µm|mm|nm|in|inch|mil|k|f|c|min|ms|h|s|pa|kpa|hpa|mbar|mmhg|rad|deg|arcsec|pct|percent)$"
-)
 _UNIT_LINE = re.compile(
     r"(?:\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;]+|(?:単位|单位|단위)\s*[:：=;]*"
     r"|\b(?:dimensions|lengths|values|angaben|ma(?:ß|ss)e|werte|cotes|valeurs|misure|valori|medidas)\s+(?:in|en)\b)\s*([^\s;,]+)",
@@ -160,11 +156,8 @@ def _check_header(header: Sequence[str], name: str, needed: Sequence[str]) -> No
             wrong.add(CmmUqError(f"the column {column!r} is there twice", where=where, fix="Keep one"))
         elif problem := column_problem(column):
             wrong.add(CmmUqError(problem, where=where, fix="Name it with letters, digits and _"))
-    for column in header:
-        known = _QUANTITIES.get(_OTHER_UNITS.sub("", column))
-        if known and column not in (*REQUIRED, *OPTIONAL):
-            fix = conversion(column, [known]) or f"Convert it and name it {known}, or say unit under [recording]"
-            wrong.add(CmmUqError(f"the column {column!r} is not in the unit of {known!r}", where=where, fix=fix))
+        elif wrong_name := misnamed(column, header):
+            wrong.add(CmmUqError(wrong_name[0], where=where, fix=wrong_name[1]))
     for column in needed:
         if column not in header:
             unread = " (of an axis that nobody reads, give one number in all rows)" * (column in COORDINATES)

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
 from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Length, key, required
+from cmm_uq.base.messages import Text, day, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.importing.format import FileKeys
 from cmm_uq.jobs.tables.length_formula import Factor, Freedom, Growing, LengthUncertainty, with_standard_uncertainty
@@ -101,6 +102,19 @@ class Traceability(JobTable):
         years, month = divmod(self.date.month - 1 + self.interval_months, 12)
         year = min(self.date.year + years, dt.MAXYEAR)
         return dt.date(year, month + 1, min(self.date.day, monthrange(year, month + 1)[1]))
+
+    def denials(self, measured: dt.date) -> Iterator[tuple[Text, str]]:
+        """What of its dates says that the calibration did not hold on the day of a measurement, and by which key."""
+        date, until, on = self.date, self.until, day(measured)
+        if date is not None and date > measured:
+            yield say("the certificate is dated {date}, after the measurement of {day}", date=day(date), day=on), "date"
+        if until is not None and until < measured:
+            yield (
+                say("the calibration was due on {due}, before the measurement of {day}", due=day(until), day=on),
+                "due",
+            )
+        elif date is not None and until is not None and until < date:
+            yield say("the calibration was due before the certificate was issued"), "due"
 
 
 class ThermometerFacts(JobTable):

@@ -27,6 +27,7 @@ from cmm_uq.base.files.table import (
     key,
     required,
 )
+from cmm_uq.base.messages import Text
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.identification import Capability, RequiredText
 from cmm_uq.jobs.tables.length_formula import FLATTEST, mpe_of
@@ -184,6 +185,7 @@ class Circumstances:
     cmc: Capability | None = None
     clauses: Mapping[str, ClausesForm] = field(default_factory=dict)
     set_aside: Mapping[int, str] = field(default_factory=dict)
+    lapsed: tuple[tuple[Text, str], ...] = ()  # what says that a calibration did not hold on the day, with its key
 
 
 class MaximumPermissibleError(JobTable):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import say
 from cmm_uq.jobs.tables.conformity import (
     Circumstances,
     ConformityFacts,
@@ -256,3 +258,38 @@ def test_a_certificate_warns_of_a_warm_gauge_of_unknown_expansion(tmp_path: Path
     (folder / "recording.csv").write_text(text, encoding="utf-8")
     (warned,) = [text for text in cmm_uq.report(folder).warnings if "its expansion is not stated" in text]
     assert warned.startswith("The artefact was up to 3 K from 20 °C")
+
+
+# --- calibrations ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("certificate", "key"), [
+    ("date = 2003-09-01\ndue = 2004-08-31", "due"), ("date = 2003-08-31\ninterval_months = 12", "due"),
+    ("date = 2004-09-02\ndue = 2005-09-02", "date"), ("date = 2004-08-01\ndue = 2004-07-31", "due"),
+    ("date = 2003-09-01\ndue = 2004-09-01", None), ("date = 2004-09-01", None), ("due = 2004-09-01", None), ("", None),
+])  # fmt: skip
+def test_a_certificate_of_lengths_holds_on_the_day_unless_its_dates_deny_it(
+    certificate: str, key: str | None, iota: Path, tmp_path: Path
+) -> None:
+    """Measured on 2004-09-01; both days at the ends count."""
+    text = (
+        (iota / "job.toml")
+        .read_text(encoding="utf-8")
+        .replace("[artefact.certificate]\n", "[artefact.certificate]\n" + certificate + "\n")
+    )
+    shutil.copytree(iota, tmp_path / "job")
+    (tmp_path / "job" / "job.toml").write_text(text, encoding="utf-8")
+    found = read_job(tmp_path / "job").circumstances.lapsed
+    keys = {at for _, at in found}
+    assert keys == (set() if key is None else {f"[artefact.certificate] {key}"}), found
+
+
+@pytest.mark.parametrize(("limit_um", "outcome"), [(60.0, "incomplete"), (0.01, "remeasure")])
+def test_a_calibration_that_did_not_hold_makes_no_pass_and_hides_nothing_worse(limit_um: float, outcome: str) -> None:
+    lack = say("traceability (artefact: it was due)")
+    under = replace(STATED, lapsed=((lack, "[artefact.certificate] due"),))
+    found = judged(gauge(errors={(2, 1, 20.0): 1.25}), under, limit_um=limit_um)
+    assert judged(gauge(errors={(2, 1, 20.0): 1.25}), limit_um=limit_um).outcome == (
+        "pass" if limit_um > 1 else "remeasure"
+    )
+    assert (found.outcome, lack in found.missing) == (outcome, True)

@@ -38,6 +38,19 @@ def test_a_byte_order_mark_and_windows_lines_do_no_harm() -> None:
         ("measurement,point,x_mm,y_mm,z_um\n1,1,2,3,4", r"the column 'z_um' is not in the unit of 'z_mm'"),
         ("measurement,point,x_mm,y_mm,z_mm,temp_x_k\n1,1,2,3,4,293", r"'temp_x_k' is not in the unit of 'temp_x_c'"),
         ("measurement,point,x,y,z\n1,1,2,3,4", r"'x' is not in the unit of 'x_mm'"),
+        *(
+            (
+                f"measurement,point,x_mm,y_mm,z_mm,{name}\n1,1,2,3,4,20",
+                rf"'{name}' is nearly '{meant}' and would not be used",
+            )
+            for name, meant in (
+                ("temp_artifact_c", "temp_artefact_c"),
+                ("temp_arefact_c", "temp_artefact_c"),
+                ("temp_X_c", "temp_x_c"),
+                ("temperature_x_c", "temp_x_c"),
+                ("Repeat", "repeat"),
+            )
+        ),
         (f"{HEADER},x_mm\n1,1,1,2,3,4", r"the column 'x_mm' is there twice"),
         (f"{HEADER},\n1,1,1,2,3,4", r"column 6 has no name"),
         (f"{HEADER}\n1,1,1,2,3\n1,2,1,2", r"line 3: has 4 cells where the header has 5"),
